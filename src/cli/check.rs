@@ -1,0 +1,11 @@
+//! `kinocue check`.
+
+use super::{Exit, Failure, OrExit as _};
+
+/// Checks cue and configuration files: every fault, with its place.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {}
+
+pub(super) fn run(_args: &Args) -> Result<Exit, Failure> {
+    Err(anyhow::anyhow!("not built yet")).or_exit(Exit::Internal)
+}

@@ -1,0 +1,76 @@
+//! Exit codes (sysexits) and the error that carries one.
+
+use std::fmt;
+use std::process::ExitCode;
+
+/// How the program ends; the numbers are those of `sysexits.h`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Done, also after a requested stop.
+    Done = 0,
+    /// A check failed: limits, preflight, doctor.
+    CheckFailed = 1,
+    /// Wrong use of the command line.
+    Usage = 64,
+    /// A cue that cannot be played.
+    BadCue = 65,
+    /// A file that is missing, or a folder where a file belongs.
+    NoInput = 66,
+    /// A daemon or controller that does not answer.
+    Unavailable = 69,
+    /// A fault of our own.
+    Internal = 70,
+    /// The system refused what was asked of it.
+    System = 71,
+    /// Reading or writing failed.
+    Io = 74,
+    /// Not ready; try again.
+    TryAgain = 75,
+    /// A controller refused.
+    Refused = 76,
+    /// Not allowed.
+    NotAllowed = 77,
+    /// A bad configuration.
+    Config = 78,
+    /// Another master drives the seats.
+    OtherMaster = 79,
+    /// A second Ctrl-C.
+    Interrupted = 130,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// An error together with the code that the program ends with.
+#[derive(Debug)]
+pub struct Failure {
+    /// How the program ends.
+    pub exit: Exit,
+    /// What to tell the person; shown with its chain of causes.
+    pub error: anyhow::Error,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:#}", self.error)
+    }
+}
+
+/// Gives an error its exit code.
+pub trait OrExit<T> {
+    /// The value, or the error as a [`Failure`] that ends the program with `exit`.
+    ///
+    /// # Errors
+    /// A [`Failure`] where there was an error.
+    fn or_exit(self, exit: Exit) -> Result<T, Failure>;
+}
+
+impl<T, E: Into<anyhow::Error>> OrExit<T> for Result<T, E> {
+    fn or_exit(self, exit: Exit) -> Result<T, Failure> {
+        self.map_err(|error| Failure { exit, error: error.into() })
+    }
+}

@@ -1,0 +1,69 @@
+//! The commands: one small file each; arguments in, exit code out.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod check;
+mod convert;
+mod decode;
+mod demo;
+mod exit;
+mod info;
+mod play;
+mod sim;
+
+pub use exit::{Exit, Failure, OrExit};
+
+/// Plays motion cues to the seats of a theatre, in time with a film.
+///
+/// Not a safety device: the protocol has no stop command, so the emergency stop is hard-wired.
+#[derive(Debug, Parser)]
+#[command(name = "kinocue", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Args),
+    Play(play::Args),
+    Sim(sim::Args),
+    Check(check::Args),
+    Info(info::Args),
+    Convert(convert::Args),
+    Decode(decode::Args),
+}
+
+/// Runs the program on the process's arguments and says how it ends.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let exit = if error.use_stderr() { Exit::Usage } else { Exit::Done };
+            let _ = error.print(); // a closed terminal is no reason to end otherwise
+            return exit.into();
+        }
+    };
+    match run(cli.command) {
+        Ok(exit) => exit.into(),
+        Err(failure) => {
+            eprintln!("kinocue: {failure}");
+            failure.exit.into()
+        }
+    }
+}
+
+fn run(command: Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Demo(args) => demo::run(&args),
+        Command::Play(args) => play::run(&args),
+        Command::Sim(args) => sim::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Convert(args) => convert::run(&args),
+        Command::Decode(args) => decode::run(&args),
+    }
+}

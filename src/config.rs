@@ -1,0 +1,1 @@
+//! The configuration file: TOML in, checked configuration out, every fault with its line. Control thread.

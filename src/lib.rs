@@ -1,0 +1,32 @@
+//! kinocue plays motion cues to the seats of a theatre, in time with a film.
+//!
+//! ```text
+//!  cues/*.csv *.mcap --> cue --> timeline             read, check, name the bad cell; then immutable
+//!                                   | handed over whole
+//!              +------------------- v ------------------------------+
+//!              | tick thread, fixed rate, up to 1 kHz               |
+//!              |   engine   clock -> tick -> playhead -> Pose       |
+//!  control --> |   fanout   Pose -> + axis offset -> octets -> net  | --> controllers
+//!              +--------------------|-------------------------------+          |
+//!                                   v Sent, TickReport                        acks
+//!       report, progress <----- tracker (latency, loss, silence) <---- net <---+
+//! ```
+//!
+//! The rooms, in the order a motion value passes through them; ARCHITECTURE.md walks through each.
+
+pub mod time;
+
+pub mod motion;
+
+pub mod wire;
+
+pub mod cue;
+pub mod timeline;
+
+pub mod config;
+
+pub mod sim;
+
+pub mod sys;
+
+pub mod cli;

@@ -1,0 +1,197 @@
+//! How speed, acceleration and jerk of what is sent are judged: by divided differences over poses 20 ms and more
+//! apart, never tick by tick, because pulses are whole and some curves change their acceleration at a point.
+//!
+//! Two distances without a common factor are used, since either is blind to motion at its own frequency.
+
+use crate::time::ShowTime;
+
+/// The poses one third difference spans at the most: 3 x 27 periods at 1,000 Hz, and its own end.
+const HISTORY: usize = 82;
+
+/// How many periods apart the poses of a difference are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Spacing {
+    /// 20 ms in whole periods, halves up, at least one.
+    pub n: usize,
+    /// The smallest count over 1.3 n that shares no factor with it.
+    pub m: usize,
+}
+
+impl Spacing {
+    /// The distances at a rate of 1 to 1,000 Hz; other rates are taken as the nearer end.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 20 after the clamp")]
+    pub fn at_rate(rate_hz: f64) -> Self {
+        let n = ((0.020 * rate_hz.clamp(1.0, 1000.0) + 0.5).floor() as usize).max(1);
+        let mut m = 13 * n / 10 + 1;
+        while gcd(m, n) != 1 {
+            m += 1;
+        }
+        Self { n, m }
+    }
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// A measured value and the show time in the middle of the poses it was measured over.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Reading {
+    /// In the position's unit, per second, per second squared, or per second cubed.
+    pub value: f64,
+    /// Show time in the middle of the poses that gave it.
+    pub at: ShowTime,
+}
+
+/// What one more pose showed; a part is 0 until enough poses have come.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Readings {
+    /// Distance over Time of the newest frame.
+    pub velocity: Reading,
+    /// Change of velocity from the frame before to the newest, per second (not divided by time).
+    pub step: Reading,
+    /// Of the two distances, the acceleration of larger size.
+    pub acceleration: Reading,
+    /// Of the two distances, the jerk of larger size.
+    pub jerk: Reading,
+}
+
+/// Measures one axis pose by pose. Never allocates.
+#[derive(Debug, Clone)]
+pub struct Measure {
+    spacing: Spacing,
+    seen: usize,
+    last_velocity: f64,
+    times: [i64; HISTORY],
+    positions: [f64; HISTORY],
+}
+
+impl Measure {
+    /// A measure that has seen no pose yet.
+    #[must_use]
+    pub const fn new(spacing: Spacing) -> Self {
+        Self { spacing, seen: 0, last_velocity: 0.0, times: [0; HISTORY], positions: [0.0; HISTORY] }
+    }
+
+    /// Takes the next pose, at a show time after the one before, and says what it showed.
+    pub fn push(&mut self, at: ShowTime, position: f64) -> Readings {
+        let slot = self.seen % HISTORY;
+        self.times[slot] = at.as_nanos();
+        self.positions[slot] = position;
+        self.seen += 1;
+        let mut readings = Readings::default();
+        if self.seen >= 2 {
+            let (velocity, at) = self.slope(0, 1);
+            readings.velocity = Reading { value: velocity, at: ShowTime::from_nanos(at) };
+            if self.seen >= 3 {
+                readings.step = Reading { value: velocity - self.last_velocity, at: self.time(1) };
+            }
+            self.last_velocity = velocity;
+        }
+        for apart in [self.spacing.n, self.spacing.m] {
+            self.differences(apart, &mut readings);
+        }
+        readings
+    }
+
+    fn differences(&self, apart: usize, readings: &mut Readings) {
+        if self.seen <= 2 * apart {
+            return;
+        }
+        let newest = self.second(0, apart);
+        keep_larger(&mut readings.acceleration, 2.0 * newest, self.time(apart));
+        if self.seen <= 3 * apart {
+            return;
+        }
+        let span = self.seconds(0, 3 * apart);
+        let third = (newest - self.second(apart, apart)) / span;
+        let middle = self.time(apart).as_nanos().midpoint(self.time(2 * apart).as_nanos());
+        keep_larger(&mut readings.jerk, 6.0 * third, ShowTime::from_nanos(middle));
+    }
+
+    /// The second divided difference of the poses `back`, `back + apart` and `back + 2 apart` before the newest.
+    fn second(&self, back: usize, apart: usize) -> f64 {
+        let newer = self.slope(back, apart).0;
+        let older = self.slope(back + apart, apart).0;
+        (newer - older) / self.seconds(back, 2 * apart)
+    }
+
+    fn slope(&self, back: usize, apart: usize) -> (f64, i64) {
+        let (a, b) = (self.slot(back + apart), self.slot(back));
+        let slope = (self.positions[b] - self.positions[a]) / self.seconds(back, apart);
+        (slope, self.times[a].midpoint(self.times[b]))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "spans of some milliseconds")]
+    fn seconds(&self, back: usize, apart: usize) -> f64 {
+        (self.times[self.slot(back)] - self.times[self.slot(back + apart)]) as f64 * 1e-9
+    }
+
+    fn time(&self, back: usize) -> ShowTime {
+        ShowTime::from_nanos(self.times[self.slot(back)])
+    }
+
+    fn slot(&self, back: usize) -> usize {
+        (self.seen - 1 - back) % HISTORY
+    }
+}
+
+fn keep_larger(kept: &mut Reading, value: f64, at: ShowTime) {
+    if value.abs() > kept.value.abs() {
+        *kept = Reading { value, at };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_distances_are_about_20_ms_and_coprime() {
+        for (rate, n, m) in
+            [(1.0, 1, 2), (25.0, 1, 2), (50.0, 1, 2), (100.0, 2, 3), (200.0, 4, 7), (1000.0, 20, 27)]
+        {
+            assert_eq!(Spacing::at_rate(rate), Spacing { n, m }, "{rate} Hz");
+        }
+    }
+
+    fn worst(rate: u32, seconds: u32, position: impl Fn(f64) -> f64) -> (f64, f64, f64, f64) {
+        let mut measure = Measure::new(Spacing::at_rate(f64::from(rate)));
+        let mut worst = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+        for k in 0..=rate * seconds {
+            let t = f64::from(k) / f64::from(rate);
+            let r = measure.push(ShowTime::from_secs_f64(t), position(t));
+            worst.0 = worst.0.max(r.velocity.value.abs());
+            worst.1 = worst.1.max(r.acceleration.value.abs());
+            worst.2 = worst.2.max(r.jerk.value.abs());
+            worst.3 = worst.3.max(r.step.value.abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn a_cubic_is_measured_exactly() {
+        // x = t³: v = 3t², a = 6t, j = 6. Differences see the acceleration in their middle, 40 ms before the end.
+        let (v, a, j, _) = worst(100, 1, |t| t * t * t);
+        assert!((v - 2.9701).abs() < 1e-3, "{v}");
+        assert!((a - 6.0 * 0.98).abs() < 1e-6, "{a}");
+        assert!((j - 6.0).abs() < 1e-5, "{j}");
+    }
+
+    #[test]
+    fn a_zigzag_that_one_distance_is_blind_to_shows_at_the_other_or_from_frame_to_frame() {
+        let zigzag = |t: f64| if ((t * 100.0).round() as i64) % 2 == 0 { 1.5 } else { -1.5 };
+        let (_, a, _, step) = worst(100, 1, zigzag);
+        assert!(a > 3000.0 || step > 4.0 * 3000.0 * 0.010, "{a} {step}");
+        let fine = |t: f64| if ((t * 200.0).round() as i64) % 2 == 0 { 0.25 } else { -0.25 };
+        let (_, a, _, step) = worst(200, 1, fine);
+        assert!(a > 3000.0 || step > 4.0 * 3000.0 * 0.005, "{a} {step}");
+    }
+
+    #[test]
+    fn rounding_to_pulses_alone_stays_far_below_the_limits() {
+        let (_, a, j, _) = worst(1000, 2, |t| ((20.0 * t) / 0.0005).round() * 0.0005);
+        assert!(a < 30.0 && j < 3000.0, "{a} {j}");
+    }
+}

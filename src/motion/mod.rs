@@ -1,0 +1,14 @@
+//! What moves: axes, poses, seat types and how motion is measured. Pure; no file, no clock, no allocation in
+//! anything that the tick thread calls.
+
+mod measure;
+mod seat;
+
+pub use measure::{Measure, Reading, Readings, Spacing};
+pub use seat::{Pulses, SeatType};
+
+/// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).
+pub const MAX_AXES: usize = 12;
+
+/// All axes of a cue at an instant, axis 1 first, in the unit of whoever made it; axes past the last one are 0.
+pub type Pose = [f64; MAX_AXES];

@@ -1,0 +1,90 @@
+//! A seat type: the geometry and limits of the axes of one controller, and the way from stroke to pulses.
+
+use super::MAX_AXES;
+
+/// A motor position as the controller counts it: whole pulses from the lower end of the stroke.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Pulses(pub i32);
+
+/// Geometry and limits of a seat's axes; every axis of one controller has the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeatType {
+    /// The name it has in the configuration.
+    pub name: String,
+    /// Axes of one controller, 1 to 12.
+    pub axes: usize,
+    /// Length of the stroke, mm, above 0.
+    pub stroke_mm: f64,
+    /// Travel per turn of the motor, mm, above 0.
+    pub lead_mm: f64,
+    /// Pulses per turn of the motor, above 0.
+    pub pulses_per_rev: f64,
+    /// Greatest speed, mm/s, above 0.
+    pub max_velocity_mm_s: f64,
+    /// Greatest acceleration, mm/s², above 0.
+    pub max_acceleration_mm_s2: f64,
+    /// Greatest jerk, mm/s³, above 0.
+    pub max_jerk_mm_s3: f64,
+    /// Where each axis rests between shows, fraction of the stroke; axes past the last one rest at 0.
+    pub park: [f64; MAX_AXES],
+    /// What levels scale about, fraction of the stroke.
+    pub neutral: [f64; MAX_AXES],
+}
+
+impl SeatType {
+    /// The seat that `--to` means: the bench seat with that many axes.
+    #[must_use]
+    pub fn bench3(axes: usize) -> Self {
+        Self {
+            name: "bench3".to_owned(),
+            axes,
+            stroke_mm: 150.0,
+            lead_mm: 5.0,
+            pulses_per_rev: 10_000.0,
+            max_velocity_mm_s: 240.0,
+            max_acceleration_mm_s2: 3_000.0,
+            max_jerk_mm_s3: 60_000.0,
+            park: [0.0; MAX_AXES],
+            neutral: [0.0; MAX_AXES],
+        }
+    }
+
+    /// Pulses over the whole stroke.
+    #[must_use]
+    pub fn stroke_pulses(&self) -> f64 {
+        self.stroke_mm / self.lead_mm * self.pulses_per_rev
+    }
+
+    /// Where the motor stands at `fraction` of the stroke: rounded to nearest, ties away from zero, saturating.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]
+    pub fn pulses(&self, fraction: f64) -> Pulses {
+        Pulses((fraction * self.stroke_pulses()).round() as i32)
+    }
+
+    /// The fraction of the stroke at which the motor stands at `pulses`.
+    #[must_use]
+    pub fn fraction(&self, pulses: Pulses) -> f64 {
+        f64::from(pulses.0) / self.stroke_pulses()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bench_seat_turns_stroke_into_pulses() {
+        let seat = SeatType::bench3(3);
+        assert_eq!(seat.pulses(1.0), Pulses(300_000));
+        assert_eq!(seat.pulses(0.5), Pulses(150_000));
+        assert_eq!(seat.fraction(Pulses(75_000)), 0.25);
+    }
+
+    #[test]
+    fn half_a_pulse_rounds_away_from_zero() {
+        let seat = SeatType { stroke_mm: 1.0, lead_mm: 1.0, pulses_per_rev: 1.0, ..SeatType::bench3(1) };
+        assert_eq!(seat.pulses(0.5), Pulses(1));
+        assert_eq!(seat.pulses(-0.5), Pulses(-1));
+    }
+}

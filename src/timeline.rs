@@ -1,0 +1,1 @@
+//! Answers what a cue says at a show time. Tick thread once built.
