@@ -23,6 +23,10 @@ pub mod wire;
 pub mod cue;
 pub mod timeline;
 
+pub mod plan;
+
+pub mod engine;
+
 pub mod config;
 
 pub mod sim;

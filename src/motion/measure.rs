@@ -181,10 +181,10 @@ mod tests {
 
     #[test]
     fn a_zigzag_that_one_distance_is_blind_to_shows_at_the_other_or_from_frame_to_frame() {
-        let zigzag = |t: f64| if ((t * 100.0).round() as i64) % 2 == 0 { 1.5 } else { -1.5 };
+        let zigzag = |t: f64| if (t * 100.0).round().rem_euclid(2.0) < 0.5 { 1.5 } else { -1.5 };
         let (_, a, _, step) = worst(100, 1, zigzag);
         assert!(a > 3000.0 || step > 4.0 * 3000.0 * 0.010, "{a} {step}");
-        let fine = |t: f64| if ((t * 200.0).round() as i64) % 2 == 0 { 0.25 } else { -0.25 };
+        let fine = |t: f64| if (t * 200.0).round().rem_euclid(2.0) < 0.5 { 0.25 } else { -0.25 };
         let (_, a, _, step) = worst(200, 1, fine);
         assert!(a > 3000.0 || step > 4.0 * 3000.0 * 0.005, "{a} {step}");
     }

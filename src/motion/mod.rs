@@ -3,9 +3,11 @@
 
 mod measure;
 mod seat;
+mod window;
 
 pub use measure::{Measure, Reading, Readings, Spacing};
 pub use seat::{Pulses, SeatType};
+pub use window::{Limits, Slot, Window};
 
 /// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).
 pub const MAX_AXES: usize = 12;

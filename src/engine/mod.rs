@@ -1,0 +1,380 @@
+//! The life of a play, tick by tick: where show time stands, which course the lanes follow, and what each frame says.
+//! Tick thread; told the time, never asks; allocates nothing.
+
+mod grid;
+mod headroom;
+mod slew;
+mod stamps;
+mod switch;
+
+pub use grid::{Rate, Tick, TickGrid};
+pub use headroom::Headroom;
+pub use slew::MAX_SPEED_UP;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::motion::{Pose, Window};
+use crate::plan::{After, Course, From, Request, To};
+use crate::time::ShowTime;
+use crate::timeline::{Hint, Timeline};
+use crate::wire::Timing;
+use slew::Slew;
+use stamps::Stamps;
+use switch::{Goal, Retired, Switch};
+
+/// A lag beyond this, and beyond one period, is not slewed away: the lanes hold, then join.
+const LAG_HOLD: Duration = Duration::from_millis(50);
+/// A course is asked for at least this long before it is to begin, and at least two ticks.
+const LEAD: Duration = Duration::from_millis(20);
+/// The course that follows the end of the cue is asked for this long before it.
+const END_LEAD: Duration = Duration::from_secs(1);
+/// Hold frames that close a play.
+const CLOSING_FRAMES: u8 = 3;
+/// What a controller takes for its first absolute frame at the most (PA09, IMAX manual 2.3.1).
+const FIRST_ABSOLUTE_MS: u32 = 100;
+
+/// How a play ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The cue was played to its end.
+    Completed,
+    /// Somebody asked for it.
+    Stopped,
+    /// A move could not be planned; the lanes were stopped where they could be.
+    Fault,
+}
+
+/// What a play is about; fixed before it starts.
+#[derive(Debug, Clone)]
+pub struct Show {
+    /// Ticks per second.
+    pub rate: Rate,
+    /// Which Time the frames carry.
+    pub timing: Timing,
+    /// Show time of tick 0.
+    pub start: ShowTime,
+    /// Plays in all; 0 plays until stopped.
+    pub plays: u32,
+}
+
+/// What the frames of one tick have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beat {
+    /// Which kind of Time they carry.
+    pub timing: Timing,
+    /// The Time field.
+    pub time_ms: u32,
+    /// The tick's own show time, at which vibration and effects are taken; none where both are off.
+    pub show: Option<ShowTime>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Repeats the park pose once, so that no motion hangs on how a controller times its first absolute frame.
+    Settling,
+    Riding,
+    /// Frames stopped for too long: holds the last pose until a course leads on.
+    Stalled,
+    Parking,
+    Closing(u8),
+    Done,
+}
+
+/// The engine of one play.
+#[derive(Debug)]
+pub struct Engine {
+    show: Show,
+    timeline: Arc<Timeline>,
+    headroom: Headroom,
+    windows: Vec<Window>,
+    poses: Vec<Pose>,
+    hint: Hint,
+    phase: Phase,
+    ending: Ending,
+    course: Box<Course>,
+    switch: Option<Switch>,
+    retired: Retired,
+    serial: u32,
+    plays_left: Option<u32>,
+    /// Whether the lanes are to park, come what may.
+    homeward: bool,
+    /// Answers of the planner in a row that came too late.
+    late_answers: u32,
+    frames: u64,
+    /// The show time of the next tick.
+    playhead: ShowTime,
+    /// The show time of the pose sent last.
+    reached: ShowTime,
+    slew: Slew,
+    stamps: Stamps,
+}
+
+impl Engine {
+    /// An engine whose lanes are in their park poses; `course` begins at the show's start.
+    #[must_use]
+    pub fn new(
+        show: Show,
+        timeline: Arc<Timeline>,
+        headroom: Headroom,
+        windows: Vec<Window>,
+        course: Box<Course>,
+    ) -> Self {
+        let settles = show.timing == Timing::Absolute && show.rate.period() > millis(FIRST_ABSOLUTE_MS);
+        Self {
+            poses: windows.iter().map(Window::park).collect(),
+            hint: Hint::default(),
+            phase: if settles { Phase::Settling } else { Phase::Riding },
+            ending: Ending::Completed,
+            switch: None,
+            retired: Retired::default(),
+            serial: course.serial,
+            plays_left: show.plays.checked_sub(1),
+            homeward: false,
+            late_answers: 0,
+            frames: 0,
+            playhead: show.start,
+            reached: show.start,
+            slew: Slew::default(),
+            stamps: Stamps::new(show.timing),
+            show,
+            timeline,
+            headroom,
+            windows,
+            course,
+        }
+    }
+
+    /// Asks for the end: park, three hold frames, done. Asking again changes nothing.
+    pub fn stop(&mut self) {
+        if !self.homeward && matches!(self.phase, Phase::Settling | Phase::Riding | Phase::Stalled) {
+            self.homeward = true;
+            self.ending = Ending::Stopped;
+        }
+    }
+
+    /// The poses of the frames of this tick, lane by lane, as fractions of each slot's stroke.
+    #[must_use]
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// The show time of the next tick.
+    #[must_use]
+    pub fn playhead(&self) -> ShowTime {
+        self.playhead
+    }
+
+    /// How far the show is behind its grid.
+    #[must_use]
+    pub fn lag(&self) -> Duration {
+        self.slew.lag()
+    }
+
+    /// How the play ended; none while it lasts.
+    #[must_use]
+    pub fn ending(&self) -> Option<Ending> {
+        (self.phase == Phase::Done).then_some(self.ending)
+    }
+
+    /// Serves one tick: sets the poses and says what their frames carry. None once the play has ended.
+    pub fn tick(&mut self, missed: u64) -> Option<Beat> {
+        self.count_missed(missed);
+        self.take_switch();
+        match self.phase {
+            Phase::Done => return None,
+            Phase::Closing(0) => {
+                self.phase = Phase::Done;
+                return None;
+            }
+            _ => {}
+        }
+        let time_ms = self.show.rate.time_ms(self.frames);
+        self.frames += 1;
+        let riding = self.phase == Phase::Riding && self.course.then == After::Cue;
+        let show = (riding || self.phase == Phase::Stalled).then_some(self.playhead);
+        self.move_on(millis(time_ms));
+        let (timing, time_ms) = self.stamps.next(time_ms);
+        self.look_ahead();
+        Some(Beat { timing, time_ms, show })
+    }
+
+    /// Advances show time by one frame and sets the poses.
+    fn move_on(&mut self, time: Duration) {
+        match self.phase {
+            Phase::Settling => self.phase = Phase::Riding,
+            Phase::Stalled => self.playhead += time,
+            Phase::Closing(left) => {
+                self.phase = Phase::Closing(left - 1);
+                if left == 1 {
+                    self.stamps.break_off(); // whoever plays next starts its sum after a relative frame
+                }
+            }
+            Phase::Riding | Phase::Parking | Phase::Done => {
+                let ceiling = if self.phase == Phase::Riding { self.headroom.at(self.playhead) } else { 0.0 };
+                self.playhead += self.slew.advance(time, ceiling);
+                self.reached = self.playhead;
+                let cue = self.timeline.sample(self.reached, &mut self.hint);
+                for (lane, (pose, window)) in self.poses.iter_mut().zip(&self.windows).enumerate() {
+                    *pose = self.course.pose(lane, self.reached, window, &cue);
+                }
+            }
+        }
+    }
+
+    /// A few missed ticks leave a lag that is slewed away; after too many the lanes hold, then go on from rest.
+    fn count_missed(&mut self, missed: u64) {
+        let gap = self.show.rate.offset(missed);
+        let too_long = gap > LAG_HOLD && gap > self.show.rate.period();
+        match self.phase {
+            Phase::Stalled => self.playhead += gap,
+            Phase::Riding | Phase::Parking if too_long => {
+                // The controllers reached the last pose and stand there.
+                self.homeward |= self.phase == Phase::Parking;
+                self.playhead += gap + self.slew.lag();
+                self.slew.reset();
+                self.stamps.break_off();
+                self.drop_switch();
+                self.phase = Phase::Stalled;
+            }
+            Phase::Riding => self.slew.fall_behind(gap),
+            _ => {}
+        }
+    }
+
+    /// Asks for the course that the present state will need, if it needs one.
+    fn look_ahead(&mut self) {
+        let asked = self.switch.as_ref().map(|switch| switch.goal);
+        match self.phase {
+            Phase::Parking if self.reached >= self.course.settled() => {
+                self.phase = Phase::Closing(CLOSING_FRAMES)
+            }
+            Phase::Riding | Phase::Stalled if self.homeward => {
+                if asked != Some(Goal::Home) {
+                    let at = self.playhead + self.lead();
+                    self.ask(Goal::Home, at, at);
+                }
+            }
+            Phase::Stalled if asked.is_none() => {
+                let at = self.playhead + self.lead();
+                self.ask(Goal::Rejoin, at, at);
+            }
+            Phase::Riding if asked.is_none() => self.look_ahead_riding(),
+            _ => {}
+        }
+    }
+
+    fn look_ahead_riding(&mut self) {
+        let soonest = self.playhead + self.lead();
+        let lag = self.slew.lag();
+        if lag > LAG_HOLD && lag > self.show.rate.period() {
+            // Many small gaps: the lanes are moving, so they join from the lagging cue onto the true one.
+            self.ask(Goal::Rejoin, soonest, soonest + lag);
+            return;
+        }
+        let end = self.timeline.duration().max(self.course.settled());
+        if self.playhead + END_LEAD >= end || soonest >= end {
+            let at = end.max(soonest);
+            if self.plays_left == Some(0) {
+                self.ask(Goal::Home, at, at);
+            } else {
+                self.ask(Goal::Again, at, ShowTime::ZERO);
+            }
+        }
+    }
+
+    /// Asks for a course that takes over when show time, as it runs now, is `at`, and calls that instant `start`.
+    fn ask(&mut self, goal: Goal, at: ShowTime, start: ShowTime) {
+        self.drop_switch();
+        let serial = self.course.serial;
+        let from = match self.phase {
+            Phase::Stalled => From::Stalled(serial, self.reached),
+            _ => From::Course(serial, at),
+        };
+        let to = if goal == Goal::Home { To::Park } else { To::Cue };
+        self.serial = self.serial.wrapping_add(1);
+        let request = Request { from, to, start, serial: self.serial };
+        let gained = if goal == Goal::Rejoin { start.as_nanos() - at.as_nanos() } else { 0 };
+        let skipped = Duration::from_nanos(gained.unsigned_abs());
+        self.switch = Some(Switch { goal, at, skipped, request, unsent: true, course: None });
+    }
+
+    /// The request that the planner has not seen yet.
+    pub fn take_request(&mut self) -> Option<Request> {
+        let switch = self.switch.as_mut().filter(|switch| switch.unsent)?;
+        switch.unsent = false;
+        Some(switch.request)
+    }
+
+    /// Hands over a course that the planner made. One that nobody waits for any more, or that came after its time, is
+    /// not taken up.
+    pub fn offer(&mut self, course: Box<Course>) {
+        match &mut self.switch {
+            Some(switch) if switch.request.serial == course.serial && self.playhead <= switch.at => {
+                switch.course = Some(course);
+            }
+            Some(switch) if switch.request.serial == course.serial => {
+                self.retired.put(Some(course));
+                self.late_answers += 1;
+                self.switch = None; // asked again, with more time, at this tick's end
+            }
+            _ => self.retired.put(Some(course)),
+        }
+    }
+
+    /// Hears that the planner found no course for the request of that serial: the lanes park, or close where they are.
+    pub fn refuse(&mut self, serial: u32) {
+        let Some(switch) = self.switch.as_ref().filter(|switch| switch.request.serial == serial) else {
+            return;
+        };
+        self.ending = Ending::Fault;
+        self.homeward = true;
+        if switch.goal == Goal::Home {
+            self.phase = Phase::Closing(CLOSING_FRAMES);
+        }
+        self.switch = None;
+    }
+
+    /// A course that is to be freed on another thread.
+    pub fn take_retired(&mut self) -> Option<Box<Course>> {
+        self.retired.take()
+    }
+
+    /// Takes up the new course when its time has come.
+    fn take_switch(&mut self) {
+        let Some(switch) =
+            self.switch.take_if(|switch| switch.course.is_some() && self.playhead >= switch.at)
+        else {
+            return;
+        };
+        let Some(course) = switch.course else { return };
+        let over = self.playhead.as_nanos() - switch.at.as_nanos();
+        self.playhead = ShowTime::from_nanos(course.start.as_nanos() + over);
+        self.slew.skip(switch.skipped);
+        self.late_answers = 0;
+        if switch.goal == Goal::Again {
+            self.plays_left = self.plays_left.map(|left| left.saturating_sub(1));
+        }
+        self.phase = match switch.goal {
+            Goal::Home if course.settled() <= course.start => Phase::Closing(CLOSING_FRAMES),
+            Goal::Home => Phase::Parking,
+            Goal::Again | Goal::Rejoin => Phase::Riding,
+        };
+        let old = std::mem::replace(&mut self.course, course);
+        self.retired.put(Some(old));
+    }
+
+    fn drop_switch(&mut self) {
+        let switch = self.switch.take();
+        self.retired.put(switch.and_then(|switch| switch.course));
+    }
+
+    /// The time a planner is given: at least two ticks and 20 ms, twice as long after each answer that came too late.
+    fn lead(&self) -> Duration {
+        LEAD.max(2 * self.show.rate.period()) * (1 << self.late_answers.min(6))
+    }
+}
+
+fn millis(ms: u32) -> Duration {
+    Duration::from_millis(u64::from(ms))
+}

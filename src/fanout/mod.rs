@@ -1,0 +1,110 @@
+//! From a pose to the octets of one controller's frame: slots to pulses, effects to outputs, the frame number.
+//! Tick thread; allocates nothing.
+
+mod lanes;
+
+pub use lanes::{FanOutFault, lanes};
+
+use crate::cue;
+use crate::engine::Beat;
+use crate::motion::{MAX_AXES, Pose, Pulses, Window};
+use crate::timeline::Switched;
+use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration};
+
+/// Which outputs a cue's effects switch on one controller.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Wiring {
+    /// Output word of each effect of the cue, by its place among the cue's names.
+    pub named: Vec<u16>,
+    /// The bits of a raw output word that reach the controller.
+    pub raw: u16,
+}
+
+impl Wiring {
+    /// The output word for what the cue switches.
+    #[must_use]
+    pub fn outputs(&self, switched: Switched) -> u16 {
+        match switched {
+            Switched::Word(word) => word & self.raw,
+            Switched::Named(on) => {
+                let lit = self.named.iter().enumerate().filter(|(effect, _)| on >> effect & 1 == 1);
+                lit.fold(0, |word, (_, outputs)| word | outputs)
+            }
+        }
+    }
+}
+
+/// Our state for one controller, as far as sending goes.
+#[derive(Debug, Clone)]
+pub struct Lane {
+    /// The axes of its frames.
+    pub window: Window,
+    /// Object channel of its frames (SMC manual 2.2.2.5).
+    pub channel: u16,
+    /// Who takes its frames, and who answers those that ask.
+    pub code: Code,
+    /// Whether its frames carry vibration.
+    pub vibrates: bool,
+    /// Which outputs it switches.
+    pub wiring: Wiring,
+    /// Asks for a reply in each so-manieth frame; 0 never asks.
+    pub ack_every: u32,
+    next_frame: FrameNo,
+}
+
+/// A frame that was written: its number, and whether it asks for a reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamped {
+    /// Its number.
+    pub frame: FrameNo,
+    /// Whether it asks for a reply.
+    pub asked: bool,
+}
+
+impl Lane {
+    /// Writes the frame of this tick to `buf`, and takes a frame number for it.
+    pub fn encode<'b>(&mut self, beat: &Beat, pose: &Pose, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+        let slots = self.window.slots();
+        let mut positions = [Pulses(0); MAX_AXES];
+        let mut vibration = [Vibration::NONE; MAX_AXES];
+        for (index, slot) in slots.iter().enumerate() {
+            positions[index] = slot.pulses(pose[index]);
+            if let Some(axis) = slot.axis.filter(|_| self.vibrates) {
+                let cue::Vibration { hz, amplitude } = beat.vibration[axis];
+                vibration[index] = Vibration::from_hz(hz, amplitude * slot.to_stroke * slot.stroke_pulses);
+            }
+        }
+        let stamped = self.stamp();
+        let motion = Motion {
+            timing: beat.timing,
+            channel: self.channel,
+            accept: self.code,
+            reply: if stamped.asked { self.code } else { Code::NONE },
+            frame: stamped.frame,
+            time_ms: beat.time_ms,
+            positions: &positions[..slots.len()],
+            outputs: self.wiring.outputs(beat.effects),
+            vibration: self.vibrates.then_some(&vibration[..slots.len()]),
+        };
+        (stamped, motion.emit(buf))
+    }
+
+    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects off.
+    pub fn encode_homing<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+        let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
+        let beat = Beat::still(Timing::Relative, time_ms);
+        let written = self.encode(&beat, &park, buf);
+        self.vibrates = vibrates;
+        written
+    }
+
+    fn stamp(&mut self) -> Stamped {
+        let frame = self.next_frame;
+        self.next_frame = frame.next();
+        let asked = self.ack_every > 0 && frame.0.wrapping_sub(1).is_multiple_of(self.ack_every);
+        Stamped { frame, asked }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,136 @@
+//! The axes of one controller's frame: which axis of the cue each slot carries, and on what seat.
+
+use super::{MAX_AXES, Pose, Pulses, SeatType};
+
+/// What an axis may do, in strokes per second, second squared and second cubed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Greatest speed.
+    pub velocity: f64,
+    /// Greatest acceleration.
+    pub acceleration: f64,
+    /// Greatest jerk.
+    pub jerk: f64,
+}
+
+impl Limits {
+    /// The limits of a seat type's axes.
+    #[must_use]
+    pub fn of(seat: &SeatType) -> Self {
+        Self {
+            velocity: seat.max_velocity_mm_s / seat.stroke_mm,
+            acceleration: seat.max_acceleration_mm_s2 / seat.stroke_mm,
+            jerk: seat.max_jerk_mm_s3 / seat.stroke_mm,
+        }
+    }
+}
+
+/// One position of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slot {
+    /// The axis of the cue it carries, counted from 0; none where the slot rests at park throughout.
+    pub axis: Option<usize>,
+    /// Cue unit to fraction of this slot's stroke.
+    pub to_stroke: f64,
+    /// Where it rests, fraction of the stroke.
+    pub park: f64,
+    /// Pulses over the whole stroke.
+    pub stroke_pulses: f64,
+    /// Length of the stroke, mm.
+    pub stroke_mm: f64,
+    /// What the axis may do.
+    pub limits: Limits,
+}
+
+impl Slot {
+    /// A slot of a seat that carries `axis` of the cue, `seat_axis` being the seat's own count from 0.
+    #[must_use]
+    pub fn new(seat: &SeatType, seat_axis: usize, axis: Option<usize>, to_stroke: f64) -> Self {
+        Self {
+            axis,
+            to_stroke,
+            park: seat.park.get(seat_axis).copied().unwrap_or(0.0),
+            stroke_pulses: seat.stroke_pulses(),
+            stroke_mm: seat.stroke_mm,
+            limits: Limits::of(seat),
+        }
+    }
+
+    /// Where the motor stands at `fraction` of the stroke, held inside it: nearest pulse, ties away from zero.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32, checked with the seat type")]
+    pub fn pulses(&self, fraction: f64) -> Pulses {
+        Pulses((fraction.clamp(0.0, 1.0) * self.stroke_pulses).round() as i32)
+    }
+}
+
+/// The slots of one frame, in frame order: 3, 6, 10 or 12 of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window {
+    slots: Vec<Slot>,
+}
+
+impl Window {
+    /// A window of these slots.
+    ///
+    /// # Panics
+    /// Where there are more than [`MAX_AXES`].
+    #[must_use]
+    pub fn new(slots: Vec<Slot>) -> Self {
+        assert!(slots.len() <= MAX_AXES, "a frame has at most {MAX_AXES} slots");
+        Self { slots }
+    }
+
+    /// The slots, in frame order.
+    #[must_use]
+    pub fn slots(&self) -> &[Slot] {
+        &self.slots
+    }
+
+    /// The slots that follow the cue, with their place in the frame.
+    pub fn moving(&self) -> impl Iterator<Item = (usize, &Slot)> {
+        self.slots.iter().enumerate().filter(|(_, slot)| slot.axis.is_some())
+    }
+
+    /// The cue's pose as fractions of each slot's stroke, held inside it; slots without an axis rest at park.
+    #[must_use]
+    pub fn place(&self, cue: &Pose) -> Pose {
+        let mut placed = [0.0; MAX_AXES];
+        for (place, slot) in placed.iter_mut().zip(&self.slots) {
+            *place = match slot.axis {
+                Some(axis) => (cue[axis] * slot.to_stroke).clamp(0.0, 1.0),
+                None => slot.park,
+            };
+        }
+        placed
+    }
+
+    /// The park pose, as fractions of each slot's stroke.
+    #[must_use]
+    pub fn park(&self) -> Pose {
+        let mut placed = [0.0; MAX_AXES];
+        for (place, slot) in placed.iter_mut().zip(&self.slots) {
+            *place = slot.park;
+        }
+        placed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slot_without_an_axis_rests_at_park_and_the_others_stay_inside_the_stroke() {
+        let seat = SeatType { park: [0.25; MAX_AXES], ..SeatType::bench3(3) };
+        let window = Window::new(vec![
+            Slot::new(&seat, 0, Some(1), 1.0),
+            Slot::new(&seat, 1, Some(0), 2.0),
+            Slot::new(&seat, 2, None, 1.0),
+        ]);
+        let mut cue = [0.0; MAX_AXES];
+        cue[..2].copy_from_slice(&[0.75, 0.5]);
+        assert_eq!(window.place(&cue)[..4], [0.5, 1.0, 0.25, 0.0]);
+        assert_eq!(window.park()[..3], [0.25; 3]);
+    }
+}

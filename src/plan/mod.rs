@@ -1,0 +1,140 @@
+//! Jerk-limited moves, planned off the tick thread in units of the stroke: joins onto the moving cue, and parking.
+//!
+//! The solver has absolute tolerances, so nothing here is ever in millimetres or pulses. Its error path allocates:
+//! only [`Course::pose`] may be called on the tick thread.
+
+mod course;
+mod join;
+mod park;
+mod planner;
+mod solve;
+mod states;
+
+pub use course::{After, Course};
+pub use join::{JOIN_MIN, join, joins_without_a_move};
+pub use park::{PARK_VELOCITY_MM_S, park};
+pub use planner::{From, Planner, Request, To};
+
+use rsruckig::prelude::{DataArrayOrVec, Trajectory};
+
+use crate::motion::Pose;
+use crate::time::ShowTime;
+
+/// The cue as the planner sees it.
+#[derive(Clone, Copy)]
+pub struct Curve<'a> {
+    /// Its pose at a show time, in its own unit; before its first and after its last row those rows'.
+    pub pose: &'a dyn Fn(ShowTime) -> Pose,
+    /// Its last row.
+    pub end: ShowTime,
+}
+
+/// Where an axis is and how it moves: strokes, strokes per second, strokes per second squared.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AxisState {
+    /// Fraction of the stroke.
+    pub position: f64,
+    /// Strokes per second.
+    pub velocity: f64,
+    /// Strokes per second squared.
+    pub acceleration: f64,
+}
+
+impl AxisState {
+    /// At rest there.
+    #[must_use]
+    pub const fn at_rest(position: f64) -> Self {
+        Self { position, velocity: 0.0, acceleration: 0.0 }
+    }
+}
+
+/// Why no move could be planned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// No join of up to 10 s meets the cue.
+    #[error(
+        "no move of up to {limit_s} s joins the cue at {at}: {reason}; make the cue gentler there, or start elsewhere"
+    )]
+    NoJoin {
+        /// The show time at which the join would begin.
+        at: ShowTime,
+        /// The longest join tried, seconds.
+        limit_s: f64,
+        /// What the solver said last.
+        reason: String,
+    },
+    /// The solver refused even to stop.
+    #[error("no way to stop could be planned: {0}")]
+    NoStop(String),
+}
+
+/// A finished move of the moving slots of one lane: one trajectory, or a stop and what follows it.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    parts: Vec<Trajectory<0>>,
+    positions: DataArrayOrVec<f64, 0>,
+    velocities: DataArrayOrVec<f64, 0>,
+    accelerations: DataArrayOrVec<f64, 0>,
+}
+
+impl Plan {
+    fn new(trajectory: Trajectory<0>, axes: usize) -> Self {
+        let zeros = || DataArrayOrVec::new(Some(axes), 0.0);
+        Self { parts: vec![trajectory], positions: zeros(), velocities: zeros(), accelerations: zeros() }
+    }
+
+    /// This move and `next` after it, which starts where this one ends.
+    fn then(mut self, next: Self) -> Self {
+        self.parts.extend(next.parts);
+        self
+    }
+
+    /// How long the move takes, seconds.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.parts.iter().map(Trajectory::get_duration).sum()
+    }
+
+    /// The positions `seconds` after its start, one for each moving slot, clamped to the move's own duration and to the
+    /// stroke. Never allocates.
+    pub fn position_at(&mut self, seconds: f64) -> &[f64] {
+        let (part, t) = self.part_at(seconds);
+        let positions = &mut self.positions;
+        self.parts[part].at_time(t, &mut Some(positions), &mut None, &mut None, &mut None, &mut None);
+        for position in self.positions.iter_mut() {
+            *position = position.clamp(0.0, 1.0);
+        }
+        &self.positions
+    }
+
+    /// The state of each moving slot `seconds` after the start, clamped likewise.
+    #[must_use]
+    pub fn states_at(&mut self, seconds: f64) -> Vec<AxisState> {
+        let (part, t) = self.part_at(seconds);
+        let (p, v, a) = (&mut self.positions, &mut self.velocities, &mut self.accelerations);
+        self.parts[part].at_time(t, &mut Some(p), &mut Some(v), &mut Some(a), &mut None, &mut None);
+        let velocities = self.velocities.iter().zip(self.accelerations.iter());
+        self.positions
+            .iter()
+            .zip(velocities)
+            .map(|(position, (velocity, acceleration))| AxisState {
+                position: position.clamp(0.0, 1.0),
+                velocity: *velocity,
+                acceleration: *acceleration,
+            })
+            .collect()
+    }
+
+    fn part_at(&self, seconds: f64) -> (usize, f64) {
+        let mut t = seconds.max(0.0);
+        let last = self.parts.len() - 1;
+        for (part, trajectory) in self.parts[..last].iter().enumerate() {
+            if t < trajectory.get_duration() {
+                return (part, t);
+            }
+            t -= trajectory.get_duration();
+        }
+        (last, t.min(self.parts[last].get_duration()))
+    }
+}

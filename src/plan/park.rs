@@ -1,0 +1,108 @@
+//! Parking: from wherever a lane is and however it moves to rest in its park pose, no faster than 50 mm/s.
+
+use super::solve::{Problem, to_position, to_velocity};
+use super::{AxisState, Plan, PlanError};
+use crate::motion::{Limits, Window};
+
+/// The greatest speed of a seat on its way to park, mm/s.
+pub const PARK_VELOCITY_MM_S: f64 = 50.0;
+
+/// Plans the move from the states `from`, one for each moving slot of the window, to rest in its park pose: straight
+/// where that can be had, else a stop where the lane is and then to park.
+///
+/// Acceleration and jerk are the seat's own: with lower ones a moving seat cannot stop inside its stroke.
+///
+/// # Errors
+/// [`PlanError::NoStop`] where the solver refuses everything.
+pub fn park(window: &Window, from: &[AxisState]) -> Result<Plan, PlanError> {
+    let target: Vec<AxisState> = window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect();
+    if let Ok(plan) = straight(window, from, &target) {
+        return Ok(plan);
+    }
+    let limits: Vec<Limits> =
+        window.moving().zip(from).map(|((_, slot), from)| stopping(slot.limits, from)).collect();
+    let mut stop = to_velocity(&Problem { from, to: &target, limits: &limits, minimum_s: 0.001 })
+        .map_err(PlanError::NoStop)?;
+    let ends = stop.seconds();
+    let stopped: Vec<AxisState> =
+        stop.position_at(ends).iter().map(|position| AxisState::at_rest(*position)).collect();
+    let rest = straight(window, &stopped, &target).map_err(PlanError::NoStop)?;
+    Ok(stop.then(rest))
+}
+
+fn straight(window: &Window, from: &[AxisState], target: &[AxisState]) -> Result<Plan, String> {
+    let limits: Vec<Limits> = window
+        .moving()
+        .zip(from)
+        .map(|((_, slot), from)| Limits {
+            velocity: slot.limits.velocity.min(PARK_VELOCITY_MM_S / slot.stroke_mm),
+            ..stopping(slot.limits, from)
+        })
+        .collect();
+    to_position(&Problem { from, to: target, limits: &limits, minimum_s: 0.001 })
+}
+
+/// The seat's own limits, raised to the acceleration it has.
+fn stopping(limits: Limits, from: &AxisState) -> Limits {
+    Limits { acceleration: limits.acceleration.max(from.acceleration.abs()), ..limits }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::{SeatType, Slot};
+
+    fn one_axis() -> (Window, Limits) {
+        let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
+        (Window::new(vec![slot]), slot.limits)
+    }
+
+    #[test]
+    fn a_seat_at_rest_parks_at_no_more_than_50_mm_a_second() {
+        let (window, _) = one_axis();
+        let mut plan = park(&window, &[AxisState::at_rest(1.0)]).unwrap();
+        // 150 mm at 50 mm/s, and the time to gather and to lose the speed.
+        assert!(plan.seconds() > 3.0 && plan.seconds() < 3.2, "{}", plan.seconds());
+        let fastest =
+            (0..3200).map(|ms| plan.states_at(f64::from(ms) * 1e-3)[0].velocity.abs()).fold(0.0, f64::max);
+        assert!(fastest * 150.0 <= PARK_VELOCITY_MM_S * 1.000_001, "{fastest}");
+        assert!(plan.position_at(plan.seconds())[0].abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_seat_at_full_speed_slows_down_within_its_own_limits_first() {
+        let (window, limits) = one_axis();
+        let from = AxisState { position: 0.5, velocity: -limits.velocity, acceleration: 0.0 };
+        let mut plan = park(&window, &[from]).unwrap();
+        for ms in 0..4000 {
+            let state = plan.states_at(f64::from(ms) * 1e-3)[0];
+            assert!(state.acceleration.abs() <= limits.acceleration * 1.000_001, "{state:?}");
+            assert!((0.0..=1.0).contains(&state.position), "{state:?}");
+        }
+    }
+
+    #[test]
+    fn a_seat_that_cannot_stop_inside_its_stroke_stops_as_fast_as_it_may_and_then_parks() {
+        let (window, limits) = one_axis();
+        let from = AxisState { position: 0.99, velocity: limits.velocity, acceleration: 0.0 };
+        let mut plan = park(&window, &[from]).unwrap();
+        let halted =
+            (0..200).map(|ms| plan.states_at(f64::from(ms) * 1e-3)[0].velocity).any(|v| v.abs() < 0.02);
+        assert!(halted, "a seat at its full 240 mm/s is slow within 200 ms");
+        let mut last = from.position;
+        for ms in 0..4000 {
+            let now = plan.position_at(f64::from(ms) * 1e-3)[0];
+            assert!((now - last).abs() <= limits.velocity * 1.001e-3, "{ms} ms: {last} to {now}");
+            last = now;
+        }
+        assert!(last.abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_parked_seat_parks_again_without_a_refusal() {
+        let (window, _) = one_axis();
+        for off in [0.0, 1e-16, 1e-15, 1e-13, 1e-11, 1e-9, 1e-6] {
+            assert!(park(&window, &[AxisState::at_rest(off)]).unwrap().seconds() < 0.1, "{off}");
+        }
+    }
+}

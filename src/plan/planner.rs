@@ -1,0 +1,182 @@
+//! The planner: asked for a course by the tick thread, answers with one. It keeps the courses that it gave out, so that
+//! a request need only say from which one, and when, to go on.
+
+use std::collections::VecDeque;
+
+use super::{After, AxisState, Course, Curve, Plan, PlanError, join, joins_without_a_move, park};
+use crate::motion::Window;
+use crate::time::ShowTime;
+
+/// How many of its courses it remembers; the tick thread follows the newest or the one before.
+const REMEMBERED: usize = 4;
+
+/// How the lanes are as the new course begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum From {
+    /// In their park pose, at rest: the beginning of a play.
+    Park,
+    /// On the course of that serial, at that show time, under way.
+    Course(u32, ShowTime),
+    /// Where that course was at that show time, but at rest: frames stopped coming there.
+    Stalled(u32, ShowTime),
+}
+
+/// Where the new course leads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum To {
+    /// Onto the cue.
+    Cue,
+    /// Into the park pose.
+    Park,
+}
+
+/// A request for a course.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Request {
+    /// How the lanes are as it begins.
+    pub from: From,
+    /// Where it leads.
+    pub to: To,
+    /// The show time at which it begins.
+    pub start: ShowTime,
+    /// The number it is to have.
+    pub serial: u32,
+}
+
+/// Plans courses for the lanes of one play.
+#[derive(Debug)]
+pub struct Planner {
+    windows: Vec<Window>,
+    rate_hz: f64,
+    given: VecDeque<Course>,
+}
+
+impl Planner {
+    /// A planner for lanes with these windows.
+    #[must_use]
+    pub fn new(windows: Vec<Window>, rate_hz: f64) -> Self {
+        Self { windows, rate_hz, given: VecDeque::with_capacity(REMEMBERED + 1) }
+    }
+
+    /// Plans what is asked.
+    ///
+    /// # Errors
+    /// [`PlanError`] where a lane's move cannot be planned; nothing is remembered then.
+    pub fn plan(&mut self, request: Request, curve: &Curve<'_>) -> Result<Course, PlanError> {
+        let mut moves: Vec<Option<Plan>> = Vec::with_capacity(self.windows.len());
+        let mut states: Vec<Vec<AxisState>> = Vec::with_capacity(self.windows.len());
+        for lane in 0..self.windows.len() {
+            states.push(self.states(lane, request.from, curve));
+            // The seats of a hall are mostly alike: what was planned for one serves all like it.
+            let twin = (0..lane)
+                .find(|&other| self.windows[other] == self.windows[lane] && states[other] == states[lane]);
+            let planned = match twin {
+                Some(twin) => moves[twin].clone(),
+                None => self.lane_move(lane, &states[lane], request, curve)?,
+            };
+            moves.push(planned);
+        }
+        let then = if request.to == To::Cue { After::Cue } else { After::Rest };
+        let course = Course::new(request.serial, request.start, then, moves);
+        self.given.push_back(course.clone());
+        if self.given.len() > REMEMBERED {
+            self.given.pop_front();
+        }
+        Ok(course)
+    }
+
+    fn lane_move(
+        &self,
+        lane: usize,
+        from: &[AxisState],
+        request: Request,
+        curve: &Curve<'_>,
+    ) -> Result<Option<Plan>, PlanError> {
+        let window = &self.windows[lane];
+        let parked =
+            window.moving().zip(from).all(|((_, slot), from)| *from == AxisState::at_rest(slot.park));
+        match request.to {
+            _ if from.is_empty() => Ok(None),
+            To::Park if parked => Ok(None),
+            To::Park => park(window, from).map(Some),
+            To::Cue if parked && joins_without_a_move(window, curve, request.start, self.rate_hz) => Ok(None),
+            To::Cue => join(window, from, curve, request.start, self.rate_hz).map(Some),
+        }
+    }
+
+    fn states(&mut self, lane: usize, from: From, curve: &Curve<'_>) -> Vec<AxisState> {
+        let window = &self.windows[lane];
+        let (serial, at, stalled) = match from {
+            From::Park => (None, ShowTime::ZERO, true),
+            From::Course(serial, at) => (Some(serial), at, false),
+            From::Stalled(serial, at) => (Some(serial), at, true),
+        };
+        let Some(course) = self.given.iter_mut().find(|course| Some(course.serial) == serial) else {
+            return window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect();
+        };
+        let mut states = course.states(lane, at, window, curve);
+        if stalled {
+            states.iter_mut().for_each(|state| *state = AxisState::at_rest(state.position));
+        }
+        states
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::{MAX_AXES, Pose, SeatType, Slot};
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn heave(at: ShowTime) -> Pose {
+        let mut pose = [0.0; MAX_AXES];
+        pose[0] = 0.5 - 0.25 * (at.as_secs_f64() * std::f64::consts::PI).cos();
+        pose
+    }
+
+    fn planner(lanes: usize) -> Planner {
+        let window = Window::new(vec![Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0)]);
+        Planner::new(vec![window; lanes], 100.0)
+    }
+
+    fn request(serial: u32, from: From, to: To, start_s: i64) -> Request {
+        Request { from, to, start: ShowTime::from_nanos(start_s * SECOND), serial }
+    }
+
+    #[test]
+    fn a_course_joins_the_cue_and_another_parks_from_it_without_a_step() {
+        let curve = Curve { pose: &heave, end: ShowTime::from_millis(20_000) };
+        let mut planner = planner(2);
+        let mut ride = planner.plan(request(1, From::Park, To::Cue, 0), &curve).unwrap();
+        let at = ShowTime::from_nanos(5 * SECOND);
+        let mut home = planner.plan(request(2, From::Course(1, at), To::Park, 5), &curve).unwrap();
+        let window = planner.windows[0].clone();
+        let before = ride.pose(0, at, &window, &heave(at));
+        let after = home.pose(0, at, &window, &heave(at));
+        assert!((before[0] - after[0]).abs() < 1e-9, "{before:?} {after:?}");
+        assert!(home.pose(1, home.settled(), &window, &heave(at))[0] < 1e-9);
+    }
+
+    #[test]
+    fn lanes_that_stalled_join_again_from_rest() {
+        let curve = Curve { pose: &heave, end: ShowTime::from_millis(20_000) };
+        let mut planner = planner(1);
+        planner.plan(request(1, From::Park, To::Cue, 0), &curve).unwrap();
+        let stalled = From::Stalled(1, ShowTime::from_nanos(4 * SECOND + SECOND / 2));
+        let mut again = planner.plan(request(2, stalled, To::Cue, 6), &curve).unwrap();
+        let window = planner.windows[0].clone();
+        let start = again.pose(0, again.start, &window, &heave(again.start));
+        let soon =
+            again.pose(0, again.start + std::time::Duration::from_millis(1), &window, &heave(again.start));
+        assert!((start[0] - 0.5).abs() < 1e-6, "{start:?}");
+        assert!((soon[0] - start[0]).abs() < 1e-6, "at rest first");
+    }
+
+    #[test]
+    fn a_parked_lane_parks_without_a_move() {
+        let curve = Curve { pose: &|_| [0.0; MAX_AXES], end: ShowTime::from_millis(1_000) };
+        let course = planner(1).plan(request(1, From::Park, To::Park, 0), &curve).unwrap();
+        assert_eq!(course.settled(), course.start);
+    }
+}
