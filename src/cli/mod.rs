@@ -12,6 +12,7 @@ mod exit;
 mod info;
 mod play;
 mod sim;
+pub mod times;
 
 pub use exit::{Exit, Failure, OrExit};
 

@@ -1,0 +1,109 @@
+//! What is wrong with a configuration file, and where.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+/// One fault of a configuration file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConfigFault {
+    /// The file.
+    pub path: PathBuf,
+    /// Line, counted from 1.
+    pub line: usize,
+    /// Column in characters, counted from 1.
+    pub column: usize,
+    /// What is wrong, with value and limit.
+    pub message: String,
+}
+
+impl fmt::Display for ConfigFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}: {}", self.path.display(), self.line, self.column, self.message)
+    }
+}
+
+/// Why a configuration cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigFaults {
+    /// The file is missing, a folder, or cannot be read.
+    #[error("cannot read the configuration {}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file was read; these are all its faults, at least one, in its order.
+    #[error("{}", lines(.0))]
+    Bad(Vec<ConfigFault>),
+}
+
+fn lines(faults: &[ConfigFault]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// The faults found so far in a text, by their place in it.
+pub(super) struct Faults<'t> {
+    text: &'t str,
+    found: Vec<(usize, String)>,
+    /// Lines that are no TOML: what was made of them says nothing.
+    broken: Vec<usize>,
+}
+
+impl<'t> Faults<'t> {
+    pub(super) fn of(text: &'t str) -> Self {
+        Self { text, found: Vec::new(), broken: Vec::new() }
+    }
+
+    /// Notes a fault at octet `at` of the text.
+    pub(super) fn note(&mut self, at: usize, message: impl Into<String>) {
+        if !self.broken.contains(&self.line(at)) {
+            self.found.push((at, message.into()));
+        }
+    }
+
+    /// Notes that something is not there, unless a line that is no TOML may have held it.
+    pub(super) fn note_missing(&mut self, at: usize, message: impl Into<String>) {
+        if self.broken.is_empty() {
+            self.note(at, message);
+        }
+    }
+
+    /// Notes that the text is no TOML at octet `at`; further faults of that line are not noted.
+    pub(super) fn note_syntax(&mut self, at: usize, message: impl Into<String>) {
+        self.note(at, message);
+        self.broken.push(self.line(at));
+    }
+
+    /// The line of octet `at`, counted from 1.
+    pub(super) fn line(&self, at: usize) -> usize {
+        place(self.text.as_bytes(), at).0
+    }
+
+    /// Whether none has been noted.
+    pub(super) fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// All of them, in the order of the text.
+    pub(super) fn into_list(mut self, path: &std::path::Path) -> Vec<ConfigFault> {
+        self.found.sort_by_key(|&(at, _)| at);
+        let text = self.text.as_bytes();
+        let at_place = |(at, message)| {
+            let (line, column) = place(text, at);
+            ConfigFault { path: path.to_owned(), line, column, message }
+        };
+        self.found.into_iter().map(at_place).collect()
+    }
+}
+
+/// Line and column of octet `at`, as an editor counts them: from 1, the column in characters.
+pub(super) fn place(text: &[u8], at: usize) -> (usize, usize) {
+    let before = &text[..at.min(text.len())];
+    let line_start = before.iter().rposition(|&octet| octet == b'\n').map_or(0, |end| end + 1);
+    let line = 1 + before.iter().filter(|&&octet| octet == b'\n').count();
+    let is_char_start = |octet: &&u8| (**octet & 0xc0) != 0x80;
+    (line, 1 + before[line_start..].iter().filter(is_char_start).count())
+}

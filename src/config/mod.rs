@@ -1,0 +1,266 @@
+//! The configuration: a TOML file or `--to` arguments in, checked values out, every fault with its line.
+//! Control thread.
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::motion::{MAX_AXES, SeatType};
+
+mod fault;
+mod read;
+mod section;
+mod target;
+#[cfg(test)]
+mod tests;
+
+pub use fault::{ConfigFault, ConfigFaults};
+pub use target::{TargetError, from_to_args};
+
+/// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
+pub const ALL_OUTPUTS: u16 = 0x0fff;
+
+/// The largest configuration file that is read, octets.
+pub const MAX_FILE_LEN: u64 = 1 << 20;
+
+/// A hall: how it is played, what its seats are, and where its controllers are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// How cues are played.
+    pub show: Show,
+    /// The seat types, by name.
+    pub seats: Vec<Arc<SeatType>>,
+    /// The site's wiring. Two names may mean one output.
+    pub effects: Vec<Effect>,
+    /// The controllers, at least one, in the order of the file.
+    pub controllers: Vec<Controller>,
+}
+
+/// How cues are played.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Show {
+    /// Frames a second to every controller, 1 to 1,000.
+    pub rate_hz: f64,
+    /// What the Time field of a frame means.
+    pub timing: Timing,
+    /// The address the controllers answer to (PA20 to PA24); port 0 takes any.
+    pub bind: SocketAddrV4,
+    /// A reply is asked for in each frame of this many, 1 to 1,000.
+    pub ack_every: u32,
+    /// What the hall does when a group of controllers is lost.
+    pub loss_policy: LossPolicy,
+    /// How long before a deadline the tick thread stops sleeping and spins, µs, 0 to 900.
+    pub spin_us: u32,
+    /// The folder with the cues of the daemon.
+    pub library: PathBuf,
+}
+
+impl Default for Show {
+    fn default() -> Self {
+        Self {
+            rate_hz: 100.0,
+            timing: Timing::Relative,
+            bind: SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 8410),
+            ack_every: 1,
+            loss_policy: LossPolicy::Continue,
+            spin_us: 0,
+            library: PathBuf::from("/var/lib/kinocue/cues"),
+        }
+    }
+}
+
+/// What the Time field of a frame means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Timing {
+    /// How long the move takes (0x1401, 0x1901; SMC manual 2.2.2.7).
+    Relative,
+    /// When the move ends, on the clock that the first frame starts (0x1301, 0x1801; SMC manual 2.2.2.5).
+    Absolute,
+}
+
+/// What the hall does when a group of controllers is lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LossPolicy {
+    /// The others play on.
+    Continue,
+    /// All hold.
+    Pause,
+    /// All park.
+    Park,
+}
+
+/// One name of an output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Effect {
+    /// What cues call it.
+    pub name: String,
+    /// The output, 1 to 12 for Y01 to Y12.
+    pub output: u8,
+}
+
+impl Effect {
+    /// The output as a bit of the Port Out word: bit 0 is Y01 (SMC manual 2.2.2.5).
+    #[must_use]
+    pub fn word(&self) -> u16 {
+        1_u16.checked_shl(u32::from(self.output).wrapping_sub(1)).unwrap_or(0) & ALL_OUTPUTS
+    }
+}
+
+/// A network peer that moves one seat.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Controller {
+    /// Its name in reports, unlike any other's.
+    pub name: String,
+    /// The row its seat stands in.
+    pub row: Option<String>,
+    /// What it moves.
+    pub seat: Arc<SeatType>,
+    /// Where it listens (PA10 to PA14), unlike any other's.
+    pub address: SocketAddrV4,
+    /// PA95: its first axis is axis `axis_offset + 1` of the cue; 0 to 11.
+    pub axis_offset: usize,
+    /// Who applies the axis offset.
+    pub fan_out: FanOut,
+    /// The message set it speaks.
+    pub dialect: Dialect,
+    /// Controllers under one rigid seat share a group; its own name by default.
+    pub group: String,
+    /// The accept and reply code of its frames.
+    pub accept: Accept,
+    /// The effects it switches; `None` for all of them and every bit of a raw output word.
+    pub effects: Option<Vec<String>>,
+}
+
+/// Who applies the axis offset (PA95).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FanOut {
+    /// The host: a frame carries just the controller's own axes; PA95 is 0.
+    Slice,
+    /// The device: a frame carries all axes of the cue; PA95 is the axis offset.
+    Shared,
+}
+
+/// The message set of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dialect {
+    /// SMC, with vibration.
+    Smc,
+    /// MBOX, without.
+    Mbox,
+}
+
+/// The accept and reply code (SMC manual 2.2.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Accept {
+    /// ffff: whoever gets the datagram.
+    All,
+    /// The station's own code: the last two octets of its address (PA12, PA13).
+    Station,
+    /// A code given as it is, not 0.
+    Code(u16),
+}
+
+impl Accept {
+    /// The code in a frame to the station at `address`.
+    #[must_use]
+    pub fn code(self, address: SocketAddrV4) -> u16 {
+        let [_, _, xx, yy] = address.ip().octets();
+        match self {
+            Self::All => 0xffff,
+            Self::Station => u16::from_be_bytes([xx, yy]),
+            Self::Code(code) => code,
+        }
+    }
+}
+
+impl Config {
+    /// What the effect called `name` adds to the output word of `controller`: 0 where that controller does not
+    /// switch it, `None` where no output has that name.
+    #[must_use]
+    pub fn effect_outputs(&self, controller: &Controller, name: &str) -> Option<u16> {
+        let effect = self.effects.iter().find(|effect| effect.name == name)?;
+        Some(if controller.switches(name) { effect.word() } else { 0 })
+    }
+
+    /// The bits of a raw output word that reach `controller`.
+    #[must_use]
+    pub fn allowed_outputs(&self, controller: &Controller) -> u16 {
+        match &controller.effects {
+            None => ALL_OUTPUTS,
+            Some(_) => {
+                let switched = self.effects.iter().filter(|effect| controller.switches(&effect.name));
+                switched.fold(0, |word, effect| word | effect.word())
+            }
+        }
+    }
+
+    /// The axes of a cue of `cue_axes` axes that no controller takes, counted from 1.
+    #[must_use]
+    pub fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
+        (1..=cue_axes).filter(|&axis| !self.controllers.iter().any(|c| c.takes(axis - 1))).collect()
+    }
+
+    /// The seat type called `name`.
+    #[must_use]
+    pub fn seat(&self, name: &str) -> Option<&Arc<SeatType>> {
+        self.seats.iter().find(|seat| seat.name == name)
+    }
+}
+
+impl Controller {
+    /// Whether axis `axis` of the cue, counted from 0, is one of its own.
+    #[must_use]
+    pub fn takes(&self, axis: usize) -> bool {
+        (self.axis_offset..self.axis_offset + self.seat.axes).contains(&axis)
+    }
+
+    fn switches(&self, effect: &str) -> bool {
+        self.effects.as_ref().is_none_or(|names| names.iter().any(|name| name == effect))
+    }
+}
+
+/// Reads and checks a configuration file.
+///
+/// # Errors
+/// [`ConfigFaults::Unreadable`] if there is no such file; else [`ConfigFaults::Bad`] with every fault of it.
+pub fn load(path: &Path) -> Result<Config, ConfigFaults> {
+    let text = read::file(path)?;
+    read::document(path, &text)
+}
+
+/// Whether a window of `axes` axes from `offset` on can be one of a cue; the reason if not.
+fn check_window(offset: usize, axes: usize, fan_out: FanOut) -> Result<(), String> {
+    if fan_out == FanOut::Shared && offset + axes > MAX_AXES {
+        let last = offset + axes;
+        return Err(format!(
+            "axes {} to {last} reach past axis {MAX_AXES}, the last that a shared frame can carry; lower axis_offset, \
+             or use fan_out = \"slice\"",
+            offset + 1
+        ));
+    }
+    Ok(())
+}
+
+/// Whether datagrams can be sent to one controller at `address`; the reason if not.
+fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
+    let ip = address.ip();
+    if address.port() == 0 {
+        Err("port 0 is no destination; controllers listen on 7408 unless PA14 says otherwise")
+    } else if ip.is_broadcast() || ip.is_multicast() {
+        Err("is not the address of one controller; frames are sent to each by itself")
+    } else if ip.is_unspecified() {
+        Err("is no destination; give the controller's own address (PA10 to PA13)")
+    } else {
+        Ok(())
+    }
+}
+
+/// Whether cues can use `name` for an effect; the reason if not.
+fn check_effect_name(name: &str) -> Result<(), &'static str> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !name.is_empty() && name.chars().all(fits) {
+        Ok(())
+    } else {
+        Err("an effect's name has letters, digits, - and _ alone")
+    }
+}

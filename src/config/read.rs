@@ -1,0 +1,308 @@
+//! From the text of a configuration file to a [`Config`]: section by section, noting every fault.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::net::SocketAddrV4;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use toml::de::DeTable;
+
+use crate::motion::{MAX_AXES, SeatType};
+
+use super::fault::{ConfigFault, ConfigFaults, Faults, place};
+use super::section::{Entry, Section, did_you_mean};
+use super::{
+    Accept, Config, Controller, Dialect, Effect, FanOut, LossPolicy, MAX_FILE_LEN, Show, Timing,
+    check_effect_name, check_peer, check_window,
+};
+
+/// The text of a file of at most [`MAX_FILE_LEN`] octets.
+pub(super) fn file(path: &Path) -> Result<String, ConfigFaults> {
+    let unreadable = |source| ConfigFaults::Unreadable { path: path.to_owned(), source };
+    let file = File::open(path).map_err(unreadable)?;
+    if file.metadata().map_err(unreadable)?.is_dir() {
+        return Err(unreadable(io::ErrorKind::IsADirectory.into()));
+    }
+    let mut octets = Vec::new();
+    file.take(MAX_FILE_LEN + 1).read_to_end(&mut octets).map_err(unreadable)?;
+    let bad = |at: usize, message: &str| {
+        let (line, column) = place(&octets, at);
+        ConfigFaults::Bad(vec![ConfigFault {
+            path: path.to_owned(),
+            line,
+            column,
+            message: message.to_owned(),
+        }])
+    };
+    if octets.len() as u64 > MAX_FILE_LEN {
+        return Err(bad(0, &format!("the file is longer than {MAX_FILE_LEN} octets")));
+    }
+    match str::from_utf8(&octets) {
+        Ok(text) => Ok(text.to_owned()),
+        Err(error) => Err(bad(error.valid_up_to(), "the file is not UTF-8")),
+    }
+}
+
+/// Checks the text of the file at `path`.
+pub(super) fn document(path: &Path, text: &str) -> Result<Config, ConfigFaults> {
+    let mut faults = Faults::of(text);
+    let (tree, errors) = DeTable::parse_recoverable(text);
+    for error in errors {
+        faults.note_syntax(error.span().map_or(0, |span| span.start), error.message());
+    }
+    let config = root(tree.get_ref(), &mut faults);
+    match config {
+        Some(config) if faults.is_empty() => Ok(config),
+        _ => Err(ConfigFaults::Bad(faults.into_list(path))),
+    }
+}
+
+fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
+    let mut section = Section::new("the file", 0, table, faults);
+    let [show_at, seat_at, effects_at, controller_at] =
+        ["show", "seat", "effects", "controller"].map(|key| section.get(key));
+    if controller_at.is_none() {
+        section.faults.note_missing(0, "there is no [[controller]]; name at least one");
+    }
+    section.finish();
+    let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
+    let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
+    let effects = effects_at.map_or_else(Vec::new, |entry| effects(entry, faults));
+    let site = Site { seats: &seats, named: &named, effects: &effects };
+    let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
+    Some(Config { show: show?, seats, effects, controllers })
+}
+
+fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
+    let default = Show::default();
+    let mut section = Section::new("[show]", entry.at, entry.table(faults)?, faults);
+    let timing = [("relative", Timing::Relative), ("absolute", Timing::Absolute)];
+    let policy =
+        [("continue", LossPolicy::Continue), ("pause", LossPolicy::Pause), ("park", LossPolicy::Park)];
+    let show = Show {
+        rate_hz: section.number_in("rate_hz", 1.0..=1000.0).unwrap_or(default.rate_hz),
+        timing: section.choice("time", &timing).unwrap_or(default.timing),
+        bind: section.address("bind").unwrap_or(default.bind),
+        ack_every: section.whole_in("ack_every", 1..=1000).unwrap_or(default.ack_every),
+        loss_policy: section.choice("loss_policy", &policy).unwrap_or(default.loss_policy),
+        spin_us: section.whole_in("spin_us", 0..=900).unwrap_or(default.spin_us),
+        library: section.text("library").map_or(default.library, PathBuf::from),
+    };
+    section.finish();
+    Some(show)
+}
+
+/// The seat types that are sound, and the names of all.
+fn seats<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> (Vec<Arc<SeatType>>, Vec<&'t str>) {
+    let Some(table) = entry.table(faults) else { return Default::default() };
+    let mut sound = Vec::new();
+    for (name, value) in table {
+        let entry = Entry::new(name.get_ref(), value);
+        sound.extend(seat(entry, faults).map(Arc::new));
+    }
+    (sound, table.keys().map(|name| name.get_ref().as_ref()).collect())
+}
+
+fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
+    let table = entry.table(faults)?;
+    let mut section = Section::new(format!("[seat.{}]", entry.key), entry.at, table, faults);
+    section.require(&[
+        "axes",
+        "stroke_mm",
+        "lead_mm",
+        "pulses_per_rev",
+        "max_velocity_mm_s",
+        "max_acceleration_mm_s2",
+        "max_jerk_mm_s3",
+    ]);
+    let axes = section.whole_in("axes", 1..=MAX_AXES);
+    let stroke_mm = section.above_zero("stroke_mm");
+    let lead_mm = section.above_zero("lead_mm");
+    let pulses_per_rev = section.above_zero("pulses_per_rev");
+    let velocity = section.above_zero("max_velocity_mm_s");
+    let acceleration = section.above_zero("max_acceleration_mm_s2");
+    let jerk = section.above_zero("max_jerk_mm_s3");
+    let park = fractions(&mut section, "park", axes).unwrap_or_default();
+    let neutral = fractions(&mut section, "neutral", axes).unwrap_or(park);
+    section.finish();
+    let seat = SeatType {
+        name: entry.key.to_owned(),
+        axes: axes?,
+        stroke_mm: stroke_mm?,
+        lead_mm: lead_mm?,
+        pulses_per_rev: pulses_per_rev?,
+        max_velocity_mm_s: velocity?,
+        max_acceleration_mm_s2: acceleration?,
+        max_jerk_mm_s3: jerk?,
+        park,
+        neutral,
+    };
+    let pulses = seat.stroke_pulses();
+    if !(1.0..=f64::from(i32::MAX)).contains(&pulses) {
+        let message = format!("the stroke is {pulses:.1} pulses, outside 1..={}", i32::MAX);
+        table.get("stroke_mm").map(|value| Entry::new("stroke_mm", value))?.fault(faults, &message);
+        return None;
+    }
+    Some(seat)
+}
+
+/// A pose of the seat: one fraction of the stroke for each axis.
+fn fractions(
+    section: &mut Section<'_, '_, '_>,
+    key: &'static str,
+    axes: Option<usize>,
+) -> Option<[f64; MAX_AXES]> {
+    let entry = section.get(key)?;
+    let values = entry.array(section.faults)?;
+    if let Some(axes) = axes.filter(|&axes| axes != values.len()) {
+        entry.fault(section.faults, &format!("{} values for {axes} axes; give one for each", values.len()));
+        return None;
+    }
+    let mut pose = [0.0; MAX_AXES];
+    for (axis, value) in pose.iter_mut().zip(&values) {
+        *axis = value.number_in(0.0..=1.0, section.faults).unwrap_or(0.0);
+    }
+    Some(pose)
+}
+
+fn effects(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<Effect> {
+    let Some(table) = entry.table(faults) else { return Vec::new() };
+    let mut effects = Vec::new();
+    for (name, value) in table {
+        if let Err(reason) = check_effect_name(name.get_ref()) {
+            faults.note(name.span().start, format!("{:?}: {reason}", name.get_ref()));
+        }
+        let output = Entry::new(name.get_ref(), value).whole_in(1..=12, faults);
+        // A name whose output is wrong still counts as known, so that one slip makes one fault.
+        effects.push(Effect { name: name.get_ref().to_string(), output: output.unwrap_or(1) });
+    }
+    effects
+}
+
+/// What controllers refer to.
+struct Site<'a> {
+    seats: &'a [Arc<SeatType>],
+    /// The names of all seat types, also of those with faults.
+    named: &'a [&'a str],
+    effects: &'a [Effect],
+}
+
+fn controllers(entry: Entry<'_>, site: &Site<'_>, faults: &mut Faults<'_>) -> Vec<Controller> {
+    if entry.value.is_table() {
+        entry.fault(faults, "write [[controller]], with two brackets, once for each controller");
+        return Vec::new();
+    }
+    let Some(entries) = entry.array(faults) else { return Vec::new() };
+    let mut taken = Vec::new();
+    let mut sound = Vec::new();
+    for entry in entries {
+        let Some(table) = entry.table(faults) else { continue };
+        sound.extend(controller(entry.at, table, site, faults));
+        for key in ["name", "address"] {
+            if let Some(value) = table.get(key) {
+                refuse_repeat(Entry::new(key, value), &mut taken, faults);
+            }
+        }
+    }
+    sound
+}
+
+/// Notes a name or address that a controller before has too; `taken` holds key, value and place of each.
+fn refuse_repeat<'t>(entry: Entry<'t>, taken: &mut Vec<(&'t str, String, usize)>, faults: &mut Faults<'_>) {
+    let Some(text) = entry.value.as_str() else { return };
+    // One address can be spelt in more than one way.
+    let value = text.parse().map_or_else(|_| text.to_owned(), |address: SocketAddrV4| address.to_string());
+    match taken.iter().find(|(key, before, _)| *key == entry.key && *before == value) {
+        None => taken.push((entry.key, value, entry.at)),
+        Some(&(_, _, first)) => {
+            let line = faults.line(first);
+            entry.fault(faults, &format!("{value} is that of another controller too, on line {line}"));
+        }
+    }
+}
+
+fn controller<'t>(
+    at: usize,
+    table: &'t DeTable<'t>,
+    site: &Site<'_>,
+    faults: &mut Faults<'_>,
+) -> Option<Controller> {
+    let mut section = Section::new("[[controller]]", at, table, faults);
+    section.require(&["name", "seat", "address"]);
+    let name = section.text("name");
+    let row = section.text("row");
+    let group = section.text("group");
+    let seat = seat_of(&mut section, site);
+    let address = section.address("address");
+    if let (Some(address), Some(entry)) = (address, section.get("address"))
+        && let Err(reason) = check_peer(address)
+    {
+        entry.fault(section.faults, &format!("{address}: {reason}"));
+    }
+    let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
+    let fan_out = section.choice("fan_out", &[("slice", FanOut::Slice), ("shared", FanOut::Shared)]);
+    let dialect = section.choice("dialect", &[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)]);
+    let accept = accept(&mut section).unwrap_or(Accept::All);
+    let effects = effects_of(&mut section, site);
+    section.finish();
+    let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
+    if let Err(reason) = check_window(axis_offset, seat.axes, fan_out) {
+        faults.note(table.get("axis_offset").map_or(at, |value| value.span().start), reason);
+    }
+    Some(Controller {
+        group: group.unwrap_or_else(|| name.clone()),
+        name,
+        row,
+        seat,
+        address: address?,
+        axis_offset,
+        fan_out,
+        dialect: dialect.unwrap_or(Dialect::Smc),
+        accept,
+        effects,
+    })
+}
+
+fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<SeatType>> {
+    let entry = section.get("seat")?;
+    let name = entry.text(section.faults)?;
+    if !site.named.contains(&name) {
+        let hint = did_you_mean(name, site.named.iter().copied());
+        entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
+    }
+    site.seats.iter().find(|seat| seat.name == name).cloned()
+}
+
+fn accept(section: &mut Section<'_, '_, '_>) -> Option<Accept> {
+    let entry = section.get("accept")?;
+    let text = entry.text(section.faults)?;
+    if text == "station" {
+        return Some(Accept::Station);
+    }
+    let hex = text.len() == 4 && text.bytes().all(|octet| octet.is_ascii_hexdigit());
+    match u16::from_str_radix(text, 16).ok().filter(|_| hex) {
+        Some(0) => entry.fault(section.faults, "0000 means that no station accepts the frame; use \"ffff\""),
+        Some(0xffff) => return Some(Accept::All),
+        Some(code) => return Some(Accept::Code(code)),
+        None => entry.fault(
+            section.faults,
+            &format!("{text:?} is neither \"station\" nor four hex digits, as \"ffff\""),
+        ),
+    }
+    None
+}
+
+fn effects_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Vec<String>> {
+    let entries = section.get("effects")?.array(section.faults)?;
+    let mut names = Vec::new();
+    for entry in entries {
+        let Some(name) = entry.text(section.faults) else { continue };
+        if !site.effects.iter().any(|effect| effect.name == name) {
+            let hint = did_you_mean(name, site.effects.iter().map(|effect| effect.name.as_str()));
+            entry.fault(section.faults, &format!("{name} is not in [effects]{hint}"));
+        }
+        names.push(name.to_owned());
+    }
+    Some(names)
+}

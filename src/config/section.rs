@@ -1,0 +1,247 @@
+//! Reads one table of a TOML document and notes every fault of it, instead of stopping at the first.
+
+use std::fmt::Display;
+use std::net::SocketAddrV4;
+use std::ops::RangeInclusive;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::fault::Faults;
+
+/// How alike two words must be, 0 to 1, for one to be taken as a slip for the other.
+const ALIKE: f64 = 0.75;
+
+/// The kinds of whole number that settings have.
+pub(super) trait Whole: TryFrom<i64> + PartialOrd + Display {}
+
+impl Whole for u8 {}
+impl Whole for u32 {}
+impl Whole for usize {}
+
+/// A value and its place.
+#[derive(Clone, Copy)]
+pub(super) struct Entry<'t> {
+    /// What faults call it: its key.
+    pub(super) key: &'t str,
+    /// Its first octet in the text.
+    pub(super) at: usize,
+    pub(super) value: &'t DeValue<'t>,
+}
+
+impl<'t> Entry<'t> {
+    pub(super) fn new(key: &'t str, value: &'t Spanned<DeValue<'t>>) -> Self {
+        Self { key, at: value.span().start, value: value.get_ref() }
+    }
+
+    /// Notes what is wrong with it.
+    pub(super) fn fault(&self, faults: &mut Faults<'_>, message: &str) {
+        faults.note(self.at, format!("{}: {message}", self.key));
+    }
+
+    fn wrong_type(&self, faults: &mut Faults<'_>, wanted: &str) {
+        self.fault(faults, &format!("{wanted} is wanted here, not {}", kind(self.value)));
+    }
+
+    pub(super) fn table(&self, faults: &mut Faults<'_>) -> Option<&'t DeTable<'t>> {
+        let table = self.value.as_table();
+        if table.is_none() {
+            self.wrong_type(faults, "a table");
+        }
+        table
+    }
+
+    /// The values of an array, each under the array's own key.
+    pub(super) fn array(&self, faults: &mut Faults<'_>) -> Option<Vec<Self>> {
+        let Some(array) = self.value.as_array() else {
+            self.wrong_type(faults, "an array");
+            return None;
+        };
+        Some(array.iter().map(|value| Entry::new(self.key, value)).collect())
+    }
+
+    pub(super) fn text(&self, faults: &mut Faults<'_>) -> Option<&'t str> {
+        let text = self.value.as_str();
+        match text {
+            None => self.wrong_type(faults, "a string"),
+            Some(text) if text.trim().is_empty() || text.chars().any(char::is_control) => {
+                self.fault(faults, &format!("{text:?} has nothing to read, or control characters"));
+                return None;
+            }
+            Some(_) => {}
+        }
+        text
+    }
+
+    /// A finite number, whole or not.
+    pub(super) fn number(&self, faults: &mut Faults<'_>) -> Option<f64> {
+        let number = match self.value {
+            DeValue::Integer(digits) if digits.radix() == 10 => digits.as_str().parse().ok(),
+            DeValue::Integer(_) => {
+                whole_number(self.value).and_then(|n| u32::try_from(n).ok()).map(f64::from)
+            }
+            DeValue::Float(digits) => digits.as_str().parse().ok(),
+            _ => {
+                self.wrong_type(faults, "a number");
+                return None;
+            }
+        };
+        let finite = number.filter(|number: &f64| number.is_finite());
+        if finite.is_none() {
+            self.fault(faults, &format!("{} is not a finite number", shown(self.value)));
+        }
+        finite
+    }
+
+    pub(super) fn number_in(&self, range: RangeInclusive<f64>, faults: &mut Faults<'_>) -> Option<f64> {
+        let number = self.number(faults)?;
+        if !range.contains(&number) {
+            let (least, most) = (range.start(), range.end());
+            self.fault(faults, &format!("{} is outside {least}..={most}", shown(self.value)));
+            return None;
+        }
+        Some(number)
+    }
+
+    pub(super) fn whole_in<T: Whole>(&self, range: RangeInclusive<T>, faults: &mut Faults<'_>) -> Option<T> {
+        if !self.value.is_integer() {
+            self.wrong_type(faults, "a whole number");
+            return None;
+        }
+        let whole = whole_number(self.value).and_then(|n| T::try_from(n).ok());
+        let within = whole.filter(|n| range.contains(n));
+        if within.is_none() {
+            let (least, most) = (range.start(), range.end());
+            self.fault(faults, &format!("{} is outside {least}..={most}", shown(self.value)));
+        }
+        within
+    }
+}
+
+/// One table that is being read.
+pub(super) struct Section<'t, 'f, 'x> {
+    name: String,
+    at: usize,
+    table: &'t DeTable<'t>,
+    asked: Vec<&'static str>,
+    pub(super) faults: &'f mut Faults<'x>,
+}
+
+impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
+    /// Starts on the table called `name`, whose header is at octet `at`.
+    pub(super) fn new(
+        name: impl Into<String>,
+        at: usize,
+        table: &'t DeTable<'t>,
+        faults: &'f mut Faults<'x>,
+    ) -> Self {
+        Self { name: name.into(), at, table, asked: Vec::new(), faults }
+    }
+
+    /// Notes each key of `keys` that the table has not.
+    pub(super) fn require(&mut self, keys: &[&str]) {
+        for key in keys.iter().filter(|key| !self.table.contains_key(**key)) {
+            self.faults.note_missing(self.at, format!("{} has no {key}, which is needed", self.name));
+        }
+    }
+
+    /// The value of `key`, which the section then knows.
+    pub(super) fn get(&mut self, key: &'static str) -> Option<Entry<'t>> {
+        self.asked.push(key);
+        self.table.get(key).map(|value| Entry::new(key, value))
+    }
+
+    pub(super) fn text(&mut self, key: &'static str) -> Option<String> {
+        self.get(key)?.text(self.faults).map(str::to_owned)
+    }
+
+    pub(super) fn number_in(&mut self, key: &'static str, range: RangeInclusive<f64>) -> Option<f64> {
+        self.get(key)?.number_in(range, self.faults)
+    }
+
+    pub(super) fn whole_in<T: Whole>(&mut self, key: &'static str, range: RangeInclusive<T>) -> Option<T> {
+        self.get(key)?.whole_in(range, self.faults)
+    }
+
+    pub(super) fn above_zero(&mut self, key: &'static str) -> Option<f64> {
+        let entry = self.get(key)?;
+        let number = entry.number(self.faults)?;
+        if number <= 0.0 {
+            entry.fault(self.faults, &format!("{} is not above 0", shown(entry.value)));
+            return None;
+        }
+        Some(number)
+    }
+
+    pub(super) fn address(&mut self, key: &'static str) -> Option<SocketAddrV4> {
+        let entry = self.get(key)?;
+        let text = entry.text(self.faults)?;
+        let address = text.parse().ok();
+        if address.is_none() {
+            entry.fault(
+                self.faults,
+                &format!("{text:?} is not an IPv4 address and port, as 192.168.15.201:7408"),
+            );
+        }
+        address
+    }
+
+    /// One of a few words, as what it stands for.
+    pub(super) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
+        let entry = self.get(key)?;
+        let text = entry.text(self.faults)?;
+        let chosen = choices.iter().find(|(word, _)| *word == text).map(|&(_, value)| value);
+        if chosen.is_none() {
+            let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
+            let message = format!(
+                "{text:?} is none of {}{}",
+                words.join(", "),
+                did_you_mean(text, words.iter().copied())
+            );
+            entry.fault(self.faults, &message);
+        }
+        chosen
+    }
+
+    /// Notes every key that nothing asked for.
+    pub(super) fn finish(self) {
+        for key in self.table.keys().filter(|key| !self.asked.contains(&key.get_ref().as_ref())) {
+            let word: &str = key.get_ref();
+            let hint = did_you_mean(word, self.asked.iter().copied());
+            self.faults.note(key.span().start, format!("{word}: unknown key in {}{hint}", self.name));
+        }
+    }
+}
+
+/// `; did you mean x?` for the word most like `word`, or nothing.
+pub(super) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
+    let likeness = |candidate: &str| strsim::jaro_winkler(word, candidate);
+    let best = known.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    best.filter(|best| likeness(best) >= ALIKE)
+        .map_or_else(String::new, |best| format!("; did you mean {best}?"))
+}
+
+fn whole_number(value: &DeValue<'_>) -> Option<i64> {
+    let digits = value.as_integer()?;
+    i64::from_str_radix(digits.as_str(), digits.radix()).ok()
+}
+
+fn shown(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::Integer(digits) => digits.to_string(),
+        DeValue::Float(digits) => digits.to_string(),
+        other => kind(other).to_owned(),
+    }
+}
+
+fn kind(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a string",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number with a point",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date or time",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a table",
+    }
+}
