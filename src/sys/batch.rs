@@ -148,13 +148,7 @@ fn receive(
     // buffer and a control buffer with their true lengths; all of them live in this frame or in the exclusively
     // borrowed `buffers` and are not touched while the kernel writes. A null timeout is allowed.
     let count = unsafe {
-        libc::recvmmsg(
-            socket.as_raw_fd(),
-            headers.as_mut_ptr(),
-            VLEN,
-            libc::MSG_DONTWAIT,
-            ptr::null_mut(),
-        )
+        libc::recvmmsg(socket.as_raw_fd(), headers.as_mut_ptr(), VLEN, libc::MSG_DONTWAIT, ptr::null_mut())
     };
     let count = usize::try_from(count).map_err(|_| io::Error::last_os_error())?;
     for ((arrival, header), name) in arrivals.iter_mut().zip(&headers).zip(&names).take(count) {

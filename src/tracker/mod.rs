@@ -1,1 +1,1 @@
-//! x
+//! What became of every frame.
