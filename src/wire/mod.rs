@@ -1,1 +1,105 @@
-//! The protocol of the IMAX, SMC and MBOX controllers: octets to messages and back. Any thread; allocates nothing.
+//! The protocol of the IMAX, SMC and MBOX controllers: octets to messages and back, as host and as controller. Any
+//! thread; neither way allocates, writing cannot fail, and reading takes any octets without a panic.
+//!
+//! Numbers are big-endian throughout; one message is one datagram. Sources are the SMC manual (2.2 and 2.3) and the
+//! IMAX manual (2.2 and 2.3); where they are silent or disagree, what public programs send.
+
+mod error;
+mod frame_no;
+mod header;
+mod imax;
+mod motion;
+mod octets;
+mod per_axis;
+mod position;
+mod register;
+mod report;
+mod servo;
+mod status;
+mod vibration;
+mod words;
+
+pub use error::{DeviceError, WireError};
+pub use frame_no::FrameNo;
+pub use header::{Code, Dialect, ReplyCode};
+pub use imax::{ImaxMotion, ImaxRegisters};
+pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_slots};
+pub use per_axis::PerAxis;
+pub use position::{DP_POSITIONS, position, position_reads, position_words, positions};
+pub use register::{Access, ReadRequest, RegisterReply, Space, WriteRequest};
+pub use report::Report;
+pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
+pub use status::Status;
+pub use vibration::Vibration;
+pub use words::{MAX_WORDS, Words};
+
+/// Octets that hold any message we write; the longest carries a whole table of registers.
+pub const MAX_LEN: usize = words::HEAD_LEN + 2 * MAX_WORDS;
+
+/// Any message of the protocol, read from a datagram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Message<'a> {
+    /// 0x1301, 0x1401, 0x1801, 0x1901.
+    Motion(MotionRequest),
+    /// 0x130x, 0x140x, 0x180x, 0x190x.
+    MotionReply(MotionReply),
+    /// 0x1101.
+    Read(ReadRequest),
+    /// 0x1201.
+    Write(WriteRequest<'a>),
+    /// 0x110x, 0x120x.
+    RegisterReply(RegisterReply<'a>),
+    /// 0x2101.
+    ServoRead(ServoRead),
+    /// 0x2201.
+    ServoWrite(ServoWrite<'a>),
+    /// 0x210x, 0x220x.
+    ServoReply(ServoReply<'a>),
+    /// 0x3101.
+    Status(Status),
+    /// 0x1001.
+    Report(Report<'a>),
+}
+
+impl<'a> Message<'a> {
+    /// Reads any message of the SMC and MBOX layout.
+    ///
+    /// # Errors
+    /// At which octet, and why, these octets are none.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        if octets.len() < header::SLOT {
+            return Err(WireError::Short { len: octets.len(), need: header::LEN });
+        }
+        let found = header::function_at(octets)?;
+        let [family, low] = found.to_be_bytes();
+        match (family, low) {
+            (family, 1) if motion::is_motion(family) => MotionRequest::parse(octets).map(Self::Motion),
+            (family, _) if motion::is_motion(family) => MotionReply::parse(octets).map(Self::MotionReply),
+            (register::READ, 1) => ReadRequest::parse(octets).map(Self::Read),
+            (register::WRITE, 1) => WriteRequest::parse(octets).map(Self::Write),
+            (register::READ | register::WRITE, _) => RegisterReply::parse(octets).map(Self::RegisterReply),
+            (servo::READ, 1) => ServoRead::parse(octets).map(Self::ServoRead),
+            (servo::WRITE, 1) => ServoWrite::parse(octets).map(Self::ServoWrite),
+            (servo::READ | servo::WRITE, _) => ServoReply::parse(octets).map(Self::ServoReply),
+            (status::FAMILY, _) => Status::parse(octets).map(Self::Status),
+            (report::FAMILY, _) => Report::parse(octets).map(Self::Report),
+            _ => Err(WireError::Function { found }),
+        }
+    }
+
+    /// Writes the message to the front of `buf` and returns it; nothing of what was there is kept.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        match self {
+            Self::Motion(message) => message.emit(buf),
+            Self::MotionReply(message) => message.emit(buf),
+            Self::Read(message) => message.emit(buf),
+            Self::Write(message) => message.emit(buf),
+            Self::RegisterReply(message) => message.emit(buf),
+            Self::ServoRead(message) => message.emit(buf),
+            Self::ServoWrite(message) => message.emit(buf),
+            Self::ServoReply(message) => message.emit(buf),
+            Self::Status(message) => message.emit(buf),
+            Self::Report(message) => message.emit(buf),
+        }
+    }
+}

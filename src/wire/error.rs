@@ -1,0 +1,106 @@
+//! Why octets are no message, and what the numbers mean that a controller puts into its replies.
+
+use std::fmt;
+
+/// Why octets are not a message of the protocol, and at which octet (counted from 0) that shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WireError {
+    /// It ends inside its header.
+    #[error("octet {len}: ends after {len} octets, inside the header; {need} are needed")]
+    Short {
+        /// Octets there are.
+        len: usize,
+        /// Octets the header takes.
+        need: usize,
+    },
+    /// It does not open with the confirm code of its function.
+    #[error("octet 0: confirm code {found:04x} where {expected:04x} belongs")]
+    Confirm {
+        /// What it opens with.
+        found: u16,
+        /// What its function asks for.
+        expected: u16,
+    },
+    /// The pass code is not zero.
+    #[error("octet 2: pass code {found:04x} where 0000 belongs")]
+    Pass {
+        /// What stands there.
+        found: u16,
+    },
+    /// No function, or not one of those asked for.
+    #[error("octet 4: function code {found:04x} is none that belongs here")]
+    Function {
+        /// What stands there.
+        found: u16,
+    },
+    /// The object channel, or the count of axes, fits no number of axes from 1 to 12.
+    #[error("octet {at}: {found} names no number of axes; 3 to 12 axes are possible")]
+    Axes {
+        /// Where the channel or count stands.
+        at: usize,
+        /// What stands there.
+        found: u16,
+    },
+    /// It is shorter than its function, channel and counts say.
+    #[error("octet {len}: ends after {len} octets; this message takes {need}")]
+    Length {
+        /// Octets there are.
+        len: usize,
+        /// Octets its layout takes.
+        need: usize,
+    },
+    /// It is longer than its layout, where nothing may follow.
+    #[error("octet {need}: goes on to {len} octets; this message takes {need}")]
+    Surplus {
+        /// Octets there are.
+        len: usize,
+        /// Octets its layout takes.
+        need: usize,
+    },
+    /// It counts more registers than the controller has.
+    #[error("octet {at}: {found} registers at once; at most {max} are possible")]
+    Count {
+        /// Where the count stands.
+        at: usize,
+        /// What stands there.
+        found: u16,
+        /// The most there can be.
+        max: u16,
+    },
+}
+
+impl WireError {
+    /// The octet at which the fault shows, counted from 0.
+    #[must_use]
+    pub const fn offset(self) -> usize {
+        match self {
+            Self::Confirm { .. } => 0,
+            Self::Pass { .. } => 2,
+            Self::Function { .. } => 4,
+            Self::Axes { at, .. } | Self::Count { at, .. } => at,
+            Self::Short { len, .. } | Self::Length { len, .. } => len,
+            Self::Surplus { need, .. } => need,
+        }
+    }
+}
+
+/// An error number of a controller, shown in words (chapter 6 of both manuals).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeviceError(pub u16);
+
+impl fmt::Display for DeviceError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = self.0;
+        match number {
+            0 => f.write_str("unspecified"),
+            1..=6 => write!(f, "Err{number}: no communication with the servo of axis {number}"),
+            7 => f.write_str("Err7: the servo is of another model"),
+            10..=15 => write!(f, "Err{number}: alarm of the servo of axis {}", number - 9),
+            17 => f.write_str("Err17: the play time began too long"),
+            20 => f.write_str("Err20: UDP memory overflow"),
+            21 => f.write_str("Err21: UDP data buffer overflow; needs a reset"),
+            _ => write!(f, "Err{number}: not in the manual"),
+        }
+    }
+}

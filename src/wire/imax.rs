@@ -1,0 +1,140 @@
+//! Messages as the IMAX manual prints them: motion without a frame number and with four octets of outputs (2.2.2.6,
+//! 2.2.2.7), registers of 32 bits (2.3). No program is known to send them, so they are only read, to put a capture in
+//! words.
+
+use super::header::{self, Header};
+use super::octets::{i32_at, u32_at};
+use super::{Access, Code, PerAxis, ReplyCode, Timing, WireError, register, words};
+use crate::motion::{MAX_AXES, Pulses};
+
+mod field {
+    pub(super) const TIME: usize = 12; // u32, ms
+    pub(super) const POSITIONS: usize = 16; // n x i32; then Port u32, PlayDAC u32
+    pub(super) const TAIL_LEN: usize = 8;
+}
+
+/// A motion frame, or the reply to one, of the literal IMAX layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImaxMotion {
+    /// What `time_ms` counts from.
+    pub timing: Timing,
+    /// What became of the frame; none in the frame itself.
+    pub code: Option<ReplyCode>,
+    /// Object channel, kept in every reply.
+    pub channel: u16,
+    /// Who shall obey.
+    pub accept: Code,
+    /// Who shall answer.
+    pub reply: Code,
+    /// Time to reach the positions, ms.
+    pub time_ms: u32,
+    /// Where each axis shall be.
+    pub positions: PerAxis<Pulses>,
+    /// Outputs of a frame, inputs of a reply; bit 0 = Y01 or X01.
+    pub port: u32,
+    /// Analogue outputs.
+    pub dac: u32,
+}
+
+impl ImaxMotion {
+    /// Reads 0x1301, 0x1401 and their replies.
+    ///
+    /// # Errors
+    /// [`WireError::Axes`], [`WireError::Length`] or [`WireError::Surplus`] unless channel and length agree exactly,
+    /// and those of a broken header or another function.
+    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        let timing = match header.family() {
+            0x13 => Timing::Absolute,
+            0x14 => Timing::Relative,
+            _ => return Err(header.foreign()),
+        };
+        let code = header.reply_code();
+        if code.is_none() && !header.is_request() {
+            return Err(header.foreign());
+        }
+        let axes = axes(header.slot, octets.len())?;
+        let (len, need) = (octets.len(), Self::len(axes));
+        if len < need {
+            return Err(WireError::Length { len, need });
+        }
+        if len > need {
+            return Err(WireError::Surplus { len, need });
+        }
+        let port = field::POSITIONS + 4 * axes;
+        Ok(Self {
+            timing,
+            code,
+            channel: header.slot,
+            accept: header.accept,
+            reply: header.reply,
+            time_ms: u32_at(octets, field::TIME),
+            positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(octets, field::POSITIONS + 4 * axis))),
+            port: u32_at(octets, port),
+            dac: u32_at(octets, port + 4),
+        })
+    }
+
+    /// Octets for `axes` axes: 36 for three, 48 for six.
+    #[must_use]
+    pub const fn len(axes: usize) -> usize {
+        field::POSITIONS + 4 * axes + field::TAIL_LEN
+    }
+}
+
+fn axes(channel: u16, octets: usize) -> Result<usize, WireError> {
+    match channel {
+        0 => Ok(3),
+        1 => Ok(6),
+        2 => Ok((octets.saturating_sub(ImaxMotion::len(0)) / 4).clamp(1, MAX_AXES)),
+        found => Err(WireError::Axes { at: header::SLOT, found }),
+    }
+}
+
+/// A reply about registers with words of 32 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImaxRegisters<'a> {
+    /// What it answers.
+    pub access: Access,
+    /// What became of the request.
+    pub code: ReplyCode,
+    /// Object channel, kept in every reply.
+    pub channel: u16,
+    /// The first register.
+    pub start: u16,
+    /// How many were asked for.
+    pub num: u16,
+    data: &'a [u8],
+}
+
+impl<'a> ImaxRegisters<'a> {
+    /// Reads 0x110x and 0x120x.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] or [`WireError::Surplus`] unless x = 2 has four octets for each register, and those of a
+    /// broken header or another function.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        let access = match header.family() {
+            register::READ => Access::Read,
+            register::WRITE => Access::Write,
+            _ => return Err(header.foreign()),
+        };
+        let code = header.reply_code().ok_or(header.foreign())?;
+        let (start, num) = words::ask(octets)?;
+        let (len, need) = (octets.len(), words::HEAD_LEN + 4 * usize::from(num));
+        if code == ReplyCode::Running && len < need {
+            return Err(WireError::Length { len, need });
+        }
+        if code == ReplyCode::Running && len > need {
+            return Err(WireError::Surplus { len, need });
+        }
+        let data = &octets[words::HEAD_LEN..];
+        Ok(Self { access, code, channel: header.slot, start, num, data })
+    }
+
+    /// The registers in order; with x = 3 the error number.
+    pub fn values(&self) -> impl Iterator<Item = u32> + use<'a> {
+        self.data.chunks_exact(4).map(|word| u32_at(word, 0))
+    }
+}

@@ -1,0 +1,79 @@
+//! Positions of axes 1 to 6 in the monitor registers: two words each, in an order that the manuals disagree on (SMC
+//! manual 2.3.3: low word first; IMAX manual 2.3.3: high word first). Further axes have none.
+
+use super::{Code, Dialect, PerAxis, ReadRequest, Words};
+use crate::motion::Pulses;
+
+/// The monitor register at which the position of each of axes 1 to 6 begins.
+pub const DP_POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
+
+/// Axes of one block of position registers.
+const AXES_PER_BLOCK: usize = 3;
+
+/// The reads that tell the position of axes 1 to `axes`: DP06.. for axes 1 to 3, and DP21.. for 4 to 6 where there are
+/// as many. The words of each answer go to [`positions`].
+pub fn position_reads(axes: usize, accept: Code, reply: Code) -> impl Iterator<Item = ReadRequest> {
+    let axes = axes.min(DP_POSITIONS.len());
+    (0..axes).step_by(AXES_PER_BLOCK).map(move |first| {
+        let num = if axes - first < AXES_PER_BLOCK { axes - first } else { AXES_PER_BLOCK };
+        let num = super::octets::count(2 * num);
+        ReadRequest { channel: 0, accept, reply, start: DP_POSITIONS[first], num }
+    })
+}
+
+/// The positions that position registers hold, first axis first; an odd word at the end is left out.
+#[must_use]
+pub fn positions(words: Words<'_>, dialect: Dialect) -> PerAxis<Pulses> {
+    PerAxis::from_fn(words.len() / 2, |axis| {
+        let word = |index| words.get(index).unwrap_or(0);
+        position([word(2 * axis), word(2 * axis + 1)], dialect)
+    })
+}
+
+/// The position that two registers hold.
+#[must_use]
+pub const fn position(words: [u16; 2], dialect: Dialect) -> Pulses {
+    let [low, high] = swapped(words, dialect);
+    Pulses(((high as u32) << 16 | low as u32).cast_signed())
+}
+
+/// The two registers that hold a position.
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "each takes half of the 32 bits")]
+pub const fn position_words(position: Pulses, dialect: Dialect) -> [u16; 2] {
+    let bits = position.0.cast_unsigned();
+    swapped([bits as u16, (bits >> 16) as u16], dialect)
+}
+
+const fn swapped([first, second]: [u16; 2], dialect: Dialect) -> [u16; 2] {
+    match dialect {
+        Dialect::Smc => [first, second],
+        Dialect::Mbox => [second, first],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_word_order_follows_the_dialect() {
+        assert_eq!(position([6784, 6], Dialect::Smc), Pulses(400_000));
+        assert_eq!(position([6, 6784], Dialect::Mbox), Pulses(400_000));
+        assert_eq!(positions(Words::from(&[0xff9c, 0xffff, 7][..]), Dialect::Smc)[..], [Pulses(-100)]);
+        for dialect in [Dialect::Smc, Dialect::Mbox] {
+            let there = Pulses(-1_234_567);
+            assert_eq!(position(position_words(there, dialect), dialect), there);
+        }
+    }
+
+    #[test]
+    fn four_axes_take_two_reads_and_ten_no_more() {
+        let reads = |axes| -> Vec<(u16, u16)> {
+            position_reads(axes, Code::ALL, Code::ALL).map(|read| (read.start, read.num)).collect()
+        };
+        assert_eq!(reads(2), [(0x06, 4)]);
+        assert_eq!(reads(4), [(0x06, 6), (0x21, 2)]);
+        assert_eq!(reads(10), [(0x06, 6), (0x21, 6)]);
+    }
+}

@@ -1,0 +1,186 @@
+//! Registers of the controller: 0x1101 reads, 0x1201 writes, and their replies (SMC manual 2.2.2.1 to 2.2.2.4).
+
+use super::header::{Header, reply_function, request_function};
+use super::words::{self, Words};
+use super::{Code, Dialect, MAX_LEN, ReplyCode, WireError};
+
+pub(super) const READ: u8 = 0x11;
+pub(super) const WRITE: u8 = 0x12;
+
+/// A table of registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Space {
+    /// DP00 to DPFF: what the controller sees and does.
+    Monitor,
+    /// PA00 to PAFF: its parameters.
+    Parameter,
+    /// DPF0 to DPFF, counted from DPF0: reset, outputs, reboot.
+    Control,
+}
+
+impl Space {
+    /// The table that an object channel means in a read.
+    #[must_use]
+    pub const fn of_read(channel: u16) -> Option<Self> {
+        match channel {
+            0 => Some(Self::Monitor),
+            1 => Some(Self::Parameter),
+            _ => None,
+        }
+    }
+
+    /// The table that an object channel means in a write. Channel 0 is parameters that are not kept over a power
+    /// cycle on MBOX.
+    #[must_use]
+    pub const fn of_write(channel: u16, dialect: Dialect) -> Option<Self> {
+        match (channel, dialect) {
+            (0, Dialect::Smc) => Some(Self::Monitor),
+            (0, Dialect::Mbox) | (1, _) => Some(Self::Parameter),
+            (2, _) => Some(Self::Control),
+            _ => None,
+        }
+    }
+}
+
+/// Host to controller, 0x1101: what stands in these registers?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReadRequest {
+    /// Object channel: 0 DP, 1 PA.
+    pub channel: u16,
+    /// Who shall receive it.
+    pub accept: Code,
+    /// Who shall answer.
+    pub reply: Code,
+    /// The first register.
+    pub start: u16,
+    /// How many.
+    pub num: u16,
+}
+
+impl ReadRequest {
+    /// Writes the request to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let function = request_function(READ);
+        Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
+        words::emit_ask(buf, self.start, self.num)
+    }
+
+    /// Reads a request; octets after it are let pass ("extra data").
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
+    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        if header.family() != READ || !header.is_request() {
+            return Err(header.foreign());
+        }
+        let (start, num) = words::ask(octets)?;
+        Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, num })
+    }
+}
+
+/// Host to controller, 0x1201: put these words into registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WriteRequest<'a> {
+    /// Object channel; see [`Space::of_write`].
+    pub channel: u16,
+    /// Who shall obey.
+    pub accept: Code,
+    /// Who shall answer.
+    pub reply: Code,
+    /// The first register.
+    pub start: u16,
+    /// A word for each register; at most 256.
+    pub data: Words<'a>,
+}
+
+impl<'a> WriteRequest<'a> {
+    /// Writes the request to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let function = request_function(WRITE);
+        Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
+        words::emit_all(buf, self.start, self.data)
+    }
+
+    /// Reads a request; octets after it are let pass.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
+    /// a broken header or another function.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        if header.family() != WRITE || !header.is_request() {
+            return Err(header.foreign());
+        }
+        let (start, data) = words::all(octets)?;
+        Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, data })
+    }
+}
+
+/// What a register reply answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Access {
+    /// A read.
+    Read,
+    /// A write.
+    Write,
+}
+
+/// Controller to host, 0x110x and 0x120x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RegisterReply<'a> {
+    /// What it answers.
+    pub access: Access,
+    /// What became of the request.
+    pub code: ReplyCode,
+    /// The object channel (x = 2 only, else 0).
+    pub channel: u16,
+    /// The error number (x over 2 only, else 0); MBOX controllers leave the object channel there.
+    pub error: u16,
+    /// The first register.
+    pub start: u16,
+    /// How many were asked for.
+    pub num: u16,
+    /// A word for each register; may be fewer, or none, with x over 2.
+    pub data: Words<'a>,
+}
+
+impl<'a> RegisterReply<'a> {
+    /// Writes the reply to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let family = match self.access {
+            Access::Read => READ,
+            Access::Write => WRITE,
+        };
+        let slot = if self.code == ReplyCode::Running { self.channel } else { self.error };
+        let function = reply_function(family, self.code);
+        Header { function, slot, accept: Code::NONE, reply: Code::NONE }.emit(buf);
+        words::emit_some(buf, self.start, self.num, self.data)
+    }
+
+    /// Reads a reply, x = 2 to 5; octets after it are let pass.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Count`] for more than 256,
+    /// and those of a broken header or another function.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        let access = match header.family() {
+            READ => Access::Read,
+            WRITE => Access::Write,
+            _ => return Err(header.foreign()),
+        };
+        let code = header.reply_code().ok_or(header.foreign())?;
+        let running = code == ReplyCode::Running;
+        let (start, num, data) = if running { words::answer(octets)? } else { words::refusal(octets)? };
+        Ok(Self {
+            access,
+            code,
+            channel: if running { header.slot } else { 0 },
+            error: if running { 0 } else { header.slot },
+            start,
+            num,
+            data,
+        })
+    }
+}

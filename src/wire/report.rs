@@ -1,0 +1,46 @@
+//! Registers that an IMAX or MBOX controller reports unasked when something is wrong, 0x1001 (IMAX manual 2.2.2.1).
+
+use super::header::{Header, request_function};
+use super::words::{self, Words};
+use super::{Code, MAX_LEN, WireError};
+
+/// High octet of the function.
+pub(super) const FAMILY: u8 = 0x10;
+
+/// Controller to host: what stands in these registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Report<'a> {
+    /// Object channel: 0 DP.
+    pub channel: u16,
+    /// Who is meant: 0, the host.
+    pub accept: Code,
+    /// Who shall answer: nobody.
+    pub reply: Code,
+    /// The first register.
+    pub start: u16,
+    /// A word for each register; at most 256.
+    pub data: Words<'a>,
+}
+
+impl<'a> Report<'a> {
+    /// Writes the report to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let function = request_function(FAMILY);
+        Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
+        words::emit_all(buf, self.start, self.data)
+    }
+
+    /// Reads a report; octets after it are let pass.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
+    /// a broken header or another function.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        if header.family() != FAMILY || !header.is_request() {
+            return Err(header.foreign());
+        }
+        let (start, data) = words::all(octets)?;
+        Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, data })
+    }
+}

@@ -1,0 +1,146 @@
+//! Registers of the servo drives behind a controller: 0x2101 reads, 0x2201 writes (SMC manual 2.2.2.13 and
+//! 2.2.2.14). The manual has no table for the replies; they are taken to be like those of the controller's own.
+
+use super::header::{Header, reply_function, request_function};
+use super::words::{self, Words};
+use super::{Access, Code, MAX_LEN, ReplyCode, WireError};
+
+pub(super) const READ: u8 = 0x21;
+pub(super) const WRITE: u8 = 0x22;
+
+/// The most registers of a drive that one message may read.
+pub const MAX_SERVO_READ: u16 = 6;
+
+/// Host to controller, 0x2101: what stands in these registers of a drive?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ServoRead {
+    /// The drive, counted from 1.
+    pub servo: u16,
+    /// Who shall receive it.
+    pub accept: Code,
+    /// Who shall answer.
+    pub reply: Code,
+    /// The first register: the drive's parameter number, 508 for PA508.
+    pub start: u16,
+    /// How many; at most [`MAX_SERVO_READ`] are answered.
+    pub num: u16,
+}
+
+impl ServoRead {
+    /// Writes the request to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let function = request_function(READ);
+        Header { function, slot: self.servo, accept: self.accept, reply: self.reply }.emit(buf);
+        words::emit_ask(buf, self.start, self.num)
+    }
+
+    /// Reads a request; octets after it are let pass.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
+    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        if header.family() != READ || !header.is_request() {
+            return Err(header.foreign());
+        }
+        let (start, num) = words::ask(octets)?;
+        Ok(Self { servo: header.slot, accept: header.accept, reply: header.reply, start, num })
+    }
+}
+
+/// Host to controller, 0x2201: put these words into registers of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ServoWrite<'a> {
+    /// The drive, counted from 1.
+    pub servo: u16,
+    /// Who shall obey.
+    pub accept: Code,
+    /// Who shall answer.
+    pub reply: Code,
+    /// The first register: the drive's parameter number, 508 for PA508.
+    pub start: u16,
+    /// A word for each register; at most 256.
+    pub data: Words<'a>,
+}
+
+impl<'a> ServoWrite<'a> {
+    /// Writes the request to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let function = request_function(WRITE);
+        Header { function, slot: self.servo, accept: self.accept, reply: self.reply }.emit(buf);
+        words::emit_all(buf, self.start, self.data)
+    }
+
+    /// Reads a request; octets after it are let pass.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
+    /// a broken header or another function.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        if header.family() != WRITE || !header.is_request() {
+            return Err(header.foreign());
+        }
+        let (start, data) = words::all(octets)?;
+        Ok(Self { servo: header.slot, accept: header.accept, reply: header.reply, start, data })
+    }
+}
+
+/// Controller to host, 0x210x and 0x220x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ServoReply<'a> {
+    /// What it answers.
+    pub access: Access,
+    /// What became of the request.
+    pub code: ReplyCode,
+    /// The drive (x = 2 only, else 0).
+    pub servo: u16,
+    /// The error number (x over 2 only, else 0).
+    pub error: u16,
+    /// The first register.
+    pub start: u16,
+    /// How many were asked for.
+    pub num: u16,
+    /// A word for each register; may be fewer, or none, with x over 2.
+    pub data: Words<'a>,
+}
+
+impl<'a> ServoReply<'a> {
+    /// Writes the reply to the front of `buf` and returns it.
+    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let family = match self.access {
+            Access::Read => READ,
+            Access::Write => WRITE,
+        };
+        let slot = if self.code == ReplyCode::Running { self.servo } else { self.error };
+        let function = reply_function(family, self.code);
+        Header { function, slot, accept: Code::NONE, reply: Code::NONE }.emit(buf);
+        words::emit_some(buf, self.start, self.num, self.data)
+    }
+
+    /// Reads a reply, x = 2 to 5; octets after it are let pass.
+    ///
+    /// # Errors
+    /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Count`] for more than 256,
+    /// and those of a broken header or another function.
+    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(octets)?;
+        let access = match header.family() {
+            READ => Access::Read,
+            WRITE => Access::Write,
+            _ => return Err(header.foreign()),
+        };
+        let code = header.reply_code().ok_or(header.foreign())?;
+        let running = code == ReplyCode::Running;
+        let (start, num, data) = if running { words::answer(octets)? } else { words::refusal(octets)? };
+        Ok(Self {
+            access,
+            code,
+            servo: if running { header.slot } else { 0 },
+            error: if running { 0 } else { header.slot },
+            start,
+            num,
+            data,
+        })
+    }
+}
