@@ -31,6 +31,9 @@ pub mod config;
 
 pub mod sim;
 
+pub mod net;
+pub mod tracker;
+
 pub mod sys;
 
 pub mod cli;

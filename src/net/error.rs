@@ -1,0 +1,54 @@
+//! Why the sockets of a show cannot be opened.
+
+use std::io;
+use std::net::SocketAddrV4;
+
+/// What keeps the sockets from being opened.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetError {
+    /// Two controllers with one address: their replies could not be told apart.
+    #[error("the controller address {0} is given twice; each controller needs its own")]
+    Twice(SocketAddrV4),
+
+    /// An address that is no single controller's.
+    #[error("{0} is not the address of one controller; give its own IPv4 address and a port from 1 to 65535")]
+    NotUnicast(SocketAddrV4),
+
+    /// The system refused.
+    #[error("cannot {attempt} {address}; {remedy}")]
+    Refused {
+        /// What was attempted, in words that lead to the address.
+        attempt: &'static str,
+        /// Where: the local address, or the controller's.
+        address: SocketAddrV4,
+        /// What a person can do about it.
+        remedy: &'static str,
+        /// What the system said.
+        #[source]
+        cause: io::Error,
+    },
+}
+
+impl NetError {
+    /// The refusal of `attempt` at `address`, with the remedy that fits its cause.
+    pub(super) fn refused(attempt: &'static str, address: SocketAddrV4, cause: io::Error) -> Self {
+        let remedy = match cause.raw_os_error() {
+            Some(libc::EADDRINUSE) => {
+                "another program holds the port, perhaps a second kinocue: end it, or bind another port"
+            }
+            Some(libc::EADDRNOTAVAIL) => "no network interface has this address: bind one of this machine's",
+            Some(libc::EACCES | libc::EPERM) => {
+                "ports below 1024 and broadcast addresses are not allowed: use another"
+            }
+            Some(libc::ENETUNREACH | libc::EHOSTUNREACH) => {
+                "no route leads there: check the cable and this machine's address and mask"
+            }
+            Some(libc::EMFILE | libc::ENFILE) => {
+                "too many files are open: raise the limit with LimitNOFILE= or `ulimit -n`"
+            }
+            _ => "check the network settings of this machine",
+        };
+        Self::Refused { attempt, address, remedy, cause }
+    }
+}

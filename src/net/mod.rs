@@ -1,0 +1,72 @@
+//! Datagrams to and from the controllers: one connected socket each, all on one local port, and one more for whoever
+//! else writes to that port. The tick thread has the [`Sender`], the ack thread the [`Receiver`].
+//!
+//! Why not one socket for all: the frames to a controller that is switched off wait for its hardware address and fill
+//! the send buffer, and then the live ones starve. Connected sockets also leave it to the kernel that a reply is taken
+//! from its own controller only.
+
+mod error;
+mod open;
+mod recv;
+mod schedule;
+mod send;
+#[cfg(test)]
+mod tests;
+
+use std::net::SocketAddrV4;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use socket2::Socket;
+
+use crate::time::MonoTime;
+
+pub use error::NetError;
+pub use recv::{Origin, Receiver};
+pub use schedule::DrainGrid;
+pub use send::{Delivery, SendFault, Sender};
+
+/// The sockets of one show, opened and quiet: nothing that was sent before they were connected can be read from them.
+#[derive(Debug)]
+pub struct Ports {
+    local: SocketAddrV4,
+    lanes: Vec<Lane>,
+    stray: Socket,
+    /// Nothing that came before this can be read.
+    quiet: MonoTime,
+}
+
+/// One controller's socket, and how often the kernel reported that its port is closed, be it to the sender or to the
+/// receiver.
+#[derive(Debug)]
+struct Lane {
+    socket: Socket,
+    refusals: AtomicU64,
+}
+
+impl Ports {
+    /// Opens a socket on `bind` for each of `peers`, in their order, and one for strangers. Port 0 takes a free port,
+    /// the same one for all.
+    ///
+    /// While they live, no other program can bind the port, not even one that asks to share it.
+    ///
+    /// # Errors
+    /// [`NetError::Twice`] and [`NetError::NotUnicast`] for peers that cannot have a socket of their own;
+    /// [`NetError::Refused`] where the system refuses, be it that another program has the port.
+    pub fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Self, NetError> {
+        open::open(bind, peers)
+    }
+
+    /// The local address, with the port that was taken.
+    #[must_use]
+    pub const fn local(&self) -> SocketAddrV4 {
+        self.local
+    }
+
+    /// The two halves, for two threads; the sockets are closed with the last of them.
+    #[must_use]
+    pub fn split(self) -> (Sender, Receiver) {
+        let lanes: Arc<[Lane]> = self.lanes.into();
+        (Sender::new(Arc::clone(&lanes)), Receiver::new(lanes, self.stray, self.quiet))
+    }
+}

@@ -1,0 +1,99 @@
+//! Opens the sockets in the one order that keeps every other program off the port.
+
+use std::collections::HashSet;
+use std::io;
+use std::net::{SocketAddr, SocketAddrV4};
+use std::os::fd::AsFd;
+use std::sync::atomic::AtomicU64;
+
+use socket2::{Domain, Protocol, Socket, Type};
+
+use super::{Lane, NetError, Ports};
+use crate::sys::batch::{Batch, stamp_arrivals};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock;
+
+/// Octets of replies that may wait in a socket; the kernel cuts it to what it allows. Generous, so that an ack thread
+/// kept from running for a while finds them all.
+const RECEIVE_BUFFER_LEN: usize = 1 << 20;
+
+/// Batches read from a socket at most to quiet it. A receive buffer holds far fewer.
+const QUIET_BATCHES: usize = 1_024;
+
+/// The socket for strangers binds first and alone, which fails if anyone has the port. Only then may the port be
+/// shared, and only until all of ours are bound: a permission left on any socket would let another program in.
+pub(super) fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Ports, NetError> {
+    check(peers)?;
+    let at_bind = |cause| NetError::refused("bind UDP address", bind, cause);
+    let stray = socket().map_err(at_bind)?;
+    stray.bind(&bind.into()).map_err(at_bind)?;
+    let local = local_address(&stray).map_err(at_bind)?;
+    stray.set_reuse_address(true).map_err(at_bind)?;
+    stamp_arrivals(&stray).map_err(at_bind)?;
+
+    let lanes = peers.iter().map(|&peer| lane(local, peer)).collect::<Result<Vec<_>, _>>()?;
+
+    for socket in lanes.iter().map(|lane| &lane.socket).chain([&stray]) {
+        socket.set_reuse_address(false).map_err(at_bind)?;
+    }
+    let quiet_from = Monotonic.now();
+    let mut batch = Batch::new();
+    for socket in lanes.iter().map(|lane| &lane.socket).chain([&stray]) {
+        quiet(&mut batch, socket);
+    }
+    Ok(Ports { local, lanes, stray, quiet: quiet_from })
+}
+
+fn check(peers: &[SocketAddrV4]) -> Result<(), NetError> {
+    let mut seen = HashSet::new();
+    for &peer in peers {
+        let ip = peer.ip();
+        if ip.is_unspecified() || ip.is_multicast() || ip.is_broadcast() || peer.port() == 0 {
+            return Err(NetError::NotUnicast(peer));
+        }
+        if !seen.insert(peer) {
+            return Err(NetError::Twice(peer));
+        }
+    }
+    Ok(())
+}
+
+fn socket() -> io::Result<Socket> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
+}
+
+fn local_address(socket: &Socket) -> io::Result<SocketAddrV4> {
+    socket.local_addr()?.as_socket_ipv4().ok_or_else(|| io::ErrorKind::AddrNotAvailable.into())
+}
+
+fn lane(local: SocketAddrV4, peer: SocketAddrV4) -> Result<Lane, NetError> {
+    let at_bind = |cause| NetError::refused("bind UDP address", local, cause);
+    let socket = socket().map_err(at_bind)?;
+    prepare(&socket).map_err(at_bind)?;
+    socket.bind(&local.into()).map_err(at_bind)?;
+    socket
+        .connect(&SocketAddr::V4(peer).into())
+        .map_err(|cause| NetError::refused("reach the controller", peer, cause))?;
+    Ok(Lane { socket, refusals: AtomicU64::new(0) })
+}
+
+fn prepare(socket: &Socket) -> io::Result<()> {
+    socket.set_reuse_address(true)?;
+    // The kernel's minimum: after a cable cut, what waits for the wire is thrown away rather than delivered late in one
+    // burst.
+    socket.set_send_buffer_size(1)?;
+    socket.set_recv_buffer_size(RECEIVE_BUFFER_LEN)?;
+    stamp_arrivals(socket)
+}
+
+/// Reads away what came while the socket was bound but not yet connected: anyone could have sent that.
+pub(super) fn quiet(batch: &mut Batch, socket: impl AsFd) {
+    for _ in 0..QUIET_BATCHES {
+        // Any other error is an earlier datagram's, and gone once read.
+        if batch.receive(socket.as_fd()).is_err_and(|e| e.kind() == io::ErrorKind::WouldBlock) {
+            return;
+        }
+    }
+}

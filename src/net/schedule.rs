@@ -1,0 +1,92 @@
+//! When to look for replies: often enough to keep the books fresh, never when a tick is due.
+
+use std::time::Duration;
+
+use crate::time::{MonoTime, nanos};
+
+/// The longest time between two drains.
+const LONGEST: Duration = Duration::from_millis(5);
+
+/// The instants at which replies are drained.
+///
+/// A period of the show is cut into equal parts of at most 5 ms, and a drain falls into the middle of each: as far from
+/// the ticks as it can be. Replies are not waited for, so their number wakes nobody.
+#[derive(Debug, Clone, Copy)]
+pub struct DrainGrid {
+    origin: MonoTime,
+    period_ns: i128,
+    parts: i128,
+}
+
+impl DrainGrid {
+    /// Drains between the ticks at `origin` and every `period` from there, in both directions.
+    ///
+    /// # Panics
+    /// If the period is zero.
+    #[must_use]
+    pub fn new(origin: MonoTime, period: Duration) -> Self {
+        assert!(!period.is_zero(), "ticks have a period");
+        let parts = nanos(period).div_ceil(nanos(LONGEST));
+        Self { origin, period_ns: i128::from(nanos(period)), parts: i128::from(parts) }
+    }
+
+    /// The first drain later than `now`.
+    #[must_use]
+    pub fn next_after(&self, now: MonoTime) -> MonoTime {
+        let elapsed = i128::from(now.as_nanos()) - i128::from(self.origin.as_nanos());
+        // The part in which `now` lies; its drain may be past already.
+        let part = (elapsed * self.parts).div_euclid(self.period_ns);
+        let middle = Some(self.middle_of(part)).filter(|&middle| middle > elapsed);
+        let next = middle.unwrap_or_else(|| self.middle_of(part + 1)) + i128::from(self.origin.as_nanos());
+        MonoTime::from_nanos(u64::try_from(next.max(0)).unwrap_or(u64::MAX))
+    }
+
+    /// Nanoseconds from the origin to the middle of a part, rounded down.
+    fn middle_of(&self, part: i128) -> i128 {
+        ((2 * part + 1) * self.period_ns).div_euclid(2 * self.parts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn us(us: u64) -> MonoTime {
+        MonoTime::from_nanos(us * 1_000)
+    }
+
+    fn drains(grid: DrainGrid, from: MonoTime, count: usize) -> Vec<u64> {
+        let next = |at: &MonoTime| Some(grid.next_after(*at));
+        std::iter::successors(Some(from), next).skip(1).take(count).map(|at| at.as_nanos() / 1_000).collect()
+    }
+
+    #[test]
+    fn a_short_period_is_drained_once_in_its_middle() {
+        let grid = DrainGrid::new(us(10_000), Duration::from_millis(1));
+        assert_eq!(drains(grid, us(10_000), 3), [10_500, 11_500, 12_500]);
+        assert_eq!(drains(DrainGrid::new(us(0), Duration::from_millis(5)), us(0), 2), [2_500, 7_500]);
+    }
+
+    #[test]
+    fn a_long_period_is_drained_at_least_every_five_milliseconds_off_its_ticks() {
+        let grid = DrainGrid::new(us(0), Duration::from_millis(10));
+        assert_eq!(drains(grid, us(0), 4), [2_500, 7_500, 12_500, 17_500]);
+        let grid = DrainGrid::new(us(0), Duration::from_nanos(16_666_667));
+        assert_eq!(drains(grid, us(0), 5), [2_083, 6_250, 10_416, 14_583, 18_750]);
+    }
+
+    #[test]
+    fn the_next_drain_is_later_than_now_wherever_now_is() {
+        let period = Duration::from_nanos(1_000_000_000 / 59);
+        let grid = DrainGrid::new(us(1_000_000), period);
+        for start in [0, 3, 999_999, 1_000_000, 1_000_001, 7_654_321] {
+            let mut at = us(start);
+            for _ in 0..200 {
+                let next = grid.next_after(at);
+                assert!(next > at && next.since(at) <= LONGEST, "{at:?} {next:?}");
+                assert_eq!(grid.next_after(MonoTime::from_nanos(next.as_nanos() - 1)), next);
+                at = next;
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Hands datagrams to the kernel. Tick thread: never blocks, never allocates, no failure stops the next controller.
+
+use std::fmt;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use rustix::io::Errno;
+use rustix::net::SendFlags;
+
+use super::Lane;
+
+/// What became of a datagram on its way into the kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delivery {
+    /// The kernel has it.
+    Sent,
+    /// The kernel has it, after reporting that an earlier datagram met a closed port.
+    SentAfterRefusal,
+    /// The kernel did not take it, and it will not be sent.
+    Failed(SendFault),
+}
+
+/// Why the kernel did not take a datagram.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SendFault {
+    errno: i32,
+}
+
+impl SendFault {
+    /// The system's error number.
+    #[must_use]
+    pub const fn errno(self) -> i32 {
+        self.errno
+    }
+
+    /// Whether the controller's port is closed: it is restarting, or nothing listens there.
+    #[must_use]
+    pub const fn refused(self) -> bool {
+        self.errno == libc::ECONNREFUSED
+    }
+
+    const fn remedy(self) -> &'static str {
+        match self.errno {
+            libc::ECONNREFUSED => {
+                "nothing listens on the controller's port: is it starting, is the port right?"
+            }
+            libc::EAGAIN => {
+                "earlier frames still wait for the wire: is the controller on, is its address right?"
+            }
+            libc::ENETUNREACH | libc::EHOSTUNREACH | libc::ENETDOWN => {
+                "no way leads there: check the cable and this machine's address"
+            }
+            libc::EPERM | libc::EACCES => "a firewall of this machine keeps it back",
+            _ => "the system is short of something; see its log",
+        }
+    }
+}
+
+impl fmt::Display for SendFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}", io::Error::from_raw_os_error(self.errno), self.remedy())
+    }
+}
+
+/// The sending half of [`Ports`](super::Ports).
+#[derive(Debug)]
+pub struct Sender {
+    lanes: Arc<[Lane]>,
+}
+
+impl Sender {
+    pub(super) const fn new(lanes: Arc<[Lane]>) -> Self {
+        Self { lanes }
+    }
+
+    /// How many controllers there are.
+    #[must_use]
+    pub fn lanes(&self) -> usize {
+        self.lanes.len()
+    }
+
+    /// Sends one datagram to controller `lane`, counted from 0 in the order in which they were opened.
+    ///
+    /// The kernel reports a closed port by failing a *later* call, without having sent that one's datagram; so it is
+    /// sent once more, at once. There is no other retry: late motion is worse than none.
+    ///
+    /// # Panics
+    /// If there is no such lane.
+    pub fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
+        let lane = &self.lanes[lane];
+        match lane.send(datagram) {
+            Ok(()) => Delivery::Sent,
+            Err(Errno::CONNREFUSED) => match lane.send(datagram) {
+                Ok(()) => Delivery::SentAfterRefusal,
+                Err(errno) => failed(errno),
+            },
+            Err(errno) => failed(errno),
+        }
+    }
+}
+
+fn failed(errno: Errno) -> Delivery {
+    Delivery::Failed(SendFault { errno: errno.raw_os_error() })
+}
+
+impl Lane {
+    fn send(&self, datagram: &[u8]) -> Result<(), Errno> {
+        let sent = rustix::net::send(&self.socket, datagram, SendFlags::DONTWAIT | SendFlags::NOSIGNAL);
+        if sent == Err(Errno::CONNREFUSED) {
+            self.refusals.fetch_add(1, Ordering::Relaxed);
+        }
+        sent.map(|_octets| ())
+    }
+}

@@ -1,0 +1,84 @@
+//! The machine's clocks: monotonic time for every decision, wall time only to read the kernel's stamps.
+
+use std::time::Duration;
+
+use rustix::io::Errno;
+use rustix::thread::clock_nanosleep_absolute;
+use rustix::time::{ClockId, Timespec, clock_gettime};
+
+use crate::time::{Clock, MonoTime};
+
+const NANOS_PER_SECOND: u64 = 1_000_000_000;
+
+/// The machine's monotonic clock (`CLOCK_MONOTONIC`): never set, never steps, stands still in suspend.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Monotonic;
+
+impl Clock for Monotonic {
+    fn now(&self) -> MonoTime {
+        MonoTime::from_nanos(read(ClockId::Monotonic))
+    }
+
+    /// Sleeps in the kernel until the absolute instant, so that no work before it adds to it; a signal does not end it.
+    fn sleep_until(&self, deadline: MonoTime) {
+        let deadline = timespec(deadline);
+        while clock_nanosleep_absolute(ClockId::Monotonic, &deadline) == Err(Errno::INTR) {}
+    }
+}
+
+/// The wall clock (`CLOCK_REALTIME`) in nanoseconds since 1970. It may step at any time; good for nothing but the age
+/// of a stamp that the kernel took with the same clock.
+#[must_use]
+pub fn wall_now_ns() -> u64 {
+    read(ClockId::Realtime)
+}
+
+/// Processor time that the calling thread has used so far, in user code and in the kernel.
+#[must_use]
+pub fn thread_cpu_time() -> Duration {
+    Duration::from_nanos(read(ClockId::ThreadCPUTime))
+}
+
+fn read(clock: ClockId) -> u64 {
+    let now = clock_gettime(clock);
+    unsigned(now.tv_sec).saturating_mul(NANOS_PER_SECOND).saturating_add(unsigned(now.tv_nsec))
+}
+
+/// A wall clock may stand before 1970; such a reading is of no use and counts as zero.
+fn unsigned(part: i64) -> u64 {
+    u64::try_from(part).unwrap_or(0)
+}
+
+fn timespec(at: MonoTime) -> Timespec {
+    let ns = at.as_nanos();
+    Timespec {
+        tv_sec: i64::try_from(ns / NANOS_PER_SECOND).expect("2^64 nanoseconds are fewer than 2^63 seconds"),
+        tv_nsec: i64::try_from(ns % NANOS_PER_SECOND).expect("less than a second of nanoseconds"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sleep_ends_at_or_after_its_deadline_and_a_past_one_at_once() {
+        let start = Monotonic.now();
+        Monotonic.sleep_until(start + Duration::from_millis(2));
+        assert!(Monotonic.now().since(start) >= Duration::from_millis(2));
+        Monotonic.sleep_until(MonoTime::from_nanos(0));
+        Monotonic.sleep_until(start);
+    }
+
+    #[test]
+    fn an_instant_is_split_into_seconds_and_nanoseconds() {
+        let at = timespec(MonoTime::from_nanos(3_000_000_007));
+        assert_eq!((at.tv_sec, at.tv_nsec), (3, 7));
+    }
+
+    #[test]
+    fn processor_time_of_a_thread_only_grows() {
+        let before = thread_cpu_time();
+        assert!(thread_cpu_time() >= before);
+    }
+}
