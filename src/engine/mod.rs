@@ -14,10 +14,11 @@ pub use slew::MAX_SPEED_UP;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::motion::{Pose, Window};
-use crate::plan::{After, Course, From, Request, To};
+use crate::cue::Vibration;
+use crate::motion::{MAX_AXES, Pose, Window};
+use crate::plan::{Course, From, Request, To};
 use crate::time::ShowTime;
-use crate::timeline::{Hint, Timeline};
+use crate::timeline::{EffectSet, Hint, Timeline};
 use crate::wire::Timing;
 use slew::Slew;
 use stamps::Stamps;
@@ -65,8 +66,18 @@ pub struct Beat {
     pub timing: Timing,
     /// The Time field.
     pub time_ms: u32,
-    /// The tick's own show time, at which vibration and effects are taken; none where both are off.
-    pub show: Option<ShowTime>,
+    /// The vibration of each of the cue's axes, in its unit.
+    pub vibration: [Vibration; MAX_AXES],
+    /// The effects that are on.
+    pub effects: EffectSet,
+}
+
+impl Beat {
+    /// Frames without vibration and effects.
+    #[must_use]
+    pub fn still(timing: Timing, time_ms: u32) -> Self {
+        Self { timing, time_ms, vibration: [Vibration::default(); MAX_AXES], effects: EffectSet::Named(0) }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -191,12 +202,17 @@ impl Engine {
         }
         let time_ms = self.show.rate.time_ms(self.frames);
         self.frames += 1;
-        let riding = self.phase == Phase::Riding && self.course.then == After::Cue;
-        let show = (riding || self.phase == Phase::Stalled).then_some(self.playhead);
+        let (show, phase) = (self.playhead, self.phase);
         self.move_on(millis(time_ms));
         let (timing, time_ms) = self.stamps.next(time_ms);
+        let mut beat = Beat::still(timing, time_ms);
+        if matches!(phase, Phase::Riding | Phase::Stalled) {
+            // They act when the frame comes, not when its pose is reached.
+            beat.vibration = self.timeline.vibration(show, &mut self.hint);
+            beat.effects = self.timeline.effects(show, &mut self.hint);
+        }
         self.look_ahead();
-        Some(Beat { timing, time_ms, show })
+        Some(beat)
     }
 
     /// Advances show time by one frame and sets the poses.

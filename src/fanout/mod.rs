@@ -8,7 +8,7 @@ pub use lanes::{FanOutFault, lanes};
 use crate::cue;
 use crate::engine::Beat;
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
-use crate::timeline::Switched;
+use crate::timeline::EffectSet;
 use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration};
 
 /// Which outputs a cue's effects switch on one controller.
@@ -23,10 +23,10 @@ pub struct Wiring {
 impl Wiring {
     /// The output word for what the cue switches.
     #[must_use]
-    pub fn outputs(&self, switched: Switched) -> u16 {
+    pub fn outputs(&self, switched: EffectSet) -> u16 {
         match switched {
-            Switched::Word(word) => word & self.raw,
-            Switched::Named(on) => {
+            EffectSet::Word(word) => word & self.raw,
+            EffectSet::Named(on) => {
                 let lit = self.named.iter().enumerate().filter(|(effect, _)| on >> effect & 1 == 1);
                 lit.fold(0, |word, (_, outputs)| word | outputs)
             }

@@ -1,0 +1,188 @@
+//! Before tick 0: reads where every seat stands, and brings those that are not at park, or do not tell, there by one
+//! slow frame.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use crate::config::Controller;
+use crate::fanout::Lane;
+use crate::motion::{MAX_AXES, Pulses};
+use crate::net::{Delivery, Sender};
+use crate::plan::PARK_VELOCITY_MM_S;
+use crate::rt::{AckLoop, Sent};
+use crate::time::{Clock, MonoTime};
+use crate::wire::{Code, MAX_LEN, RegisterReply, position_reads, positions};
+
+/// Tries of a position read, and how long each waits.
+const READ_TRIES: usize = 3;
+const READ_WAIT: Duration = Duration::from_millis(200);
+/// How often replies are looked for meanwhile.
+const LOOK: Duration = Duration::from_millis(2);
+/// The longest Time that a controller executes as it is (PA0b, IMAX manual 2.3.1).
+const LONGEST_MS: u32 = 3_000;
+/// What is waited beyond the Time of the slow frame.
+const SETTLE: Duration = Duration::from_millis(20);
+
+/// What was done before tick 0.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Prepared {
+    /// Slow frames, by controller.
+    pub(super) homing: Vec<u64>,
+    /// Controllers whose way to park may have been faster than 50 mm/s, because PA0b cuts a longer Time.
+    pub(super) hurried: Vec<usize>,
+}
+
+/// Everything that preparing needs.
+pub(super) struct Preparation<'a, C> {
+    pub(super) clock: &'a C,
+    pub(super) sender: &'a Sender,
+    pub(super) acks: &'a mut AckLoop,
+    pub(super) controllers: &'a [Controller],
+    pub(super) lanes: &'a mut [Lane],
+    /// Read throughout: somebody wants the show to stop.
+    pub(super) stop: &'a AtomicBool,
+}
+
+/// The positions that a controller has told so far, its own axes from the first on.
+type Told = [Option<Pulses>; MAX_AXES];
+
+impl<C: Clock> Preparation<'_, C> {
+    /// Brings every seat to its park pose, as far as it can be known.
+    pub(super) fn run(&mut self, ask: bool) -> Prepared {
+        let told = if ask { self.read_positions() } else { vec![Told::default(); self.lanes.len()] };
+        let count = self.lanes.len();
+        let mut prepared = Prepared { homing: vec![0; count], hurried: Vec::new() };
+        if self.stopped() {
+            return prepared;
+        }
+        let mut arrival = None;
+        for lane in 0..count {
+            if !self.is_parked(lane, &told[lane]) {
+                let time_ms = self.send_home(lane, &mut prepared);
+                arrival = arrival.max(Some(self.clock.now() + Duration::from_millis(u64::from(time_ms)) + SETTLE));
+            }
+        }
+        if let Some(arrival) = arrival {
+            self.wait_until(arrival, &mut |_, _| false, &mut || false);
+        }
+        prepared
+    }
+
+    fn read_positions(&mut self) -> Vec<Told> {
+        let mut told = vec![Told::default(); self.lanes.len()];
+        for _ in 0..READ_TRIES {
+            let open: Vec<usize> =
+                (0..told.len()).filter(|&lane| !tells_all(&self.controllers[lane], &told[lane])).collect();
+            if open.is_empty() || self.stopped() {
+                break;
+            }
+            for lane in open {
+                self.send_reads(lane);
+            }
+            let until = self.clock.now() + READ_WAIT;
+            self.wait_for_positions(until, &mut told);
+        }
+        told
+    }
+
+    fn send_reads(&self, lane: usize) {
+        let code = self.lanes[lane].code;
+        for read in position_reads(self.controllers[lane].seat.axes, code, code) {
+            // A read that the kernel does not take is like one that is lost: there are further tries.
+            let _ = self.sender.send(lane, read.emit(&mut [0; MAX_LEN]));
+        }
+    }
+
+    fn wait_for_positions(&mut self, until: MonoTime, told: &mut [Told]) {
+        let controllers = self.controllers;
+        let told = std::cell::RefCell::new(told);
+        let mut take = |lane: usize, octets: &[u8]| {
+            let Ok(reply) = RegisterReply::parse(octets) else { return false };
+            let Some(first) = first_axis(&reply) else { return false };
+            let dialect = controllers[lane].dialect;
+            for (axis, pulses) in positions(reply.data, dialect).iter().enumerate() {
+                if let Some(place) = told.borrow_mut()[lane].get_mut(first + axis) {
+                    *place = Some(*pulses);
+                }
+            }
+            true
+        };
+        let mut all = || controllers.iter().zip(told.borrow().iter()).all(|(one, told)| tells_all(one, told));
+        self.wait_until(until, &mut take, &mut all);
+    }
+
+    /// Whether every own axis told a position within a pulse of park. Axes past the sixth have no position register.
+    fn is_parked(&self, lane: usize, told: &Told) -> bool {
+        let seat = &self.controllers[lane].seat;
+        (0..seat.axes).all(|axis| {
+            told[axis].is_some_and(|pulses| pulses.0.abs_diff(seat.pulses(seat.park[axis]).0) <= 1)
+        })
+    }
+
+    fn send_home(&mut self, lane: usize, prepared: &mut Prepared) -> u32 {
+        let stroke_mm = self.controllers[lane].seat.stroke_mm;
+        let (time_ms, hurried) = homing_time(stroke_mm);
+        let mut buf = [0; MAX_LEN];
+        let (stamped, datagram) = self.lanes[lane].encode_homing(time_ms, &mut buf);
+        let of = u16::try_from(lane).expect("fewer controllers than ports");
+        self.acks.on_sent(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at: self.clock.now() });
+        if let Delivery::Failed(_) = self.sender.send(lane, datagram) {
+            self.acks.on_sent(Sent::Failed { lane: of, frame: stamped.frame });
+        }
+        prepared.homing[lane] += 1;
+        if hurried {
+            prepared.hurried.push(lane);
+        }
+        time_ms
+    }
+
+    /// Drains replies until an instant, or until there is nothing left to wait for.
+    fn wait_until(
+        &mut self,
+        until: MonoTime,
+        take: &mut dyn FnMut(usize, &[u8]) -> bool,
+        enough: &mut dyn FnMut() -> bool,
+    ) {
+        while self.clock.now() < until && !self.stopped() {
+            self.clock.sleep_until((self.clock.now() + LOOK).min(until));
+            self.acks.drain(take);
+            if enough() {
+                return;
+            }
+        }
+    }
+
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// The axis, from 0, of the first position that a reply to one of our reads tells.
+fn first_axis(reply: &RegisterReply<'_>) -> Option<usize> {
+    let asked = position_reads(MAX_AXES, Code::ALL, Code::ALL);
+    let block = asked.enumerate().find(|(_, read)| read.channel == reply.channel && read.start == reply.start)?.0;
+    Some(3 * block)
+}
+
+fn tells_all(controller: &Controller, told: &Told) -> bool {
+    told.iter().take(controller.seat.axes.min(6)).all(Option::is_some)
+}
+
+/// The Time that takes a seat over its whole stroke at 50 mm/s, and whether it had to be cut.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a saturating cast is what is wanted")]
+fn homing_time(stroke_mm: f64) -> (u32, bool) {
+    let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
+    (whole.min(LONGEST_MS), whole > LONGEST_MS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_home_takes_the_stroke_at_50_mm_a_second_and_3_s_at_the_most() {
+        assert_eq!(homing_time(100.0), (2_000, false));
+        assert_eq!(homing_time(150.0), (3_000, false));
+        assert_eq!(homing_time(475.0), (3_000, true));
+    }
+}

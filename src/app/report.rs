@@ -1,0 +1,177 @@
+//! The report of a play: the same figures as an object for programs and as a table for people.
+
+use std::fmt::Write as _;
+
+use comfy_table::{CellAlignment, Table, presets};
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+use crate::sys::realtime::RealTime;
+
+/// What became of a play. Fields may be added, never changed.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// The cue file, as it was named.
+    pub cue: String,
+    /// `completed`, `stopped` or `fault`.
+    pub result: &'static str,
+    /// Ticks that sent.
+    pub ticks: u64,
+    /// Ticks slept through.
+    pub missed_ticks: u64,
+    /// Ticks per second.
+    pub rate_hz: f64,
+    /// Lateness of the ticks that sent, µs.
+    pub lateness_us: LatencyReport,
+    /// What the system granted.
+    pub realtime: RealTimeReport,
+    /// Datagrams on the frame port from nobody we sent to.
+    pub strangers: u64,
+    /// One entry for each controller.
+    pub controllers: Vec<ControllerReport>,
+}
+
+/// Percentiles in µs; null where nothing was counted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LatencyReport {
+    /// Half of them are no longer.
+    pub p50: Option<f64>,
+    /// 99 of 100.
+    pub p99: Option<f64>,
+    /// 999 of 1,000.
+    pub p999: Option<f64>,
+    /// The longest.
+    pub max: Option<f64>,
+}
+
+impl LatencyReport {
+    /// The percentiles of a histogram of nanoseconds.
+    #[must_use]
+    pub fn of(histogram: &Histogram<u64>) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+        let us = |ns: u64| (!histogram.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
+        Self {
+            p50: us(histogram.value_at_quantile(0.5)),
+            p99: us(histogram.value_at_quantile(0.99)),
+            p999: us(histogram.value_at_quantile(0.999)),
+            max: us(histogram.max()),
+        }
+    }
+}
+
+/// What the system granted, as read back from it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RealTimeReport {
+    /// Scheduling policy of the tick thread: `fifo`, `other` …
+    pub policy: String,
+    /// Its priority; 0 for policies without one.
+    pub priority: u8,
+    /// Whether memory is locked.
+    pub memory_locked: bool,
+}
+
+impl From<&RealTime> for RealTimeReport {
+    fn from(granted: &RealTime) -> Self {
+        Self {
+            policy: granted.policy.to_string(),
+            priority: granted.priority,
+            memory_locked: granted.memory_locked,
+        }
+    }
+}
+
+/// What became of one controller's frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControllerReport {
+    /// Its name.
+    pub name: String,
+    /// Where it is reached.
+    pub address: String,
+    /// Frames that the kernel took.
+    pub sent: u64,
+    /// Of these, frames that asked for a reply; always acked + refused + lost.
+    pub asked: u64,
+    /// Answered with x = 2.
+    pub acked: u64,
+    /// Answered with x = 3, 4 or 5.
+    pub refused: u64,
+    /// Not answered within 1 s.
+    pub lost: u64,
+    /// Slow frames before tick 0, which brought it to its park pose.
+    pub homing: u64,
+    /// Further replies to an answered frame.
+    pub duplicate: u64,
+    /// Replies after 1 s.
+    pub stale: u64,
+    /// Datagrams from its address that are no reply to a frame.
+    pub stray: u64,
+    /// Frames that the kernel did not take.
+    pub send_failed: u64,
+    /// Reports of the kernel that its port is closed.
+    pub port_closed: u64,
+    /// Ack latency, µs.
+    pub ack_us: LatencyReport,
+}
+
+impl Report {
+    /// The figures as people read them, with a table of the controllers.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let late = &self.lateness_us;
+        let locked = if self.realtime.memory_locked { "locked" } else { "not locked" };
+        let lines = [
+            ("result", format!("{} ({})", self.result, self.cue)),
+            ("ticks", format!("{} at {} Hz, {} missed", self.ticks, self.rate_hz, self.missed_ticks)),
+            (
+                "lateness",
+                format!(
+                    "p50 {} µs, p99 {} µs, p99.9 {} µs, max {} µs",
+                    shown(late.p50),
+                    shown(late.p99),
+                    shown(late.p999),
+                    shown(late.max)
+                ),
+            ),
+            (
+                "real time",
+                format!("policy {}, priority {}, memory {locked}", self.realtime.policy, self.realtime.priority),
+            ),
+            ("strangers", format!("{} datagrams", self.strangers)),
+        ];
+        for (name, value) in lines {
+            writeln!(text, "{name:<10} {value}").expect("a String takes what is written to it");
+        }
+        text.push('\n');
+        text.push_str(&self.table().to_string());
+        text
+    }
+
+    fn table(&self) -> Table {
+        let mut table = Table::new();
+        table.load_preset(presets::NOTHING);
+        table.set_header([
+            "controller", "address", "sent", "acked", "refused", "lost", "homing", "dup", "stale", "stray", "failed",
+            "closed", "ack p50 µs", "p99", "p99.9", "max",
+        ]);
+        for one in &self.controllers {
+            let counts = [
+                one.sent, one.acked, one.refused, one.lost, one.homing, one.duplicate, one.stale, one.stray,
+                one.send_failed, one.port_closed,
+            ];
+            let latencies = [one.ack_us.p50, one.ack_us.p99, one.ack_us.p999, one.ack_us.max];
+            let mut row = vec![one.name.clone(), one.address.clone()];
+            row.extend(counts.iter().map(u64::to_string));
+            row.extend(latencies.iter().map(|us| shown(*us)));
+            table.add_row(row);
+        }
+        for column in table.column_iter_mut().skip(2) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        table
+    }
+}
+
+fn shown(us: Option<f64>) -> String {
+    us.map_or_else(|| "-".to_owned(), |us| format!("{us:.1}"))
+}

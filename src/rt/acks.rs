@@ -1,0 +1,113 @@
+//! The ack thread: drains replies by a timer, never woken by one, and keeps the books of every frame.
+
+use hdrhistogram::Histogram;
+use rtrb::Consumer;
+
+use super::{Sent, TickReport};
+use crate::net::{DrainGrid, Origin, Receiver};
+use crate::time::{Clock, MonoTime};
+use crate::tracker::{ACK_TIMEOUT, Books, Reply, Tracker, histogram};
+use crate::wire::MotionReply;
+
+/// Everything that was counted.
+#[derive(Debug)]
+pub struct Accounts {
+    /// The fate of every frame.
+    pub books: Books,
+    /// Lateness of every tick that sent, nanoseconds.
+    pub lateness: Histogram<u64>,
+    /// Datagrams from nobody we sent to.
+    pub strangers: u64,
+}
+
+impl Accounts {
+    /// Empty accounts of that many controllers.
+    #[must_use]
+    pub fn new(controllers: usize) -> Self {
+        Self { books: Books::new(Tracker::new(controllers)), lateness: histogram(), strangers: 0 }
+    }
+}
+
+/// The receiving side of a play.
+#[derive(Debug)]
+pub struct AckLoop {
+    receiver: Receiver,
+    accounts: Accounts,
+    sent: Consumer<Sent>,
+    ticks: Consumer<TickReport>,
+    /// The newest instant at which a frame was sent.
+    last_sent: MonoTime,
+}
+
+impl AckLoop {
+    /// A loop over the replies to what `sent` tells of.
+    #[must_use]
+    pub fn new(receiver: Receiver, sent: Consumer<Sent>, ticks: Consumer<TickReport>) -> Self {
+        let accounts = Accounts::new(receiver.lanes());
+        Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default() }
+    }
+
+    /// Drains until `done` says that no more frames come and the last of them has had its second.
+    pub fn run(mut self, clock: &impl Clock, drains: DrainGrid, done: impl Fn() -> bool) -> Accounts {
+        loop {
+            let over = done();
+            self.drain(&mut |_, _| false);
+            if over && clock.now().since(self.last_sent) > ACK_TIMEOUT {
+                break;
+            }
+            clock.sleep_until(drains.next_after(clock.now()));
+        }
+        let Self { accounts, sent, last_sent, .. } = &mut self;
+        accounts.books.finish(|tracker| take_records(sent, tracker, last_sent));
+        self.accounts
+    }
+
+    /// Reads all that came: replies to frames go to the books, `other` may take what else a controller sent, and what
+    /// it does not take is stray.
+    pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
+        let Self { receiver, accounts, sent, ticks, last_sent } = self;
+        let Accounts { books, lateness, strangers } = accounts;
+        let began = receiver.drain(|origin, octets, at| {
+            let Origin::Controller(controller) = origin else {
+                *strangers += 1;
+                return;
+            };
+            match MotionReply::parse(octets) {
+                Ok(MotionReply { frame, code, .. }) => {
+                    let reply = Reply { controller, frame, code, at };
+                    books.on_reply(reply, |tracker| take_records(sent, tracker, last_sent));
+                }
+                Err(_) if other(controller, octets) => {}
+                Err(_) => books.tracker_mut().on_stray(controller),
+            }
+        });
+        books.settle(began, |tracker| take_records(sent, tracker, last_sent));
+        for controller in 0..receiver.lanes() {
+            books.tracker_mut().on_port_closed(controller, receiver.port_closed(controller));
+        }
+        while let Ok(report) = ticks.pop() {
+            lateness.saturating_record(report.late_ns);
+        }
+    }
+
+    /// Notes a frame that is about to be sent before the tick loop runs.
+    pub fn on_sent(&mut self, sent: Sent) {
+        record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
+    }
+}
+
+fn take_records(sent: &mut Consumer<Sent>, tracker: &mut Tracker, last_sent: &mut MonoTime) {
+    while let Ok(sent) = sent.pop() {
+        record(sent, tracker, last_sent);
+    }
+}
+
+fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {
+    match sent {
+        Sent::Posted { lane, frame, asked, at } => {
+            tracker.on_sent(usize::from(lane), frame, asked, at);
+            *last_sent = at.max(*last_sent);
+        }
+        Sent::Failed { lane, frame } => tracker.on_send_failed(usize::from(lane), frame),
+    }
+}
