@@ -43,8 +43,8 @@ const PLATFORM: [Axis; 6] = legs(0.0);
 const PAIR: [Axis; 12] = {
     let (front, back) = (legs(0.0), legs(0.4));
     [
-        front[0], front[1], front[2], front[3], front[4], front[5], back[0], back[1], back[2], back[3], back[4],
-        back[5],
+        front[0], front[1], front[2], front[3], front[4], front[5], back[0], back[1], back[2], back[3],
+        back[4], back[5],
     ]
 };
 
@@ -252,7 +252,11 @@ const STORM: Ride = Ride {
         shift(Surge, 40.6, 1.0, 0.08),
         shift(Heave, 41.2, 2.2, -0.5),
     ],
-    rumbles: &[rumble(16.0, 17.0, 18.0, 0.001), rumble(24.5, 26.0, 18.0, 0.001), rumble(38.6, 40.2, 14.0, 0.0016)],
+    rumbles: &[
+        rumble(16.0, 17.0, 18.0, 0.001),
+        rumble(24.5, 26.0, 18.0, 0.001),
+        rumble(38.6, 40.2, 14.0, 0.0016),
+    ],
     effects: &["air", "water", "wind", "light"],
     bursts: &[
         burst("wind", 12.0, 36.0),

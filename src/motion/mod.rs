@@ -2,9 +2,11 @@
 //! anything that the tick thread calls.
 
 mod measure;
+mod scan;
 mod seat;
 
 pub use measure::{Measure, Reading, Readings, Spacing};
+pub use scan::{Peak, Peaks, scan};
 pub use seat::{Pulses, SeatType};
 
 /// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).
