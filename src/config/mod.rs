@@ -257,10 +257,10 @@ fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
 
 /// Whether cues can use `name` for an effect; the reason if not.
 fn check_effect_name(name: &str) -> Result<(), &'static str> {
-    let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if !name.is_empty() && name.chars().all(fits) {
         Ok(())
     } else {
-        Err("an effect's name has letters, digits, - and _ alone")
+        Err("an effect's name is made of a to z, 0 to 9 and _")
     }
 }

@@ -2,10 +2,12 @@
 //! anything that the tick thread calls.
 
 mod measure;
+mod scan;
 mod seat;
 mod window;
 
 pub use measure::{Measure, Reading, Readings, Spacing};
+pub use scan::{Peak, Peaks, scan};
 pub use seat::{Pulses, SeatType};
 pub use window::{Limits, Slot, Window};
 
