@@ -29,7 +29,12 @@ pub mod engine;
 
 pub mod config;
 
+pub mod fanout;
+pub mod rt;
+
 pub mod sim;
+
+pub mod app;
 
 pub mod net;
 pub mod tracker;

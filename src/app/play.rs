@@ -10,7 +10,7 @@ use super::report::{ControllerReport, LatencyReport, RealTimeReport, Report};
 use crate::config::{Config, Controller};
 use crate::cue::CueFaults;
 use crate::engine::{Ending, Engine, Headroom, Show, TickGrid};
-use crate::fanout::{FanOutFault, Lane, lanes};
+use crate::fanout::{FanOutFault, Lane, Manner, lanes};
 use crate::net::{DrainGrid, NetError, Ports, Sender};
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, To};
 use crate::rt::{Accounts, AckLoop, Ended, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
@@ -50,7 +50,7 @@ pub struct Play {
     config: Config,
     timeline: Arc<Timeline>,
     show: Show,
-    silent: bool,
+    manner: Manner,
     lanes: Vec<Lane>,
     headroom: Headroom,
     planner: Planner,
@@ -71,12 +71,12 @@ pub struct Played {
 }
 
 impl Play {
-    /// Proves that the cue fits the controllers and that a move leads onto it. `silent` never asks for replies.
+    /// Proves that the cue fits the controllers and that a move leads onto it.
     ///
     /// # Errors
     /// Everything that [`PlayError`] names but the network.
-    pub fn new(config: Config, timeline: Timeline, show: Show, silent: bool) -> Result<Self, PlayError> {
-        let lanes = lanes(&config, timeline.cue(), silent).map_err(PlayError::FanOut)?;
+    pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
+        let lanes = lanes(&config, timeline.cue(), manner).map_err(PlayError::FanOut)?;
         fit_strokes(&config, &timeline)?;
         let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
         let pose = |at| timeline.sample(at, &mut Hint::default());
@@ -85,7 +85,7 @@ impl Play {
         let request = Request { from: From::Park, to: To::Cue, start: show.start, serial: 1 };
         let course = Box::new(planner.plan(request, &curve).map_err(PlayError::Plan)?);
         let headroom = Headroom::measure(&windows, &curve, show.rate);
-        Ok(Self { config, timeline: Arc::new(timeline), show, silent, lanes, headroom, planner, course })
+        Ok(Self { config, timeline: Arc::new(timeline), show, manner, lanes, headroom, planner, course })
     }
 
     /// How long the first move onto the cue takes.
@@ -116,7 +116,7 @@ impl Play {
             lanes: &mut self.lanes,
             stop,
         }
-        .run(!self.silent);
+        .run(!self.manner.silent);
         let plans = PlanLoop {
             planner: self.planner,
             timeline: Arc::clone(&self.timeline),
@@ -133,7 +133,7 @@ impl Play {
             sender,
         };
         let run = stage.run(acks, plans, mail, stop);
-        Ok(sum_up(&self.config.controllers, &self.show, self.silent, &prepared, run))
+        Ok(sum_up(&self.config.controllers, &self.show, self.manner.silent, &prepared, run))
     }
 }
 

@@ -40,7 +40,7 @@ impl Headroom {
             }
             let pose = (curve.pose)(at);
             for ((axis, slot), measure) in slots.iter().zip(&mut measures) {
-                let readings = measure.push(at, (pose[*axis] * slot.to_stroke).clamp(0.0, 1.0));
+                let readings = measure.push(at, slot.place(pose[*axis]));
                 note(&mut loads, &readings, slot.limits);
             }
         }

@@ -3,7 +3,7 @@
 use super::{Lane, Wiring};
 use crate::config::{Config, Controller, Dialect, FanOut};
 use crate::cue::{Cue, Effects};
-use crate::motion::{MAX_AXES, Slot, Window};
+use crate::motion::{MAX_AXES, SeatType, Slot, Window};
 use crate::wire::{Code, FrameNo, motion_channel_and_slots};
 
 /// Why a cue cannot be sent to these controllers.
@@ -36,25 +36,34 @@ pub enum FanOutFault {
     EffectUnknown(String),
 }
 
-/// The lanes of every controller, in the configuration's order. `silent` lanes never ask for a reply.
+/// How a play is sent, whatever the controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Manner {
+    /// Intensity of motion and vibration, 0 to 1, about the seats' neutral poses.
+    pub level: f64,
+    /// Whether no frame asks for a reply.
+    pub silent: bool,
+}
+
+/// The lanes of every controller, in the configuration's order.
 ///
 /// # Errors
 /// Every [`FanOutFault`] there is.
-pub fn lanes(config: &Config, cue: &Cue, silent: bool) -> Result<Vec<Lane>, Vec<FanOutFault>> {
+pub fn lanes(config: &Config, cue: &Cue, manner: Manner) -> Result<Vec<Lane>, Vec<FanOutFault>> {
     let untaken = config.untaken_axes(cue.axes()).into_iter().map(FanOutFault::AxisUntaken);
     let mut faults: Vec<FanOutFault> = untaken.collect();
     if let Effects::Named { names, .. } = cue.effects() {
         let unknown = names.iter().filter(|name| !knows(config, name));
         faults.extend(unknown.map(|name| FanOutFault::EffectUnknown(name.clone())));
     }
-    let lanes = config.controllers.iter().map(|controller| lane(config, controller, cue, silent, &mut faults)).collect();
+    let lanes = config.controllers.iter().map(|controller| lane(config, controller, cue, manner, &mut faults)).collect();
     if faults.is_empty() { Ok(lanes) } else { Err(faults) }
 }
 
-fn lane(config: &Config, controller: &Controller, cue: &Cue, silent: bool, faults: &mut Vec<FanOutFault>) -> Lane {
+fn lane(config: &Config, controller: &Controller, cue: &Cue, manner: Manner, faults: &mut Vec<FanOutFault>) -> Lane {
     let (channel, window) = match controller.fan_out {
-        FanOut::Slice => slice(controller, cue),
-        FanOut::Shared => shared(config, controller, cue),
+        FanOut::Slice => slice(controller, cue, manner.level),
+        FanOut::Shared => shared(config, controller, cue, manner.level),
     };
     let slots = window.slots().len();
     let vibrating: Vec<usize> = window
@@ -76,34 +85,39 @@ fn lane(config: &Config, controller: &Controller, cue: &Cue, silent: bool, fault
         code: Code(controller.accept.code(controller.address)),
         vibrates: !vibrating.is_empty(),
         wiring: wiring(config, controller, cue),
-        ack_every: if silent { 0 } else { config.show.ack_every },
+        ack_every: if manner.silent { 0 } else { config.show.ack_every },
         next_frame: FrameNo::FIRST,
     }
 }
 
 /// Just the controller's own axes, the first of them in the first slot; padding rests.
-fn slice(controller: &Controller, cue: &Cue) -> (u16, Window) {
+fn slice(controller: &Controller, cue: &Cue, level: f64) -> (u16, Window) {
     let (channel, slots) = motion_channel_and_slots(controller.seat.axes);
-    let slot = |index: usize| {
+    let own_slot = |index: usize| {
         let axis = controller.axis_offset + index;
         let own = (index < controller.seat.axes && axis < cue.axes()).then_some(axis);
-        Slot::new(&controller.seat, index, own, cue.unit().to_stroke(&controller.seat))
+        slot(&controller.seat, index, own, cue, level)
     };
-    (channel, Window::new((0..slots).map(slot).collect()))
+    (channel, Window::new((0..slots).map(own_slot).collect()))
 }
 
 /// The whole cue's axes, as every controller that shares the frame sees them; each takes its own window by PA95.
-fn shared(config: &Config, controller: &Controller, cue: &Cue) -> (u16, Window) {
+fn shared(config: &Config, controller: &Controller, cue: &Cue, level: f64) -> (u16, Window) {
     let reach = (controller.axis_offset + controller.seat.axes).min(MAX_AXES);
     let (channel, slots) = motion_channel_and_slots(cue.axes().max(reach));
-    let slot = |axis: usize| {
+    let any_slot = |axis: usize| {
         let takes = |other: &&Controller| other.fan_out == FanOut::Shared && other.takes(axis);
         let taker = if controller.takes(axis) { Some(controller) } else { config.controllers.iter().find(takes) };
         let taker = taker.unwrap_or(controller);
         let own = (axis < cue.axes()).then_some(axis);
-        Slot::new(&taker.seat, axis.saturating_sub(taker.axis_offset), own, cue.unit().to_stroke(&taker.seat))
+        slot(&taker.seat, axis.saturating_sub(taker.axis_offset), own, cue, level)
     };
-    (channel, Window::new((0..slots).map(slot).collect()))
+    (channel, Window::new((0..slots).map(any_slot).collect()))
+}
+
+fn slot(seat: &SeatType, seat_axis: usize, axis: Option<usize>, cue: &Cue, level: f64) -> Slot {
+    let neutral = seat.neutral.get(seat_axis).copied().unwrap_or(0.0);
+    Slot::new(seat, seat_axis, axis, cue.unit().to_stroke(seat)).at_level(level, neutral)
 }
 
 fn wiring(config: &Config, controller: &Controller, cue: &Cue) -> Wiring {

@@ -3,7 +3,7 @@
 
 mod lanes;
 
-pub use lanes::{FanOutFault, lanes};
+pub use lanes::{FanOutFault, Manner, lanes};
 
 use crate::cue;
 use crate::engine::Beat;

@@ -30,8 +30,10 @@ impl Limits {
 pub struct Slot {
     /// The axis of the cue it carries, counted from 0; none where the slot rests at park throughout.
     pub axis: Option<usize>,
-    /// Cue unit to fraction of this slot's stroke.
+    /// Cue unit to fraction of this slot's stroke, at the level of the play.
     pub to_stroke: f64,
+    /// What the level adds to that, fraction of the stroke: levels scale about the seat's neutral pose.
+    pub shift: f64,
     /// Where it rests, fraction of the stroke.
     pub park: f64,
     /// Pulses over the whole stroke.
@@ -43,17 +45,34 @@ pub struct Slot {
 }
 
 impl Slot {
-    /// A slot of a seat that carries `axis` of the cue, `seat_axis` being the seat's own count from 0.
+    /// A slot of a seat that carries `axis` of the cue, `seat_axis` being the seat's own count from 0, at full level.
     #[must_use]
     pub fn new(seat: &SeatType, seat_axis: usize, axis: Option<usize>, to_stroke: f64) -> Self {
         Self {
             axis,
             to_stroke,
+            shift: 0.0,
             park: seat.park.get(seat_axis).copied().unwrap_or(0.0),
             stroke_pulses: seat.stroke_pulses(),
             stroke_mm: seat.stroke_mm,
             limits: Limits::of(seat),
         }
+    }
+
+    /// The same slot with motion scaled to `level`, 0 to 1, about `neutral`, fraction of the stroke.
+    #[must_use]
+    pub fn at_level(self, level: f64, neutral: f64) -> Self {
+        Self {
+            to_stroke: self.to_stroke * level,
+            shift: self.shift * level + neutral * (1.0 - level),
+            ..self
+        }
+    }
+
+    /// Where the cue's `value` puts the axis: fraction of the stroke, held inside it.
+    #[must_use]
+    pub fn place(&self, value: f64) -> f64 {
+        (value * self.to_stroke + self.shift).clamp(0.0, 1.0)
     }
 
     /// Where the motor stands at `fraction` of the stroke, held inside it: nearest pulse, ties away from zero.
@@ -98,7 +117,7 @@ impl Window {
         let mut placed = [0.0; MAX_AXES];
         for (place, slot) in placed.iter_mut().zip(&self.slots) {
             *place = match slot.axis {
-                Some(axis) => (cue[axis] * slot.to_stroke).clamp(0.0, 1.0),
+                Some(axis) => slot.place(cue[axis]),
                 None => slot.park,
             };
         }
@@ -119,6 +138,14 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_level_scales_about_the_neutral_pose() {
+        let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0).at_level(0.5, 0.4);
+        assert!((slot.place(0.4) - 0.4).abs() < 1e-12);
+        assert!((slot.place(1.0) - 0.7).abs() < 1e-12);
+        assert!((slot.place(0.0) - 0.2).abs() < 1e-12);
+    }
 
     #[test]
     fn a_slot_without_an_axis_rests_at_park_and_the_others_stay_inside_the_stroke() {
