@@ -177,7 +177,8 @@ impl Stage {
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, self.show.rate.period());
-            let ack_thread = scope.spawn(|| {
+            let sent_all = &sent_all;
+            let ack_thread = scope.spawn(move || {
                 let _ = realtime::normal_priority();
                 acks.run(&Monotonic, drains, || sent_all.load(Ordering::Acquire))
             });

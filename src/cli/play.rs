@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal as _;
 use std::net::SocketAddrV4;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -12,20 +12,33 @@ use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use super::times::{parse_level, parse_time};
 use super::{Exit, Failure, OrExit as _};
 use crate::app::{Play, PlayError, Played};
 use crate::config::{self, Config, from_to_args};
-use crate::cue::{self, FaultClass};
+use crate::cue::{self, CueFaults, FaultClass, Source};
 use crate::engine::{Rate, Show};
+use crate::fanout::Manner;
 use crate::rt::Live;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 
+const EXAMPLES: &str = "\
+Examples:
+  kinocue play cues/bench-ride.csv --to 127.0.0.1:7408
+  kinocue play cues/coaster.csv --to 192.168.15.201:7408,name=A1 --to 192.168.15.202:7408,name=A2 --rate 250
+  kinocue play cues/voyage.csv --to 127.0.0.1:7408,axes=6 --to 127.0.0.1:7409,axes=6,offset=6
+  kinocue play storm.mcap --config hall.toml --start 01:30 --json > report.json
+
+Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. This is no emergency stop: that one is
+hard-wired.";
+
 /// Plays one cue to the controllers, and reports what became of every frame.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// The cue, CSV or MCAP.
+    /// The cue: CSV or MCAP.
     cue: PathBuf,
     /// A controller: HOST:PORT[,name=A1][,axes=6][,offset=0][,fan_out=slice|shared][,dialect=smc|mbox]; repeatable.
     #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
@@ -33,6 +46,202 @@ pub(super) struct Args {
     /// Controllers, seats and show settings from a file.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    #[command(flatten)]
-    options: Options,
+    /// Ticks per second, 1 to 1000 [default: 100, or the configuration's].
+    #[arg(long, value_name = "HZ", value_parser = parse_rate)]
+    rate: Option<f64>,
+    /// Which Time the frames carry [default: relative, or the configuration's].
+    #[arg(long, value_parser = ["relative", "absolute"])]
+    time: Option<String>,
+    /// Where in the cue to begin: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    start: Option<ShowTime>,
+    /// Plays in all; 0 plays until stopped.
+    #[arg(long = "loop", value_name = "N", default_value_t = 1)]
+    plays: u32,
+    /// Intensity of motion and vibration about the seats' neutral pose: 60% or -6dB.
+    #[arg(long, value_name = "LEVEL", value_parser = parse_level)]
+    level: Option<f64>,
+    /// An effect's output, for controllers that are not on this machine: NAME=N; repeatable.
+    #[arg(long, value_name = "NAME=N", conflicts_with = "config")]
+    effect: Vec<String>,
+    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
+    #[arg(long, value_name = "ADDR")]
+    bind: Option<SocketAddrV4>,
+    /// Ask for no replies, and read none.
+    #[arg(long)]
+    no_acks: bool,
+    /// Print the report as one JSON object on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let hz: f64 = text.parse().map_err(|_| format!("{text:?} is not a number of ticks per second"))?;
+    if (1.0..=1000.0).contains(&hz) { Ok(hz) } else { Err(format!("{hz} Hz is outside 1..=1000 Hz")) }
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let timeline = load_cue(&args.cue, &Source::Native)?;
+    let config = configuration(args, timeline.cue().axes())?;
+    let show = Show {
+        rate: Rate::from_hz(config.show.rate_hz),
+        timing: config.show.timing,
+        start: args.start.unwrap_or_default(),
+        plays: args.plays,
+    };
+    if show.start >= timeline.duration() {
+        let why = anyhow!("--start {} is not before the end of the cue at {}", show.start, timeline.duration());
+        return Err(why).or_exit(Exit::Usage);
+    }
+    let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.no_acks };
+    play(config, timeline, show, manner, args.json)
+}
+
+/// Plays what is proved to fit, and prints the report; `demo` does the same with controllers of its own.
+pub(super) fn play(
+    config: Config,
+    timeline: Timeline,
+    show: Show,
+    manner: Manner,
+    json: bool,
+) -> Result<Exit, Failure> {
+    let cue = timeline.cue().path().to_path_buf();
+    let length = timeline.duration();
+    let for_ever = show.plays == 0;
+    for controller in config.without_effects().filter(|_| uses_effects(&timeline)) {
+        eprintln!("{}: effects stay off; name its outputs with --effect NAME=N or effects", controller.name);
+    }
+    let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
+    if !play.join().is_zero() {
+        eprintln!("joining the cue takes {:.2} s", play.join().as_secs_f64());
+    }
+    let stop = stop_on_signals().context("signals cannot be handled").or_exit(Exit::System)?;
+    let live = Arc::new(Live::default());
+    let progress = Progress::start(Arc::clone(&live), length, for_ever);
+    let played = play.run(&stop, live).map_err(|error| refused(error, &cue));
+    progress.finish();
+    tell(&played?, json)
+}
+
+fn uses_effects(timeline: &Timeline) -> bool {
+    !timeline.effect_names().is_empty()
+}
+
+/// Reads a cue whole and solves its curve.
+pub(super) fn load_cue(path: &Path, source: &Source) -> Result<Timeline, Failure> {
+    match cue::load(path, source) {
+        Ok(cue) => Ok(Timeline::new(cue)),
+        Err(faults) => {
+            let exit = cue_exit(&faults);
+            Err(faults).or_exit(exit)
+        }
+    }
+}
+
+pub(super) fn cue_exit(faults: &CueFaults) -> Exit {
+    match faults.class() {
+        FaultClass::NoInput => Exit::NoInput,
+        FaultClass::Io => Exit::Io,
+        _ => Exit::BadCue,
+    }
+}
+
+fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
+    let mut config = match &args.config {
+        Some(path) => config::load(path).or_exit(Exit::Config)?,
+        None => from_to_args(&args.to, &args.effect, axes).or_exit(Exit::Usage)?,
+    };
+    if let Some(hz) = args.rate {
+        config.show.rate_hz = hz;
+    }
+    if let Some(bind) = args.bind {
+        config.show.bind = bind;
+    }
+    match args.time.as_deref() {
+        Some("absolute") => config.show.timing = Timing::Absolute,
+        Some(_) => config.show.timing = Timing::Relative,
+        None => {}
+    }
+    Ok(config)
+}
+
+/// The exit code of a play that did not begin.
+fn refused(error: PlayError, cue: &Path) -> Failure {
+    let exit = if matches!(error, PlayError::Net(_)) { Exit::System } else { Exit::BadCue };
+    let error = anyhow::Error::new(error);
+    let error = if exit == Exit::BadCue { error.context(cue.display().to_string()) } else { error };
+    Failure { exit, error }
+}
+
+/// A flag that the first Ctrl-C or SIGTERM sets; a second Ctrl-C ends the program at once.
+fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let code = Exit::Interrupted as i32;
+    signal_hook::flag::register_conditional_shutdown(SIGINT, code, Arc::clone(&interrupted))?;
+    signal_hook::flag::register(SIGINT, interrupted)?;
+    signal_hook::flag::register(SIGINT, Arc::clone(&stop))?;
+    signal_hook::flag::register(SIGTERM, Arc::clone(&stop))?;
+    Ok(stop)
+}
+
+fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
+    for line in played.refusals.iter().chain(&played.notes) {
+        eprintln!("kinocue: {line}");
+    }
+    if json {
+        let object = serde_json::to_string(&played.report).expect("a report has only names and numbers");
+        println!("{object}");
+    } else {
+        eprintln!("\n{}", played.report.text());
+    }
+    let refused: Vec<&str> =
+        played.report.controllers.iter().filter(|one| one.refused > 0).map(|one| one.name.as_str()).collect();
+    if played.report.result == "fault" {
+        return Err(anyhow!("the play ended in a fault; the seats were stopped")).or_exit(Exit::Internal);
+    }
+    if !refused.is_empty() {
+        return Err(anyhow!("{} refused frames (x = 3, 4 or 5)", refused.join(", "))).or_exit(Exit::Refused);
+    }
+    if !played.silent.is_empty() {
+        let who = played.silent.join(", ");
+        let why = anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
+        return Err(why).or_exit(Exit::Unavailable);
+    }
+    Ok(Exit::Done)
+}
+
+/// The progress line on a terminal, drawn by a thread of its own.
+struct Progress(Option<(Arc<AtomicBool>, thread::JoinHandle<()>)>);
+
+impl Progress {
+    fn start(live: Arc<Live>, length: ShowTime, for_ever: bool) -> Self {
+        if !std::io::stderr().is_terminal() {
+            return Self(None);
+        }
+        let done = Arc::new(AtomicBool::new(false));
+        let over = Arc::clone(&done);
+        let drawer = thread::spawn(move || {
+            let total = u64::try_from(length.as_nanos() / 1_000_000).unwrap_or(0);
+            let bar = if for_ever { ProgressBar::no_length() } else { ProgressBar::new(total) };
+            let style = ProgressStyle::with_template("{msg} [{wide_bar}]").expect("the template is fixed");
+            bar.set_style(style.progress_chars("=> "));
+            while !over.load(Ordering::Relaxed) {
+                let show = live.show();
+                bar.set_position(u64::try_from(show.as_nanos() / 1_000_000).unwrap_or(0));
+                bar.set_message(format!("{show} / {length}, {} ticks, {} missed", live.ticks(), live.missed()));
+                thread::park_timeout(Duration::from_millis(100));
+            }
+            bar.finish_and_clear();
+        });
+        Self(Some((done, drawer)))
+    }
+
+    fn finish(self) {
+        if let Some((done, drawer)) = self.0 {
+            done.store(true, Ordering::Relaxed);
+            drawer.thread().unpark();
+            let _ = drawer.join(); // a progress line that failed is no reason to fail
+        }
+    }
 }

@@ -15,6 +15,7 @@ mod target;
 mod tests;
 
 pub use fault::{ConfigFault, ConfigFaults};
+pub use crate::wire::{Dialect, Timing};
 pub use target::{TargetError, from_to_args};
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
@@ -67,15 +68,6 @@ impl Default for Show {
             library: PathBuf::from("/var/lib/kinocue/cues"),
         }
     }
-}
-
-/// What the Time field of a frame means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Timing {
-    /// How long the move takes (0x1401, 0x1901; SMC manual 2.2.2.7).
-    Relative,
-    /// When the move ends, on the clock that the first frame starts (0x1301, 0x1801; SMC manual 2.2.2.5).
-    Absolute,
 }
 
 /// What the hall does when a group of controllers is lost.
@@ -138,15 +130,6 @@ pub enum FanOut {
     Slice,
     /// The device: a frame carries all axes of the cue; PA95 is the axis offset.
     Shared,
-}
-
-/// The message set of a controller.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dialect {
-    /// SMC, with vibration.
-    Smc,
-    /// MBOX, without.
-    Mbox,
 }
 
 /// The accept and reply code (SMC manual 2.2.1).

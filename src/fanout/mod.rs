@@ -64,6 +64,7 @@ pub struct Stamped {
 impl Lane {
     /// Writes the frame of this tick to `buf`, and takes a frame number for it.
     pub fn encode<'b>(&mut self, beat: &Beat, pose: &Pose, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+        let stamped = self.stamp();
         let slots = self.window.slots();
         let mut positions = [Pulses(0); MAX_AXES];
         let mut vibration = [Vibration::NONE; MAX_AXES];
@@ -74,7 +75,6 @@ impl Lane {
                 vibration[index] = Vibration::from_hz(hz, amplitude * slot.to_stroke * slot.stroke_pulses);
             }
         }
-        let stamped = self.stamp();
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,

@@ -49,6 +49,12 @@ impl Receiver {
         Self { lanes, stray, batch: Batch::new(), emptied }
     }
 
+    /// How many controllers there are.
+    #[must_use]
+    pub fn lanes(&self) -> usize {
+        self.lanes.len()
+    }
+
     /// Gives every waiting datagram to `on`, with its sender and the instant at which the kernel received it; socket by
     /// socket, the strangers' last, in the order of arrival within each.
     ///
