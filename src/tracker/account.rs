@@ -63,6 +63,13 @@ impl Account {
         self.counts.send_failed += 1;
     }
 
+    pub(super) fn on_last(&mut self, last: FrameNo, at: MonoTime) {
+        if !self.recorded(last) {
+            self.recorded_at = at;
+            self.record_unrecorded(self.ring.ahead(last), self.counts.asked > 0);
+        }
+    }
+
     pub(super) fn on_reply(&mut self, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
         let fate = match self.ring.find(frame) {
             Place::Never => Fate::Stray,

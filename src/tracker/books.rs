@@ -97,3 +97,86 @@ impl Books {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(ms: u64) -> MonoTime {
+        MonoTime::from_nanos(ms * 1_000_000)
+    }
+
+    fn reply(frame: u32, at: MonoTime) -> Reply {
+        Reply { controller: 0, frame: FrameNo(frame), code: ReplyCode::Running, at }
+    }
+
+    fn books() -> Books {
+        Books::new(Tracker::new(1))
+    }
+
+    #[test]
+    fn a_reply_that_overtakes_the_record_of_its_frame_is_matched() {
+        let mut books = books();
+        books.on_reply(reply(1, ms(3)), |_| panic!("there is room"));
+        books.settle(ms(4), |tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (1, 0));
+    }
+
+    #[test]
+    fn a_reply_in_time_counts_though_it_is_drained_late() {
+        let mut books = books();
+        books.on_reply(reply(1, ms(900)), |_| ());
+        books.settle(ms(3_000), |tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).lost), (1, 0));
+    }
+
+    #[test]
+    fn a_reply_to_a_frame_whose_record_was_dropped_waits_for_the_next_record() {
+        let mut books = books();
+        books.on_reply(reply(1, ms(3)), |_| ());
+        books.settle(ms(5), |_| ());
+        assert_eq!(books.tracker().counts(0), crate::tracker::Counts::default());
+        books.settle(ms(15), |tracker| tracker.on_sent(0, FrameNo(2), true, ms(11)));
+        let counts = books.tracker().counts(0);
+        assert_eq!((counts.asked, counts.acked, counts.stray), (2, 1, 0));
+    }
+
+    #[test]
+    fn a_reply_to_a_frame_that_is_never_recorded_is_stray_after_a_second_or_at_the_end() {
+        let mut books = books();
+        books.on_reply(reply(7, ms(3)), |_| ());
+        books.settle(ms(1_003), |_| ());
+        assert_eq!(books.tracker().counts(0).stray, 0);
+        books.settle(ms(1_004), |_| ());
+        assert_eq!(books.tracker().counts(0).stray, 1);
+        books.on_reply(reply(8, ms(1_005)), |_| ());
+        books.finish(|_| ());
+        assert_eq!(books.tracker().counts(0).stray, 2);
+    }
+
+    #[test]
+    fn more_replies_than_there_is_room_for_are_matched_early_after_their_records() {
+        let mut books = books();
+        let room = u32::try_from(ROOM).unwrap();
+        let mut reads = 0;
+        for frame in 1..=room + 5 {
+            books.on_reply(reply(frame, ms(500)), |tracker| {
+                reads += 1;
+                (1..=room).for_each(|sent| tracker.on_sent(0, FrameNo(sent), true, ms(1)));
+            });
+        }
+        assert_eq!((reads, books.tracker().counts(0).acked), (1, u64::from(room)));
+    }
+
+    #[test]
+    fn replies_to_nothing_cannot_fill_the_room() {
+        let mut books = books();
+        let flood = u32::try_from(3 * ROOM).unwrap();
+        for _ in 0..flood {
+            books.on_reply(reply(9, ms(1)), |_| ());
+        }
+        assert!(books.waiting.capacity() == ROOM && books.waiting.len() <= ROOM);
+        books.finish(|_| ());
+        assert_eq!(books.tracker().counts(0).stray, u64::from(flood));
+    }
+}

@@ -69,6 +69,12 @@ impl Tracker {
         self.accounts[controller].on_send_failed(frame);
     }
 
+    /// `last` was the last frame of the show, sent or not, at `at` at the latest: frames up to it of which no record came
+    /// count as sent and asked, as [`Tracker::on_sent`] has it.
+    pub fn on_last(&mut self, controller: usize, last: FrameNo, at: MonoTime) {
+        self.accounts[controller].on_last(last, at);
+    }
+
     /// A reply that the kernel received at `at`. To be told only once the record of every frame sent before has been;
     /// [`Books`] sees to that.
     ///

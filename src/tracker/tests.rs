@@ -152,6 +152,17 @@ fn frames_without_a_record_did_not_ask_where_none_ever_does() {
 }
 
 #[test]
+fn frames_without_a_record_at_the_very_end_are_accounted_as_well() {
+    let mut tracker = sent(3);
+    tracker.on_last(0, FrameNo(3), ms(9));
+    assert_eq!(tracker.counts(0).sent, 3);
+    tracker.on_last(0, FrameNo(7), ms(9));
+    assert_eq!(tracker.on_reply(0, FrameNo(6), Running, ms(10)), Fate::Answered(Running));
+    tracker.finish();
+    assert_eq!((tracker.counts(0).asked, tracker.counts(0).lost), (7, 6));
+}
+
+#[test]
 fn a_gap_of_any_length_is_accounted_at_once() {
     let mut tracker = sent(10);
     tracker.on_sent(0, FrameNo(2_000_000_000), true, ms(99));
