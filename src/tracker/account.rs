@@ -1,0 +1,169 @@
+//! The books of one controller.
+
+use crate::time::MonoTime;
+use crate::wire::{FrameNo, ReplyCode};
+
+use super::in_flight::{Entry, KEPT, Place, Ring, State};
+use super::{ACK_TIMEOUT, Counts, Fate, Histogram, histogram};
+
+/// Fewer frames than these do not tell whether a controller is lost.
+const LAST_FRAMES: usize = 10;
+
+#[derive(Debug)]
+pub(super) struct Account {
+    ring: Ring,
+    /// Every frame before this one has met its fate.
+    oldest_open: FrameNo,
+    /// Time of the newest record.
+    recorded_at: MonoTime,
+    pub(super) counts: Counts,
+    pub(super) latency: Histogram,
+    pub(super) last_ack: Option<(FrameNo, MonoTime)>,
+}
+
+impl Account {
+    pub(super) fn new(first: FrameNo) -> Self {
+        Self {
+            ring: Ring::new(first),
+            oldest_open: first,
+            recorded_at: MonoTime::default(),
+            counts: Counts::default(),
+            latency: histogram(),
+            last_ack: None,
+        }
+    }
+
+    pub(super) fn recorded(&self, frame: FrameNo) -> bool {
+        self.ring.ahead(frame) == 0
+    }
+
+    pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
+        let Some(unrecorded) = self.ring.ahead(frame).checked_sub(1) else { return };
+        self.recorded_at = at;
+        // Who never asks for a reply did not ask in the frames left out.
+        self.record_unrecorded(unrecorded, asked || self.counts.asked > 0);
+        self.record(if asked { State::InFlight } else { State::Unasked });
+    }
+
+    pub(super) fn on_send_failed(&mut self, frame: FrameNo) {
+        self.record_unrecorded(self.ring.ahead(frame), self.counts.asked > 0);
+        let Place::Kept(index) = self.ring.find(frame) else { return };
+        let entry = self.ring.get_mut(index);
+        match entry.state {
+            State::Acked | State::Refused | State::Failed { .. } => return,
+            State::Unasked => {}
+            State::InFlight | State::InFlightUntimed => self.counts.asked -= 1,
+            State::Lost => {
+                self.counts.asked -= 1;
+                self.counts.lost -= 1;
+            }
+        }
+        entry.state = State::Failed { asked: entry.state.wanted() };
+        self.counts.sent -= 1;
+        self.counts.send_failed += 1;
+    }
+
+    pub(super) fn on_last(&mut self, last: FrameNo, at: MonoTime) {
+        if !self.recorded(last) {
+            self.recorded_at = at;
+            self.record_unrecorded(self.ring.ahead(last), self.counts.asked > 0);
+        }
+    }
+
+    pub(super) fn on_reply(&mut self, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
+        let fate = match self.ring.find(frame) {
+            Place::Never => Fate::Stray,
+            Place::Forgotten => Fate::Stale,
+            Place::Kept(index) => match self.ring.get(index).state {
+                State::Unasked | State::Failed { .. } => Fate::Stray,
+                State::Acked | State::Refused => Fate::Duplicate,
+                State::Lost => Fate::Stale,
+                State::InFlight | State::InFlightUntimed => self.settle(index, frame, code, at),
+            },
+        };
+        self.counts.add_reply(fate);
+        fate
+    }
+
+    /// Ends the flight of a frame by its first reply.
+    fn settle(&mut self, index: usize, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
+        let entry = self.ring.get_mut(index);
+        let latency = at.since(entry.at);
+        if latency > ACK_TIMEOUT {
+            entry.state = State::Lost;
+            self.counts.lost += 1;
+            return Fate::Stale;
+        }
+        let timed = entry.state == State::InFlight;
+        entry.state = if code.refused() { State::Refused } else { State::Acked };
+        if !code.refused() {
+            if timed {
+                self.latency.saturating_record(crate::time::nanos(latency));
+            }
+            if self.last_ack.is_none_or(|(last, _)| frame.since(last) > 0) {
+                self.last_ack = Some((frame, at));
+            }
+        }
+        Fate::Answered(code)
+    }
+
+    pub(super) fn expire(&mut self, now: MonoTime) {
+        self.give_up(|sent_at| now.since(sent_at) > ACK_TIMEOUT);
+    }
+
+    pub(super) fn finish(&mut self) {
+        self.give_up(|_| true);
+    }
+
+    /// Frames are on record in the order of their times, so the first one in flight that is not given up ends the walk.
+    fn give_up(&mut self, too_old: impl Fn(MonoTime) -> bool) {
+        while self.recorded(self.oldest_open) {
+            if let Place::Kept(index) = self.ring.find(self.oldest_open) {
+                let entry = self.ring.get_mut(index);
+                if entry.state.open() {
+                    if !too_old(entry.at) {
+                        return;
+                    }
+                    entry.state = State::Lost;
+                    self.counts.lost += 1;
+                }
+            }
+            self.oldest_open = self.oldest_open.next();
+        }
+    }
+
+    pub(super) fn lost_at_end(&self) -> bool {
+        let wanted = self.ring.newest_first().filter(|entry| entry.state.wanted()).enumerate();
+        let mut last = wanted
+            .take_while(|(count, entry)| {
+                *count < LAST_FRAMES || self.recorded_at.since(entry.at) <= ACK_TIMEOUT
+            })
+            .peekable();
+        last.peek().is_some() && last.all(|(_, entry)| entry.state != State::Acked)
+    }
+
+    /// Takes frames on record that should have been, but of which no record came.
+    fn record_unrecorded(&mut self, count: u32, asked: bool) {
+        let forgotten = count.saturating_sub(KEPT);
+        if forgotten > 0 {
+            // Lost already, as is all before them: the rest will take the place of every frame remembered now.
+            self.ring.skip(forgotten);
+            self.oldest_open = self.ring.next();
+            self.counts.sent += u64::from(forgotten);
+            if asked {
+                self.counts.asked += u64::from(forgotten);
+                self.counts.lost += u64::from(forgotten);
+            }
+        }
+        for _ in forgotten..count {
+            self.record(if asked { State::InFlightUntimed } else { State::Unasked });
+        }
+    }
+
+    fn record(&mut self, state: State) {
+        self.counts.sent += 1;
+        self.counts.asked += u64::from(state.open());
+        let forgotten = self.ring.push(Entry { state, at: self.recorded_at });
+        self.counts.lost += u64::from(forgotten.state.open());
+    }
+}

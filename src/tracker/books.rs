@@ -1,0 +1,182 @@
+//! Replies and records, brought into the one order in which they can be matched.
+
+use crate::time::MonoTime;
+use crate::wire::{FrameNo, ReplyCode};
+
+use super::{ACK_TIMEOUT, Tracker};
+
+/// Replies put by at most before they are matched.
+const ROOM: usize = 4_096;
+
+/// A reply to a frame, as it was received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reply {
+    /// The controller it came from.
+    pub controller: usize,
+    /// The frame it answers.
+    pub frame: FrameNo,
+    /// What it says.
+    pub code: ReplyCode,
+    /// When the kernel received it.
+    pub at: MonoTime,
+}
+
+/// A [`Tracker`] and the replies that wait to be matched.
+///
+/// The record of a send is posted before the send, so whoever reads a reply first and the records after it has the
+/// record of every frame that the reply can be to. Therefore replies are put by as they are read, and the records are
+/// read (by the closure that each method takes, which passes all that have come to the tracker) before any is matched.
+#[derive(Debug)]
+pub struct Books {
+    tracker: Tracker,
+    waiting: Vec<Reply>,
+}
+
+impl Books {
+    /// Books that go on from a tracker.
+    #[must_use]
+    pub fn new(tracker: Tracker) -> Self {
+        Self { tracker, waiting: Vec::with_capacity(ROOM) }
+    }
+
+    /// The accounts as they stand.
+    #[must_use]
+    pub const fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    /// The tracker, to tell it of datagrams that are no replies and of closed ports.
+    pub const fn tracker_mut(&mut self) -> &mut Tracker {
+        &mut self.tracker
+    }
+
+    /// Puts a reply by; where there is no more room, those before it are matched first.
+    pub fn on_reply(&mut self, reply: Reply, records: impl FnOnce(&mut Tracker)) {
+        if self.waiting.len() == ROOM {
+            records(&mut self.tracker);
+            self.match_all(reply.at);
+            // Replies to frames that nobody sent must not fill the room.
+            if self.waiting.len() > ROOM / 2 {
+                self.give_up_waiting();
+            }
+        }
+        self.waiting.push(reply);
+    }
+
+    /// Ends a drain that began at `began`: matches all replies, then expires the frames that are too old.
+    pub fn settle(&mut self, began: MonoTime, records: impl FnOnce(&mut Tracker)) {
+        records(&mut self.tracker);
+        self.match_all(began);
+        self.tracker.expire(began);
+    }
+
+    /// Ends the show: there will be no more replies, and every frame that asked for one meets its fate.
+    pub fn finish(&mut self, records: impl FnOnce(&mut Tracker)) {
+        records(&mut self.tracker);
+        self.give_up_waiting();
+        self.tracker.finish();
+    }
+
+    /// A reply to a frame newer than every record is kept for a while: its record may have been dropped, which the next
+    /// one will tell.
+    fn match_all(&mut self, now: MonoTime) {
+        let tracker = &mut self.tracker;
+        self.waiting.retain(|reply| {
+            let early = !tracker.recorded(reply.controller, reply.frame);
+            if early && now.since(reply.at) <= ACK_TIMEOUT {
+                return true;
+            }
+            tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
+            false
+        });
+    }
+
+    fn give_up_waiting(&mut self) {
+        for reply in self.waiting.drain(..) {
+            self.tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(ms: u64) -> MonoTime {
+        MonoTime::from_nanos(ms * 1_000_000)
+    }
+
+    fn reply(frame: u32, at: MonoTime) -> Reply {
+        Reply { controller: 0, frame: FrameNo(frame), code: ReplyCode::Running, at }
+    }
+
+    fn books() -> Books {
+        Books::new(Tracker::new(1))
+    }
+
+    #[test]
+    fn a_reply_that_overtakes_the_record_of_its_frame_is_matched() {
+        let mut books = books();
+        books.on_reply(reply(1, ms(3)), |_| panic!("there is room"));
+        books.settle(ms(4), |tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (1, 0));
+    }
+
+    #[test]
+    fn a_reply_in_time_counts_though_it_is_drained_late() {
+        let mut books = books();
+        books.on_reply(reply(1, ms(900)), |_| ());
+        books.settle(ms(3_000), |tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).lost), (1, 0));
+    }
+
+    #[test]
+    fn a_reply_to_a_frame_whose_record_was_dropped_waits_for_the_next_record() {
+        let mut books = books();
+        books.on_reply(reply(1, ms(3)), |_| ());
+        books.settle(ms(5), |_| ());
+        assert_eq!(books.tracker().counts(0), crate::tracker::Counts::default());
+        books.settle(ms(15), |tracker| tracker.on_sent(0, FrameNo(2), true, ms(11)));
+        let counts = books.tracker().counts(0);
+        assert_eq!((counts.asked, counts.acked, counts.stray), (2, 1, 0));
+    }
+
+    #[test]
+    fn a_reply_to_a_frame_that_is_never_recorded_is_stray_after_a_second_or_at_the_end() {
+        let mut books = books();
+        books.on_reply(reply(7, ms(3)), |_| ());
+        books.settle(ms(1_003), |_| ());
+        assert_eq!(books.tracker().counts(0).stray, 0);
+        books.settle(ms(1_004), |_| ());
+        assert_eq!(books.tracker().counts(0).stray, 1);
+        books.on_reply(reply(8, ms(1_005)), |_| ());
+        books.finish(|_| ());
+        assert_eq!(books.tracker().counts(0).stray, 2);
+    }
+
+    #[test]
+    fn more_replies_than_there_is_room_for_are_matched_early_after_their_records() {
+        let mut books = books();
+        let room = u32::try_from(ROOM).unwrap();
+        let mut reads = 0;
+        for frame in 1..=room + 5 {
+            books.on_reply(reply(frame, ms(500)), |tracker| {
+                reads += 1;
+                (1..=room).for_each(|sent| tracker.on_sent(0, FrameNo(sent), true, ms(1)));
+            });
+        }
+        assert_eq!((reads, books.tracker().counts(0).acked), (1, u64::from(room)));
+    }
+
+    #[test]
+    fn replies_to_nothing_cannot_fill_the_room() {
+        let mut books = books();
+        let flood = u32::try_from(3 * ROOM).unwrap();
+        for _ in 0..flood {
+            books.on_reply(reply(9, ms(1)), |_| ());
+        }
+        assert!(books.waiting.capacity() == ROOM && books.waiting.len() <= ROOM);
+        books.finish(|_| ());
+        assert_eq!(books.tracker().counts(0).stray, u64::from(flood));
+    }
+}
