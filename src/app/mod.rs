@@ -1,7 +1,7 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
-mod prepare;
 mod play;
+mod prepare;
 mod report;
 
 pub use play::{Play, PlayError, Played};

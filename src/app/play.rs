@@ -191,8 +191,16 @@ impl Stage {
             let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
             let grid = TickGrid::new(origin.max(Monotonic.now()), self.show.rate);
             let engine = Engine::new(self.show, self.timeline, self.headroom, windows, self.course);
-            let ended =
-                TickLoop { clock: &Monotonic, grid, engine, lanes: self.lanes, sink: self.sender, mail, stop }.run();
+            let ended = TickLoop {
+                clock: &Monotonic,
+                grid,
+                engine,
+                lanes: self.lanes,
+                sink: self.sender,
+                mail,
+                stop,
+            }
+            .run();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);
             plan_thread.thread().unpark();
@@ -249,7 +257,10 @@ fn sum_up(controllers: &[Controller], show: &Show, silent: bool, prepared: &Prep
         )
     }));
     if run.ended.unposted > 0 {
-        notes.push(format!("{} records found no room and were inferred from frame numbers", run.ended.unposted));
+        notes.push(format!(
+            "{} records found no room and were inferred from frame numbers",
+            run.ended.unposted
+        ));
     }
     let lost = (0..controllers.len()).filter(|&index| !silent && tracker.lost_at_end(index));
     let silent = lost.map(|index| controllers[index].name.clone()).collect();

@@ -59,7 +59,8 @@ impl<C: Clock> Preparation<'_, C> {
         for lane in 0..count {
             if !self.is_parked(lane, &told[lane]) {
                 let time_ms = self.send_home(lane, &mut prepared);
-                arrival = arrival.max(Some(self.clock.now() + Duration::from_millis(u64::from(time_ms)) + SETTLE));
+                arrival =
+                    arrival.max(Some(self.clock.now() + Duration::from_millis(u64::from(time_ms)) + SETTLE));
             }
         }
         if let Some(arrival) = arrival {
@@ -125,7 +126,12 @@ impl<C: Clock> Preparation<'_, C> {
         let mut buf = [0; MAX_LEN];
         let (stamped, datagram) = self.lanes[lane].encode_homing(time_ms, &mut buf);
         let of = u16::try_from(lane).expect("fewer controllers than ports");
-        self.acks.on_sent(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at: self.clock.now() });
+        self.acks.on_sent(Sent::Posted {
+            lane: of,
+            frame: stamped.frame,
+            asked: stamped.asked,
+            at: self.clock.now(),
+        });
         if let Delivery::Failed(_) = self.sender.send(lane, datagram) {
             self.acks.on_sent(Sent::Failed { lane: of, frame: stamped.frame });
         }
@@ -160,7 +166,8 @@ impl<C: Clock> Preparation<'_, C> {
 /// The axis, from 0, of the first position that a reply to one of our reads tells.
 fn first_axis(reply: &RegisterReply<'_>) -> Option<usize> {
     let asked = position_reads(MAX_AXES, Code::ALL, Code::ALL);
-    let block = asked.enumerate().find(|(_, read)| read.channel == reply.channel && read.start == reply.start)?.0;
+    let block =
+        asked.enumerate().find(|(_, read)| read.channel == reply.channel && read.start == reply.start)?.0;
     Some(3 * block)
 }
 
@@ -169,7 +176,11 @@ fn tells_all(controller: &Controller, told: &Told) -> bool {
 }
 
 /// The Time that takes a seat over its whole stroke at 50 mm/s, and whether it had to be cut.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a saturating cast is what is wanted")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a saturating cast is what is wanted"
+)]
 fn homing_time(stroke_mm: f64) -> (u32, bool) {
     let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
     (whole.min(LONGEST_MS), whole > LONGEST_MS)

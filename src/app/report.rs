@@ -135,7 +135,10 @@ impl Report {
             ),
             (
                 "real time",
-                format!("policy {}, priority {}, memory {locked}", self.realtime.policy, self.realtime.priority),
+                format!(
+                    "policy {}, priority {}, memory {locked}",
+                    self.realtime.policy, self.realtime.priority
+                ),
             ),
             ("strangers", format!("{} datagrams", self.strangers)),
         ];
@@ -149,15 +152,37 @@ impl Report {
 
     fn table(&self) -> Table {
         let mut table = Table::new();
-        table.load_preset(presets::NOTHING);
+        table.load_style(presets::NOTHING);
         table.set_header([
-            "controller", "address", "sent", "acked", "refused", "lost", "homing", "dup", "stale", "stray", "failed",
-            "closed", "ack p50 µs", "p99", "p99.9", "max",
+            "controller",
+            "address",
+            "sent",
+            "acked",
+            "refused",
+            "lost",
+            "homing",
+            "dup",
+            "stale",
+            "stray",
+            "failed",
+            "closed",
+            "ack p50 µs",
+            "p99",
+            "p99.9",
+            "max",
         ]);
         for one in &self.controllers {
             let counts = [
-                one.sent, one.acked, one.refused, one.lost, one.homing, one.duplicate, one.stale, one.stray,
-                one.send_failed, one.port_closed,
+                one.sent,
+                one.acked,
+                one.refused,
+                one.lost,
+                one.homing,
+                one.duplicate,
+                one.stale,
+                one.stray,
+                one.send_failed,
+                one.port_closed,
             ];
             let latencies = [one.ack_us.p50, one.ack_us.p99, one.ack_us.p999, one.ack_us.max];
             let mut row = vec![one.name.clone(), one.address.clone()];

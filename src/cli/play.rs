@@ -90,7 +90,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         plays: args.plays,
     };
     if show.start >= timeline.duration() {
-        let why = anyhow!("--start {} is not before the end of the cue at {}", show.start, timeline.duration());
+        let why =
+            anyhow!("--start {} is not before the end of the cue at {}", show.start, timeline.duration());
         return Err(why).or_exit(Exit::Usage);
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.no_acks };
@@ -205,7 +206,8 @@ fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
     }
     if !played.silent.is_empty() {
         let who = played.silent.join(", ");
-        let why = anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
+        let why =
+            anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
         return Err(why).or_exit(Exit::Unavailable);
     }
     Ok(Exit::Done)
@@ -229,7 +231,11 @@ impl Progress {
             while !over.load(Ordering::Relaxed) {
                 let show = live.show();
                 bar.set_position(u64::try_from(show.as_nanos() / 1_000_000).unwrap_or(0));
-                bar.set_message(format!("{show} / {length}, {} ticks, {} missed", live.ticks(), live.missed()));
+                bar.set_message(format!(
+                    "{show} / {length}, {} ticks, {} missed",
+                    live.ticks(),
+                    live.missed()
+                ));
                 thread::park_timeout(Duration::from_millis(100));
             }
             bar.finish_and_clear();

@@ -14,8 +14,8 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use fault::{ConfigFault, ConfigFaults};
 pub use crate::wire::{Dialect, Timing};
+pub use fault::{ConfigFault, ConfigFaults};
 pub use target::{TargetError, from_to_args};
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).

@@ -9,35 +9,35 @@ const CHANGE_PER_S: f64 = 0.2;
 
 /// The lag of the show behind its grid, and how fast it is being taken back.
 #[derive(Debug, Clone, Default)]
-pub struct Slew {
+pub(super) struct Slew {
     lag_s: f64,
     speed_up: f64,
 }
 
 impl Slew {
     /// Show time falls behind by `span`.
-    pub fn fall_behind(&mut self, span: Duration) {
+    pub(super) fn fall_behind(&mut self, span: Duration) {
         self.lag_s += span.as_secs_f64();
     }
 
     /// How far the show is behind.
     #[must_use]
-    pub fn lag(&self) -> Duration {
+    pub(super) fn lag(&self) -> Duration {
         Duration::from_secs_f64(self.lag_s.max(0.0))
     }
 
     /// Forgets lag and speed: show time was set anew.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         *self = Self::default();
     }
 
     /// Show time was moved on by `span`.
-    pub fn skip(&mut self, span: Duration) {
+    pub(super) fn skip(&mut self, span: Duration) {
         self.lag_s = (self.lag_s - span.as_secs_f64()).max(0.0);
     }
 
     /// How much show time passes in a frame of that Time, at most `ceiling` (0 to [`MAX_SPEED_UP`]) faster than it.
-    pub fn advance(&mut self, time: Duration, ceiling: f64) -> Duration {
+    pub(super) fn advance(&mut self, time: Duration, ceiling: f64) -> Duration {
         let dt = time.as_secs_f64();
         let change = CHANGE_PER_S * dt;
         let wanted = self.closing_speed(dt).min(ceiling).min(MAX_SPEED_UP);

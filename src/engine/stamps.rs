@@ -4,7 +4,7 @@ use crate::wire::Timing;
 
 /// The Time field of the frames of one play.
 #[derive(Debug, Clone)]
-pub struct Stamps {
+pub(super) struct Stamps {
     timing: Timing,
     sum_ms: u32,
     bridge: bool,
@@ -13,17 +13,17 @@ pub struct Stamps {
 impl Stamps {
     /// Stamps of a play: an absolute sum starts at one period with the first frame.
     #[must_use]
-    pub const fn new(timing: Timing) -> Self {
+    pub(super) const fn new(timing: Timing) -> Self {
         Self { timing, sum_ms: 0, bridge: false }
     }
 
     /// The next frame does not go on from the last: it is relative, and the sum starts again after it.
-    pub fn break_off(&mut self) {
+    pub(super) fn break_off(&mut self) {
         self.bridge = true;
     }
 
     /// How the next frame, of `time_ms`, is sent: the timing it uses and the Time it says.
-    pub fn next(&mut self, time_ms: u32) -> (Timing, u32) {
+    pub(super) fn next(&mut self, time_ms: u32) -> (Timing, u32) {
         let sum = self.sum_ms.checked_add(time_ms);
         match (self.timing, sum) {
             (Timing::Relative, _) => (Timing::Relative, time_ms),

@@ -14,7 +14,9 @@ pub enum FanOutFault {
     #[error("a{0} is taken by no controller; add one with that axis in its window, or leave the column out")]
     AxisUntaken(usize),
     /// Vibration asked of a controller that has none.
-    #[error("v{axis}: controller {controller} speaks mbox, which has no vibration; leave the column out or set dialect = \"smc\"")]
+    #[error(
+        "v{axis}: controller {controller} speaks mbox, which has no vibration; leave the column out or set dialect = \"smc\""
+    )]
     NoVibration {
         /// Axis of the cue, counted from 1.
         axis: usize,
@@ -22,7 +24,9 @@ pub enum FanOutFault {
         controller: String,
     },
     /// Vibration in a frame too long for it.
-    #[error("v{axis}: the frames of controller {controller} carry {slots} axes, and vibration fits into at most 6; use fan_out = \"slice\" with at most 6 axes")]
+    #[error(
+        "v{axis}: the frames of controller {controller} carry {slots} axes, and vibration fits into at most 6; use fan_out = \"slice\" with at most 6 axes"
+    )]
     VibrationTooWide {
         /// Axis of the cue, counted from 1.
         axis: usize,
@@ -56,11 +60,21 @@ pub fn lanes(config: &Config, cue: &Cue, manner: Manner) -> Result<Vec<Lane>, Ve
         let unknown = names.iter().filter(|name| !knows(config, name));
         faults.extend(unknown.map(|name| FanOutFault::EffectUnknown(name.clone())));
     }
-    let lanes = config.controllers.iter().map(|controller| lane(config, controller, cue, manner, &mut faults)).collect();
+    let lanes = config
+        .controllers
+        .iter()
+        .map(|controller| lane(config, controller, cue, manner, &mut faults))
+        .collect();
     if faults.is_empty() { Ok(lanes) } else { Err(faults) }
 }
 
-fn lane(config: &Config, controller: &Controller, cue: &Cue, manner: Manner, faults: &mut Vec<FanOutFault>) -> Lane {
+fn lane(
+    config: &Config,
+    controller: &Controller,
+    cue: &Cue,
+    manner: Manner,
+    faults: &mut Vec<FanOutFault>,
+) -> Lane {
     let (channel, window) = match controller.fan_out {
         FanOut::Slice => slice(controller, cue, manner.level),
         FanOut::Shared => shared(config, controller, cue, manner.level),
@@ -107,7 +121,8 @@ fn shared(config: &Config, controller: &Controller, cue: &Cue, level: f64) -> (u
     let (channel, slots) = motion_channel_and_slots(cue.axes().max(reach));
     let any_slot = |axis: usize| {
         let takes = |other: &&Controller| other.fan_out == FanOut::Shared && other.takes(axis);
-        let taker = if controller.takes(axis) { Some(controller) } else { config.controllers.iter().find(takes) };
+        let taker =
+            if controller.takes(axis) { Some(controller) } else { config.controllers.iter().find(takes) };
         let taker = taker.unwrap_or(controller);
         let own = (axis < cue.axes()).then_some(axis);
         slot(&taker.seat, axis.saturating_sub(taker.axis_offset), own, cue, level)

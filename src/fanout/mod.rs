@@ -63,7 +63,12 @@ pub struct Stamped {
 
 impl Lane {
     /// Writes the frame of this tick to `buf`, and takes a frame number for it.
-    pub fn encode<'b>(&mut self, beat: &Beat, pose: &Pose, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+    pub fn encode<'b>(
+        &mut self,
+        beat: &Beat,
+        pose: &Pose,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> (Stamped, &'b [u8]) {
         let stamped = self.stamp();
         let slots = self.window.slots();
         let mut positions = [Pulses(0); MAX_AXES];

@@ -126,8 +126,7 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     let (requests, requests_end) = RingBuffer::new(PLANS);
     let (answers_end, answers) = RingBuffer::new(PLANS);
     let (retired, retired_end) = RingBuffer::new(PLANS);
-    let mail =
-        Mail { sent, ticks: reports, requests, answers, retired, planner: None, live, unposted: 0 };
+    let mail = Mail { sent, ticks: reports, requests, answers, retired, planner: None, live, unposted: 0 };
     let ends = MailEnds {
         sent: sent_end,
         ticks: reports_end,

@@ -7,7 +7,7 @@ mod acks;
 mod mail;
 mod planning;
 
-pub use acks::{AckLoop, Accounts};
+pub use acks::{Accounts, AckLoop};
 pub use mail::{Answer, Live, Mail, MailEnds, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
 

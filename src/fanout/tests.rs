@@ -1,0 +1,119 @@
+use super::*;
+use crate::config::{Config, from_to_args};
+use crate::cue::{Cue, Source, read};
+use crate::timeline::EffectSet;
+use crate::wire::MotionRequest;
+use std::path::Path;
+
+const FULL: Manner = Manner { level: 1.0, silent: false };
+
+fn cue(text: &str) -> Cue {
+    read(Path::new("test.csv"), text.as_bytes(), &Source::Native).unwrap()
+}
+
+fn hall(tos: &[&str], axes: usize) -> Config {
+    let tos: Vec<String> = tos.iter().map(|to| (*to).to_owned()).collect();
+    from_to_args(&tos, &[], axes).unwrap()
+}
+
+fn four_axes() -> Cue {
+    cue("time_ms,a1,a2,a3,a4\n0,0,0,0,0\n1000,0.1,0.2,0.3,0.4\n")
+}
+
+/// The first frame of each lane, for a pose of 0.1, 0.2, 0.3 and 0.4 of the stroke on axes 1 to 4.
+fn frames(config: &Config, cue: &Cue, manner: Manner) -> Vec<MotionRequest> {
+    let pose = std::array::from_fn(|axis| if axis < 4 { 0.1 * (axis as u8 + 1) as f64 } else { 0.0 });
+    let mut beat = Beat::still(Timing::Relative, 10);
+    beat.effects = EffectSet::Word(0xffff);
+    let frame = |lane: &mut Lane| {
+        let placed = lane.window.place(&pose);
+        let mut buf = [0xa5; MAX_LEN];
+        let (_, octets) = lane.encode(&beat, &placed, &mut buf);
+        MotionRequest::parse(octets).unwrap()
+    };
+    lanes(config, cue, manner).unwrap().iter_mut().map(frame).collect()
+}
+
+fn positions(frame: &MotionRequest) -> Vec<i32> {
+    frame.positions.iter().map(|pulses| pulses.0).collect()
+}
+
+#[test]
+fn a_slice_carries_just_the_controllers_own_axes_and_padding_rests() {
+    let config = hall(&["127.0.0.1:1,axes=3", "127.0.0.1:2,axes=4,offset=3"], 4);
+    let frames = frames(&config, &four_axes(), FULL);
+    assert_eq!(positions(&frames[0]), [30_000, 60_000, 90_000]);
+    assert_eq!(positions(&frames[1]), [120_000, 0, 0, 0, 0, 0]);
+    assert_eq!((frames[0].channel, frames[1].channel), (0, 1));
+}
+
+#[test]
+fn a_shared_frame_carries_the_whole_cue_to_each_controller() {
+    let config =
+        hall(&["127.0.0.1:1,axes=3,fan_out=shared", "127.0.0.1:2,axes=3,offset=3,fan_out=shared"], 4);
+    for frame in frames(&config, &four_axes(), FULL) {
+        assert_eq!(positions(&frame), [30_000, 60_000, 90_000, 120_000, 0, 0]);
+    }
+}
+
+#[test]
+fn frames_ask_for_replies_unless_the_play_is_silent() {
+    let config = hall(&["127.0.0.1:1"], 4);
+    let asks = |silent| frames(&config, &four_axes(), Manner { silent, ..FULL })[0].reply;
+    assert_eq!((asks(false), asks(true)), (Code::ALL, Code::NONE));
+}
+
+#[test]
+fn raw_words_reach_only_the_outputs_a_controller_has() {
+    let config = hall(&["127.0.0.1:1"], 4);
+    assert_eq!(frames(&config, &four_axes(), FULL)[0].outputs, 0x0fff);
+}
+
+#[test]
+fn every_misfit_is_named_at_once() {
+    let cue = cue(
+        "time_ms,a1,a2,a3,a4,a5,a6,a7,v1_hz,v1_amp,fx_lava\n0,0,0,0,0,0,0,0,20,0.01,1\n9,0,0,0,0,0,0,0,20,0.01,1\n",
+    );
+    let config = hall(&["127.0.0.1:1,axes=3,dialect=mbox", "127.0.0.1:2,axes=3,fan_out=shared"], 7);
+    let faults: Vec<String> =
+        lanes(&config, &cue, FULL).unwrap_err().iter().map(ToString::to_string).collect();
+    let starts = [
+        "a4 is",
+        "a5 is",
+        "a6 is",
+        "a7 is",
+        "fx_lava has",
+        "v1: controller c1",
+        "v1: the frames of controller c2",
+    ];
+    assert_eq!(faults.len(), starts.len(), "{faults:#?}");
+    for (fault, start) in faults.iter().zip(starts) {
+        assert!(fault.starts_with(start), "{fault}");
+    }
+}
+
+#[test]
+fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
+    let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
+    let config = hall(&["127.0.0.1:1"], 1);
+    let mut lane = lanes(&config, &cue, FULL).unwrap().remove(0);
+    let mut beat = Beat::still(Timing::Absolute, 10);
+    beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
+    let mut buf = [0xa5; MAX_LEN];
+    let (stamped, octets) = lane.encode(&beat, &lane.window.park(), &mut buf);
+    let frame = MotionRequest::parse(octets).unwrap();
+    assert_eq!(stamped, Stamped { frame: FrameNo::FIRST, asked: true });
+    assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
+    assert_eq!(octets[4..6], [0x18, 0x01]);
+}
+
+#[test]
+fn the_way_home_is_relative_and_plain_and_takes_a_frame_number() {
+    let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
+    let mut lane = lanes(&hall(&["127.0.0.1:1"], 1), &cue, FULL).unwrap().remove(0);
+    let mut buf = [0xa5; MAX_LEN];
+    let (first, octets) = lane.encode_homing(3_000, &mut buf);
+    assert_eq!((first.frame, &octets[4..6]), (FrameNo(1), &[0x14, 0x01][..]));
+    let (second, octets) = lane.encode(&Beat::still(Timing::Relative, 10), &lane.window.park(), &mut buf);
+    assert_eq!((second.frame, &octets[4..6]), (FrameNo(2), &[0x19, 0x01][..]));
+}
