@@ -1,0 +1,265 @@
+//! A whole show in virtual time: a clock that jumps from deadline to deadline, a planner that answers between ticks, and
+//! a link that keeps every datagram.
+
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::cell::{Cell, RefCell};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use kinocue::config::{Config, from_to_args};
+use kinocue::cue::{self, Source};
+use kinocue::engine::{Engine, Headroom, Rate, Show, TickGrid};
+use kinocue::fanout::{Manner, lanes};
+use kinocue::motion::{Measure, SeatType, Spacing};
+use kinocue::net::Delivery;
+use kinocue::plan::{Curve, From, Planner, Request, To};
+use kinocue::rt::{Ended, FrameSink, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::time::{Clock, MonoTime, ShowTime};
+use kinocue::timeline::{Hint, Timeline};
+use kinocue::wire::{MotionRequest, Timing};
+
+/// Something that happens at a tick.
+#[derive(Debug, Clone, Copy)]
+pub enum Event {
+    /// The tick thread wakes up this much late.
+    Late(Duration),
+    /// Somebody presses Ctrl-C.
+    Stop,
+    /// From here on the planner takes this many ticks to answer.
+    SlowPlanner(u32),
+}
+
+/// A show to be played in virtual time.
+pub struct Virtual {
+    pub cue: String,
+    pub to: Vec<String>,
+    pub rate_hz: f64,
+    pub timing: Timing,
+    pub start: ShowTime,
+    pub plays: u32,
+    pub level: f64,
+    /// What happens at the wake-up of that number, counted from 0.
+    pub script: Vec<(u64, Event)>,
+    /// Wake-ups after which a show that does not end is given up.
+    pub at_most: u64,
+}
+
+impl Virtual {
+    /// One three-axis seat at 100 Hz, relative time, once.
+    pub fn new(cue: impl Into<String>) -> Self {
+        Self {
+            cue: cue.into(),
+            to: vec!["127.0.0.1:7408".to_owned()],
+            rate_hz: 100.0,
+            timing: Timing::Relative,
+            start: ShowTime::ZERO,
+            plays: 1,
+            level: 1.0,
+            script: Vec::new(),
+            at_most: 1_000_000,
+        }
+    }
+
+    pub fn at_rate(mut self, hz: f64) -> Self {
+        self.rate_hz = hz;
+        self
+    }
+
+    pub fn with(mut self, wake_up: u64, event: Event) -> Self {
+        self.script.push((wake_up, event));
+        self
+    }
+
+    pub fn timeline(&self) -> Timeline {
+        Timeline::new(cue::read(Path::new("show.csv"), self.cue.as_bytes(), &Source::Native).unwrap())
+    }
+
+    pub fn config(&self) -> Config {
+        from_to_args(&self.to, &[], self.timeline().cue().axes()).unwrap()
+    }
+
+    /// Plays it to its end.
+    pub fn play(&self) -> Played {
+        let timeline = Arc::new(self.timeline());
+        let rate = Rate::from_hz(self.rate_hz);
+        let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
+        let lanes = lanes(&self.config(), timeline.cue(), Manner { level: self.level, silent: false }).unwrap();
+        let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
+        let pose = |at| timeline.sample(at, &mut Hint::default());
+        let curve = Curve { pose: &pose, end: timeline.duration() };
+        let mut planner = Planner::new(windows.clone(), rate.hz());
+        let request = Request { from: From::Park, to: To::Cue, start: self.start, serial: 1 };
+        let course = Box::new(planner.plan(request, &curve).unwrap());
+        let join = ShowTime::from_nanos(course.settled().as_nanos() - self.start.as_nanos());
+        let headroom = Headroom::measure(&windows, &curve, rate);
+        let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
+        let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired } = ends;
+        let plans = PlanLoop { planner, timeline: Arc::clone(&timeline), requests, answers, retired };
+        let stop = AtomicBool::new(false);
+        let clock = Stage::new(plans, &stop, &self.script, self.at_most);
+        let engine = Engine::new(show, Arc::clone(&timeline), headroom, windows, course);
+        let grid = TickGrid::new(clock.now(), rate);
+        let sink = Link { now: &clock.now, frames: Vec::new() };
+        let mut tick_loop = TickLoop { clock: &clock, grid, engine, lanes, sink, mail, stop: &stop };
+        let ended = tick_loop.run();
+        Played { ended, frames: tick_loop.sink.frames, join, timeline, rate }
+    }
+}
+
+/// Turns the clock by hand, and does in between what other threads do.
+struct Stage<'a> {
+    now: Cell<MonoTime>,
+    wake_ups: Cell<u64>,
+    plans: RefCell<PlanLoop>,
+    planner_delay: Cell<u32>,
+    planner_waits: Cell<u32>,
+    stop: &'a AtomicBool,
+    script: &'a [(u64, Event)],
+    at_most: u64,
+}
+
+impl<'a> Stage<'a> {
+    fn new(plans: PlanLoop, stop: &'a AtomicBool, script: &'a [(u64, Event)], at_most: u64) -> Self {
+        Self {
+            now: Cell::new(MonoTime::from_nanos(1_000_000_000)),
+            wake_ups: Cell::new(0),
+            plans: RefCell::new(plans),
+            planner_delay: Cell::new(0),
+            planner_waits: Cell::new(0),
+            stop,
+            script,
+            at_most,
+        }
+    }
+
+    fn serve_planner(&self) {
+        if self.plans.borrow().requests.is_empty() {
+            self.planner_waits.set(self.planner_delay.get());
+        } else if self.planner_waits.get() > 0 {
+            self.planner_waits.set(self.planner_waits.get() - 1);
+            return;
+        }
+        self.plans.borrow_mut().serve(&mut Vec::new());
+    }
+}
+
+impl Clock for Stage<'_> {
+    fn now(&self) -> MonoTime {
+        self.now.get()
+    }
+
+    fn sleep_until(&self, deadline: MonoTime) {
+        let wake_up = self.wake_ups.get();
+        assert!(wake_up < self.at_most, "the show does not end");
+        self.wake_ups.set(wake_up + 1);
+        self.now.set(deadline.max(self.now.get()));
+        self.serve_planner();
+        for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
+            match event {
+                Event::Late(span) => self.now.set(self.now.get() + *span),
+                Event::Stop => self.stop.store(true, Ordering::Relaxed),
+                Event::SlowPlanner(ticks) => {
+                    self.planner_delay.set(*ticks);
+                    self.planner_waits.set(*ticks);
+                }
+            }
+        }
+    }
+}
+
+struct Link<'a> {
+    now: &'a Cell<MonoTime>,
+    frames: Vec<Frame>,
+}
+
+impl FrameSink for Link<'_> {
+    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+        let request = MotionRequest::parse(datagram).unwrap();
+        self.frames.push(Frame { lane, at: self.now.get(), request, octets: datagram.to_vec() });
+        Delivery::Sent
+    }
+}
+
+/// A frame as it left.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    pub lane: usize,
+    pub at: MonoTime,
+    pub request: MotionRequest,
+    pub octets: Vec<u8>,
+}
+
+/// A show that was played.
+pub struct Played {
+    pub ended: Ended,
+    pub frames: Vec<Frame>,
+    /// How long the first join takes.
+    pub join: ShowTime,
+    pub timeline: Arc<Timeline>,
+    pub rate: Rate,
+}
+
+/// The worst that a seat was made to do, each over its limit.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Worst {
+    pub velocity: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+    pub step: f64,
+}
+
+impl Played {
+    /// The frames of one lane.
+    pub fn lane(&self, lane: usize) -> impl Iterator<Item = &Frame> {
+        self.frames.iter().filter(move |frame| frame.lane == lane)
+    }
+
+    /// The positions of one axis of one lane, frame by frame, mm.
+    pub fn positions_mm(&self, lane: usize, axis: usize) -> Vec<f64> {
+        let per_pulse = 150.0 / SeatType::bench3(1).stroke_pulses();
+        self.lane(lane).map(|frame| f64::from(frame.request.positions[axis].0) * per_pulse).collect()
+    }
+
+    /// What the frames make the first lane do, by the measure of what is sent, over the limits of the bench seat.
+    pub fn worst(&self) -> Worst {
+        let seat = SeatType::bench3(1);
+        let axes = self.frames[0].request.positions.len();
+        let mut worst = Worst::default();
+        for axis in 0..axes {
+            let mut measure = Measure::new(Spacing::at_rate(self.rate.hz()));
+            let mut at = ShowTime::ZERO;
+            measure.push(at, 0.0);
+            for (index, mm) in (0..).zip(self.positions_mm(0, axis)) {
+                at += Duration::from_millis(u64::from(self.rate.time_ms(index)));
+                let seen = measure.push(at, mm);
+                worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
+                worst.acceleration =
+                    worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
+                worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
+                let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / self.rate.hz()).max(0.005);
+                worst.step = worst.step.max(seen.step.value.abs() / step);
+            }
+        }
+        worst
+    }
+}
+
+/// A cue of sines about the middle of the stroke, rows 20 ms apart: `mm` of swing at `hz` on each of `axes` axes.
+pub fn swell(axes: u32, seconds: u32, mm: f64, hz: f64) -> String {
+    use std::fmt::Write as _;
+    let mut text = "time_ms".to_owned();
+    (1..=axes).for_each(|axis| write!(text, ",a{axis}").unwrap());
+    for row in 0..=50 * seconds {
+        let t = f64::from(row) * 0.02;
+        write!(text, "\n{}", row * 20).unwrap();
+        for axis in 0..axes {
+            let turn = t * hz + f64::from(axis) / f64::from(axes);
+            write!(text, ",{:.6}", 0.5 + mm / 150.0 * (turn * std::f64::consts::TAU).sin()).unwrap();
+        }
+    }
+    text.push('\n');
+    text
+}

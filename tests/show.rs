@@ -1,0 +1,220 @@
+//! Whole shows in virtual time: a cue goes in, datagrams come out.
+
+mod common;
+
+use std::time::Duration;
+
+use common::{Event, Played, Virtual, Worst, swell};
+use kinocue::engine::Ending;
+use kinocue::time::ShowTime;
+use kinocue::timeline::Hint;
+use kinocue::wire::Timing;
+
+/// Within the limits where only pulses are seen.
+fn assert_gentle(played: &Played) {
+    let worst = played.worst();
+    let Worst { velocity, acceleration, jerk, step } = worst;
+    assert!(velocity <= 1.01 && acceleration <= 1.01 && jerk <= 1.01 && step <= 1.01, "{worst:?}");
+}
+
+/// The pulses the cue itself asks of an axis at a show time.
+fn pulses_of_cue(played: &Played, axis: usize, at: ShowTime) -> i32 {
+    let pose = played.timeline.sample(at, &mut Hint::default());
+    #[expect(clippy::cast_possible_truncation, reason = "300,000 at the most")]
+    let pulses = (pose[axis] * 300_000.0).round() as i32;
+    pulses
+}
+
+#[test]
+fn a_show_joins_the_cue_follows_it_parks_and_closes_with_three_hold_frames() {
+    let played = Virtual::new(swell(3, 6, 40.0, 0.4)).play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+    assert_eq!(played.ended.missed, 0);
+    assert_gentle(&played);
+    let frames: Vec<_> = played.lane(0).collect();
+    assert!(frames.iter().all(|frame| frame.request.time_ms == 10 && frame.octets[4..6] == [0x14, 0x01]));
+    assert!(frames.iter().zip(1..).all(|(frame, number)| frame.request.frame.0 == number));
+    // From the end of the join to the end of the cue, frame k carries the cue one period after its tick.
+    let joined = usize::try_from(played.join.as_nanos() / 10_000_000).unwrap() + 1;
+    for (k, frame) in frames.iter().enumerate().take(600).skip(joined) {
+        let at = ShowTime::from_millis(10 * (i64::try_from(k).unwrap() + 1));
+        assert_eq!(frame.request.positions[1].0, pulses_of_cue(&played, 1, at), "frame {k}");
+    }
+    let last: Vec<i32> = frames[frames.len() - 4..].iter().map(|frame| frame.request.positions[0].0).collect();
+    assert_eq!(last, [0; 4]);
+    assert!(frames[frames.len() - 5].request.positions[0].0 > 0, "three hold frames, no more");
+}
+
+#[test]
+fn a_cue_that_starts_and_ends_at_rest_in_the_park_pose_is_played_row_by_row() {
+    let cue = "time_ms,a1\n0,0\n500,0\n1000,0.1\n1500,0.2\n2000,0.1\n2500,0\n3000,0\n";
+    let played = Virtual::new(cue).play();
+    assert_eq!(played.join, ShowTime::ZERO);
+    assert_eq!(played.frames[99].request.positions[0].0, 30_000, "at 1 s the cue stands at a tenth");
+    assert_eq!(played.frames.len(), 300 + 3);
+    assert_gentle(&played);
+}
+
+#[test]
+fn parking_is_no_faster_than_50_mm_a_second_and_effects_are_off() {
+    let cue = "time_ms,a1,fx_air\n0,0.8,1\n3000,0.8,1\n";
+    let played = Virtual::new(cue).play();
+    let at_end = played.frames.iter().position(|frame| frame.request.outputs == 0).unwrap();
+    assert_eq!(at_end, 300, "air is on throughout the cue");
+    let mm = played.positions_mm(0, 0);
+    let fastest = mm[at_end..].windows(2).map(|pair| (pair[1] - pair[0]).abs() / 0.010).fold(0.0, f64::max);
+    assert!(fastest <= 50.1, "{fastest} mm/s");
+    assert_gentle(&played);
+}
+
+#[test]
+fn at_any_rate_distance_and_time_agree() {
+    for hz in [1.0, 23.976, 60.0, 600.0, 1000.0] {
+        let played = Virtual::new(swell(1, 5, 60.0, 0.25)).at_rate(hz).play();
+        let sum: u32 = played.lane(0).map(|frame| frame.request.time_ms).sum();
+        let frames = u32::try_from(played.frames.len()).unwrap();
+        assert!((f64::from(sum) - f64::from(frames) * 1000.0 / hz).abs() <= 1.0, "{hz} Hz: {sum} ms");
+        if hz >= 60.0 {
+            assert_gentle(&played);
+        }
+    }
+}
+
+#[test]
+fn after_a_late_wakeup_one_frame_leaves_and_the_lag_is_taken_back_gently() {
+    let smooth = Virtual::new(swell(1, 20, 60.0, 0.25)).play();
+    let played = Virtual::new(swell(1, 20, 60.0, 0.25)).with(400, Event::Late(Duration::from_millis(35))).play();
+    assert_eq!(played.ended.missed, 3);
+    // The poses go on from the last one sent; Time stays one period.
+    assert!(played.frames.iter().all(|frame| frame.request.time_ms == 10));
+    assert_gentle(&played);
+    let positions = |played: &Played, frame: usize| played.frames[frame].request.positions[0].0;
+    assert_eq!(positions(&played, 400), positions(&smooth, 400), "the pose after the gap is the next one");
+    let much_later = 2_000 - 60;
+    assert_eq!(positions(&played, much_later - 3), positions(&smooth, much_later), "on the grid again");
+    // No instant has two frames.
+    assert!(played.frames.windows(2).all(|pair| pair[0].at < pair[1].at));
+}
+
+#[test]
+fn after_a_long_stall_the_seat_holds_and_then_joins_the_cue_where_the_film_is() {
+    let smooth = Virtual::new(swell(1, 20, 60.0, 0.25)).play();
+    let played = Virtual::new(swell(1, 20, 60.0, 0.25)).with(400, Event::Late(Duration::from_millis(800))).play();
+    assert_eq!(played.ended.missed, 80);
+    let held = played.frames[399].request.positions[0];
+    assert_eq!([400, 401].map(|frame| played.frames[frame].request.positions[0]), [held; 2]);
+    let positions = |played: &Played, frame: usize| played.frames[frame].request.positions[0].0;
+    assert_eq!(positions(&played, 1_500 - 80), positions(&smooth, 1_500), "in time with the film again");
+    // The stall itself is the controller's: it came to rest at the last pose. From there on all is gentle.
+    let resumed = Played { frames: rest_then(&played, 400), ..played };
+    assert_gentle(&resumed);
+}
+
+/// The frames from one on, after a second of rest in its pose.
+fn rest_then(played: &Played, from: usize) -> Vec<common::Frame> {
+    let held = played.frames[from].clone();
+    let mut frames: Vec<_> = Vec::new();
+    // The measure starts at zero: come up to the held pose far from anything that is judged.
+    for part in 0..400 {
+        let mut frame = held.clone();
+        let share = f64::from(part) / 399.0;
+        let smooth = share * share * share * (10.0 - 15.0 * share + 6.0 * share * share);
+        for pulses in frame.request.positions.iter_mut() {
+            #[expect(clippy::cast_possible_truncation, reason = "300,000 at the most")]
+            let moved = (f64::from(pulses.0) * smooth).round() as i32;
+            pulses.0 = moved;
+        }
+        frames.push(frame);
+    }
+    frames.extend(std::iter::repeat_n(held, 100));
+    frames.extend_from_slice(&played.frames[from..]);
+    frames
+}
+
+#[test]
+fn many_small_gaps_end_in_a_join_that_never_stops_the_seat() {
+    let mut show = Virtual::new(swell(1, 20, 60.0, 0.25));
+    for gap in 0..8 {
+        show = show.with(400 + gap, Event::Late(Duration::from_millis(10)));
+    }
+    let played = show.play();
+    assert_eq!(played.ended.missed, 8);
+    assert_gentle(&played);
+}
+
+#[test]
+fn a_stop_parks_from_the_moving_cue_within_the_limits() {
+    for at in [50, 170, 333, 400, 555] {
+        let played = Virtual::new(swell(3, 20, 60.0, 0.25)).with(at, Event::Stop).play();
+        assert_eq!(played.ended.ending, Ending::Stopped);
+        assert_gentle(&played);
+        let last = played.frames.last().unwrap();
+        assert!(last.request.positions.iter().all(|pulses| pulses.0 == 0) && last.request.outputs == 0);
+        assert!(played.frames.len() < usize::try_from(at).unwrap() + 500, "{} frames", played.frames.len());
+    }
+}
+
+#[test]
+fn a_planner_that_answers_late_is_given_more_time_and_the_seat_never_jumps() {
+    let played = Virtual::new(swell(1, 20, 60.0, 0.25))
+        .with(395, Event::SlowPlanner(25))
+        .with(400, Event::Stop)
+        .play();
+    assert_eq!(played.ended.ending, Ending::Stopped);
+    assert_gentle(&played);
+    assert_eq!(played.frames.last().unwrap().request.positions[0].0, 0);
+}
+
+#[test]
+fn a_loop_joins_the_beginning_from_the_end_without_parking() {
+    let mut show = Virtual::new(swell(1, 8, 60.0, 0.25));
+    show.plays = 2;
+    let played = show.play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+    assert_gentle(&played);
+    let again = |frame: usize| played.frames[800 + frame].request.positions[0].0;
+    let at = |frame: i64| pulses_of_cue(&played, 0, ShowTime::from_millis(10 * (frame + 1)));
+    assert_eq!((again(500), again(700)), (at(500), at(700)));
+    assert!(played.positions_mm(0, 0)[200..1500].iter().all(|mm| *mm > 5.0), "no parking in between");
+}
+
+#[test]
+fn a_show_can_start_inside_the_cue() {
+    let mut show = Virtual::new(swell(1, 20, 60.0, 0.25));
+    show.start = ShowTime::from_millis(10_000);
+    let played = show.play();
+    assert_gentle(&played);
+    let at = ShowTime::from_millis(10_000 + 5_010);
+    assert_eq!(played.frames[500].request.positions[0].0, pulses_of_cue(&played, 0, at));
+}
+
+#[test]
+fn absolute_time_counts_from_one_period_and_is_bridged_by_a_relative_frame_after_a_stall() {
+    let mut show = Virtual::new(swell(1, 10, 60.0, 0.25)).with(300, Event::Late(Duration::from_millis(500)));
+    show.timing = Timing::Absolute;
+    let played = show.play();
+    let times: Vec<(Timing, u32)> = played.frames.iter().map(|f| (f.request.timing, f.request.time_ms)).collect();
+    assert_eq!(times[..2], [(Timing::Absolute, 10), (Timing::Absolute, 20)]);
+    assert_eq!(
+        times[299..303],
+        [(Timing::Absolute, 3_000), (Timing::Relative, 10), (Timing::Absolute, 10), (Timing::Absolute, 20)]
+    );
+    assert_eq!(times.last(), Some(&(Timing::Relative, 10)), "whoever plays next starts afresh");
+}
+
+#[test]
+fn slow_absolute_shows_start_with_a_hold_frame_because_the_first_time_is_cut_to_100_ms() {
+    let mut show = Virtual::new(swell(1, 20, 60.0, 0.1)).at_rate(5.0);
+    show.timing = Timing::Absolute;
+    let played = show.play();
+    assert_eq!((played.frames[0].request.time_ms, played.frames[0].request.positions[0].0), (200, 0));
+}
+
+#[test]
+fn a_level_shrinks_the_motion_about_the_neutral_pose() {
+    let mut show = Virtual::new(swell(1, 8, 60.0, 0.25));
+    show.level = 0.5;
+    let played = show.play();
+    let full = pulses_of_cue(&played, 0, ShowTime::from_millis(5_010));
+    assert!((played.frames[500].request.positions[0].0 - full / 2).abs() <= 1);
+}
