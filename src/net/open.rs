@@ -89,7 +89,7 @@ fn prepare(socket: &Socket) -> io::Result<()> {
 }
 
 /// Reads away what came while the socket was bound but not yet connected: anyone could have sent that.
-pub(super) fn quiet(batch: &mut Batch, socket: impl AsFd) {
+fn quiet(batch: &mut Batch, socket: impl AsFd) {
     for _ in 0..QUIET_BATCHES {
         // Any other error is an earlier datagram's, and gone once read.
         if batch.receive(socket.as_fd()).is_err_and(|e| e.kind() == io::ErrorKind::WouldBlock) {

@@ -2,13 +2,12 @@
 //! drain is repeated until what must come has come.
 
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
-use std::os::fd::AsFd;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use socket2::{Domain, Socket, Type};
 
 use super::*;
-use crate::sys::batch::Batch;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock;
 
@@ -123,16 +122,32 @@ fn each_reply_comes_from_its_own_controller_and_anyone_else_is_a_stranger() {
 }
 
 #[test]
-fn what_came_before_the_socket_was_connected_is_not_read() {
-    let (a, b) = (UdpSocket::bind(LOOPBACK).unwrap(), UdpSocket::bind(LOOPBACK).unwrap());
-    b.set_read_timeout(Some(PATIENCE)).unwrap();
-    for _ in 0..200 {
-        a.send_to(b"early", b.local_addr().unwrap()).unwrap();
-    }
-    b.peek(&mut [0]).unwrap();
-    let mut batch = Batch::new();
-    open::quiet(&mut batch, b.as_fd());
-    assert_eq!(batch.receive(&b).unwrap_err().kind(), std::io::ErrorKind::WouldBlock);
+fn what_a_stranger_sends_while_the_sockets_open_is_never_taken_for_a_reply() {
+    // A host that no other test uses, so that the port stays free from one opening to the next.
+    let host = SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 3), 0);
+    let peers: Vec<_> = (0..8).map(|_| peer()).collect();
+    let addresses: Vec<_> = peers.iter().map(|&(_, address)| address).collect();
+    let local = Ports::open(host, &addresses).unwrap().local();
+
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let (stranger, _) = peer();
+            let sends = (0..1_000_000).take_while(|_| !done.load(Ordering::Relaxed));
+            sends.for_each(|_| drop(stranger.send_to(b"forged", local)));
+        });
+        let (start, mut openings) = (Monotonic.now(), 0);
+        while openings < 30 && Monotonic.now().since(start) < PATIENCE {
+            let (_sender, mut receiver) = Ports::open(local, &addresses).unwrap().split();
+            let mut strangers = 0;
+            receiver.drain(|origin, _, _| {
+                assert!(matches!(origin, Origin::Stranger(_)), "{origin:?}");
+                strangers += 1;
+            });
+            openings += strangers.min(1); // only those that met the stranger
+        }
+        done.store(true, Ordering::Relaxed);
+    });
 }
 
 #[test]
@@ -145,7 +160,7 @@ fn a_closed_port_costs_the_others_nothing_and_itself_nothing_once_it_opens() {
     let send_all = |frame: u32, receiver: &mut Receiver| {
         for lane in 0..peers.len() {
             let delivery = sender.send(lane, &frame.to_be_bytes());
-            assert!(!matches!(delivery, Delivery::Failed(_)) || lane == 1, "{lane} {delivery:?}");
+            assert!(!matches!(delivery, Delivery::Failed(_)), "{lane} {delivery:?}");
         }
         if frame.is_multiple_of(5) {
             receiver.drain(|origin, _, _| panic!("nothing was sent by {origin:?}"));
@@ -155,7 +170,6 @@ fn a_closed_port_costs_the_others_nothing_and_itself_nothing_once_it_opens() {
     for frame in 0..FRAMES {
         send_all(frame, &mut receiver);
     }
-    assert!(receiver.port_closed(1) > 0);
     let opened = UdpSocket::bind(dead).unwrap();
     opened.set_read_timeout(Some(PATIENCE)).unwrap();
     let before = receiver.port_closed(1);
@@ -175,17 +189,30 @@ fn a_closed_port_costs_the_others_nothing_and_itself_nothing_once_it_opens() {
     assert_eq!([0, 2, 3].map(|lane| receiver.port_closed(lane)), [0; 3]);
 }
 
+// The kernel sends only so many refusals a second, to all tests together: one datagram need not bring one.
 #[test]
-fn a_refusal_that_waits_is_taken_by_whichever_half_comes_first_and_counted_once() {
+fn a_refusal_is_read_by_a_drain_and_counted_once() {
     let (sender, mut receiver) = Ports::open(LOOPBACK, &[closed_port()]).unwrap().split();
-    assert_eq!(sender.send(0, b"x"), Delivery::Sent);
     let start = Monotonic.now();
     while receiver.port_closed(0) == 0 {
         assert!(Monotonic.now().since(start) < PATIENCE);
+        assert_eq!(sender.send(0, b"x"), Delivery::Sent);
         receiver.drain(|_, _, _| ());
     }
     receiver.drain(|_, _, _| ());
     assert_eq!((receiver.port_closed(0), sender.send(0, b"x")), (1, Delivery::Sent));
+}
+
+#[test]
+fn a_datagram_that_meets_the_refusal_of_an_earlier_one_is_sent_once_more() {
+    let (sender, receiver) = Ports::open(LOOPBACK, &[closed_port()]).unwrap().split();
+    let start = Monotonic.now();
+    let mut delivery = Delivery::Sent;
+    while delivery == Delivery::Sent {
+        assert!(Monotonic.now().since(start) < PATIENCE);
+        delivery = sender.send(0, b"x");
+    }
+    assert_eq!((delivery, receiver.port_closed(0)), (Delivery::SentAfterRefusal, 1));
 }
 
 #[test]

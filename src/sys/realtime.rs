@@ -8,7 +8,7 @@ use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use rustix::thread::set_current_timer_slack;
 
-/// The priority asked for: above every ordinary program, below the kernel's own interrupt threads' usual maximum.
+/// The priority asked for: above every ordinary program, with room for an operator to put something above it.
 pub const PRIORITY: u8 = 50;
 
 /// How the kernel schedules a thread.
