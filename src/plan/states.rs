@@ -13,7 +13,7 @@ const APART: Duration = Duration::from_millis(20);
 ///
 /// Within 20 ms of the cue's end, after which it stands still, the differences look back instead.
 pub(super) fn following(window: &Window, cue: &Curve<'_>, at: ShowTime) -> Vec<AxisState> {
-    if at < cue.end && at + APART > cue.end {
+    if at <= cue.end && at + APART > cue.end {
         return leaving(window, cue, at);
     }
     let [before, now, after] = [at - APART, at, at + APART].map(|at| window.place(&(cue.pose)(at)));

@@ -223,24 +223,35 @@ impl Played {
         self.lane(lane).map(|frame| f64::from(frame.request.positions[axis].0) * per_pulse).collect()
     }
 
-    /// What the frames make the first lane do, by the measure of what is sent, over the limits of the bench seat.
+    /// What the frames make the first lane do from rest in its park pose.
     pub fn worst(&self) -> Worst {
+        self.worst_of(0, |_| 0.0)
+    }
+
+    /// What the frames from `first` on make the first lane do, if it was at rest in the pose of the first of them.
+    pub fn worst_from_rest(&self, first: usize) -> Worst {
+        self.worst_of(first, |mm| mm)
+    }
+
+    /// By the measure of what is sent, over the limits of the bench seat; before the first frame the seat rested where
+    /// `before` puts it.
+    fn worst_of(&self, first: usize, before: impl Fn(f64) -> f64) -> Worst {
         let seat = SeatType::bench3(1);
-        let axes = self.frames[0].request.positions.len();
+        let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / self.rate.hz()).max(0.005);
         let mut worst = Worst::default();
-        for axis in 0..axes {
+        for axis in 0..self.frames[0].request.positions.len() {
+            let sent = self.positions_mm(0, axis);
+            let rest = std::iter::repeat_n(before(sent[first]), 100);
             let mut measure = Measure::new(Spacing::at_rate(self.rate.hz()));
             let mut at = ShowTime::ZERO;
-            measure.push(at, 0.0);
-            for (index, mm) in (0..).zip(self.positions_mm(0, axis)) {
-                at += Duration::from_millis(u64::from(self.rate.time_ms(index)));
+            for (index, mm) in (0..).zip(rest.chain(sent[first..].iter().copied())) {
                 let seen = measure.push(at, mm);
                 worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
                 worst.acceleration =
                     worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
                 worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
-                let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / self.rate.hz()).max(0.005);
                 worst.step = worst.step.max(seen.step.value.abs() / step);
+                at += Duration::from_millis(u64::from(self.rate.time_ms(index)));
             }
         }
         worst
