@@ -12,7 +12,7 @@ use super::{METADATA, Topic, VERSION};
 use crate::time::ShowTime;
 
 /// Small, so that little is lost where a file is cut short.
-const CHUNK: u64 = 256 * 1024;
+const CHUNK: u64 = 64 * 1024;
 
 /// Writes a cue as MCAP, every value exactly, its messages in order of time.
 ///
