@@ -1,1 +1,269 @@
-//! Cue files: reads them whole, checks every cell, and names each bad one. Control thread.
+//! Cues: from a file (CSV, MCAP, or a format of the field) to motion in memory, whole, before anything moves. Control
+//! thread. Every fault of a file is named with its place; see `DESIGN` of the format in `cues/README.md`.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+mod bytes;
+mod csv;
+mod fault;
+mod header;
+pub mod limits;
+mod place;
+mod rows;
+mod steps;
+mod table;
+mod unit;
+mod value;
+
+pub(crate) use fault::Collector;
+pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place, Problem};
+use place::Origin;
+pub use steps::{Step, Steps};
+pub use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation, UnknownUnit};
+
+use crate::time::ShowTime;
+
+/// What a file is said to be; nothing about it is guessed but CSV or MCAP.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Source {
+    /// A cue of our own: MCAP where it begins as one or its name ends in `.mcap`, else CSV.
+    #[default]
+    Native,
+    /// Rows `line,time_ms,x,y,z,u,v,w` of a motion editor, with durations instead of times.
+    Rows {
+        /// The unit of the positions, which such a file does not say.
+        unit: DeclaredUnit,
+    },
+    /// Raw octets, one an axis, axis 1 first; 0 to 255 over the stroke.
+    U8 {
+        /// Axes, 1 to 12.
+        axes: usize,
+        /// Rows a second, above 0.
+        rate_hz: f64,
+    },
+}
+
+/// A vibration of one axis; none where either part is 0.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Vibration {
+    /// Frequency, Hz: 0, or [`limits::MIN_VIBRATION_HZ`] to [`limits::MAX_VIBRATION_HZ`].
+    pub hz: f64,
+    /// Amplitude in the cue's unit, 0 or more.
+    pub amplitude: f64,
+}
+
+/// What a cue switches over time.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effects {
+    /// Effects by name; bit i of a step says whether effect i is on.
+    Named {
+        /// The effects' names, at most [`limits::MAX_EFFECTS`].
+        names: Vec<String>,
+        /// Which are on, and from when.
+        steps: Steps<u32>,
+    },
+    /// The raw output word; only its low 12 bits have outputs.
+    Words(Steps<u16>),
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        Self::Named { names: Vec::new(), steps: Steps::default() }
+    }
+}
+
+/// A named instant of a cue.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Marker {
+    /// When.
+    pub at: ShowTime,
+    /// What it is called.
+    pub name: String,
+}
+
+/// A cue in memory: at least two rows of positions, the first at show time 0, and what goes with them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cue {
+    path: PathBuf,
+    title: Option<String>,
+    unit: Unit,
+    interpolation: Interpolation,
+    axes: usize,
+    times: Vec<ShowTime>,
+    positions: Vec<f64>,
+    origin: Origin,
+    vibration: Vec<Steps<Vibration>>,
+    effects: Effects,
+    markers: Vec<Marker>,
+}
+
+impl Cue {
+    /// A cue with nothing in it yet.
+    fn blank(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            title: None,
+            unit: Unit::default(),
+            interpolation: Interpolation::default(),
+            axes: 0,
+            times: Vec::new(),
+            positions: Vec::new(),
+            origin: Origin::default(),
+            vibration: Vec::new(),
+            effects: Effects::default(),
+            markers: Vec::new(),
+        }
+    }
+
+    /// The file it was read from.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its title, where it has one.
+    #[must_use]
+    pub fn title(&self) -> Option<&str> {
+        self.title.as_deref()
+    }
+
+    /// Gives it another title.
+    pub fn set_title(&mut self, title: String) {
+        self.title = Some(title);
+    }
+
+    /// The unit of positions and amplitudes in memory.
+    #[must_use]
+    pub const fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    /// How the curve runs between the rows.
+    #[must_use]
+    pub const fn interpolation(&self) -> Interpolation {
+        self.interpolation
+    }
+
+    /// Axes, 1 to 12.
+    #[must_use]
+    pub const fn axes(&self) -> usize {
+        self.axes
+    }
+
+    /// Rows, 2 to [`limits::MAX_ROWS`].
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Show times of the rows, strictly increasing from 0.
+    #[must_use]
+    pub fn times(&self) -> &[ShowTime] {
+        &self.times
+    }
+
+    /// Positions `[row][axis]`, row after row, in the cue's unit.
+    #[must_use]
+    pub fn positions(&self) -> &[f64] {
+        &self.positions
+    }
+
+    /// Positions of one row, axis 1 first.
+    ///
+    /// # Panics
+    /// Where there is no such row.
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.positions[row * self.axes..][..self.axes]
+    }
+
+    /// The time of the last row.
+    #[must_use]
+    pub fn duration(&self) -> ShowTime {
+        self.times.last().copied().unwrap_or_default()
+    }
+
+    /// Vibration per axis; an axis that never had any has no steps.
+    #[must_use]
+    pub fn vibration(&self) -> &[Steps<Vibration>] {
+        &self.vibration
+    }
+
+    /// What the cue switches.
+    #[must_use]
+    pub const fn effects(&self) -> &Effects {
+        &self.effects
+    }
+
+    /// Named instants, in order of time.
+    #[must_use]
+    pub fn markers(&self) -> &[Marker] {
+        &self.markers
+    }
+
+    /// The line a row came from, or the number of its message or octet row, from 1.
+    #[must_use]
+    pub fn line(&self, row: usize) -> u64 {
+        self.origin.line(row)
+    }
+
+    /// Where a row's position of an axis stands in the file. Reads the file again for the column; where it has
+    /// changed since, the column is 1.
+    #[must_use]
+    pub fn place(&self, row: usize, axis: usize) -> Place {
+        let time = self.times.get(row).copied().unwrap_or_default();
+        self.origin.place(&self.path, row, axis, time)
+    }
+
+    fn shrink(&mut self) {
+        self.times.shrink_to_fit();
+        self.positions.shrink_to_fit();
+        self.vibration.iter_mut().for_each(Steps::shrink);
+        match &mut self.effects {
+            Effects::Named { steps, .. } => steps.shrink(),
+            Effects::Words(steps) => steps.shrink(),
+        }
+    }
+}
+
+/// Reads a whole cue from a file.
+///
+/// # Errors
+/// Every fault of the file with its place, the first [`FAULTS_TOLD`] in words.
+pub fn load(path: &Path, source: &Source) -> Result<Cue, CueFaults> {
+    read(path, open(path)?, source)
+}
+
+/// Opens a cue file.
+///
+/// # Errors
+/// A fault of class [`FaultClass::NoInput`] where there is none, it is a folder, or the system refuses.
+pub fn open(path: &Path) -> Result<File, CueFaults> {
+    let file = File::open(path).map_err(|error| {
+        let problem = match error.kind() {
+            io::ErrorKind::NotFound => Problem::Missing,
+            _ => Problem::Unopened(error.to_string()),
+        };
+        CueFaults::one(path, problem)
+    })?;
+    if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
+        return Err(CueFaults::one(path, Problem::Folder));
+    }
+    Ok(file)
+}
+
+/// Reads a whole cue from `input`; `path` names it in faults.
+///
+/// # Errors
+/// Every fault of the content with its place, the first [`FAULTS_TOLD`] in words.
+pub fn read(path: &Path, input: impl Read, source: &Source) -> Result<Cue, CueFaults> {
+    let mut cue = match *source {
+        Source::Native => csv::read(path, input)?,
+        Source::Rows { unit } => rows::read(path, input, unit)?,
+        Source::U8 { axes, rate_hz } => bytes::read(path, input, axes, rate_hz)?,
+    };
+    cue.shrink();
+    Ok(cue)
+}

@@ -1,0 +1,255 @@
+//! Our own CSV cues: declarations in comments, a header row, rows. Streamed; nothing but the rows' values is kept.
+
+use std::io::Read;
+use std::path::Path;
+use std::str::FromStr;
+
+use super::fault::{Collector, CueFaults, Place, Problem};
+use super::header::{Column, Header};
+use super::limits::MAX_ROWS;
+use super::table::{Cells, Lines, column_of};
+use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, value};
+use crate::motion::MAX_AXES;
+use crate::time::ShowTime;
+
+/// Reads a CSV cue; `path` names it in faults.
+pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
+    read_at_most(MAX_ROWS, path, input)
+}
+
+fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
+    let mut lines = Lines::new(input);
+    let mut faults = Collector::default();
+    let Some((declared, header, cells)) = read_head(&mut lines, &mut faults) else {
+        return faults.finish(path, Cue::blank(path));
+    };
+    let mut rows = Rows::new(path, &declared, header, cells);
+    loop {
+        match lines.next() {
+            Ok(Some((number, line))) => {
+                if rows.cue.times.len() == rows_at_most {
+                    faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
+                    break;
+                }
+                rows.take(number, line, &mut faults);
+            }
+            Ok(None) => break,
+            Err(fault) => {
+                faults.add(fault.place, None, fault.problem);
+                if fault.fatal {
+                    break;
+                }
+            }
+        }
+    }
+    let cue = rows.cue;
+    if faults.is_empty() && cue.rows() < 2 {
+        faults.add(Place::File, None, Problem::TooFewRows(cue.rows()));
+    }
+    faults.finish(path, cue)
+}
+
+/// What the comment lines before the header say.
+#[derive(Debug, Default)]
+struct Declared {
+    seen: Vec<String>,
+    title: Option<String>,
+    unit: DeclaredUnit,
+    interpolation: Interpolation,
+}
+
+/// Reads up to the header row; nothing where rows cannot be understood after what was found.
+fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(Declared, Header, Cells)> {
+    let mut declared = Declared::default();
+    loop {
+        match lines.next() {
+            Ok(Some((number, line))) => {
+                if let Some(comment) = line.trim_start().strip_prefix('#') {
+                    declared.take(number, line, comment, faults);
+                    continue;
+                }
+                let mut cells = Cells::new();
+                if let Err((column, problem)) = cells.split(line) {
+                    faults.add(Place::Text { line: number, column }, None, problem);
+                    return None;
+                }
+                let header = Header::read(line, number, &cells, faults);
+                return faults.is_empty().then_some((declared, header, cells));
+            }
+            Ok(None) => {
+                faults.add(Place::File, None, Problem::Empty);
+                return None;
+            }
+            Err(fault) => {
+                faults.add(fault.place, None, fault.problem);
+                return None;
+            }
+        }
+    }
+}
+
+impl Declared {
+    fn take(&mut self, number: u64, line: &str, comment: &str, faults: &mut Collector) {
+        let Some((key, text)) = comment.split_once(':') else { return };
+        let (key, text) = (key.trim().to_ascii_lowercase(), text.trim());
+        let taken = match key.as_str() {
+            "kinocue-csv" if text == "1" => Ok(()),
+            "kinocue-csv" => Err("this program reads version 1".to_owned()),
+            "title" => {
+                self.title = Some(text.to_owned());
+                Ok(())
+            }
+            "units" => parsed(text).map(|unit| self.unit = unit),
+            "interpolation" => parsed(text).map(|interpolation| self.interpolation = interpolation),
+            _ => return,
+        };
+        let column = line.find(text).map_or(1, |at| line[..at].chars().count() as u64 + 1);
+        let place = Place::Text { line: number, column };
+        if self.seen.contains(&key) {
+            faults.add(place, Some(&key), Problem::DeclaredTwice);
+        } else if let Err(allowed) = taken {
+            faults.add(place, Some(&key), Problem::Declaration { value: value::shortened(text), allowed });
+        }
+        self.seen.push(key);
+    }
+}
+
+fn parsed<T: FromStr<Err: ToString>>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|error: T::Err| error.to_string())
+}
+
+/// The rows while they are read: the cue so far, and the row that an empty cell would hold.
+struct Rows {
+    header: Header,
+    cells: Cells,
+    unit: DeclaredUnit,
+    cue: Cue,
+    /// Whether a row was read, so that an empty cell has something to hold.
+    begun: bool,
+    latest: Option<ShowTime>,
+    row: Row,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Row {
+    time: ShowTime,
+    positions: [f64; MAX_AXES],
+    vibration: [Vibration; MAX_AXES],
+    effects: u32,
+    word: u16,
+}
+
+impl Rows {
+    fn new(path: &Path, declared: &Declared, header: Header, cells: Cells) -> Self {
+        let mut axis_cells = [0; MAX_AXES];
+        for (cell, column) in header.columns.iter().enumerate() {
+            if let Column::Position(axis) = column {
+                axis_cells[*axis] = cell;
+            }
+        }
+        let effects = if header.columns.contains(&Column::Word) {
+            Effects::Words(Steps::default())
+        } else {
+            Effects::Named { names: header.effects.clone(), steps: Steps::default() }
+        };
+        let cue = Cue {
+            title: declared.title.clone(),
+            unit: declared.unit.unit(),
+            interpolation: declared.interpolation,
+            axes: header.axes,
+            origin: Origin::Text { jumps: Vec::new(), cells: axis_cells },
+            vibration: vec![Steps::default(); header.axes],
+            effects,
+            ..Cue::blank(path)
+        };
+        let unit = declared.unit;
+        Self { header, cells, unit, cue, begun: false, latest: None, row: Row::default() }
+    }
+
+    /// Takes one line as a row; what is wrong with it goes to `faults`, and the next may follow.
+    fn take(&mut self, number: u64, line: &str, faults: &mut Collector) {
+        let place = |column| Place::Text { line: number, column };
+        if line.trim_start().starts_with('#') {
+            return faults.add(place(1), None, Problem::CommentAmongRows);
+        }
+        let columns = self.header.columns.len();
+        if let Err((column, problem)) = self.cells.split_row(line, columns) {
+            return faults.add(place(column), None, problem);
+        }
+        let mut whole = true;
+        for index in 0..columns {
+            if let Err(problem) = self.cell(index) {
+                let name = self.header.names.get(index).map(String::as_str);
+                faults.add(place(column_of(line, index)), name, problem);
+                whole = false;
+            }
+        }
+        self.begun = true;
+        if whole {
+            self.keep(number);
+        }
+    }
+
+    /// Takes the cell of one column into the row.
+    fn cell(&mut self, index: usize) -> Result<(), Problem> {
+        let text = self.cells.get(index);
+        let column = self.header.columns[index];
+        if text.is_empty() {
+            return match column {
+                Column::Time => Err(Problem::EmptyCell),
+                _ if self.begun => Ok(()),
+                _ => Err(Problem::NothingToHold),
+            };
+        }
+        let row = &mut self.row;
+        match column {
+            Column::Time => {
+                row.time = checked_time(text, self.header.time_unit_ns, &mut self.latest)?;
+            }
+            Column::Position(axis) => row.positions[axis] = value::position(value::number(text)?, self.unit)?,
+            Column::Hertz(axis) => row.vibration[axis].hz = value::hertz(value::number(text)?)?,
+            Column::Amplitude(axis) => {
+                row.vibration[axis].amplitude = value::amplitude(value::number(text)?, self.unit)?;
+            }
+            Column::Effect(effect) => {
+                row.effects = row.effects & !(1 << effect) | u32::from(value::switch(text)?) << effect;
+            }
+            Column::Word => row.word = value::word(text)?,
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, line: u64) {
+        let (cue, row) = (&mut self.cue, &self.row);
+        cue.origin.push_line(cue.times.len(), line);
+        cue.times.push(row.time);
+        cue.positions.extend_from_slice(&row.positions[..cue.axes]);
+        for column in &self.header.columns {
+            if let Column::Hertz(axis) = *column {
+                cue.vibration[axis].push(row.time, row.vibration[axis]);
+            }
+        }
+        match &mut cue.effects {
+            Effects::Named { steps, names } if !names.is_empty() => steps.push(row.time, row.effects),
+            Effects::Named { .. } => {}
+            Effects::Words(steps) => steps.push(row.time, row.word),
+        }
+    }
+}
+
+/// The time of a row: 0 in the first, after the one before in the others.
+fn checked_time(text: &str, unit_ns: f64, latest: &mut Option<ShowTime>) -> Result<ShowTime, Problem> {
+    let time = value::time(text, unit_ns)?;
+    let before = *latest;
+    *latest = before.max(Some(time));
+    match before {
+        None if time != ShowTime::ZERO => Err(Problem::TimeNotZero(value::shortened(text))),
+        Some(before) if time <= before => {
+            Err(Problem::TimeNotIncreasing { time: value::shortened(text), before })
+        }
+        _ => Ok(time),
+    }
+}
+
+#[cfg(test)]
+mod tests;

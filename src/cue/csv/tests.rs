@@ -1,0 +1,209 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::cue::{FaultClass, Unit};
+
+fn cue(text: &str) -> Cue {
+    read(Path::new("t.csv"), text.as_bytes()).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+/// The faults of a text, one a line, without the file's name.
+fn faults(text: impl AsRef<[u8]>) -> String {
+    let faults = read(Path::new("t.csv"), text.as_ref()).expect_err("no fault was found");
+    assert_eq!(faults.class(), FaultClass::BadCue);
+    faults.to_string().replace("t.csv:", "")
+}
+
+#[test]
+fn a_whole_cue_is_understood() {
+    let cue = cue(
+        "# made by hand\n#Title: Storm \n# units: percent\n# interpolation: monotone\n# kinocue-csv: 1\n\
+                   time_s,a1,a2,v1_hz,v1_amp,fx_air,fx_water\n0,0,50,0,0,0,0\n0.5,100,,20,2.5,1,\n",
+    );
+    assert_eq!(
+        (cue.title(), cue.unit(), cue.interpolation()),
+        (Some("Storm"), Unit::Fraction, Interpolation::Monotone)
+    );
+    assert_eq!((cue.axes(), cue.rows(), cue.duration()), (2, 2, ShowTime::from_millis(500)));
+    assert_eq!(cue.positions(), [0.0, 0.5, 1.0, 0.5]);
+    let last = cue.vibration()[0].as_slice().last().map(|step| step.value);
+    assert_eq!(last, Some(Vibration { hz: 20.0, amplitude: 0.025 }));
+    assert!(cue.vibration()[1].as_slice().is_empty());
+    let Effects::Named { names, steps } = cue.effects() else { panic!("named effects") };
+    assert_eq!((names.join(" "), steps.at(cue.duration(), &mut 0)), ("air water".to_owned(), 0b01));
+    assert_eq!((cue.line(0), cue.line(1)), (7, 8));
+}
+
+#[test]
+fn bom_crlf_blank_lines_quotes_and_spaces_are_accepted() {
+    let cue = cue("\u{feff}# units: mm\r\n\r\n time_ms , a1 ,io\r\n0,\"0.5\" ,0x5\r\n\r\n\"10\", 1e1 ,7");
+    assert_eq!((cue.unit(), cue.positions()), (Unit::Millimetre, &[0.5, 10.0][..]));
+    assert_eq!((cue.line(0), cue.line(1)), (4, 6));
+    let Effects::Words(words) = cue.effects() else { panic!("raw words") };
+    assert_eq!(words.at(ShowTime::ZERO, &mut 0), 5);
+}
+
+#[test]
+fn an_empty_cell_holds_the_value_before_it() {
+    let cue = cue("time_ms,a1,a2\n0,0.1,0.2\n1,,0.3\n2,0.4,\n");
+    assert_eq!(cue.positions(), [0.1, 0.2, 0.1, 0.3, 0.4, 0.3]);
+    assert_eq!(
+        faults("time_ms,a1\n0,\n,1\n"),
+        "2:3: a1: is empty, and there is no value before it to hold\n3:1: time_ms: is empty; every row needs one"
+    );
+}
+
+#[test]
+fn a_file_with_nothing_to_play_is_refused() {
+    for text in ["", "\n \n", "# title: x\n"] {
+        assert_eq!(faults(text), " is empty; a cue needs a header row and two rows", "{text:?}");
+    }
+    assert_eq!(faults("time_ms,a1\n"), " 0 of the two rows that a cue needs at least");
+    assert_eq!(faults("time_ms,a1\n0,0\n"), " 1 of the two rows that a cue needs at least");
+}
+
+#[test]
+fn bad_numbers_are_named_with_line_and_column() {
+    assert_eq!(
+        faults("time_ms,a1,a2\n0,0,0\n10,x1, nan\n20,inf,1e999\n30,\"0,5\",0\n"),
+        "3:4: a1: \"x1\" is not a number\n\
+         3:8: a2: nan is not a finite number\n\
+         4:4: a1: inf is not a finite number\n\
+         4:8: a2: 1e999 is not a finite number\n\
+         5:4: a1: \"0,5\" is not a number"
+    );
+}
+
+#[test]
+fn columns_are_counted_in_characters() {
+    assert_eq!(
+        faults("time_ms,a1,a2\n0,0,0\n1,öäü,-1\n").lines().nth(1),
+        Some("3:7: a2: -1 is outside the stroke, 0 to 1")
+    );
+}
+
+#[test]
+fn positions_outside_the_stroke_are_refused_in_the_unit_of_the_file() {
+    assert_eq!(faults("time_ms,a1\n0,1.42\n1,0"), "2:3: a1: 1.42 is outside the stroke, 0 to 1");
+    assert_eq!(
+        faults("# units: percent\ntime_ms,a1\n0,100.5\n1,0"),
+        "3:3: a1: 100.5 is outside the stroke, 0 to 100 %"
+    );
+    assert_eq!(
+        faults("# units: mm\ntime_ms,a1\n0,-1\n1,0"),
+        "3:3: a1: -1 is outside the stroke, 0 to 100000 mm"
+    );
+}
+
+#[test]
+fn time_starts_at_0_and_increases() {
+    assert_eq!(faults("time_ms,a1\n5,0\n6,0"), "2:1: time_ms: the first time is 5 and must be 0");
+    assert_eq!(
+        faults("time_ms,a1\n0,0\n2000,0\n2000,0\n1999.5,0\n2001,0"),
+        "4:1: time_ms: 2000 does not come after 00:02.000, the time before it\n\
+         5:1: time_ms: 1999.5 does not come after 00:02.000, the time before it"
+    );
+    assert_eq!(
+        faults("time_s,a1\n0,0\n86401,0"),
+        "3:1: time_s: 86401 lies after 24:00:00.000, the latest time of a cue"
+    );
+    assert!(faults("time_s,a1\n0,0\n-1e308,0\n").contains("does not come after"));
+}
+
+#[test]
+fn ragged_rows_are_refused_and_the_next_is_read() {
+    assert_eq!(
+        faults("time_ms,a1,a2\n0,0,0\n1,0\n2,0,0,0\n3,0,2\n"),
+        "3:4: the row ends after 2 of 3 cells\n\
+         4:7: the row has 4 cells, the header 3\n\
+         5:5: a2: 2 is outside the stroke, 0 to 1"
+    );
+    assert!(faults(format!("time_ms,a1\n0,0\n1,0{}\n", ",".repeat(500))).contains("the row has 502 cells"));
+}
+
+#[test]
+fn effects_and_words_have_their_values() {
+    assert_eq!(
+        faults("time_ms,a1,fx_air\n0,0,2\n1,0,on"),
+        "2:5: fx_air: \"2\" is neither 0 nor 1\n3:5: fx_air: \"on\" is neither 0 nor 1"
+    );
+    assert_eq!(
+        faults("time_ms,a1,io\n0,0,65536\n1,0,0"),
+        "2:5: io: \"65536\" is no output word; 0 to 65535, or 0x0 to 0xffff"
+    );
+}
+
+#[test]
+fn vibration_must_fit_into_a_frame() {
+    assert_eq!(
+        faults("time_ms,a1,v1_hz,v1_amp\n0,0,0.1,0\n1,0,-1,-0.5\n2,0,8001,1"),
+        "2:5: v1_hz: 0.1 Hz is neither 0 nor within 0.1221 to 8000 Hz\n\
+         3:5: v1_hz: -1 Hz is neither 0 nor within 0.1221 to 8000 Hz\n\
+         3:8: v1_amp: an amplitude of -0.5 is outside 0 to 1\n\
+         4:5: v1_hz: 8001 Hz is neither 0 nor within 0.1221 to 8000 Hz"
+    );
+}
+
+#[test]
+fn declarations_that_are_not_known_are_refused_with_their_line() {
+    assert_eq!(
+        faults("# kinocue-csv: 2\n# units: cm\n#interpolation:bezier\n# units: mm\ntime_ms,a1\n0,0\n1,0"),
+        "1:16: kinocue-csv: \"2\" is not known; this program reads version 1\n\
+         2:10: units: \"cm\" is not known; units are fraction, percent, u8, mm or pulse\n\
+         3:16: interpolation: \"bezier\" is not known; interpolations are spline, monotone, linear or hold\n\
+         4:10: units: declared twice"
+    );
+}
+
+#[test]
+fn comments_stand_before_the_header_only() {
+    assert!(faults("time_ms,a1\n0,0\n# units: mm\n1,0").starts_with("3:1: a comment among the rows"));
+}
+
+#[test]
+fn text_that_is_none_is_refused() {
+    assert_eq!(
+        faults(b"time_ms,a1\n0,0\n1,\xff\n2,5"),
+        "3:3: not UTF-8 text\n4:3: a1: 5 is outside the stroke, 0 to 1"
+    );
+    assert_eq!(
+        faults("time_ms,a1\r0,0\r1,0\r"),
+        "1:11: a carriage return within a line; lines end in LF or CRLF"
+    );
+    assert_eq!(faults("time_ms,a1\n0,0\n1,\"0\n"), "3:3: a quote that is not closed in its line");
+    let long = format!("time_ms,a1\n0,0\n1,{}\n2,7\n", "0".repeat(70_000));
+    assert_eq!(faults(long), "3:1: over 65536 octets long, the most that is read");
+}
+
+#[test]
+fn twenty_faults_are_told_and_the_rest_counted() {
+    let rows: String = (1..=25).map(|ms| format!("{ms},9\n")).collect();
+    let text = faults(format!("time_ms,a1\n0,0\n{rows}"));
+    assert_eq!(text.lines().count(), 21);
+    assert_eq!(text.lines().last(), Some(" and 5 more"));
+}
+
+#[test]
+fn too_many_rows_are_refused_where_the_limit_is_met() {
+    let endless = "time_ms,a1\n0,0\n1,0\n2,0\n".as_bytes().chain(std::io::repeat(b'x'));
+    let faults = read_at_most(2, Path::new("t.csv"), endless).unwrap_err();
+    assert_eq!(faults.to_string(), "t.csv:4:1: over 8000000 rows, the most that a cue may have");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn nothing_from_outside_panics(octets in proptest::collection::vec(any::<u8>(), 0..2048)) {
+        let _ = read(Path::new("t.csv"), octets.as_slice());
+    }
+
+    #[test]
+    fn nothing_that_looks_like_a_cue_panics(
+        lines in proptest::collection::vec("[-0-9.e,\"#: \r_a-z]{0,30}", 0..20),
+        header in "time_(ms|s)(,a[0-9]{1,2}|,v[12]_(hz|amp)|,fx_[a-z]|,io|,\"){0,6}",
+    ) {
+        let text = format!("{header}\n{}", lines.join("\n"));
+        let _ = read(Path::new("t.csv"), text.as_bytes());
+    }
+}

@@ -1,0 +1,81 @@
+//! Where the rows of a cue came from, kept small: a line number is stored only where the count of lines jumps.
+
+use std::fs::File;
+use std::path::Path;
+
+use super::fault::Place;
+use super::table::{Lines, column_of};
+use crate::motion::MAX_AXES;
+use crate::time::ShowTime;
+
+/// Where the rows of a cue came from.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Origin {
+    /// Lines of a text file.
+    Text {
+        /// A row and its line, wherever it is not the line after the row before.
+        jumps: Vec<(usize, u64)>,
+        /// The cell of each axis in its line, from 0.
+        cells: [usize; MAX_AXES],
+    },
+    /// Messages of an MCAP file, one a row.
+    Messages,
+    /// Octets, so many a row.
+    Octets(usize),
+}
+
+impl Default for Origin {
+    fn default() -> Self {
+        Self::Text { jumps: Vec::new(), cells: [0; MAX_AXES] }
+    }
+}
+
+impl Origin {
+    /// Notes the line of the next row, the `row`-th from 0.
+    pub(super) fn push_line(&mut self, row: usize, line: u64) {
+        let follows = row > 0 && self.line(row - 1) + 1 == line;
+        if let Self::Text { jumps, .. } = self
+            && !follows
+        {
+            jumps.push((row, line));
+        }
+    }
+
+    /// The line of a row, or its number from 1 where the file has no lines.
+    #[must_use]
+    pub(super) fn line(&self, row: usize) -> u64 {
+        match self {
+            Self::Text { jumps, .. } => {
+                let after = jumps.partition_point(|(first, _)| *first <= row);
+                after.checked_sub(1).map_or(1, |i| jumps[i].1 + (row - jumps[i].0) as u64)
+            }
+            Self::Messages | Self::Octets(_) => row as u64 + 1,
+        }
+    }
+
+    pub(super) fn place(&self, path: &Path, row: usize, axis: usize, time: ShowTime) -> Place {
+        match self {
+            Self::Text { cells, .. } => {
+                let line = self.line(row);
+                let cell = cells.get(axis).copied().unwrap_or(0);
+                Place::Text { line, column: column_in_file(path, line, cell).unwrap_or(1) }
+            }
+            Self::Messages => Place::Message {
+                topic: "/cue/axes",
+                number: self.line(row),
+                log_time: time.as_nanos().unsigned_abs(),
+            },
+            Self::Octets(axes) => Place::Octet((row * axes + axis) as u64),
+        }
+    }
+}
+
+fn column_in_file(path: &Path, line: u64, cell: usize) -> Option<u64> {
+    let mut lines = Lines::new(File::open(path).ok()?);
+    loop {
+        let (number, text) = lines.next().ok()??;
+        if number >= line {
+            return (number == line).then(|| column_of(text, cell));
+        }
+    }
+}

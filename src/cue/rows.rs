@@ -1,0 +1,202 @@
+//! Rows as motion editors of the field write them, `line,time_ms,x,y,z,u,v,w`: a row is reached at the sum of the
+//! durations up to its own, and at time 0 the cue stands at the first row.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::fault::{Collector, CueFaults, Place, Problem};
+use super::limits::{MAX_ROWS, MAX_TIME};
+use super::table::{Cells, Lines, column_of};
+use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps, value};
+use crate::motion::MAX_AXES;
+use crate::time::ShowTime;
+
+const HEADER: [&str; 8] = ["line", "time_ms", "x", "y", "z", "u", "v", "w"];
+const FIRST_AXIS: usize = 2;
+
+/// Reads rows with durations; `path` names the file in faults.
+pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<Cue, CueFaults> {
+    let mut lines = Lines::new(input);
+    let mut faults = Collector::default();
+    let mut reading: Option<Reading> = None;
+    loop {
+        match (lines.next(), &mut reading) {
+            (Ok(Some((number, line))), Some(reading)) => {
+                if reading.cue.times.len() > MAX_ROWS {
+                    faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
+                    break;
+                }
+                reading.take(number, line, &mut faults);
+            }
+            (Ok(Some((number, line))), None) => match Reading::new(path, unit, number, line, &mut faults) {
+                Some(begun) => reading = Some(begun),
+                None => break,
+            },
+            (Ok(None), _) => break,
+            (Err(fault), _) => {
+                faults.add(fault.place, None, fault.problem);
+                if fault.fatal {
+                    break;
+                }
+            }
+        }
+    }
+    if faults.is_empty() && reading.as_ref().is_none_or(|reading| reading.cue.rows() == 0) {
+        faults.add(Place::File, None, Problem::Empty);
+    }
+    faults.finish(path, reading.map(|reading| reading.cue).unwrap_or_else(|| Cue::blank(path)))
+}
+
+struct Reading {
+    cells: Cells,
+    unit: DeclaredUnit,
+    cue: Cue,
+    positions: [f64; MAX_AXES],
+    begun: bool,
+}
+
+impl Reading {
+    /// Understands the header row.
+    fn new(path: &Path, unit: DeclaredUnit, number: u64, line: &str, faults: &mut Collector) -> Option<Self> {
+        let mut cells = Cells::new();
+        let place = |column| Place::Text { line: number, column };
+        if let Err((column, problem)) = cells.split(line) {
+            faults.add(place(column), None, problem);
+            return None;
+        }
+        for index in 0..cells.count().max(FIRST_AXIS + 1) {
+            let (name, expected) = (cells.get(index), HEADER.get(index));
+            if index >= cells.count() {
+                faults.add(place(column_of(line, index)), expected.copied(), Problem::MissingColumn);
+            } else if expected != Some(&name) {
+                let problem =
+                    Problem::UnknownColumn("the header is line,time_ms,x,y,z,u,v,w, or less at the end");
+                faults.add(place(column_of(line, index)), Some(name), problem);
+            }
+        }
+        let axes = cells.count().saturating_sub(FIRST_AXIS);
+        let mut origin_cells = [0; MAX_AXES];
+        origin_cells.iter_mut().enumerate().for_each(|(axis, cell)| *cell = axis + FIRST_AXIS);
+        let cue = Cue {
+            unit: unit.unit(),
+            interpolation: Interpolation::Linear,
+            axes,
+            origin: Origin::Text { jumps: Vec::new(), cells: origin_cells },
+            vibration: vec![Steps::default(); axes],
+            ..Cue::blank(path)
+        };
+        faults.is_empty().then_some(Self { cells, unit, cue, positions: [0.0; MAX_AXES], begun: false })
+    }
+
+    fn take(&mut self, number: u64, line: &str, faults: &mut Collector) {
+        let place = |column| Place::Text { line: number, column };
+        let columns = self.cue.axes + FIRST_AXIS;
+        if let Err((column, problem)) = self.cells.split_row(line, columns) {
+            return faults.add(place(column), None, problem);
+        }
+        let mut reached = Ok(self.cue.duration());
+        let mut whole = true;
+        for (index, name) in HEADER.iter().enumerate().take(columns) {
+            let taken = match index {
+                0 => value::number(self.cells.get(0)).map(drop),
+                1 => {
+                    reached = self.reached();
+                    reached.clone().map(drop)
+                }
+                _ => self.position(index),
+            };
+            if let Err(problem) = taken {
+                faults.add(place(column_of(line, index)), Some(name), problem);
+                whole = false;
+            }
+        }
+        self.begun = true;
+        if let (true, Ok(time)) = (whole, reached) {
+            self.keep(number, time);
+        }
+    }
+
+    /// When this row is reached: its duration after the row before.
+    fn reached(&self) -> Result<ShowTime, Problem> {
+        let text = self.cells.get(1);
+        if text.is_empty() {
+            return Err(Problem::EmptyCell);
+        }
+        let duration = value::time(text, 1e6)?;
+        if duration <= ShowTime::ZERO {
+            return Err(Problem::NoDuration(value::shortened(text)));
+        }
+        let reached = ShowTime::from_nanos(self.cue.duration().as_nanos() + duration.as_nanos());
+        if reached > MAX_TIME { Err(Problem::TimeTooLate(reached.to_string())) } else { Ok(reached) }
+    }
+
+    fn position(&mut self, index: usize) -> Result<(), Problem> {
+        let text = self.cells.get(index);
+        match (text.is_empty(), self.begun) {
+            (true, true) => return Ok(()),
+            (true, false) => return Err(Problem::NothingToHold),
+            (false, _) => {}
+        }
+        self.positions[index - FIRST_AXIS] = value::position(value::number(text)?, self.unit)?;
+        Ok(())
+    }
+
+    fn keep(&mut self, line: u64, time: ShowTime) {
+        let times: &[ShowTime] = if self.cue.rows() == 0 { &[ShowTime::ZERO, time] } else { &[time] };
+        for time in times {
+            self.cue.origin.push_line(self.cue.rows(), line);
+            self.cue.times.push(*time);
+            self.cue.positions.extend_from_slice(&self.positions[..self.cue.axes]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn faults(text: &str) -> String {
+        read(Path::new("t.csv"), text.as_bytes(), DeclaredUnit::Millimetre)
+            .expect_err("no fault was found")
+            .to_string()
+            .replace("t.csv:", "")
+    }
+
+    #[test]
+    fn a_row_is_reached_at_the_sum_of_the_durations() {
+        let text = "line,time_ms,x,y,z,u,v,w\n1,1000,1,2,3,4,5,6\n2,500,7,8,9,10,11,12\n";
+        let cue = read(Path::new("t.csv"), text.as_bytes(), DeclaredUnit::Millimetre).unwrap();
+        assert_eq!(cue.times(), [0, 1000, 1500].map(ShowTime::from_millis));
+        assert_eq!(
+            (cue.row(0), cue.row(1), cue.row(2)[5]),
+            (cue.row(1), &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0][..], 12.0)
+        );
+        assert_eq!((cue.line(0), cue.line(1), cue.line(2)), (2, 2, 3));
+        assert_eq!((cue.axes(), cue.interpolation()), (6, Interpolation::Linear));
+    }
+
+    #[test]
+    fn fewer_axes_and_percent_are_accepted() {
+        let cue =
+            read(Path::new("t.csv"), "line,time_ms,x\n1,10,50\n".as_bytes(), DeclaredUnit::Percent).unwrap();
+        assert_eq!((cue.axes(), cue.positions()), (1, &[0.5, 0.5][..]));
+    }
+
+    #[test]
+    fn bad_rows_are_named_with_their_place() {
+        assert_eq!(
+            faults("line,time_ms,x,y\n1,0,0,0\n2,-5,0,0\n3,9,,0\n4,9,0\nx,9,0,-1\n"),
+            "2:3: time_ms: a row's duration of 0 is not above 0\n\
+             3:3: time_ms: a row's duration of -5 is not above 0\n\
+             5:6: the row ends after 3 of 4 cells\n\
+             6:1: line: \"x\" is not a number\n\
+             6:7: y: -1 is outside the stroke, 0 to 100000 mm"
+        );
+        assert_eq!(faults(""), " is empty; a cue needs a header row and two rows");
+        assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");
+        assert!(
+            faults("1,1000,0,0\n")
+                .starts_with("1:1: 1: unknown column; the header is line,time_ms,x,y,z,u,v,w")
+        );
+    }
+}

@@ -1,0 +1,253 @@
+//! A text file as lines and cells, read once from front to back; no more than a line of it is ever in memory.
+
+use std::cmp::Ordering;
+use std::io::{BufRead as _, BufReader, Read};
+
+use super::fault::{Place, Problem};
+use super::limits::{MAX_FILE, MAX_LINE};
+
+/// Room for more cells than any header can have; a line with more is wrong in any case.
+const MAX_CELLS: usize = 128;
+const BUFFER: usize = 256 * 1024;
+const BOM: &[u8] = b"\xef\xbb\xbf";
+
+/// What is wrong with a line, and whether reading can go on behind it.
+#[derive(Debug)]
+pub(super) struct LineFault {
+    pub(super) place: Place,
+    pub(super) problem: Problem,
+    pub(super) fatal: bool,
+}
+
+/// The lines of a file.
+pub(super) struct Lines<R> {
+    input: BufReader<R>,
+    line: Vec<u8>,
+    number: u64,
+    octets: u64,
+}
+
+impl<R: Read> Lines<R> {
+    pub(super) fn new(input: R) -> Self {
+        Self { input: BufReader::with_capacity(BUFFER, input), line: Vec::new(), number: 0, octets: 0 }
+    }
+
+    /// The next line that is not blank, and its number from 1; nothing at the end of the file.
+    pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, LineFault> {
+        while self.read()? {
+            if !self.line.trim_ascii().is_empty() {
+                let number = self.number;
+                return self.checked().map(|text| Some((number, text)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reads one line and takes off its end; false at the end of the file.
+    fn read(&mut self) -> Result<bool, LineFault> {
+        self.line.clear();
+        self.number += 1;
+        let most = MAX_LINE as u64 + 2; // its LF and CR
+        match self.input.by_ref().take(most).read_until(b'\n', &mut self.line) {
+            Ok(0) => return Ok(false),
+            Ok(octets) => self.octets += octets as u64,
+            Err(error) => return Err(self.fatal(Problem::Unread(error.to_string()))),
+        }
+        if self.octets > MAX_FILE {
+            return Err(self.fatal(Problem::FileTooLarge));
+        }
+        if self.line.last() == Some(&b'\n') {
+            self.line.pop();
+            if self.line.last() == Some(&b'\r') {
+                self.line.pop();
+            }
+        }
+        if self.number == 1 && self.line.starts_with(BOM) {
+            self.line.drain(..BOM.len());
+        }
+        Ok(true)
+    }
+
+    fn checked(&self) -> Result<&str, LineFault> {
+        if let Some(at) = memchr_cr(&self.line) {
+            let column = characters(&self.line[..at]) + 1;
+            let fatal = self.line.len() > MAX_LINE;
+            return Err(LineFault { place: self.place(column), problem: Problem::CarriageReturn, fatal });
+        }
+        if self.line.len() > MAX_LINE {
+            return Err(self.fatal(Problem::TooLong));
+        }
+        str::from_utf8(&self.line).map_err(|error| {
+            let column = characters(&self.line[..error.valid_up_to()]) + 1;
+            LineFault { place: self.place(column), problem: Problem::NotUtf8, fatal: false }
+        })
+    }
+
+    fn fatal(&self, problem: Problem) -> LineFault {
+        LineFault { place: self.place(1), problem, fatal: true }
+    }
+
+    const fn place(&self, column: u64) -> Place {
+        Place::Text { line: self.number, column }
+    }
+}
+
+fn memchr_cr(line: &[u8]) -> Option<usize> {
+    // `contains` is vectorised where `position` is not, and hardly any line has one.
+    if line.contains(&b'\r') { line.iter().position(|octet| *octet == b'\r') } else { None }
+}
+
+fn characters(octets: &[u8]) -> u64 {
+    String::from_utf8_lossy(octets).chars().count() as u64
+}
+
+/// The cells of one line.
+pub(super) struct Cells {
+    reader: csv_core::Reader,
+    input: Vec<u8>,
+    text: Vec<u8>,
+    ends: [usize; MAX_CELLS],
+    count: usize,
+}
+
+impl Cells {
+    pub(super) fn new() -> Self {
+        Self {
+            reader: csv_core::Reader::new(),
+            input: Vec::new(),
+            text: vec![0; MAX_LINE + 1],
+            ends: [0; MAX_CELLS],
+            count: 0,
+        }
+    }
+
+    /// Takes the cells of a line apart; a fault where a quote is not closed.
+    pub(super) fn split(&mut self, line: &str) -> Result<(), (u64, Problem)> {
+        if line.contains('"')
+            && let Some(column) = open_quote(line)
+        {
+            return Err((column, Problem::OpenQuote));
+        }
+        self.input.clear();
+        self.input.extend_from_slice(line.as_bytes());
+        self.input.push(b'\n');
+        self.reader.reset();
+        let (result, _, _, ends) = self.reader.read_record(&self.input, &mut self.text, &mut self.ends);
+        self.count = match result {
+            csv_core::ReadRecordResult::Record => ends,
+            _ => raw_cells(line).count(), // more than there is room for
+        };
+        Ok(())
+    }
+
+    /// Takes a line apart that must have as many cells as the header has columns.
+    pub(super) fn split_row(&mut self, line: &str, columns: usize) -> Result<(), (u64, Problem)> {
+        self.split(line)?;
+        let cells = self.count;
+        let problem = match cells.cmp(&columns) {
+            Ordering::Equal => return Ok(()),
+            Ordering::Less => Problem::RowTooShort { cells, columns },
+            Ordering::Greater => Problem::RowTooLong { cells, columns },
+        };
+        Err((column_of(line, cells.min(columns)), problem))
+    }
+
+    /// How many cells the line has.
+    pub(super) const fn count(&self) -> usize {
+        self.count
+    }
+
+    /// A cell without the spaces around it; empty where there is none.
+    pub(super) fn get(&self, index: usize) -> &str {
+        let start = index.checked_sub(1).map_or(0, |before| self.ends.get(before).copied().unwrap_or(0));
+        let cell = self.ends.get(index).and_then(|end| self.text.get(start..*end)).unwrap_or(&[]);
+        str::from_utf8(cell.trim_ascii()).unwrap_or("") // the line was UTF-8, and cells end at ASCII
+    }
+}
+
+/// The column, in characters from 1, at which the text of a cell begins; of the line's end where it has no such cell.
+pub(super) fn column_of(line: &str, index: usize) -> u64 {
+    let start = raw_cells(line).nth(index).map_or(line.len(), |(start, _)| start);
+    let spaces = line[start..].len() - line[start..].trim_start_matches([' ', '\t']).len();
+    line[..start + spaces].chars().count() as u64 + 1
+}
+
+/// The column of the cell whose quote is not closed in the line.
+fn open_quote(line: &str) -> Option<u64> {
+    let last = raw_cells(line).enumerate().last()?;
+    last.1.1.then(|| column_of(line, last.0))
+}
+
+/// Where each cell starts in the line, in octets, and whether the line ends within its quotes.
+fn raw_cells(line: &str) -> impl Iterator<Item = (usize, bool)> {
+    let octets = line.as_bytes();
+    let mut next = Some(0);
+    std::iter::from_fn(move || {
+        let start = next?;
+        let quoted = octets.get(start) == Some(&b'"');
+        let mut inside = quoted;
+        let mut at = start + usize::from(quoted);
+        next = loop {
+            match octets.get(at) {
+                None => break None,
+                Some(b',') if !inside => break Some(at + 1),
+                Some(b'"') if quoted => inside = !inside,
+                Some(_) => {}
+            }
+            at += 1;
+        };
+        Some((start, inside))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cells(line: &str) -> Vec<String> {
+        let mut cells = Cells::new();
+        cells.split(line).unwrap();
+        (0..cells.count()).map(|i| cells.get(i).to_owned()).collect()
+    }
+
+    #[test]
+    fn cells_lose_quotes_and_the_spaces_around_them() {
+        assert_eq!(cells("a, b ,\"c,d\",\"e\"\"f\","), ["a", "b", "c,d", "e\"f", ""]);
+        assert_eq!(cells("x"), ["x"]);
+    }
+
+    #[test]
+    fn a_column_is_counted_in_characters_up_to_the_cells_text() {
+        assert_eq!(column_of("ä,  b,\"c,ö\",d", 0), 1);
+        assert_eq!(column_of("ä,  b,\"c,ö\",d", 1), 5);
+        assert_eq!(column_of("ä,  b,\"c,ö\",d", 3), 13);
+        assert_eq!(column_of("ä,b", 2), 4);
+    }
+
+    #[test]
+    fn an_open_quote_is_found_at_its_cell() {
+        let fault = Cells::new().split("0,\"1").unwrap_err();
+        assert_eq!(fault, (3, Problem::OpenQuote));
+    }
+
+    #[test]
+    fn lines_end_in_lf_or_crlf_and_blank_ones_are_passed_over() {
+        let mut lines = Lines::new("\u{feff}a\r\n\r\n  \nb".as_bytes());
+        assert_eq!(lines.next().unwrap(), Some((1, "a")));
+        assert_eq!(lines.next().unwrap(), Some((4, "b")));
+        assert_eq!(lines.next().unwrap(), None);
+    }
+
+    #[test]
+    fn a_long_line_is_refused_where_the_limit_is_met() {
+        let mut endless = Lines::new(std::io::repeat(b'1'));
+        let fault = endless.next().unwrap_err();
+        assert!(fault.fatal && fault.problem == Problem::TooLong, "{fault:?}");
+        assert!(endless.line.capacity() < 4 * MAX_LINE);
+        let longest = "1".repeat(MAX_LINE) + "\r\n";
+        assert_eq!(
+            Lines::new(longest.as_bytes()).next().unwrap().map(|(_, text)| text.len()),
+            Some(MAX_LINE)
+        );
+    }
+}

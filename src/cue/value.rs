@@ -1,0 +1,120 @@
+//! Single values: from text to numbers, and whether a cue may have them.
+
+use super::fault::Problem;
+use super::limits::{MAX_TIME, MAX_VIBRATION_HZ, MIN_VIBRATION_HZ};
+use super::unit::DeclaredUnit;
+use crate::time::ShowTime;
+
+/// A finite number.
+pub(super) fn number(text: &str) -> Result<f64, Problem> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(Problem::NotFinite(shortened(text))),
+        Err(_) => Err(Problem::NotANumber(shortened(text))),
+    }
+}
+
+/// A show time from a number of units of `unit_ns` nanoseconds, rounded to the nanosecond.
+#[expect(clippy::cast_possible_truncation, reason = "held below a day")]
+pub(super) fn time(text: &str, unit_ns: f64) -> Result<ShowTime, Problem> {
+    let ns = (number(text)? * unit_ns).round();
+    let time = ShowTime::from_nanos(ns as i64);
+    if time > MAX_TIME { Err(Problem::TimeTooLate(shortened(text))) } else { Ok(time) }
+}
+
+/// A position in the unit of memory, from one in the unit of the file.
+pub(super) fn position(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
+    let high = unit.ceiling();
+    if (0.0..=high).contains(&value) {
+        Ok(value / unit.divisor())
+    } else {
+        Err(Problem::OutsideStroke { value, high, unit: unit.suffix() })
+    }
+}
+
+/// A vibration amplitude in the unit of memory, from one in the unit of the file.
+pub(super) fn amplitude(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
+    let high = unit.ceiling();
+    if (0.0..=high).contains(&value) {
+        Ok(value / unit.divisor())
+    } else {
+        Err(Problem::Amplitude { value, high, unit: unit.suffix() })
+    }
+}
+
+/// A vibration frequency in Hz; 0 is none.
+pub(super) fn hertz(value: f64) -> Result<f64, Problem> {
+    if value == 0.0 || (MIN_VIBRATION_HZ..=MAX_VIBRATION_HZ).contains(&value) {
+        Ok(value)
+    } else {
+        Err(Problem::Frequency(value))
+    }
+}
+
+/// Whether an effect is on: `1` or `0`.
+pub(super) fn switch(text: &str) -> Result<bool, Problem> {
+    match text {
+        "0" => Ok(false),
+        "1" => Ok(true),
+        _ => Err(Problem::Switch(shortened(text))),
+    }
+}
+
+/// A raw output word: decimal, or hexadecimal behind `0x`.
+pub(super) fn word(text: &str) -> Result<u16, Problem> {
+    let (digits, radix) = match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(digits) => (digits, 16),
+        None => (text, 10),
+    };
+    u16::from_str_radix(digits, radix)
+        .ok()
+        .filter(|_| !digits.starts_with('+'))
+        .ok_or_else(|| Problem::Word(shortened(text)))
+}
+
+/// The text, cut where it would fill the screen.
+pub(super) fn shortened(text: &str) -> String {
+    const MOST: usize = 40;
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_finite_or_refused() {
+        assert_eq!(number("-1.5e3"), Ok(-1500.0));
+        for text in ["nan", "NaN", "inf", "-infinity", "1e400"] {
+            assert_eq!(number(text), Err(Problem::NotFinite(text.to_owned())));
+        }
+        for text in ["", "1,5", "abc", "0x10", "1 2"] {
+            assert_eq!(number(text), Err(Problem::NotANumber(text.to_owned())));
+        }
+    }
+
+    #[test]
+    fn words_are_decimal_or_hexadecimal() {
+        assert_eq!((word("65535"), word("0x0fFF")), (Ok(0xffff), Ok(0x0fff)));
+        for text in ["65536", "-1", "+1", "0x", "fff", "0x+1"] {
+            assert!(word(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_units_have_their_ends() {
+        assert_eq!(position(255.0, DeclaredUnit::U8), Ok(1.0));
+        assert_eq!(position(50.0, DeclaredUnit::Percent), Ok(0.5));
+        assert!(position(100.1, DeclaredUnit::Percent).is_err());
+        assert!(position(-0.1, DeclaredUnit::Millimetre).is_err());
+        assert_eq!(position(1234.5, DeclaredUnit::Millimetre), Ok(1234.5));
+    }
+
+    #[test]
+    fn a_long_text_is_shortened_between_characters() {
+        assert_eq!(shortened(&"ä".repeat(50)), format!("{}…", "ä".repeat(40)));
+    }
+}

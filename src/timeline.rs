@@ -1,1 +1,0 @@
-//! Answers what a cue says at a show time. Tick thread once built.

@@ -1,0 +1,118 @@
+//! Whether a curve stays within a seat's stroke.
+
+use std::ops::Range;
+
+use super::Timeline;
+use crate::cue::{Collector, CueFaults, Problem};
+use crate::motion::SeatType;
+use crate::time::ShowTime;
+
+/// The part of the stroke by which a curve may leave it between rows, to be held at its end there: a spline out of rest
+/// at an end always dips.
+pub const HELD_BACK: f64 = 0.001;
+
+/// Whether a cue's axes stay within a stroke.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StrokeFit {
+    /// Rows outside the stroke, and stretches between rows more than [`HELD_BACK`] of it outside.
+    pub faults: Option<CueFaults>,
+    /// Axes whose curve is held at an end of the stroke somewhere.
+    pub held: Vec<Held>,
+}
+
+/// An axis whose curve is held at an end of the stroke between some rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// The axis, from 0.
+    pub axis: usize,
+    /// Between how many pairs of rows.
+    pub stretches: usize,
+    /// How far the curve would go over the end at the most, in the cue's unit.
+    pub over: f64,
+    /// When it would.
+    pub at: ShowTime,
+    /// The line of the row before that, or the number of its message.
+    pub line: u64,
+}
+
+impl Timeline {
+    /// Holds some of the cue's axes against a stroke. Without a seat the ends are those of the unit: of a cue in
+    /// fractions both, of one in mm or pulses the lower one only.
+    #[must_use]
+    pub fn fits_stroke(&self, axes: Range<usize>, seat: Option<&SeatType>) -> StrokeFit {
+        let unit = self.unit();
+        let stroke = match seat {
+            Some(seat) => unit.stroke(seat),
+            None if unit == crate::cue::Unit::Fraction => 1.0,
+            None => f64::INFINITY,
+        };
+        let mut check = Check { timeline: self, stroke, faults: Collector::default(), held: Vec::new() };
+        for row in 0..self.cue.rows() {
+            for axis in axes.start..axes.end.min(self.axes()) {
+                check.point(row, axis);
+                if row + 1 < self.cue.rows() {
+                    check.stretch(row, axis);
+                }
+            }
+        }
+        check.held.sort_by_key(|held| held.axis);
+        StrokeFit { faults: check.faults.into_faults(self.cue.path()), held: check.held }
+    }
+}
+
+struct Check<'a> {
+    timeline: &'a Timeline,
+    stroke: f64,
+    faults: Collector,
+    held: Vec<Held>,
+}
+
+impl Check<'_> {
+    fn point(&mut self, row: usize, axis: usize) {
+        let value = self.timeline.cue.row(row)[axis];
+        if !(0.0..=self.stroke).contains(&value) {
+            let (high, unit) = (self.stroke, self.timeline.unit().suffix());
+            self.add(row, axis, Problem::OutsideStroke { value, high, unit });
+        }
+    }
+
+    /// The curve between a row and the next; where a row itself is outside, that has been said.
+    fn stretch(&mut self, row: usize, axis: usize) {
+        let cubic = self.timeline.cubic(row, axis);
+        let (low, high) = cubic.hull();
+        if low >= 0.0 && high <= self.stroke {
+            return;
+        }
+        let over = |value: f64| (-value).max(value - self.stroke);
+        let worst = cubic.still().map(|u| (u, cubic.at(u))).max_by(|a, b| over(a.1).total_cmp(&over(b.1)));
+        let Some((u, value)) = worst.filter(|(_, value)| over(*value) > 0.0) else { return };
+        let at = self.timeline.time(row, u);
+        // The lower end of a stroke of unknown length has nothing to take a part of.
+        let may_hold = if self.stroke.is_finite() { HELD_BACK * self.stroke } else { f64::INFINITY };
+        if over(value) > may_hold {
+            let (high, unit) = (self.stroke, self.timeline.unit().suffix());
+            self.add(row, axis, Problem::CurveOutsideStroke { value, at, high, unit });
+        } else {
+            self.hold(Held { axis, stretches: 1, over: over(value), at, line: self.timeline.cue.line(row) });
+        }
+    }
+
+    fn hold(&mut self, new: Held) {
+        match self.held.iter_mut().find(|held| held.axis == new.axis) {
+            Some(held) => {
+                let stretches = held.stretches + 1;
+                let worst = if new.over > held.over { new } else { *held };
+                *held = Held { stretches, ..worst };
+            }
+            None => self.held.push(new),
+        }
+    }
+
+    fn add(&mut self, row: usize, axis: usize, problem: Problem) {
+        if self.faults.is_full() {
+            return self.faults.count();
+        }
+        let place = self.timeline.cue.place(row, axis);
+        self.faults.add(place, Some(&format!("a{}", axis + 1)), problem);
+    }
+}

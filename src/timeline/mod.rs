@@ -1,0 +1,173 @@
+//! A cue as a function of show time: solved once from a [`Cue`], then only read. Built on a control thread; sampled on
+//! the tick thread, where nothing here allocates, blocks or panics.
+
+mod cubic;
+mod curve;
+mod extremes;
+mod fit;
+mod spline;
+
+pub use extremes::{AxisExtremes, Extreme};
+pub use fit::{HELD_BACK, Held, StrokeFit};
+
+use crate::cue::{Cue, Effects, Unit, Vibration};
+use crate::motion::{MAX_AXES, Pose};
+use crate::time::ShowTime;
+
+/// Where the last answers were found, so that the next ones, a little later in time, are found at once.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Hint {
+    row: usize,
+    vibration: [usize; MAX_AXES],
+    effects: usize,
+}
+
+/// What is switched on at an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EffectSet {
+    /// Bit i says whether effect i of [`Timeline::effect_names`] is on.
+    Named(u32),
+    /// The raw output word; only its low 12 bits have outputs.
+    Word(u16),
+}
+
+/// A cue's motion, vibration and effects at any show time. Immutable.
+#[derive(Debug)]
+pub struct Timeline {
+    cue: Cue,
+    /// Second derivatives `[row][axis]` of a spline, per second squared; empty for the other curves. Single precision
+    /// is some 1e-7 of the curve's own bend, and halves the memory.
+    bends: Vec<f32>,
+    extremes: Vec<AxisExtremes>,
+    vibrates: bool,
+}
+
+impl Timeline {
+    /// Solves the cue's curve. Takes time and memory in proportion to its rows.
+    #[must_use]
+    pub fn new(cue: Cue) -> Self {
+        let bends = spline::solve(&cue);
+        let vibrates =
+            cue.vibration().iter().flat_map(|steps| steps.as_slice()).any(|step| moves(step.value));
+        let mut timeline = Self { cue, bends, extremes: Vec::new(), vibrates };
+        timeline.extremes = extremes::find(&timeline);
+        timeline
+    }
+
+    /// The cue it was made from.
+    #[must_use]
+    pub const fn cue(&self) -> &Cue {
+        &self.cue
+    }
+
+    /// Axes, 1 to 12.
+    #[must_use]
+    pub const fn axes(&self) -> usize {
+        self.cue.axes()
+    }
+
+    /// The unit of poses and amplitudes.
+    #[must_use]
+    pub const fn unit(&self) -> Unit {
+        self.cue.unit()
+    }
+
+    /// The time of the last row.
+    #[must_use]
+    pub fn duration(&self) -> ShowTime {
+        self.cue.duration()
+    }
+
+    /// The pose at a show time, in the cue's unit; before the first row its pose, after the last row that row's. Where
+    /// the curve of a cue in fractions leaves the stroke, it is held at the stroke's end; curves in other units are
+    /// not, as their stroke is the seat's. Asked onwards in time this takes constant time, after a seek the logarithm
+    /// of the number of rows.
+    #[must_use]
+    pub fn sample(&self, at: ShowTime, hint: &mut Hint) -> Pose {
+        let mut pose = [0.0; MAX_AXES];
+        let row = self.row_at(at, &mut hint.row);
+        if row + 1 < self.cue.rows() && at > ShowTime::ZERO {
+            let (start, end) = (self.cue.times()[row].as_nanos(), self.cue.times()[row + 1].as_nanos());
+            let part = ratio(at.as_nanos() - start, end - start);
+            for (axis, position) in pose.iter_mut().enumerate().take(self.axes()) {
+                *position = self.cubic(row, axis).at(part);
+            }
+        } else {
+            pose[..self.axes()].copy_from_slice(self.cue.row(row));
+        }
+        if self.unit() == Unit::Fraction {
+            pose.iter_mut().for_each(|position| *position = position.clamp(0.0, 1.0));
+        }
+        pose
+    }
+
+    /// The last row at or before a show time; the first one before it.
+    fn row_at(&self, at: ShowTime, hint: &mut usize) -> usize {
+        let times = self.cue.times();
+        let holds = |row: usize| {
+            times.get(row).is_some_and(|start| *start <= at) && times.get(row + 1).is_none_or(|end| at < *end)
+        };
+        if !holds(*hint) {
+            *hint = if holds(*hint + 1) {
+                *hint + 1
+            } else {
+                times.partition_point(|start| *start <= at).saturating_sub(1)
+            };
+        }
+        *hint
+    }
+
+    /// The vibration of each axis that holds at a show time; none past the cue's axes.
+    #[must_use]
+    pub fn vibration(&self, at: ShowTime, hint: &mut Hint) -> [Vibration; MAX_AXES] {
+        let mut all = [Vibration::default(); MAX_AXES];
+        for ((steps, found), vibration) in self.cue.vibration().iter().zip(&mut hint.vibration).zip(&mut all)
+        {
+            *vibration = steps.at(at, found);
+        }
+        all
+    }
+
+    /// Whether anything ever vibrates.
+    #[must_use]
+    pub const fn has_vibration(&self) -> bool {
+        self.vibrates
+    }
+
+    /// The effects that are on at a show time.
+    #[must_use]
+    pub fn effects(&self, at: ShowTime, hint: &mut Hint) -> EffectSet {
+        match self.cue.effects() {
+            Effects::Named { steps, .. } => EffectSet::Named(steps.at(at, &mut hint.effects)),
+            Effects::Words(steps) => EffectSet::Word(steps.at(at, &mut hint.effects)),
+        }
+    }
+
+    /// The names of the effects, in the order of their bits; none where the cue carries raw output words.
+    #[must_use]
+    pub fn effect_names(&self) -> &[String] {
+        match self.cue.effects() {
+            Effects::Named { names, .. } => names,
+            Effects::Words(_) => &[],
+        }
+    }
+
+    /// The least and greatest value of each axis's curve, exact also between rows, and before anything is held at
+    /// the stroke's ends.
+    #[must_use]
+    pub fn extremes(&self) -> &[AxisExtremes] {
+        &self.extremes
+    }
+}
+
+fn moves(vibration: Vibration) -> bool {
+    vibration.hz > 0.0 && vibration.amplitude > 0.0
+}
+
+#[expect(clippy::cast_precision_loss, reason = "spans under a day are exact")]
+fn ratio(part: i64, whole: i64) -> f64 {
+    part as f64 / whole as f64
+}
+
+#[cfg(test)]
+mod tests;
