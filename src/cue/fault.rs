@@ -91,7 +91,7 @@ pub enum Problem {
     #[error("over {MAX_ROWS} rows, the most that a cue may have")]
     TooManyRows,
     /// There is nothing in the file.
-    #[error("is empty; a cue needs a header row and two rows")]
+    #[error("is empty; a cue needs at least two rows")]
     Empty,
     /// There are too few rows to play.
     #[error("{0} of the two rows that a cue needs at least")]

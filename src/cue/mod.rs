@@ -7,9 +7,12 @@ use std::path::{Path, PathBuf};
 
 mod bytes;
 mod csv;
+mod csv_write;
 mod fault;
 mod header;
 pub mod limits;
+mod mcap;
+mod number;
 mod place;
 mod rows;
 mod steps;
@@ -17,8 +20,10 @@ mod table;
 mod unit;
 mod value;
 
+pub use csv_write::{CsvError, write as write_csv};
 pub(crate) use fault::Collector;
 pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place, Problem};
+pub use mcap::{recover, write as write_mcap};
 use place::Origin;
 pub use steps::{Step, Steps};
 pub use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation, UnknownUnit};
@@ -267,10 +272,22 @@ pub fn open(path: &Path) -> Result<File, CueFaults> {
 /// Every fault of the content with its place, the first [`FAULTS_TOLD`] in words.
 pub fn read(path: &Path, input: impl Read, source: &Source) -> Result<Cue, CueFaults> {
     let mut cue = match *source {
-        Source::Native => csv::read(path, input)?,
+        Source::Native => read_native(path, input)?,
         Source::Rows { unit } => rows::read(path, input, unit)?,
         Source::U8 { axes, rate_hz } => bytes::read(path, input, axes, rate_hz)?,
     };
     cue.shrink();
     Ok(cue)
+}
+
+/// Reads a cue of our own: the content says whether it is MCAP, and a name in `.mcap` that it should be.
+fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
+    let mut front = Vec::new();
+    if let Err(error) = input.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut front) {
+        return Err(CueFaults::one(path, Problem::Unread(error.to_string())));
+    }
+    let named_so = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
+    let begins_so = front == mcap::MAGIC;
+    let input = front.as_slice().chain(input);
+    if named_so || begins_so { mcap::read(path, input) } else { csv::read(path, input) }
 }

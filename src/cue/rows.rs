@@ -192,7 +192,7 @@ mod tests {
              6:1: line: \"x\" is not a number\n\
              6:7: y: -1 is outside the stroke, 0 to 100000 mm"
         );
-        assert_eq!(faults(""), " is empty; a cue needs a header row and two rows");
+        assert_eq!(faults(""), " is empty; a cue needs at least two rows");
         assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");
         assert!(
             faults("1,1000,0,0\n")

@@ -56,7 +56,7 @@ fn an_empty_cell_holds_the_value_before_it() {
 #[test]
 fn a_file_with_nothing_to_play_is_refused() {
     for text in ["", "\n \n", "# title: x\n"] {
-        assert_eq!(faults(text), " is empty; a cue needs a header row and two rows", "{text:?}");
+        assert_eq!(faults(text), " is empty; a cue needs at least two rows", "{text:?}");
     }
     assert_eq!(faults("time_ms,a1\n"), " 0 of the two rows that a cue needs at least");
     assert_eq!(faults("time_ms,a1\n0,0\n"), " 1 of the two rows that a cue needs at least");

@@ -1,0 +1,108 @@
+//! From a cue to a CSV file.
+
+use std::io::{self, Write};
+
+use super::number::{push_millis, push_number};
+use super::{Cue, Effects, Steps};
+use crate::time::ShowTime;
+
+/// Why a cue cannot be written as CSV.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CsvError {
+    /// Writing failed.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// Something changes where the cue has no row, which a CSV cannot say.
+    #[error(
+        "{what} changes at {at}, between two rows; csv can only switch at a row, so keep the cue as mcap"
+    )]
+    BetweenRows {
+        /// What changes.
+        what: String,
+        /// When.
+        at: ShowTime,
+    },
+}
+
+/// Writes a cue as CSV, every value exactly; markers have no place there.
+///
+/// # Errors
+/// Where writing fails, or vibration or effects change between rows.
+pub fn write(cue: &Cue, mut out: impl Write) -> Result<(), CsvError> {
+    check_changes(cue)?;
+    out.write_all(head(cue).as_bytes())?;
+    let shaking: Vec<_> = shaking(cue).collect();
+    let mut found = vec![0; shaking.len()];
+    let mut switched = 0;
+    let mut line = String::new();
+    for (row, time) in cue.times().iter().enumerate() {
+        line.clear();
+        push_millis(&mut line, *time);
+        for value in cue.row(row) {
+            line.push(',');
+            push_number(&mut line, *value);
+        }
+        for ((_, steps), found) in shaking.iter().zip(&mut found) {
+            let vibration = steps.at(*time, found);
+            for value in [vibration.hz, vibration.amplitude] {
+                line.push(',');
+                push_number(&mut line, value);
+            }
+        }
+        match cue.effects() {
+            Effects::Named { names, steps } => {
+                let on = steps.at(*time, &mut switched);
+                (0..names.len()).for_each(|bit| line.push_str(if on >> bit & 1 == 1 { ",1" } else { ",0" }));
+            }
+            Effects::Words(steps) => line.push_str(&format!(",{}", steps.at(*time, &mut switched))),
+        }
+        line.push('\n');
+        out.write_all(line.as_bytes())?;
+    }
+    Ok(out.flush()?)
+}
+
+/// The declarations and the header row.
+fn head(cue: &Cue) -> String {
+    let mut head = "# kinocue-csv: 1\n".to_owned();
+    if let Some(title) = cue.title() {
+        let one_line: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        head.push_str(&format!("# title: {one_line}\n"));
+    }
+    head.push_str(&format!("# units: {}\n", cue.unit().name()));
+    head.push_str(&format!("# interpolation: {}\ntime_ms", cue.interpolation().name()));
+    (1..=cue.axes()).for_each(|axis| head.push_str(&format!(",a{axis}")));
+    shaking(cue).for_each(|(axis, _)| head.push_str(&format!(",v{axis}_hz,v{axis}_amp")));
+    match cue.effects() {
+        Effects::Named { names, .. } => names.iter().for_each(|name| head.push_str(&format!(",fx_{name}"))),
+        Effects::Words(_) => head.push_str(",io"),
+    }
+    head.push('\n');
+    head
+}
+
+/// The axes with vibration, counted from 1, and what they do.
+fn shaking(cue: &Cue) -> impl Iterator<Item = (usize, &Steps<super::Vibration>)> {
+    let axes = cue.vibration().iter().enumerate();
+    axes.filter(|(_, steps)| !steps.as_slice().is_empty()).map(|(axis, steps)| (axis + 1, steps))
+}
+
+fn check_changes(cue: &Cue) -> Result<(), CsvError> {
+    for (axis, steps) in shaking(cue) {
+        check_steps(cue, steps, || format!("the vibration of axis {axis}"))?;
+    }
+    match cue.effects() {
+        Effects::Named { steps, .. } => check_steps(cue, steps, || "an effect".to_owned()),
+        Effects::Words(steps) => check_steps(cue, steps, || "the output word".to_owned()),
+    }
+}
+
+fn check_steps<T: Copy + PartialEq + Default>(
+    cue: &Cue,
+    steps: &Steps<T>,
+    what: impl Fn() -> String,
+) -> Result<(), CsvError> {
+    let stray = steps.as_slice().iter().find(|step| cue.times().binary_search(&step.at).is_err());
+    stray.map_or(Ok(()), |step| Err(CsvError::BetweenRows { what: what(), at: step.at }))
+}

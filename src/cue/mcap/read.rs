@@ -1,0 +1,321 @@
+//! From an MCAP file to a cue.
+
+use std::collections::HashMap;
+use std::io::Read;
+use std::path::Path;
+
+use mcap::records::op;
+use serde::Deserialize;
+
+use super::super::fault::{Collector, CueFaults, Place, Problem};
+use super::super::header::is_effect_name;
+use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKERS, MAX_ROWS, MAX_TIME};
+use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, Vibration, value};
+use super::{METADATA, Topic, VERSION, message, record};
+use crate::motion::MAX_AXES;
+use crate::time::ShowTime;
+
+/// Reads an MCAP cue; `path` names it in faults.
+pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
+    let mut reading = Reading::new(path);
+    if let Err(problem) = record::each(input, |opcode, body| reading.take(opcode, body)) {
+        reading.faults.add(Place::File, None, problem);
+    }
+    reading.finish()
+}
+
+/// Reads what is complete in an MCAP cue that is cut short or damaged: every message before that place. Says with it
+/// why the rest is lost; nothing where the file is whole.
+///
+/// # Errors
+/// Where what is complete makes no cue.
+pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), CueFaults> {
+    let mut reading = Reading::new(path);
+    let lost = match record::each(input, |opcode, body| reading.take(opcode, body)) {
+        Ok(()) => None,
+        Err(problem @ (Problem::CutShort | Problem::Damaged(_))) => Some(problem),
+        Err(problem) => {
+            reading.faults.add(Place::File, None, problem);
+            None
+        }
+    };
+    let mut cue = reading.finish()?;
+    cue.shrink();
+    Ok((cue, lost))
+}
+
+/// A message's topic, number in its topic, and log time.
+#[derive(Debug, Clone, Copy)]
+struct At {
+    topic: Topic,
+    number: u64,
+    log_time: u64,
+}
+
+impl At {
+    const fn place(self) -> Place {
+        Place::Message { topic: self.topic.name(), number: self.number, log_time: self.log_time }
+    }
+
+    /// Right for times up to [`MAX_TIME`], to which every message was held.
+    fn time(self) -> ShowTime {
+        ShowTime::from_nanos(i64::try_from(self.log_time).unwrap_or(i64::MAX))
+    }
+}
+
+/// A file while it is read. Units may be declared behind the messages, so values are checked at the end.
+struct Reading {
+    faults: Collector,
+    channels: HashMap<u16, Option<Topic>>,
+    /// Messages so far and last log time, by topic.
+    seen: HashMap<Topic, (u64, u64)>,
+    unit: Option<DeclaredUnit>,
+    cue: Cue,
+    vibration: Vec<(At, message::Vibration)>,
+    switched: u32,
+}
+
+impl Reading {
+    fn new(path: &Path) -> Self {
+        Self {
+            faults: Collector::default(),
+            channels: HashMap::new(),
+            seen: HashMap::new(),
+            unit: None,
+            cue: Cue { origin: Origin::Messages, ..Cue::blank(path) },
+            vibration: Vec::new(),
+            switched: 0,
+        }
+    }
+
+    /// Takes one record. An error ends the reading; faults that do not are gathered.
+    fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), Problem> {
+        let broken = |what: &str| Problem::Damaged(format!("a {what} record that is too short"));
+        match opcode {
+            op::CHANNEL => {
+                let (id, topic, encoding) = record::channel(body).ok_or_else(|| broken("channel"))?;
+                self.channel(id, topic, encoding);
+            }
+            op::METADATA => {
+                let (name, entries) = record::metadata(body).ok_or_else(|| broken("metadata"))?;
+                if name == METADATA {
+                    self.declare(&entries);
+                }
+            }
+            op::MESSAGE => {
+                let (channel, log_time, data) = record::message(body).ok_or_else(|| broken("message"))?;
+                if let Some(Some(topic)) = self.channels.get(&channel).copied() {
+                    let (number, before) = self.seen.get(&topic).copied().unwrap_or_default();
+                    let at = At { topic, number: number + 1, log_time };
+                    self.seen.insert(topic, (at.number, log_time));
+                    return self.message(at, before, data);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Topics that are not below `/cue/` belong to someone else and are passed over.
+    fn channel(&mut self, id: u16, name: &str, encoding: &str) {
+        if self.channels.contains_key(&id) {
+            return; // repeated in the summary
+        }
+        let topic = Topic::ALL.into_iter().find(|topic| topic.name() == name);
+        if topic.is_none() && name.starts_with("/cue/") {
+            self.faults.add(Place::File, None, Problem::UnknownTopic(value::shortened(name)));
+        }
+        if topic.is_some() && encoding != "json" {
+            let problem = Problem::Foreign(format!("{name} is encoded as {encoding:?}, not as json"));
+            self.faults.add(Place::File, None, problem);
+        }
+        self.channels.insert(id, topic);
+    }
+
+    fn declare(&mut self, entries: &std::collections::BTreeMap<&str, &str>) {
+        let mut refuse = |key: &str, value: &str, allowed: String| {
+            let problem = Problem::Declaration { value: value::shortened(value), allowed };
+            self.faults.add(Place::File, Some(key), problem);
+        };
+        let entry = |key| entries.get(key).copied().unwrap_or("");
+        if entry("version") != VERSION {
+            refuse("version", entry("version"), format!("this program reads version {VERSION}"));
+        }
+        let unit = entry("units").parse::<DeclaredUnit>();
+        let interpolation = entries.get("interpolation").copied().map(|text| (text, text.parse()));
+        match &unit {
+            Err(error) => refuse("units", entry("units"), error.to_string()),
+            Ok(unit) => self.cue.unit = unit.unit(),
+        }
+        match interpolation {
+            Some((text, Err(error))) => {
+                refuse("interpolation", text, super::super::UnknownInterpolation::to_string(&error))
+            }
+            Some((_, Ok(interpolation))) => self.cue.interpolation = interpolation,
+            None => {}
+        }
+        if self.unit.is_some() {
+            self.faults.add(Place::File, Some(METADATA), Problem::DeclaredTwice);
+        }
+        self.unit = Some(unit.unwrap_or_default());
+        self.cue.title =
+            entries.get("title").filter(|title| !title.is_empty()).map(|title| (*title).to_owned());
+    }
+
+    fn message(&mut self, at: At, before: u64, data: &[u8]) -> Result<(), Problem> {
+        let taken = if data.len() > MAX_LINE {
+            Err(Problem::TooLong)
+        } else if at.log_time > MAX_TIME.as_nanos().unsigned_abs() {
+            Err(Problem::TimeTooLate(format!("{} ns", at.log_time)))
+        } else {
+            match at.topic {
+                Topic::Axes => self.axes(at, before, data),
+                _ if at.log_time < before => Err(Problem::TimeGoesBack { early_ns: before - at.log_time }),
+                Topic::Vibration => parsed(data).map(|vibration| self.vibration.push((at, vibration))),
+                Topic::Io => parsed(data).and_then(|io| self.io(at, io)),
+                Topic::Marker => parsed(data).and_then(|marker| self.marker(at, marker)),
+            }
+        };
+        match taken {
+            Err(problem @ (Problem::TooManyRows | Problem::TooManyMarkers)) => Err(problem),
+            Err(problem) => {
+                self.faults.add(at.place(), None, problem);
+                Ok(())
+            }
+            Ok(()) if self.vibration.len() > MAX_ROWS => Err(Problem::TooManyRows),
+            Ok(()) => Ok(()),
+        }
+    }
+
+    fn axes(&mut self, at: At, before: u64, data: &[u8]) -> Result<(), Problem> {
+        let axes = parsed::<message::Axes>(data)?.a;
+        let cue = &mut self.cue;
+        if at.number == 1 {
+            if !(1..=MAX_AXES).contains(&axes.len()) {
+                return Err(Problem::Axes(axes.len()));
+            }
+            if at.log_time != 0 {
+                return Err(Problem::TimeNotZero(format!("{} ns", at.log_time)));
+            }
+            cue.axes = axes.len();
+        } else if axes.len() != cue.axes && cue.axes != 0 {
+            return Err(Problem::AxesChange { here: axes.len(), first: cue.axes });
+        } else if at.log_time <= before {
+            let before = At { log_time: before, ..at }.time();
+            return Err(Problem::TimeNotIncreasing { time: at.time().to_string(), before });
+        }
+        if cue.times.len() == MAX_ROWS {
+            return Err(Problem::TooManyRows);
+        }
+        cue.times.push(at.time());
+        cue.positions.extend(axes);
+        Ok(())
+    }
+
+    fn io(&mut self, at: At, io: message::Io) -> Result<(), Problem> {
+        let begun = self.seen.get(&Topic::Io).is_some_and(|(count, _)| *count > 1);
+        match (io.effects, io.word, &mut self.cue.effects) {
+            (None, Some(word), Effects::Words(steps)) => steps.push(at.time(), word),
+            (None, Some(word), Effects::Named { .. }) if !begun => {
+                let mut steps = Steps::default();
+                steps.push(at.time(), word);
+                self.cue.effects = Effects::Words(steps);
+            }
+            (Some(switches), None, Effects::Named { names, steps }) => {
+                for (name, on) in switches.0 {
+                    let bit = effect(names, name)?;
+                    let on = value::switch(&on.to_string())?;
+                    self.switched = self.switched & !(1 << bit) | u32::from(on) << bit;
+                }
+                steps.push(at.time(), self.switched);
+            }
+            (None, None, _) => return Err(Problem::Message("neither effects nor word".to_owned())),
+            _ => return Err(Problem::WordAndEffects),
+        }
+        Ok(())
+    }
+
+    fn marker(&mut self, at: At, marker: message::Marker) -> Result<(), Problem> {
+        if self.cue.markers.len() == MAX_MARKERS {
+            return Err(Problem::TooManyMarkers);
+        }
+        self.cue.markers.push(Marker { at: at.time(), name: marker.name });
+        Ok(())
+    }
+
+    /// The cue, once every value is known to be right in its unit.
+    fn finish(mut self) -> Result<Cue, CueFaults> {
+        let unit = self.unit.unwrap_or_default();
+        if self.faults.is_empty() {
+            if self.unit.is_none() {
+                let problem = Problem::Foreign(format!("it has no metadata record {METADATA:?}"));
+                self.faults.add(Place::File, None, problem);
+            } else if self.cue.rows() < 2 {
+                self.faults.add(Place::File, None, Problem::TooFewRows(self.cue.rows()));
+            } else {
+                self.check_positions(unit);
+                self.build_vibration(unit);
+            }
+        }
+        let Self { faults, cue, .. } = self;
+        match faults.into_faults(cue.path()) {
+            Some(faults) => Err(faults),
+            None => Ok(cue),
+        }
+    }
+
+    fn check_positions(&mut self, unit: DeclaredUnit) {
+        let (axes, times) = (self.cue.axes, &self.cue.times);
+        for (index, position) in self.cue.positions.iter_mut().enumerate() {
+            match value::position(*position, unit) {
+                Ok(value) => *position = value,
+                Err(problem) => {
+                    let (row, axis) = (index / axes, index % axes);
+                    let log_time = times[row].as_nanos().unsigned_abs();
+                    let at = At { topic: Topic::Axes, number: row as u64 + 1, log_time };
+                    self.faults.add(at.place(), Some(&format!("a{}", axis + 1)), problem);
+                }
+            }
+        }
+    }
+
+    fn build_vibration(&mut self, unit: DeclaredUnit) {
+        let axes = self.cue.axes;
+        self.cue.vibration = vec![Steps::default(); axes];
+        for (at, message::Vibration { axis, hz, amp }) in std::mem::take(&mut self.vibration) {
+            let Some(steps) = axis.checked_sub(1).and_then(|axis| self.cue.vibration.get_mut(axis)) else {
+                self.faults.add(at.place(), Some("axis"), Problem::NoSuchAxis { axis, axes });
+                continue;
+            };
+            match (value::hertz(hz), value::amplitude(amp, unit)) {
+                (Ok(hz), Ok(amplitude)) => steps.push(at.time(), Vibration { hz, amplitude }),
+                (hz, amplitude) => {
+                    for (name, problem) in [("hz", hz.err()), ("amp", amplitude.err())] {
+                        if let Some(problem) = problem {
+                            self.faults.add(at.place(), Some(name), problem);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The bit of an effect; a new one where the name is new.
+fn effect(names: &mut Vec<String>, name: String) -> Result<usize, Problem> {
+    if let Some(bit) = names.iter().position(|known| *known == name) {
+        return Ok(bit);
+    }
+    if !is_effect_name(&name) {
+        return Err(Problem::EffectName);
+    }
+    if names.len() == MAX_EFFECTS {
+        return Err(Problem::TooManyEffects);
+    }
+    names.push(name);
+    Ok(names.len() - 1)
+}
+
+fn parsed<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, Problem> {
+    serde_json::from_slice(data).map_err(|error| Problem::Message(error.to_string()))
+}

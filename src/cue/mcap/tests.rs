@@ -1,0 +1,273 @@
+use std::io::Cursor;
+use std::path::Path;
+
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions};
+use proptest::prelude::*;
+
+use super::*;
+use crate::cue::{self, Cue, CueFaults, Interpolation, Problem, Source, Unit};
+use crate::time::ShowTime;
+
+const CUE: &str = "# title: Störm\n# units: mm\n# interpolation: monotone\n\
+    time_ms,a1,a2,v2_hz,v2_amp,fx_water,fx_air\n\
+    0,0.1,150,0,0,1,0\n16.666667,0.30000000000000004,5e-324,20,1.5,1,1\n33.3,1,2,20,1.5,0,0\n";
+
+fn csv(text: &str) -> Cue {
+    cue::read(Path::new("t.csv"), text.as_bytes(), &Source::Native)
+        .unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn mcap_of(cue: &Cue) -> Vec<u8> {
+    let mut file = Cursor::new(Vec::new());
+    write(cue, &mut file).unwrap();
+    file.into_inner()
+}
+
+fn csv_of(cue: &Cue) -> String {
+    let mut text = Vec::new();
+    cue::write_csv(cue, &mut text).unwrap();
+    String::from_utf8(text).unwrap()
+}
+
+fn load(octets: &[u8]) -> Result<Cue, CueFaults> {
+    cue::read(Path::new("t.mcap"), octets, &Source::Native)
+}
+
+fn faults(octets: &[u8]) -> String {
+    load(octets).expect_err("no fault was found").to_string().replace("t.mcap: ", "")
+}
+
+/// A file made by hand: metadata, then messages of topic, log time and JSON.
+fn file(metadata: &[(&str, &str)], messages: &[(&str, u64, &str)]) -> Vec<u8> {
+    file_packed(Some(Compression::Lz4), metadata, messages)
+}
+
+fn file_packed(
+    compression: Option<Compression>,
+    metadata: &[(&str, &str)],
+    messages: &[(&str, u64, &str)],
+) -> Vec<u8> {
+    let mut out = Cursor::new(Vec::new());
+    let mut writer =
+        WriteOptions::new().compression(compression).compression_threads(0).create(&mut out).unwrap();
+    let empty = std::collections::BTreeMap::new();
+    for (topic, log_time, json) in messages {
+        let channel_id = writer.add_channel(0, topic, "json", &empty).unwrap();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: *log_time, publish_time: 0 };
+        writer.write_to_known_channel(&header, json.as_bytes()).unwrap();
+    }
+    if !metadata.is_empty() {
+        let metadata = metadata.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+        writer.write_metadata(&mcap::records::Metadata { name: METADATA.to_owned(), metadata }).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    out.into_inner()
+}
+
+const FRACTION: &[(&str, &str)] = &[("version", "1"), ("units", "fraction")];
+const ROWS: [(&str, u64, &str); 2] =
+    [("/cue/axes", 0, r#"{"a":[0,0.5]}"#), ("/cue/axes", 10, r#"{"a":[1,1]}"#)];
+
+/// The faults of a file with good rows and these messages behind them.
+fn faults_behind_rows(messages: &[(&str, u64, &str)]) -> String {
+    faults(&file(FRACTION, &[&ROWS, messages].concat()))
+}
+
+#[test]
+fn csv_to_mcap_to_csv_keeps_every_value() {
+    let first = csv(CUE);
+    let second = load(&mcap_of(&first)).unwrap();
+    assert_eq!((second.title(), second.unit()), (Some("Störm"), Unit::Millimetre));
+    assert_eq!(second.interpolation(), Interpolation::Monotone);
+    assert_eq!((second.times(), second.positions()), (first.times(), first.positions()));
+    assert_eq!((second.vibration(), second.effects()), (first.vibration(), first.effects()));
+    assert_eq!(csv_of(&second), csv_of(&first));
+    assert_eq!(csv_of(&csv(&csv_of(&first))), csv_of(&first));
+    let words = csv("time_ms,a1,io\n0,0,0x5\n1,1,65535\n");
+    assert_eq!(csv_of(&load(&mcap_of(&words)).unwrap()), csv_of(&words));
+}
+
+#[test]
+fn metadata_may_stand_behind_the_messages() {
+    for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
+        let metadata = [("version", "1"), ("units", "percent"), ("interpolation", "hold")];
+        let messages = [
+            ("/cue/axes", 0, r#"{"a":[0,50]}"#),
+            ("/other", 0, "anything"),
+            ("/cue/marker", 5, r#"{"name":"drop"}"#),
+            ("/cue/io", 5, r#"{"effects":{"wind":1,"air":0}}"#),
+            ("/cue/io", 7, r#"{"effects":{"air":1}}"#),
+            ("/cue/axes", 10, r#"{ "a" : [1e2, 0] }"#),
+        ];
+        let cue = load(&file_packed(compression, &metadata, &messages)).unwrap();
+        assert_eq!((cue.unit(), cue.positions()), (Unit::Fraction, &[0.0, 0.5, 1.0, 0.0][..]));
+        assert_eq!((cue.markers().len(), cue.markers()[0].at), (1, ShowTime::from_nanos(5)));
+        let cue::Effects::Named { names, steps } = cue.effects() else { panic!("named effects") };
+        assert_eq!((names.join(" "), steps.at(cue.duration(), &mut 0)), ("wind air".to_owned(), 0b11));
+        let error = cue::write_csv(&cue, Vec::new()).unwrap_err().to_string();
+        assert!(error.starts_with("an effect changes at 00:00.000, between two rows"), "{error}");
+    }
+}
+
+#[test]
+fn faults_are_placed_by_topic_message_and_log_time() {
+    let at = |n: u64, ns: u64| format!("/cue/axes message {n}, log_time {ns} ns: ");
+    assert_eq!(
+        faults_behind_rows(&[("/cue/axes", 20, r#"{"a":[0.5,1.5]}"#)]),
+        at(3, 20) + "a2: 1.5 is outside the stroke, 0 to 1"
+    );
+    assert_eq!(
+        faults_behind_rows(&[("/cue/axes", 10, r#"{"a":[0,0]}"#)]),
+        at(3, 10) + "00:00.000 does not come after 00:00.000, the time before it"
+    );
+    assert_eq!(
+        faults_behind_rows(&[("/cue/axes", 20, r#"{"a":[0]}"#)]),
+        at(3, 20) + "1 axes where the first message has 2"
+    );
+    assert_eq!(
+        faults_behind_rows(&[("/cue/vibration", 0, r#"{"axis":3,"hz":1,"amp":0}"#)]),
+        "/cue/vibration message 1, log_time 0 ns: axis: the cue has no axis 3; its axes are 1 to 2"
+    );
+    assert_eq!(
+        faults_behind_rows(&[("/cue/vibration", 3, r#"{"axis":1,"hz":0.01,"amp":2}"#)]),
+        "/cue/vibration message 1, log_time 3 ns: hz: 0.01 Hz is neither 0 nor within 0.1221 to 8000 Hz\n\
+         /cue/vibration message 1, log_time 3 ns: amp: an amplitude of 2 is outside 0 to 1"
+    );
+}
+
+#[test]
+fn messages_that_are_not_what_they_should_be_are_refused() {
+    for (topic, json, expected) in [
+        ("/cue/axes", r#"{"a":["x",1]}"#, "not the JSON of its topic: invalid type: string"),
+        ("/cue/axes", r#"{"a":[1e999,1]}"#, "not the JSON of its topic: number out of range"),
+        ("/cue/axes", r#"{"a":[NaN,1]}"#, "not the JSON of its topic: expected value"),
+        ("/cue/axes", r#"{"b":[0,1]}"#, "not the JSON of its topic: unknown field `b`"),
+        ("/cue/axes", "\u{0}", "not the JSON of its topic"),
+        ("/cue/vibration", r#"{"axis":1,"hz":1}"#, "not the JSON of its topic: missing field `amp`"),
+        ("/cue/io", r#"{"effects":{"air":2}}"#, "\"2\" is neither 0 nor 1"),
+        ("/cue/io", r#"{"effects":{"Air":1}}"#, "an effect's name is made of"),
+        ("/cue/io", r#"{"word":65536}"#, "not the JSON of its topic: invalid value"),
+        ("/cue/io", r#"{"word":1,"effects":{"air":1}}"#, "the raw output word and named effects exclude"),
+        ("/cue/io", "{}", "not the JSON of its topic: neither effects nor word"),
+    ] {
+        let told = faults_behind_rows(&[(topic, 20, json)]);
+        let number = if topic == "/cue/axes" { 3 } else { 1 };
+        assert!(told.starts_with(&format!("{topic} message {number}, log_time 20 ns: {expected}")), "{told}");
+    }
+    let late =
+        faults_behind_rows(&[("/cue/marker", 20, r#"{"name":""}"#), ("/cue/marker", 19, r#"{"name":""}"#)]);
+    assert_eq!(late, "/cue/marker message 2, log_time 19 ns: comes 1 ns before the message before it");
+    let both =
+        faults_behind_rows(&[("/cue/io", 1, r#"{"effects":{"air":1}}"#), ("/cue/io", 2, r#"{"word":1}"#)]);
+    assert!(
+        both.ends_with("log_time 2 ns: the raw output word and named effects exclude each other"),
+        "{both}"
+    );
+    let long = format!(r#"{{"a":[0,0{}]}}"#, " ".repeat(70_000));
+    assert!(
+        faults_behind_rows(&[("/cue/axes", 20, &long)])
+            .ends_with("over 65536 octets long, the most that is read")
+    );
+    let end = faults_behind_rows(&[("/cue/axes", u64::MAX, r#"{"a":[0,0]}"#)]);
+    assert!(
+        end.ends_with("18446744073709551615 ns lies after 24:00:00.000, the latest time of a cue"),
+        "{end}"
+    );
+}
+
+#[test]
+fn foreign_files_are_refused() {
+    assert_eq!(faults(b""), "is empty; a cue needs at least two rows");
+    assert_eq!(faults(b"time_ms,a1\n0,0\n1,0\n"), "not an MCAP cue: it does not begin as MCAP files do");
+    assert_eq!(faults(&file(&[], &ROWS)), "not an MCAP cue: it has no metadata record \"kinocue\"");
+    assert_eq!(faults(&file(FRACTION, &[])), "0 of the two rows that a cue needs at least");
+    assert_eq!(
+        faults_behind_rows(&[("/cue/smell", 0, "{}")]),
+        "unknown topic \"/cue/smell\"; a cue has /cue/axes, /cue/vibration, /cue/io and /cue/marker"
+    );
+    assert_eq!(
+        faults(&file(&[("version", "2"), ("interpolation", "sine")], &ROWS)),
+        "version: \"2\" is not known; this program reads version 1\n\
+         units: \"\" is not known; units are fraction, percent, u8, mm or pulse\n\
+         interpolation: \"sine\" is not known; interpolations are spline, monotone, linear or hold"
+    );
+    assert!(
+        faults(&file(FRACTION, &[("/cue/axes", 1, r#"{"a":[0]}"#)]))
+            .ends_with("the first time is 1 ns and must be 0")
+    );
+}
+
+#[test]
+fn an_mcap_is_known_by_its_first_octets_whatever_its_name() {
+    let octets = mcap_of(&csv(CUE));
+    assert!(cue::read(Path::new("storm.dat"), octets.as_slice(), &Source::Native).is_ok());
+}
+
+#[test]
+fn a_cut_file_is_refused_for_play_and_its_complete_messages_are_saved() {
+    let rows: String = (0..5000).map(|k| format!("{},{}\n", k * 10, (f64::from(k) * 0.618).fract())).collect();
+    let whole = csv(&format!("time_ms,a1\n{rows}"));
+    let octets = mcap_of(&whole);
+    assert!(
+        recover(Path::new("t"), octets.as_slice())
+            .is_ok_and(|(cue, lost)| lost.is_none() && cue.rows() == 5000)
+    );
+    let cut = &octets[..octets.len() / 2];
+    assert!(faults(cut).starts_with("the file is cut short; `kinocue convert --recover`"));
+    let (saved, lost) = recover(Path::new("t"), cut).unwrap();
+    assert_eq!(lost, Some(Problem::CutShort));
+    assert!((1000..4999).contains(&saved.rows()), "{}", saved.rows());
+    assert_eq!(saved.positions(), &whole.positions()[..saved.rows()]);
+}
+
+#[test]
+fn every_cut_is_refused_and_none_panics() {
+    let octets = mcap_of(&csv(CUE));
+    for length in 0..octets.len() {
+        assert!(load(&octets[..length]).is_err(), "{length}");
+        let _ = recover(Path::new("t"), &octets[..length]);
+    }
+}
+
+#[test]
+fn every_changed_octet_is_survived() {
+    for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
+        let octets = file_packed(compression, FRACTION, &ROWS);
+        for at in 0..octets.len() {
+            for flip in [0x01, 0x80, 0xff] {
+                let mut changed = octets.clone();
+                changed[at] ^= flip;
+                let _ = load(&changed);
+                let _ = recover(Path::new("t"), changed.as_slice());
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    #[test]
+    fn nothing_from_outside_panics(octets in proptest::collection::vec(any::<u8>(), 0..2048)) {
+        let _ = load(&[MAGIC, &octets].concat());
+    }
+
+    #[test]
+    fn any_cue_survives_the_way_there_and_back(
+        rows in proptest::collection::vec((1_u64..1_000_000_000, 0.0..=1.0, 0.0..=1.0), 2..50),
+    ) {
+        let mut ns = 0;
+        let text: String = rows.iter().enumerate().map(|(n, (gap, a, b))| {
+            ns += if n == 0 { 0 } else { *gap };
+            format!("{}.{:09},{a},{b}\n", ns / 1_000_000_000, ns % 1_000_000_000)
+        }).collect();
+        let first = csv(&format!("time_s,a1,a2\n{text}"));
+        prop_assert_eq!(first.duration().as_nanos().unsigned_abs(), ns);
+        let second = load(&mcap_of(&first)).unwrap();
+        prop_assert_eq!(first.positions(), second.positions());
+        let third = csv(&csv_of(&second));
+        prop_assert_eq!((first.times(), first.positions()), (third.times(), third.positions()));
+    }
+}
