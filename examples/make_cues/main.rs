@@ -4,14 +4,15 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+mod files;
 mod rides;
 mod shapes;
 
 fn main() -> io::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("cues");
-    for ride in rides::ALL {
-        let path = folder.join(ride.file);
-        fs::write(&path, ride.csv())?;
+    for (name, octets) in files::all() {
+        let path = folder.join(name);
+        fs::write(&path, octets)?;
         println!("{}", path.display());
     }
     Ok(())

@@ -1,11 +1,232 @@
 //! `kinocue info`.
 
-use super::{Exit, Failure, OrExit as _};
+use std::fmt::Write as _;
+use std::path::PathBuf;
 
-/// Shows what a cue holds.
+use serde::Serialize;
+
+use super::figures::{self, AxisReport};
+use super::load::{self, Judge, SeatArgs, SourceArgs};
+use super::{Exit, Failure, print};
+use crate::time::ShowTime;
+use crate::timeline::{AxisFigures, EffectUse, Held, Hint, Timeline};
+
+/// How many marks a curve is drawn with.
+const DRAWN: u32 = 64;
+
+/// Shows what a cue holds: length, axes, effects, and the extremes of each axis with their times.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+#[command(after_help = load::after_help(&[
+    "kinocue info cues/coaster.csv",
+    "kinocue info cues/storm.mcap --json",
+    "kinocue info ride.txt --from rows --units mm",
+    "kinocue info cues/voyage.csv --config hall.toml --rate 200",
+]))]
+pub(super) struct Args {
+    /// The cue, CSV or MCAP.
+    cue: PathBuf,
 
-pub(super) fn run(_args: &Args) -> Result<Exit, Failure> {
-    Err(anyhow::anyhow!("not built yet")).or_exit(Exit::Internal)
+    #[command(flatten)]
+    source: SourceArgs,
+
+    #[command(flatten)]
+    seat: SeatArgs,
+
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let hall = args.seat.config.as_deref().map(load::config).transpose()?;
+    let judge = args.seat.judge(hall)?;
+    let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);
+    let info = Info::new(&timeline, &judge);
+    if args.json {
+        print::json(&info)?
+    } else {
+        print::out(&info.text(&timeline))?
+    }
+    Ok(Exit::Done)
+}
+
+/// What is shown of a cue.
+#[derive(Debug, Serialize)]
+struct Info {
+    cue: String,
+    title: Option<String>,
+    length_s: f64,
+    rows: usize,
+    row_interval_ms: f64,
+    unit: &'static str,
+    interpolation: &'static str,
+    seat: String,
+    rate_hz: f64,
+    vibration: Vec<VibrationReport>,
+    effects: Vec<EffectReport>,
+    markers: Vec<MarkerReport>,
+    notes: Vec<String>,
+    axes: Vec<AxisReport>,
+    #[serde(skip)]
+    figures: Vec<AxisFigures>,
+}
+
+#[derive(Debug, Serialize)]
+struct EffectReport {
+    name: String,
+    times: usize,
+    on_s: f64,
+    first_s: Option<f64>,
+}
+
+impl From<EffectUse> for EffectReport {
+    fn from(usage: EffectUse) -> Self {
+        let EffectUse { name, times, on, first } = usage;
+        Self { name, times, on_s: on.as_secs_f64(), first_s: first.map(ShowTime::as_secs_f64) }
+    }
+}
+
+/// The vibration of an axis: frequencies while its amplitude is above 0, and the greatest amplitude.
+#[derive(Debug, Serialize)]
+struct VibrationReport {
+    axis: String,
+    min_hz: f64,
+    max_hz: f64,
+    max_amplitude_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct MarkerReport {
+    name: String,
+    at_s: f64,
+}
+
+impl Info {
+    fn new(timeline: &Timeline, judge: &Judge) -> Self {
+        let cue = timeline.cue();
+        let seats = judge.seats(timeline.axes());
+        let figures = timeline.figures(judge.rate_hz, &seats);
+        let name = cue.path().display().to_string();
+        Self {
+            axes: figures::report(&name, &figures),
+            cue: name,
+            title: cue.title().map(str::to_owned),
+            length_s: timeline.duration().as_secs_f64(),
+            rows: cue.rows(),
+            row_interval_ms: timeline.row_interval().as_secs_f64() * 1000.0,
+            unit: timeline.unit().name(),
+            interpolation: cue.interpolation().name(),
+            seat: figures::seat_names(&seats),
+            rate_hz: judge.rate_hz,
+            vibration: vibration(timeline, &figures),
+            effects: timeline.effect_uses().into_iter().map(Into::into).collect(),
+            markers: cue
+                .markers()
+                .iter()
+                .map(|m| MarkerReport { name: m.name.clone(), at_s: m.at.as_secs_f64() })
+                .collect(),
+            notes: judge.stroke(timeline).held.iter().map(|held| note(held, timeline)).collect(),
+            figures,
+        }
+    }
+
+    fn text(&self, timeline: &Timeline) -> String {
+        let title = self.title.as_ref().map_or_else(String::new, |title| format!(": {title}"));
+        let mut text = format!("{}{title}\n\n", self.cue);
+        for (word, value) in self.facts(timeline) {
+            append(&mut text, format_args!("{word:<14}{value}\n"));
+        }
+        append(&mut text, format_args!("\nfor seat {} at {} frames a second:\n", self.seat, self.rate_hz));
+        text += &figures::table(&self.figures);
+        text.push('\n');
+        for (axis, curve) in drawn(timeline, &self.figures).iter().enumerate() {
+            append(&mut text, format_args!("{:<4}{curve}\n", format!("a{}", axis + 1)));
+        }
+        if !self.notes.is_empty() {
+            append(&mut text, format_args!("\n{}\n", self.notes.join("\n")));
+        }
+        text
+    }
+
+    fn facts(&self, timeline: &Timeline) -> Vec<(&'static str, String)> {
+        let ms = self.row_interval_ms;
+        let rate =
+            if ms > 0.0 { format!(", {:.5} ms apart ({:.2} Hz)", ms, 1000.0 / ms) } else { String::new() };
+        let mut facts = vec![
+            ("length", timeline.duration().to_string()),
+            ("rows", format!("{}{rate}", self.rows)),
+            ("axes", format!("{}, in {}", timeline.axes(), self.unit)),
+            ("interpolation", self.interpolation.to_owned()),
+        ];
+        facts.extend(self.vibration.iter().map(|v| {
+            let value =
+                format!("{}: {} to {} Hz, up to {:.2} mm", v.axis, v.min_hz, v.max_hz, v.max_amplitude_mm);
+            ("vibration", value)
+        }));
+        facts.extend(self.effects.iter().map(|effect| {
+            let first = effect
+                .first_s
+                .map_or_else(String::new, |s| format!(", first at {}", ShowTime::from_secs_f64(s)));
+            (
+                "effect",
+                format!("{}: on {} times, {:.1} s in all{first}", effect.name, effect.times, effect.on_s),
+            )
+        }));
+        facts.extend(
+            self.markers.iter().map(|marker| {
+                ("marker", format!("{} {}", ShowTime::from_secs_f64(marker.at_s), marker.name))
+            }),
+        );
+        facts
+    }
+}
+
+fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationReport> {
+    let axes = timeline.cue().vibration().iter().zip(figures).enumerate();
+    let report = axes.filter_map(|(axis, (steps, figures))| {
+        let shaking =
+            steps.as_slice().iter().map(|step| step.value).filter(|v| v.hz > 0.0 && v.amplitude > 0.0);
+        let (hz, amplitudes): (Vec<_>, Vec<_>) = shaking.map(|v| (v.hz, v.amplitude)).unzip();
+        let mm = timeline.unit().to_stroke(&figures.seat) * figures.seat.stroke_mm;
+        Some(VibrationReport {
+            axis: format!("a{}", axis + 1),
+            min_hz: hz.iter().copied().reduce(f64::min)?,
+            max_hz: hz.iter().copied().reduce(f64::max)?,
+            max_amplitude_mm: mm * amplitudes.iter().copied().reduce(f64::max)?,
+        })
+    });
+    report.collect()
+}
+
+fn note(held: &Held, timeline: &Timeline) -> String {
+    format!(
+        "a{}: the curve is held at the stroke's end in {} places; it would go {:.2e} {} past it at {}",
+        held.axis + 1,
+        held.stretches,
+        held.over,
+        timeline.unit().name(),
+        held.at
+    )
+}
+
+/// Each axis as a line of marks, from the bottom of its seat's stroke to the top.
+fn drawn(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<String> {
+    const MARKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let mut curves = vec![String::new(); timeline.axes()];
+    let mut hint = Hint::default();
+    for step in 0..DRAWN {
+        let part = f64::from(step) / f64::from(DRAWN - 1);
+        let at = ShowTime::from_secs_f64(part * timeline.duration().as_secs_f64());
+        let pose = timeline.sample(at, &mut hint);
+        for ((curve, position), figures) in curves.iter_mut().zip(pose).zip(figures) {
+            let fraction = position * timeline.unit().to_stroke(&figures.seat);
+            let above = (1..8_u8).filter(|&mark| fraction >= f64::from(mark) / 8.0).count();
+            curve.push(MARKS[above]);
+        }
+    }
+    curves
+}
+
+fn append(text: &mut String, what: std::fmt::Arguments<'_>) {
+    text.write_fmt(what).expect("a String takes all text");
 }

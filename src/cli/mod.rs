@@ -5,12 +5,16 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod check;
+mod completions;
 mod convert;
 mod decode;
 mod demo;
 mod exit;
+mod figures;
 mod info;
+mod load;
 mod play;
+mod print;
 mod sim;
 pub mod times;
 
@@ -35,6 +39,7 @@ enum Command {
     Info(info::Args),
     Convert(convert::Args),
     Decode(decode::Args),
+    Completions(completions::Args),
 }
 
 /// Runs the program on the process's arguments and says how it ends.
@@ -66,5 +71,6 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Completions(args) => completions::run(&args),
     }
 }

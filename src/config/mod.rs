@@ -2,12 +2,14 @@
 //! Control thread.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::motion::{MAX_AXES, SeatType};
 
 mod fault;
+mod fit;
 mod read;
 mod section;
 mod target;
@@ -16,6 +18,7 @@ mod tests;
 
 pub use crate::wire::{Dialect, Timing};
 pub use fault::{ConfigFault, ConfigFaults};
+pub use fit::{HallStroke, Misfit};
 pub use target::{TargetError, from_to_args};
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
@@ -194,7 +197,13 @@ impl Controller {
     /// Whether axis `axis` of the cue, counted from 0, is one of its own.
     #[must_use]
     pub fn takes(&self, axis: usize) -> bool {
-        (self.axis_offset..self.axis_offset + self.seat.axes).contains(&axis)
+        self.window().contains(&axis)
+    }
+
+    /// The axes of the cue that are its own, counted from 0.
+    #[must_use]
+    pub fn window(&self) -> Range<usize> {
+        self.axis_offset..self.axis_offset + self.seat.axes
     }
 
     fn switches(&self, effect: &str) -> bool {

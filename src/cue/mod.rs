@@ -222,6 +222,13 @@ impl Cue {
         self.origin.place(&self.path, row, axis, time)
     }
 
+    /// Where the header of its file names a column, or the file as a whole where it has no such header. Reads the
+    /// file again.
+    #[must_use]
+    pub fn column_place(&self, column: &str) -> Place {
+        self.origin.column_place(&self.path, column)
+    }
+
     fn shrink(&mut self) {
         self.times.shrink_to_fit();
         self.positions.shrink_to_fit();

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use super::fault::Place;
-use super::table::{Lines, column_of};
+use super::table::{Cells, Lines, column_of};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -67,6 +67,26 @@ impl Origin {
             },
             Self::Octets(axes) => Place::Octet((row * axes + axis) as u64),
         }
+    }
+
+    /// Where the header names a column; the file as a whole where there is no such header.
+    pub(super) fn column_place(&self, path: &Path, column: &str) -> Place {
+        let place = if let Self::Text { .. } = self { column_in_header(path, column) } else { None };
+        place.unwrap_or(Place::File)
+    }
+}
+
+fn column_in_header(path: &Path, column: &str) -> Option<Place> {
+    let mut lines = Lines::new(File::open(path).ok()?);
+    loop {
+        let (number, text) = lines.next().ok()??;
+        if text.trim_start().starts_with('#') {
+            continue;
+        }
+        let mut cells = Cells::new();
+        cells.split(text).ok()?;
+        let index = (0..cells.count()).find(|&index| cells.get(index) == column)?;
+        return Some(Place::Text { line: number, column: column_of(text, index) });
     }
 }
 

@@ -4,10 +4,12 @@
 mod cubic;
 mod curve;
 mod extremes;
+mod figures;
 mod fit;
 mod spline;
 
 pub use extremes::{AxisExtremes, Extreme};
+pub use figures::{AxisFigures, EffectUse, Figure};
 pub use fit::{HELD_BACK, Held, StrokeFit};
 
 use crate::cue::{Cue, Effects, Unit, Vibration};
@@ -132,6 +134,15 @@ impl Timeline {
     #[must_use]
     pub const fn has_vibration(&self) -> bool {
         self.vibrates
+    }
+
+    /// Whether an axis, counted from 0, ever vibrates.
+    #[must_use]
+    pub fn vibrates(&self, axis: usize) -> bool {
+        self.cue
+            .vibration()
+            .get(axis)
+            .is_some_and(|steps| steps.as_slice().iter().any(|step| moves(step.value)))
     }
 
     /// The effects that are on at a show time.

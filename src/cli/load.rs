@@ -1,0 +1,167 @@
+//! What several commands read: cues and configurations, with the exit codes of their faults.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::anyhow;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+
+use super::{Exit, Failure};
+use crate::config::{self, Config, ConfigFaults, HallStroke};
+use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
+use crate::motion::SeatType;
+use crate::timeline::Timeline;
+
+/// What stands behind the options in the help of a command that reads cues.
+pub(super) fn after_help(examples: &[&str]) -> String {
+    format!(
+        "Limits of a cue: 8,000,000 rows (two hours at 1 kHz), 12 axes, 64 KiB a line, 2 GiB a file.\n\n\
+         Examples:\n  {}",
+        examples.join("\n  ")
+    )
+}
+
+/// What a cue file is, where it is none of kinocue's own formats.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(super) struct SourceArgs {
+    /// The cue is a file of a motion editor: rows of line, time_ms, x, y, z, u, v, w.
+    #[arg(long, value_enum, value_name = "FORMAT", requires = "units")]
+    from: Option<Import>,
+
+    /// The unit of its positions, which such a file does not say.
+    #[arg(long, value_name = "UNIT", requires = "from", value_parser = declared_unit())]
+    units: Option<DeclaredUnit>,
+}
+
+/// The formats of others that a cue can be read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Import {
+    /// Lines of line,time_ms,x,y,z,u,v,w; time_ms is how long the row takes.
+    Rows,
+}
+
+impl SourceArgs {
+    /// What the arguments say the file is.
+    pub(super) fn source(&self) -> Source {
+        match (self.from, self.units) {
+            (Some(Import::Rows), Some(unit)) => Source::Rows { unit },
+            _ => Source::Native,
+        }
+    }
+}
+
+/// Reads one of the units that a person can declare.
+pub(super) fn declared_unit() -> impl clap::builder::TypedValueParser<Value = DeclaredUnit> {
+    PossibleValuesParser::new(["mm", "percent", "fraction", "pulse"])
+        .try_map(|unit| unit.parse::<DeclaredUnit>())
+}
+
+/// The seat and the rate that a cue is judged for.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct SeatArgs {
+    /// The configuration with the seat types, effects and controllers.
+    #[arg(long, value_name = "FILE")]
+    pub(super) config: Option<PathBuf>,
+
+    /// The seat type to judge for [default: of each axis that of its controller; bench3 without a configuration].
+    #[arg(long, value_name = "NAME")]
+    seat: Option<String>,
+
+    /// Frames a second [default: those of the configuration; 100 without].
+    #[arg(long, value_name = "HZ", value_parser = parse_rate)]
+    rate: Option<f64>,
+}
+
+/// What a cue is judged for.
+#[derive(Debug)]
+pub(super) struct Judge {
+    pub(super) hall: Option<Config>,
+    /// The seat asked for by name.
+    pub(super) seat: Option<Arc<SeatType>>,
+    pub(super) rate_hz: f64,
+}
+
+impl SeatArgs {
+    /// What the arguments mean beside `hall`, the configuration they name.
+    pub(super) fn judge(&self, hall: Option<Config>) -> Result<Judge, Failure> {
+        let seat = self.seat.as_deref().map(|name| seat(name, hall.as_ref())).transpose()?;
+        let rate_hz = self.rate.or_else(|| hall.as_ref().map(|hall| hall.show.rate_hz)).unwrap_or(100.0);
+        Ok(Judge { hall, seat, rate_hz })
+    }
+}
+
+fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
+    let known = match hall {
+        Some(hall) => hall.seat(name).cloned(),
+        None => (name == "bench3").then(|| Arc::new(SeatType::bench3(3))),
+    };
+    known.ok_or_else(|| {
+        let names: Vec<_> =
+            hall.map_or(vec!["bench3"], |hall| hall.seats.iter().map(|s| s.name.as_str()).collect());
+        let hint = if hall.is_none() { "; --config FILE brings others" } else { "" };
+        Failure {
+            exit: Exit::Usage,
+            error: anyhow!("--seat {name}: the seat types are {}{hint}", names.join(", ")),
+        }
+    })
+}
+
+impl Judge {
+    /// The seat of each axis of a cue: the one asked for, else that of the first controller that takes the axis,
+    /// else the bench seat.
+    pub(super) fn seats(&self, axes: usize) -> Vec<Arc<SeatType>> {
+        let bench = Arc::new(SeatType::bench3(axes));
+        let seat_of = |axis| {
+            let controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
+            let taker = controllers.into_iter().find(|controller| controller.takes(axis));
+            self.seat.as_ref().or(taker.map(|controller| &controller.seat)).unwrap_or(&bench)
+        };
+        (0..axes).map(|axis| Arc::clone(seat_of(axis))).collect()
+    }
+
+    /// Holds a cue against the stroke of the seat asked for, else of each seat of the configuration, else of the
+    /// bench seat.
+    pub(super) fn stroke(&self, timeline: &Timeline) -> HallStroke {
+        match (&self.seat, &self.hall) {
+            (None, Some(hall)) => hall.fits_stroke(timeline),
+            (seat, _) => {
+                let bench = SeatType::bench3(timeline.axes());
+                let fit = timeline.fits_stroke(0..timeline.axes(), Some(seat.as_deref().unwrap_or(&bench)));
+                HallStroke { faults: fit.faults.into_iter().collect(), held: fit.held }
+            }
+        }
+    }
+}
+
+/// A rate in frames a second.
+pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (1.0..=1000.0).contains(rate));
+    rate.ok_or_else(|| "a rate is 1 to 1000 Hz".to_owned())
+}
+
+/// Reads a configuration; its faults end the program.
+pub(super) fn config(path: &Path) -> Result<Config, Failure> {
+    config::load(path).map_err(|faults| Failure { exit: config_exit(&faults), error: faults.into() })
+}
+
+/// Reads a cue; its faults end the program.
+pub(super) fn cue(path: &Path, source: &Source) -> Result<Cue, Failure> {
+    cue::load(path, source).map_err(|faults| Failure { exit: cue_exit(&faults), error: faults.into() })
+}
+
+/// How the program ends where a configuration has these faults.
+pub(super) fn config_exit(faults: &ConfigFaults) -> Exit {
+    match faults {
+        ConfigFaults::Unreadable { .. } => Exit::NoInput,
+        ConfigFaults::Bad(_) => Exit::Config,
+    }
+}
+
+/// How the program ends where a cue has these faults.
+pub(super) fn cue_exit(faults: &CueFaults) -> Exit {
+    match faults.class() {
+        FaultClass::NoInput => Exit::NoInput,
+        FaultClass::Io => Exit::Io,
+        FaultClass::BadCue => Exit::BadCue,
+    }
+}
