@@ -1,7 +1,7 @@
 //! A whole show in virtual time: a clock that jumps from deadline to deadline, a planner that answers between ticks, and
 //! a link that keeps every datagram.
 
-#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(dead_code, unreachable_pub, reason = "each test file uses its own part")]
 
 use std::cell::{Cell, RefCell};
 use std::path::Path;
