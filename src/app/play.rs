@@ -191,7 +191,7 @@ impl Stage {
             let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
             let grid = TickGrid::new(origin.max(Monotonic.now()), self.show.rate);
             let engine = Engine::new(self.show, self.timeline, self.headroom, windows, self.course);
-            let ended = TickLoop {
+            let mut ticks = TickLoop {
                 clock: &Monotonic,
                 grid,
                 engine,
@@ -199,13 +199,14 @@ impl Stage {
                 sink: self.sender,
                 mail,
                 stop,
-            }
-            .run();
+            };
+            let ended = ticks.run();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);
             plan_thread.thread().unpark();
             let refusals = plan_thread.join().expect("the planner does not panic");
-            let accounts = ack_thread.join().expect("the ack thread does not panic");
+            let mut accounts = ack_thread.join().expect("the ack thread does not panic");
+            accounts.close(ticks.lanes.iter().map(Lane::last_frame), Monotonic.now());
             Run { ended, accounts, granted, refusals, cue }
         })
     }

@@ -56,8 +56,8 @@ impl<C: Clock> Preparation<'_, C> {
             return prepared;
         }
         let mut arrival = None;
-        for lane in 0..count {
-            if !self.is_parked(lane, &told[lane]) {
+        for (lane, told) in told.iter().enumerate() {
+            if !self.is_parked(lane, told) {
                 let time_ms = self.send_home(lane, &mut prepared);
                 arrival =
                     arrival.max(Some(self.clock.now() + Duration::from_millis(u64::from(time_ms)) + SETTLE));

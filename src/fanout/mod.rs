@@ -103,6 +103,12 @@ impl Lane {
         written
     }
 
+    /// The number of the frame written last; one less than the first where there was none.
+    #[must_use]
+    pub const fn last_frame(&self) -> FrameNo {
+        FrameNo(self.next_frame.0.wrapping_sub(1))
+    }
+
     fn stamp(&mut self) -> Stamped {
         let frame = self.next_frame;
         self.next_frame = frame.next();

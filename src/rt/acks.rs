@@ -7,7 +7,7 @@ use super::{Sent, TickReport};
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Reply, Tracker, histogram};
-use crate::wire::MotionReply;
+use crate::wire::{FrameNo, MotionReply};
 
 /// Everything that was counted.
 #[derive(Debug)]
@@ -25,6 +25,15 @@ impl Accounts {
     #[must_use]
     pub fn new(controllers: usize) -> Self {
         Self { books: Books::new(Tracker::new(controllers)), lateness: histogram(), strangers: 0 }
+    }
+
+    /// Closes the accounts at `at`: every frame meets its fate. `last` are the controllers' last frames, whose records
+    /// may have found no room.
+    pub fn close(&mut self, last: impl Iterator<Item = FrameNo>, at: MonoTime) {
+        for (controller, frame) in last.enumerate() {
+            self.books.tracker_mut().on_last(controller, frame, at);
+        }
+        self.books.finish(|_| {});
     }
 }
 
@@ -47,7 +56,8 @@ impl AckLoop {
         Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default() }
     }
 
-    /// Drains until `done` says that no more frames come and the last of them has had its second.
+    /// Drains until `done` says that no more frames come and the last of them has had its second; the accounts are still
+    /// open then.
     pub fn run(mut self, clock: &impl Clock, drains: DrainGrid, done: impl Fn() -> bool) -> Accounts {
         loop {
             let over = done();
@@ -57,8 +67,6 @@ impl AckLoop {
             }
             clock.sleep_until(drains.next_after(clock.now()));
         }
-        let Self { accounts, sent, last_sent, .. } = &mut self;
-        accounts.books.finish(|tracker| take_records(sent, tracker, last_sent));
         self.accounts
     }
 
