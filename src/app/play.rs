@@ -19,7 +19,7 @@ use crate::sys::realtime::{self, RealTime};
 use crate::time::Clock;
 use crate::timeline::{Hint, Timeline};
 
-/// From the end of preparing to tick 0: time to start the threads.
+/// From the end of preparing to tick 0: time to start the other threads.
 const RUN_UP: Duration = Duration::from_millis(20);
 
 /// Why nothing was played. Nothing has moved then.
@@ -103,6 +103,8 @@ impl Play {
     /// # Panics
     /// Where one of its threads panicked.
     pub fn run(mut self, stop: &AtomicBool, live: Arc<Live>) -> Result<Played, PlayError> {
+        // Refused, the ports may still open; if not, their error says what to do.
+        let _ = realtime::raise_open_files();
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let (mail, ends) = mailboxes(self.lanes.len(), self.show.rate, live);
@@ -169,11 +171,12 @@ struct Run {
 }
 
 impl Stage {
-    /// The calling thread becomes the tick thread; the others are started before it asks for real-time service, which
-    /// they would inherit.
+    /// The calling thread becomes the tick thread. Everything it touches has been made by now, so that memory can be
+    /// locked; the threads started after it are ordinary ones.
     fn run(self, acks: AckLoop, mut plans: PlanLoop, mut mail: crate::rt::Mail, stop: &AtomicBool) -> Run {
         let cue = self.timeline.cue().path().display().to_string();
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
+        let granted = realtime::request();
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, self.show.rate.period());
@@ -187,9 +190,8 @@ impl Stage {
                 plans.run(&done)
             });
             mail.wakes(plan_thread.thread().clone());
-            let granted = realtime::request();
             let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
-            let grid = TickGrid::new(origin.max(Monotonic.now()), self.show.rate);
+            let grid = TickGrid::new(origin, self.show.rate);
             let engine = Engine::new(self.show, self.timeline, self.headroom, windows, self.course);
             let mut ticks = TickLoop {
                 clock: &Monotonic,
