@@ -75,7 +75,7 @@ pub(super) struct Args {
     json: bool,
 }
 
-fn parse_rate(text: &str) -> Result<f64, String> {
+pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
     let hz: f64 = text.parse().map_err(|_| format!("{text:?} is not a number of ticks per second"))?;
     if (1.0..=1000.0).contains(&hz) { Ok(hz) } else { Err(format!("{hz} Hz is outside 1..=1000 Hz")) }
 }
