@@ -21,12 +21,12 @@ fn folder() -> PathBuf {
 }
 
 fn shipped() -> Vec<Timeline> {
-    let load = |ride: &shapes::Ride| cue::load(&folder().join(ride.file), &Source::Native).unwrap();
+    let load = |ride: &shapes::Ride| cue::load(&folder().join(ride.file), &Source::Native).expect(ride.file);
     rides::ALL.iter().map(load).map(Timeline::new).collect()
 }
 
 fn name(timeline: &Timeline) -> String {
-    timeline.cue().path().file_name().unwrap().display().to_string()
+    timeline.cue().path().file_name().expect("a file").display().to_string()
 }
 
 #[test]
@@ -43,8 +43,9 @@ fn the_files_are_what_the_generator_makes() {
 #[test]
 fn every_cue_keeps_to_nine_tenths_of_the_bench_seat_at_100_and_1000_hz() {
     for timeline in shipped() {
-        let seats = vec![Arc::new(SeatType::bench3(timeline.axes())); timeline.axes()];
-        assert_eq!(timeline.fits_stroke(0..timeline.axes(), Some(&seats[0])).faults, None);
+        let seat = Arc::new(SeatType::bench3(timeline.axes()));
+        let seats = vec![Arc::clone(&seat); timeline.axes()];
+        assert_eq!(timeline.fits_stroke(0..timeline.axes(), Some(&seat)).faults, None);
         for rate in [100.0, 1000.0] {
             for (axis, figures) in timeline.figures(rate, &seats).iter().enumerate() {
                 let seat = &figures.seat;

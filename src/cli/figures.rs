@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use serde::Serialize;
 
 use crate::motion::SeatType;
@@ -85,10 +85,13 @@ pub(super) fn seat_names(seats: &[Arc<SeatType>]) -> String {
     names.join(", ")
 }
 
+/// A line under the header, and no other lines.
+const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
+
 /// One row an axis: the extremes, their part of the limit, and when; `!` marks what is over its limit.
 pub(super) fn table(figures: &[AxisFigures]) -> String {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(STYLE);
     table.set_header([
         "axis",
         "lowest mm",
@@ -108,7 +111,8 @@ pub(super) fn table(figures: &[AxisFigures]) -> String {
     for (index, f) in figures.iter().enumerate() {
         let mut row = vec![format!("a{}", index + 1)];
         for figure in [f.lowest, f.highest] {
-            row.extend([format!("{:.1}", figure.value), figure.at.to_string()]);
+            // Added to 0, a small value below 0 is not shown as -0.0.
+            row.extend([format!("{:.1}", (10.0 * figure.value).round() / 10.0 + 0.0), figure.at.to_string()]);
         }
         let limits = [f.seat.max_velocity_mm_s, f.seat.max_acceleration_mm_s2, f.seat.max_jerk_mm_s3];
         for (figure, limit) in [f.velocity, f.acceleration, f.jerk].into_iter().zip(limits) {

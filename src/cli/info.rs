@@ -95,6 +95,14 @@ struct VibrationReport {
     max_amplitude_mm: f64,
 }
 
+impl VibrationReport {
+    /// Whether another axis vibrates alike.
+    fn is_as(&self, other: &Self) -> bool {
+        let figures = |v: &Self| (v.min_hz, v.max_hz, v.max_amplitude_mm);
+        figures(self) == figures(other)
+    }
+}
+
 #[derive(Debug, Serialize)]
 struct MarkerReport {
     name: String,
@@ -107,6 +115,8 @@ impl Info {
         let seats = judge.seats(timeline.axes());
         let figures = timeline.figures(judge.rate_hz, &seats);
         let name = cue.path().display().to_string();
+        let stroke = judge.stroke(timeline);
+        let notes = stroke.held.iter().filter_map(|held| note(held, &figures, timeline));
         Self {
             axes: figures::report(&name, &figures),
             cue: name,
@@ -125,7 +135,7 @@ impl Info {
                 .iter()
                 .map(|m| MarkerReport { name: m.name.clone(), at_s: m.at.as_secs_f64() })
                 .collect(),
-            notes: judge.stroke(timeline).held.iter().map(|held| note(held, timeline)).collect(),
+            notes: notes.chain(stroke.faults.iter().map(ToString::to_string)).collect(),
             figures,
         }
     }
@@ -150,33 +160,28 @@ impl Info {
 
     fn facts(&self, timeline: &Timeline) -> Vec<(&'static str, String)> {
         let ms = self.row_interval_ms;
-        let rate =
-            if ms > 0.0 { format!(", {:.5} ms apart ({:.2} Hz)", ms, 1000.0 / ms) } else { String::new() };
         let mut facts = vec![
             ("length", timeline.duration().to_string()),
-            ("rows", format!("{}{rate}", self.rows)),
+            (
+                "rows",
+                format!("{}, {} ms apart ({} Hz)", self.rows, thousandths(ms), thousandths(1000.0 / ms)),
+            ),
             ("axes", format!("{}, in {}", timeline.axes(), self.unit)),
             ("interpolation", self.interpolation.to_owned()),
         ];
-        facts.extend(self.vibration.iter().map(|v| {
-            let value =
-                format!("{}: {} to {} Hz, up to {:.2} mm", v.axis, v.min_hz, v.max_hz, v.max_amplitude_mm);
-            ("vibration", value)
+        facts.extend(self.vibration.chunk_by(VibrationReport::is_as).map(|alike| {
+            let axes: Vec<_> = alike.iter().map(|v| v.axis.as_str()).collect();
+            let VibrationReport { min_hz, max_hz, max_amplitude_mm, .. } = &alike[0];
+            let axes = axes.join(", ");
+            ("vibration", format!("{axes}: {min_hz} to {max_hz} Hz, up to {max_amplitude_mm:.2} mm"))
         }));
         facts.extend(self.effects.iter().map(|effect| {
-            let first = effect
-                .first_s
-                .map_or_else(String::new, |s| format!(", first at {}", ShowTime::from_secs_f64(s)));
-            (
-                "effect",
-                format!("{}: on {} times, {:.1} s in all{first}", effect.name, effect.times, effect.on_s),
-            )
+            let first = effect.first_s.map(|s| format!(", first at {}", ShowTime::from_secs_f64(s)));
+            let (name, times, on) = (&effect.name, effect.times, effect.on_s);
+            ("effect", format!("{name}: {times}×, {on:.1} s in all{}", first.unwrap_or_default()))
         }));
-        facts.extend(
-            self.markers.iter().map(|marker| {
-                ("marker", format!("{} {}", ShowTime::from_secs_f64(marker.at_s), marker.name))
-            }),
-        );
+        let at = |marker: &MarkerReport| ShowTime::from_secs_f64(marker.at_s);
+        facts.extend(self.markers.iter().map(|marker| ("marker", format!("{} {}", at(marker), marker.name))));
         facts
     }
 }
@@ -198,15 +203,20 @@ fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationRepor
     report.collect()
 }
 
-fn note(held: &Held, timeline: &Timeline) -> String {
-    format!(
-        "a{}: the curve is held at the stroke's end in {} places; it would go {:.2e} {} past it at {}",
-        held.axis + 1,
-        held.stretches,
-        held.over,
-        timeline.unit().name(),
-        held.at
-    )
+/// What is held back at the ends of an axis's stroke.
+fn note(held: &Held, figures: &[AxisFigures], timeline: &Timeline) -> Option<String> {
+    let seat = &figures.get(held.axis)?.seat;
+    let mm = held.over * timeline.unit().to_stroke(seat) * seat.stroke_mm;
+    let Held { axis, stretches, at, .. } = held;
+    Some(format!(
+        "a{}: held at the stroke's end in {stretches} places, where the curve goes up to {mm:.4} mm past it ({at})",
+        axis + 1
+    ))
+}
+
+/// Rounded to three places, and as short as that allows.
+fn thousandths(value: f64) -> f64 {
+    (1000.0 * value).round() / 1000.0
 }
 
 /// Each axis as a line of marks, from the bottom of its seat's stroke to the top.

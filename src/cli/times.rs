@@ -192,4 +192,11 @@ mod tests {
         }
         assert_eq!(parse_level("-infdB"), Ok(0.0));
     }
+
+    proptest::proptest! {
+        #[test]
+        fn no_text_panics(text in "[0-9:.@a-z%é -]{0,12}") {
+            let _ = (parse_time(&text), parse_duration(&text), parse_level(&text));
+        }
+    }
 }

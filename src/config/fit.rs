@@ -173,6 +173,8 @@ mod tests {
         );
         assert!(misfits(&["1,axes=1,dialect=mbox", "2,axes=1,offset=1"], header, row).is_empty());
         assert!(misfits(&["1,axes=10"], header, row)[0].ends_with("carry 10 axes, over 6"));
+        assert!(misfits(&["1,axes=6"], header, row).is_empty());
+        assert_eq!(misfits(&["1,axes=7"], header, row).len(), 1);
         assert!(misfits(&["1,axes=10"], header, "0,0,0,0").is_empty());
     }
 

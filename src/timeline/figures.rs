@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn a_steady_move_has_its_speed_in_mm_of_the_seat() {
         let cue = timeline("# interpolation: linear\ntime_s,a1,a2\n0,0,0.5\n1,0.5,0.5\n2,0.5,0.5\n");
-        let seats = vec![Arc::new(SeatType::bench3(2)); 2];
+        let seats = [0, 1].map(|_| Arc::new(SeatType::bench3(2)));
         let figures = cue.figures(100.0, &seats);
         assert!((figures[0].velocity.value - 75.0).abs() < 1e-6, "{figures:?}");
         assert_eq!((figures[0].velocity.line, figures[0].highest.line), (3, 4));
