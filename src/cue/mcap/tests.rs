@@ -207,7 +207,8 @@ fn an_mcap_is_known_by_its_first_octets_whatever_its_name() {
 
 #[test]
 fn a_cut_file_is_refused_for_play_and_its_complete_messages_are_saved() {
-    let rows: String = (0..5000).map(|k| format!("{},{}\n", k * 10, (f64::from(k) * 0.618).fract())).collect();
+    let rows: String =
+        (0..5000).map(|k| format!("{},{}\n", k * 10, (f64::from(k) * 0.618).fract())).collect();
     let whole = csv(&format!("time_ms,a1\n{rows}"));
     let octets = mcap_of(&whole);
     assert!(
