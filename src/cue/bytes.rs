@@ -47,7 +47,7 @@ fn fill(cue: &mut Cue, input: impl Read, rate_hz: f64) -> Result<(), Problem> {
     for row in 0..rows.len() {
         cue.times.push(time_of(row, rate_hz)?);
     }
-    cue.positions.extend(octets.iter().map(|octet| f64::from(*octet) / DeclaredUnit::U8.divisor()));
+    cue.positions.extend(octets.iter().map(|octet| DeclaredUnit::U8.in_memory(f64::from(*octet))));
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use super::fault::{Collector, CueFaults, Place, Problem};
 use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
-use super::table::{Cells, Lines, column_of};
+use super::table::{Lines, Splitter, column_of};
 use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, value};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
@@ -20,10 +20,10 @@ pub(super) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
 fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
-    let Some((declared, header, cells)) = read_head(&mut lines, &mut faults) else {
+    let Some((declared, header)) = read_head(&mut lines, &mut faults) else {
         return faults.finish(path, Cue::blank(path));
     };
-    let mut rows = Rows::new(path, &declared, header, cells);
+    let mut rows = Rows::new(path, &declared, header);
     loop {
         match lines.next() {
             Ok(Some((number, line))) => {
@@ -59,7 +59,7 @@ struct Declared {
 }
 
 /// Reads up to the header row; nothing where rows cannot be understood after what was found.
-fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(Declared, Header, Cells)> {
+fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(Declared, Header)> {
     let mut declared = Declared::default();
     loop {
         match lines.next() {
@@ -68,13 +68,15 @@ fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(D
                     declared.take(number, line, comment, faults);
                     continue;
                 }
-                let mut cells = Cells::new();
-                if let Err((column, problem)) = cells.split(line) {
-                    faults.add(Place::Text { line: number, column }, None, problem);
-                    return None;
-                }
-                let header = Header::read(line, number, &cells, faults);
-                return faults.is_empty().then_some((declared, header, cells));
+                let mut splitter = Splitter::new();
+                let header = match splitter.split(line) {
+                    Ok(cells) => Header::read(line, number, cells, faults),
+                    Err((column, problem)) => {
+                        faults.add(Place::Text { line: number, column }, None, problem);
+                        return None;
+                    }
+                };
+                return faults.is_empty().then_some((declared, header));
             }
             Ok(None) => {
                 faults.add(Place::File, None, Problem::Empty);
@@ -118,29 +120,16 @@ fn parsed<T: FromStr<Err: ToString>>(text: &str) -> Result<T, String> {
     text.parse().map_err(|error: T::Err| error.to_string())
 }
 
-/// The rows while they are read: the cue so far, and the row that an empty cell would hold.
+/// The rows while they are read, and the cue so far.
 struct Rows {
     header: Header,
-    cells: Cells,
-    unit: DeclaredUnit,
-    cue: Cue,
-    /// Whether a row was read, so that an empty cell has something to hold.
-    begun: bool,
-    latest: Option<ShowTime>,
+    splitter: Splitter,
     row: Row,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Row {
-    time: ShowTime,
-    positions: [f64; MAX_AXES],
-    vibration: [Vibration; MAX_AXES],
-    effects: u32,
-    word: u16,
+    cue: Cue,
 }
 
 impl Rows {
-    fn new(path: &Path, declared: &Declared, header: Header, cells: Cells) -> Self {
+    fn new(path: &Path, declared: &Declared, header: Header) -> Self {
         let mut axis_cells = [0; MAX_AXES];
         for (cell, column) in header.columns.iter().enumerate() {
             if let Column::Position(axis) = column {
@@ -162,61 +151,32 @@ impl Rows {
             effects,
             ..Cue::blank(path)
         };
-        let unit = declared.unit;
-        Self { header, cells, unit, cue, begun: false, latest: None, row: Row::default() }
+        let row = Row { unit: declared.unit, time_unit_ns: header.time_unit_ns, ..Row::default() };
+        Self { header, splitter: Splitter::new(), row, cue }
     }
 
     /// Takes one line as a row; what is wrong with it goes to `faults`, and the next may follow.
     fn take(&mut self, number: u64, line: &str, faults: &mut Collector) {
         let place = |column| Place::Text { line: number, column };
-        if line.trim_start().starts_with('#') {
+        if line.trim_ascii_start().starts_with('#') {
             return faults.add(place(1), None, Problem::CommentAmongRows);
         }
-        let columns = self.header.columns.len();
-        if let Err((column, problem)) = self.cells.split_row(line, columns) {
-            return faults.add(place(column), None, problem);
-        }
+        let cells = match self.splitter.split_row(line, self.header.columns.len()) {
+            Ok(cells) => cells,
+            Err((column, problem)) => return faults.add(place(column), None, problem),
+        };
         let mut whole = true;
-        for index in 0..columns {
-            if let Err(problem) = self.cell(index) {
+        for (index, (text, column)) in cells.iter().zip(&self.header.columns).enumerate() {
+            if let Err(problem) = self.row.take(*column, text) {
                 let name = self.header.names.get(index).map(String::as_str);
                 faults.add(place(column_of(line, index)), name, problem);
                 whole = false;
             }
         }
-        self.begun = true;
+        self.row.begun = true;
         if whole {
             self.keep(number);
         }
-    }
-
-    /// Takes the cell of one column into the row.
-    fn cell(&mut self, index: usize) -> Result<(), Problem> {
-        let text = self.cells.get(index);
-        let column = self.header.columns[index];
-        if text.is_empty() {
-            return match column {
-                Column::Time => Err(Problem::EmptyCell),
-                _ if self.begun => Ok(()),
-                _ => Err(Problem::NothingToHold),
-            };
-        }
-        let row = &mut self.row;
-        match column {
-            Column::Time => {
-                row.time = checked_time(text, self.header.time_unit_ns, &mut self.latest)?;
-            }
-            Column::Position(axis) => row.positions[axis] = value::position(value::number(text)?, self.unit)?,
-            Column::Hertz(axis) => row.vibration[axis].hz = value::hertz(value::number(text)?)?,
-            Column::Amplitude(axis) => {
-                row.vibration[axis].amplitude = value::amplitude(value::number(text)?, self.unit)?;
-            }
-            Column::Effect(effect) => {
-                row.effects = row.effects & !(1 << effect) | u32::from(value::switch(text)?) << effect;
-            }
-            Column::Word => row.word = value::word(text)?,
-        }
-        Ok(())
     }
 
     fn keep(&mut self, line: u64) {
@@ -234,6 +194,49 @@ impl Rows {
             Effects::Named { .. } => {}
             Effects::Words(steps) => steps.push(row.time, row.word),
         }
+    }
+}
+
+/// The row being read; before that the one before it, which an empty cell holds.
+#[derive(Debug, Clone, Copy, Default)]
+struct Row {
+    unit: DeclaredUnit,
+    time_unit_ns: f64,
+    /// Whether a row was read, so that an empty cell has something to hold.
+    begun: bool,
+    latest: Option<ShowTime>,
+    time: ShowTime,
+    positions: [f64; MAX_AXES],
+    vibration: [Vibration; MAX_AXES],
+    effects: u32,
+    word: u16,
+}
+
+impl Row {
+    /// Takes the cell of a column.
+    fn take(&mut self, column: Column, text: &str) -> Result<(), Problem> {
+        if text.is_empty() {
+            return match column {
+                Column::Time => Err(Problem::EmptyCell),
+                _ if self.begun => Ok(()),
+                _ => Err(Problem::NothingToHold),
+            };
+        }
+        match column {
+            Column::Time => self.time = checked_time(text, self.time_unit_ns, &mut self.latest)?,
+            Column::Position(axis) => {
+                self.positions[axis] = value::position(value::number(text)?, self.unit)?;
+            }
+            Column::Hertz(axis) => self.vibration[axis].hz = value::hertz(value::number(text)?)?,
+            Column::Amplitude(axis) => {
+                self.vibration[axis].amplitude = value::amplitude(value::number(text)?, self.unit)?;
+            }
+            Column::Effect(effect) => {
+                self.effects = self.effects & !(1 << effect) | u32::from(value::switch(text)?) << effect;
+            }
+            Column::Word => self.word = value::word(text)?,
+        }
+        Ok(())
     }
 }
 

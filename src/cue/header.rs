@@ -39,7 +39,7 @@ const KNOWN: &str = "a cue has time_ms or time_s, then a1 to a12, v1_hz and v1_a
 
 impl Header {
     /// Reads the header from its cells; what is wrong goes to `faults`.
-    pub(super) fn read(line: &str, number: u64, cells: &Cells, faults: &mut Collector) -> Self {
+    pub(super) fn read(line: &str, number: u64, cells: Cells<'_>, faults: &mut Collector) -> Self {
         let mut header = Self::default();
         let place = |index| Place::Text { line: number, column: column_of(line, index) };
         for index in 0..cells.count() {
@@ -141,12 +141,11 @@ pub(super) fn is_effect_name(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cue::table::Splitter;
 
     fn faults(line: &str) -> Vec<String> {
-        let mut cells = Cells::new();
-        cells.split(line).unwrap();
         let mut faults = Collector::default();
-        Header::read(line, 1, &cells, &mut faults);
+        Header::read(line, 1, Splitter::new().split(line).unwrap(), &mut faults);
         faults
             .into_faults(std::path::Path::new("f"))
             .map_or_else(Vec::new, |f| f.to_string().lines().map(str::to_owned).collect())

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::fault::{Collector, CueFaults, Place, Problem};
 use super::limits::{MAX_ROWS, MAX_TIME};
-use super::table::{Cells, Lines, column_of};
+use super::table::{Lines, Splitter, column_of};
 use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps, value};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
@@ -48,7 +48,7 @@ pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<
 }
 
 struct Reading {
-    cells: Cells,
+    splitter: Splitter,
     unit: DeclaredUnit,
     cue: Cue,
     positions: [f64; MAX_AXES],
@@ -58,12 +58,15 @@ struct Reading {
 impl Reading {
     /// Understands the header row.
     fn new(path: &Path, unit: DeclaredUnit, number: u64, line: &str, faults: &mut Collector) -> Option<Self> {
-        let mut cells = Cells::new();
+        let mut splitter = Splitter::new();
         let place = |column| Place::Text { line: number, column };
-        if let Err((column, problem)) = cells.split(line) {
-            faults.add(place(column), None, problem);
-            return None;
-        }
+        let cells = match splitter.split(line) {
+            Ok(cells) => cells,
+            Err((column, problem)) => {
+                faults.add(place(column), None, problem);
+                return None;
+            }
+        };
         for index in 0..cells.count().max(FIRST_AXIS + 1) {
             let (name, expected) = (cells.get(index), HEADER.get(index));
             if index >= cells.count() {
@@ -85,25 +88,28 @@ impl Reading {
             vibration: vec![Steps::default(); axes],
             ..Cue::blank(path)
         };
-        faults.is_empty().then_some(Self { cells, unit, cue, positions: [0.0; MAX_AXES], begun: false })
+        faults.is_empty().then_some(Self { splitter, unit, cue, positions: [0.0; MAX_AXES], begun: false })
     }
 
     fn take(&mut self, number: u64, line: &str, faults: &mut Collector) {
         let place = |column| Place::Text { line: number, column };
-        let columns = self.cue.axes + FIRST_AXIS;
-        if let Err((column, problem)) = self.cells.split_row(line, columns) {
-            return faults.add(place(column), None, problem);
-        }
-        let mut reached = Ok(self.cue.duration());
+        let cells = match self.splitter.split_row(line, self.cue.axes + FIRST_AXIS) {
+            Ok(cells) => cells,
+            Err((column, problem)) => return faults.add(place(column), None, problem),
+        };
+        let mut reached = Ok(ShowTime::ZERO);
         let mut whole = true;
-        for (index, name) in HEADER.iter().enumerate().take(columns) {
+        for (index, (text, name)) in cells.iter().zip(HEADER).enumerate() {
             let taken = match index {
-                0 => value::number(self.cells.get(0)).map(drop),
+                0 => value::number(text).map(drop),
                 1 => {
-                    reached = self.reached();
+                    reached = reached_after(self.cue.duration(), text);
                     reached.clone().map(drop)
                 }
-                _ => self.position(index),
+                _ => position(text, self.unit, self.begun).map(|new| {
+                    let held = &mut self.positions[index - FIRST_AXIS];
+                    *held = new.unwrap_or(*held);
+                }),
             };
             if let Err(problem) = taken {
                 faults.add(place(column_of(line, index)), Some(name), problem);
@@ -116,31 +122,6 @@ impl Reading {
         }
     }
 
-    /// When this row is reached: its duration after the row before.
-    fn reached(&self) -> Result<ShowTime, Problem> {
-        let text = self.cells.get(1);
-        if text.is_empty() {
-            return Err(Problem::EmptyCell);
-        }
-        let duration = value::time(text, 1e6)?;
-        if duration <= ShowTime::ZERO {
-            return Err(Problem::NoDuration(value::shortened(text)));
-        }
-        let reached = ShowTime::from_nanos(self.cue.duration().as_nanos() + duration.as_nanos());
-        if reached > MAX_TIME { Err(Problem::TimeTooLate(reached.to_string())) } else { Ok(reached) }
-    }
-
-    fn position(&mut self, index: usize) -> Result<(), Problem> {
-        let text = self.cells.get(index);
-        match (text.is_empty(), self.begun) {
-            (true, true) => return Ok(()),
-            (true, false) => return Err(Problem::NothingToHold),
-            (false, _) => {}
-        }
-        self.positions[index - FIRST_AXIS] = value::position(value::number(text)?, self.unit)?;
-        Ok(())
-    }
-
     fn keep(&mut self, line: u64, time: ShowTime) {
         let times: &[ShowTime] = if self.cue.rows() == 0 { &[ShowTime::ZERO, time] } else { &[time] };
         for time in times {
@@ -148,6 +129,28 @@ impl Reading {
             self.cue.times.push(*time);
             self.cue.positions.extend_from_slice(&self.positions[..self.cue.axes]);
         }
+    }
+}
+
+/// When a row is reached: its duration after the row before.
+fn reached_after(before: ShowTime, text: &str) -> Result<ShowTime, Problem> {
+    if text.is_empty() {
+        return Err(Problem::EmptyCell);
+    }
+    let duration = value::time(text, 1e6)?;
+    if duration <= ShowTime::ZERO {
+        return Err(Problem::NoDuration(value::shortened(text)));
+    }
+    let reached = ShowTime::from_nanos(before.as_nanos() + duration.as_nanos());
+    if reached > MAX_TIME { Err(Problem::TimeTooLate(reached.to_string())) } else { Ok(reached) }
+}
+
+/// The position in a cell; none where an empty cell holds the one before it.
+fn position(text: &str, unit: DeclaredUnit, begun: bool) -> Result<Option<f64>, Problem> {
+    match (text.is_empty(), begun) {
+        (true, true) => Ok(None),
+        (true, false) => Err(Problem::NothingToHold),
+        (false, _) => value::position(value::number(text)?, unit).map(Some),
     }
 }
 

@@ -101,67 +101,99 @@ fn characters(octets: &[u8]) -> u64 {
     String::from_utf8_lossy(octets).chars().count() as u64
 }
 
-/// The cells of one line.
-pub(super) struct Cells {
+/// Takes lines apart into cells; its memory is used again for each line.
+pub(super) struct Splitter {
     reader: csv_core::Reader,
-    input: Vec<u8>,
     text: Vec<u8>,
     ends: [usize; MAX_CELLS],
+}
+
+impl Splitter {
+    pub(super) fn new() -> Self {
+        Self { reader: csv_core::Reader::new(), text: vec![0; MAX_LINE], ends: [0; MAX_CELLS] }
+    }
+
+    /// The cells of a line; where a quote is not closed, its column.
+    pub(super) fn split<'a>(&'a mut self, line: &'a str) -> Result<Cells<'a>, (u64, Problem)> {
+        if line.contains('"') { self.split_quoted(line) } else { Ok(self.split_plain(line)) }
+    }
+
+    /// Lines without quotes, nearly all, need neither a copy nor a parser.
+    fn split_plain<'a>(&'a mut self, line: &'a str) -> Cells<'a> {
+        let commas = line.bytes().enumerate().filter(|(_, octet)| *octet == b',').map(|(at, _)| at);
+        let mut count = 0;
+        for end in commas.chain([line.len()]) {
+            if let Some(slot) = self.ends.get_mut(count) {
+                *slot = end;
+            }
+            count += 1;
+        }
+        Cells { text: line, gap: 1, ends: &self.ends[..count.min(MAX_CELLS)], count }
+    }
+
+    fn split_quoted(&mut self, line: &str) -> Result<Cells<'_>, (u64, Problem)> {
+        if let Some(column) = open_quote(line) {
+            return Err((column, Problem::OpenQuote));
+        }
+        self.reader.reset();
+        let (_, _, octets, cells) = self.reader.read_record(line.as_bytes(), &mut self.text, &mut self.ends);
+        let (result, _, _, last) =
+            self.reader.read_record(b"\n", &mut self.text[octets..], &mut self.ends[cells..]);
+        let count = match result {
+            csv_core::ReadRecordResult::Record => cells + last,
+            _ => raw_cells(line).count(), // more than there is room for
+        };
+        // The line was UTF-8, and what was taken out of it are quotes and commas.
+        let text = str::from_utf8(&self.text[..octets]).unwrap_or("");
+        Ok(Cells { text, gap: 0, ends: &self.ends[..count.min(MAX_CELLS)], count })
+    }
+
+    /// The cells of a line that must have as many as the header has columns.
+    pub(super) fn split_row<'a>(
+        &'a mut self,
+        line: &'a str,
+        columns: usize,
+    ) -> Result<Cells<'a>, (u64, Problem)> {
+        let cells = self.split(line)?;
+        let count = cells.count;
+        let problem = match count.cmp(&columns) {
+            Ordering::Equal => return Ok(cells),
+            Ordering::Less => Problem::RowTooShort { cells: count, columns },
+            Ordering::Greater => Problem::RowTooLong { cells: count, columns },
+        };
+        Err((column_of(line, count.min(columns)), problem))
+    }
+}
+
+/// The cells of one line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cells<'a> {
+    text: &'a str,
+    /// Octets between a cell and the next.
+    gap: usize,
+    ends: &'a [usize],
     count: usize,
 }
 
-impl Cells {
-    pub(super) fn new() -> Self {
-        Self {
-            reader: csv_core::Reader::new(),
-            input: Vec::new(),
-            text: vec![0; MAX_LINE + 1],
-            ends: [0; MAX_CELLS],
-            count: 0,
-        }
-    }
-
-    /// Takes the cells of a line apart; a fault where a quote is not closed.
-    pub(super) fn split(&mut self, line: &str) -> Result<(), (u64, Problem)> {
-        if line.contains('"')
-            && let Some(column) = open_quote(line)
-        {
-            return Err((column, Problem::OpenQuote));
-        }
-        self.input.clear();
-        self.input.extend_from_slice(line.as_bytes());
-        self.input.push(b'\n');
-        self.reader.reset();
-        let (result, _, _, ends) = self.reader.read_record(&self.input, &mut self.text, &mut self.ends);
-        self.count = match result {
-            csv_core::ReadRecordResult::Record => ends,
-            _ => raw_cells(line).count(), // more than there is room for
-        };
-        Ok(())
-    }
-
-    /// Takes a line apart that must have as many cells as the header has columns.
-    pub(super) fn split_row(&mut self, line: &str, columns: usize) -> Result<(), (u64, Problem)> {
-        self.split(line)?;
-        let cells = self.count;
-        let problem = match cells.cmp(&columns) {
-            Ordering::Equal => return Ok(()),
-            Ordering::Less => Problem::RowTooShort { cells, columns },
-            Ordering::Greater => Problem::RowTooLong { cells, columns },
-        };
-        Err((column_of(line, cells.min(columns)), problem))
-    }
-
+impl<'a> Cells<'a> {
     /// How many cells the line has.
     pub(super) const fn count(&self) -> usize {
         self.count
     }
 
-    /// A cell without the spaces around it; empty where there is none.
-    pub(super) fn get(&self, index: usize) -> &str {
-        let start = index.checked_sub(1).map_or(0, |before| self.ends.get(before).copied().unwrap_or(0));
-        let cell = self.ends.get(index).and_then(|end| self.text.get(start..*end)).unwrap_or(&[]);
-        str::from_utf8(cell.trim_ascii()).unwrap_or("") // the line was UTF-8, and cells end at ASCII
+    /// The cells without the spaces around them.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        let (text, gap, mut start) = (self.text, self.gap, 0);
+        self.ends.iter().map(move |end| {
+            let cell = text.get(start..*end).unwrap_or("");
+            start = *end + gap;
+            cell.trim_ascii()
+        })
+    }
+
+    /// One cell without the spaces around it; empty where there is none.
+    pub(super) fn get(&self, index: usize) -> &'a str {
+        self.iter().nth(index).unwrap_or("")
     }
 }
 
@@ -205,9 +237,7 @@ mod tests {
     use super::*;
 
     fn cells(line: &str) -> Vec<String> {
-        let mut cells = Cells::new();
-        cells.split(line).unwrap();
-        (0..cells.count()).map(|i| cells.get(i).to_owned()).collect()
+        Splitter::new().split(line).unwrap().iter().map(str::to_owned).collect()
     }
 
     #[test]
@@ -226,7 +256,7 @@ mod tests {
 
     #[test]
     fn an_open_quote_is_found_at_its_cell() {
-        let fault = Cells::new().split("0,\"1").unwrap_err();
+        let fault = Splitter::new().split("0,\"1").unwrap_err();
         assert_eq!(fault, (3, Problem::OpenQuote));
     }
 

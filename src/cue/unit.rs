@@ -86,7 +86,9 @@ impl DeclaredUnit {
     #[must_use]
     pub(super) const fn ceiling(self) -> f64 {
         match self {
-            Self::Fraction | Self::Percent | Self::U8 => self.divisor(),
+            Self::Fraction => 1.0,
+            Self::Percent => 100.0,
+            Self::U8 => 255.0,
             Self::Millimetre => MAX_MILLIMETRES,
             Self::Pulse => MAX_PULSES,
         }
@@ -101,13 +103,13 @@ impl DeclaredUnit {
         }
     }
 
-    /// What a value of the file is divided by to be in the unit in memory.
+    /// A value of the file in the unit of memory.
     #[must_use]
-    pub(super) const fn divisor(self) -> f64 {
+    pub(super) const fn in_memory(self, value: f64) -> f64 {
         match self {
-            Self::Percent => 100.0,
-            Self::U8 => 255.0,
-            Self::Fraction | Self::Millimetre | Self::Pulse => 1.0,
+            Self::Percent => value / 100.0,
+            Self::U8 => value / 255.0,
+            Self::Fraction | Self::Millimetre | Self::Pulse => value,
         }
     }
 }

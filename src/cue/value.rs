@@ -26,7 +26,7 @@ pub(super) fn time(text: &str, unit_ns: f64) -> Result<ShowTime, Problem> {
 pub(super) fn position(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
     let high = unit.ceiling();
     if (0.0..=high).contains(&value) {
-        Ok(value / unit.divisor())
+        Ok(unit.in_memory(value))
     } else {
         Err(Problem::OutsideStroke { value, high, unit: unit.suffix() })
     }
@@ -36,7 +36,7 @@ pub(super) fn position(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
 pub(super) fn amplitude(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
     let high = unit.ceiling();
     if (0.0..=high).contains(&value) {
-        Ok(value / unit.divisor())
+        Ok(unit.in_memory(value))
     } else {
         Err(Problem::Amplitude { value, high, unit: unit.suffix() })
     }

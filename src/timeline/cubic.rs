@@ -11,13 +11,6 @@ impl Cubic {
         ((c3 * u + c2) * u + c1) * u + c0
     }
 
-    /// Bounds that the curve cannot leave: those of its Bézier points.
-    pub(super) fn hull(&self) -> (f64, f64) {
-        let [c0, c1, c2, c3] = self.0;
-        let (b1, b2, b3) = (c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, c0 + c1 + c2 + c3);
-        (c0.min(b1).min(b2).min(b3), c0.max(b1).max(b2).max(b3))
-    }
-
     /// Where within 0 to 1, ends not included, the curve stands still.
     pub(super) fn still(&self) -> impl Iterator<Item = f64> {
         let [_, c1, c2, c3] = self.0;

@@ -25,6 +25,20 @@ impl Timeline {
             Interpolation::Hold => Cubic([y0, 0.0, 0.0, 0.0]),
         }
     }
+
+    /// Bounds that the curve of an axis cannot leave between `row` and the next row: a spline bends away from its chord
+    /// by an eighth of h² times its greatest second derivative at the most, the other curves not at all.
+    pub(super) fn bounds(&self, row: usize) -> impl Fn(usize) -> (f64, f64) {
+        let (here, next) = (self.cue.row(row), self.cue.row(row + 1));
+        let axes = self.cue.axes();
+        let bends = self.bends.get(row * axes..(row + 2) * axes).map(|both| both.split_at(axes));
+        let h = seconds(&self.cue, row);
+        let eighth = h * h / 8.0;
+        move |axis| {
+            let bow = bends.map_or(0.0, |(m0, m1)| eighth * f64::from(m0[axis].abs().max(m1[axis].abs())));
+            (here[axis].min(next[axis]) - bow, here[axis].max(next[axis]) + bow)
+        }
+    }
 }
 
 /// The slope of a monotone curve at a row, after Fritsch and Carlson (SIAM J. Numer. Anal. 17, 1980): that of the

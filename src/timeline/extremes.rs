@@ -28,16 +28,14 @@ pub(super) fn find(timeline: &Timeline) -> Vec<AxisExtremes> {
     let cue = timeline.cue();
     let begin = |value: &f64| Reached { min: (*value, 0, 0.0), max: (*value, 0, 0.0) };
     let mut reached: Vec<_> = cue.row(0).iter().map(begin).collect();
-    for row in 0..cue.rows() {
-        for (axis, (reached, value)) in reached.iter_mut().zip(cue.row(row)).enumerate() {
-            reached.take(*value, row, 0.0);
-            if row + 1 == cue.rows() {
-                continue;
-            }
-            let cubic = timeline.cubic(row, axis);
-            let (low, high) = cubic.hull();
+    for row in 0..cue.rows() - 1 {
+        let bounds = timeline.bounds(row);
+        for (axis, reached) in reached.iter_mut().enumerate() {
+            let (low, high) = bounds(axis);
             if low < reached.min.0 || high > reached.max.0 {
+                let cubic = timeline.cubic(row, axis);
                 cubic.still().for_each(|u| reached.take(cubic.at(u), row, u));
+                reached.take(cue.row(row + 1)[axis], row + 1, 0.0);
             }
         }
     }

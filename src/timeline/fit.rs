@@ -78,11 +78,11 @@ impl Check<'_> {
 
     /// The curve between a row and the next; where a row itself is outside, that has been said.
     fn stretch(&mut self, row: usize, axis: usize) {
-        let cubic = self.timeline.cubic(row, axis);
-        let (low, high) = cubic.hull();
+        let (low, high) = self.timeline.bounds(row)(axis);
         if low >= 0.0 && high <= self.stroke {
             return;
         }
+        let cubic = self.timeline.cubic(row, axis);
         let over = |value: f64| (-value).max(value - self.stroke);
         let worst = cubic.still().map(|u| (u, cubic.at(u))).max_by(|a, b| over(a.1).total_cmp(&over(b.1)));
         let Some((u, value)) = worst.filter(|(_, value)| over(*value) > 0.0) else { return };

@@ -47,15 +47,23 @@ fn coefficients(cue: &Cue, row: usize) -> (f64, f64, f64) {
 fn forward(cue: &Cue, bends: &mut [f32]) -> Vec<f64> {
     let axes = cue.axes();
     let mut uppers = vec![0.0; cue.rows()];
-    let (mut upper, mut before) = (0.0, [0.0; MAX_AXES]);
+    let (mut upper, mut before, mut slope) = (0.0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
+    let per_second = seconds(cue, 0).recip();
+    for axis in 0..axes {
+        slope[axis] = (cue.row(1)[axis] - cue.row(0)[axis]) * per_second;
+    }
     for row in 1..cue.rows() - 1 {
         let (below, on, above) = coefficients(cue, row);
-        let pivot = on - below * upper;
-        upper = above / pivot;
+        let per_pivot = (on - below * upper).recip();
+        let per_second = seconds(cue, row).recip();
+        upper = above * per_pivot;
         uppers[row] = upper;
-        for (axis, before) in before.iter_mut().enumerate().take(axes) {
-            *before = (6.0 * turn(cue, row, axis) - below * *before) / pivot;
-            bends[row * axes + axis] = single(*before);
+        let (here, next) = (cue.row(row), cue.row(row + 1));
+        for (axis, bend) in bends[row * axes..][..axes].iter_mut().enumerate() {
+            let after = (next[axis] - here[axis]) * per_second;
+            before[axis] = (6.0 * (after - slope[axis]) - below * before[axis]) * per_pivot;
+            slope[axis] = after;
+            *bend = single(before[axis]);
         }
     }
     uppers
@@ -66,8 +74,7 @@ fn backward(cue: &Cue, uppers: &[f64], bends: &mut [f32]) {
     let axes = cue.axes();
     let mut after = [0.0; MAX_AXES];
     for row in (1..cue.rows() - 1).rev() {
-        for (axis, after) in after.iter_mut().enumerate().take(axes) {
-            let bend = &mut bends[row * axes + axis];
+        for (after, bend) in after.iter_mut().zip(&mut bends[row * axes..][..axes]) {
             *after = f64::from(*bend) - uppers[row] * *after;
             *bend = single(*after);
         }
