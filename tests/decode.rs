@@ -2,7 +2,7 @@
 
 use assert_cmd::Command;
 
-fn decode(args: &[&str], input: &str) -> (Option<i32>, String, String) {
+fn decode(args: &[&str], input: impl Into<Vec<u8>>) -> (Option<i32>, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
     let output = command.arg("decode").args(args).write_stdin(input).output().expect("the program runs");
     let text = |octets| String::from_utf8(octets).expect("text");
@@ -35,7 +35,7 @@ fn octets_that_are_no_message_end_with_65_and_say_where() {
 #[test]
 fn what_is_no_hex_ends_with_64() {
     for args in [&["5"][..], &["xy"], &["-"], &[]] {
-        let (code, out, error) = decode(args, "");
+        let (code, out, error) = decode(args, [0xff, b'5']);
         assert_eq!((code, out.as_str()), (Some(64), ""), "{args:?}");
         assert!(!error.is_empty());
     }

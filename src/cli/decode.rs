@@ -73,9 +73,10 @@ fn gather(words: &[String]) -> Result<String, Failure> {
     for word in words {
         if word == "-" {
             let limit = 16 * MAX_OCTETS as u64; // digits, separators and line ends of the longest datagram
-            let mut input = std::io::stdin().lock().take(limit);
-            let read = input.read_to_string(&mut all).context("cannot read hex from the standard input");
-            read.or_exit(Exit::Io)?;
+            let mut input = Vec::new();
+            let read = std::io::stdin().lock().take(limit).read_to_end(&mut input);
+            read.context("cannot read hex from the standard input").or_exit(Exit::Io)?;
+            all.push_str(&String::from_utf8_lossy(&input));
         } else {
             all.push_str(word);
         }

@@ -57,6 +57,13 @@ struct EmergencyStop {
     latched: bool,
 }
 
+impl EmergencyStop {
+    /// Since when it is asked for without a break, if it is.
+    fn asked(&self, at: MonoTime) -> Option<MonoTime> {
+        [self.forced, self.inputs].into_iter().flatten().filter(|&since| since <= at).min()
+    }
+}
+
 /// What a controller did with a datagram.
 #[derive(Debug, Clone, Copy)]
 pub struct Handled<'b> {
@@ -274,8 +281,8 @@ impl Controller {
     /// Lets time pass: moves go on, an emergency stop comes into effect or ends.
     fn advance(&mut self, at: MonoTime) {
         let pace = self.registers.pace();
-        let due = [self.estop.forced, self.estop.inputs].into_iter().flatten().min();
-        if let (Some(due), false) = (due.filter(|&due| due <= at), self.estop.taken) {
+        let due = self.estop.asked(at);
+        if let (Some(due), false) = (due, self.estop.taken) {
             self.estop.taken = true;
             self.last_absolute = None;
             if due < self.homing_until {

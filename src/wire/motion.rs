@@ -40,7 +40,8 @@ pub const fn motion_channel_and_slots(axes: usize) -> (u16, usize) {
     }
 }
 
-/// A motion frame to send, host to controller. Surplus digital-analogue data ("Extend") is always 0.
+/// A motion frame to send, host to controller: 38 octets for three axes, 50 for six, 66 for ten, 74 for twelve, with
+/// vibration 46 for three and 70 for six. Extend, which switches analogue outputs, is always 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Motion<'a> {
     /// What `time_ms` counts from.
@@ -64,18 +65,6 @@ pub struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Octets of the message without vibration: 38 for three axes, 50 for six, 66 for ten, 74 for twelve.
-    #[must_use]
-    pub const fn len_plain(axes: usize) -> usize {
-        len(axes, false)
-    }
-
-    /// Octets of the message with vibration: 46 for three axes, 70 for six.
-    #[must_use]
-    pub const fn len_vibrating(axes: usize) -> usize {
-        len(axes, true)
-    }
-
     /// Writes the message to the front of `buf` and returns it; nothing of what was there is kept.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(family(self.timing, self.vibration.is_some()));

@@ -302,12 +302,10 @@ impl Sheet {
         self.object.insert("positions".to_owned(), json!(pulses));
     }
 
+    /// Outputs (Y) or inputs (X) that are on; the bits past the twelfth mean nothing and are shown in the word alone.
     fn bits(&mut self, name: &str, letter: char, word: u32) {
-        let on: Vec<String> = (0..32)
-            .filter(|bit| word >> bit & 1 == 1)
-            .map(|bit| bit + 1)
-            .map(|number| format!("{letter}{number:02}"))
-            .collect();
+        let on = (1..=12).filter(|number| word >> (number - 1) & 1 == 1);
+        let on: Vec<String> = on.map(|number| format!("{letter}{number:02}")).collect();
         let names = if on.is_empty() { "none".to_owned() } else { on.join(" ") };
         self.line(name, format!("{names} (0x{word:04x})"));
         self.object.insert(name.to_owned(), json!({ "word": word, "on": on }));
@@ -393,7 +391,7 @@ time       50 ms to reach the positions
 a1         -1 pulses
 a2         0 pulses
 a3         1 pulses
-outputs    Y02 Y12 Y16 (0x8802)
+outputs    Y02 Y12 (0x8802)
 v1         20.00 Hz, 10 pulses (period 400 x 0.125 ms)
 v2         none
 v3         none

@@ -142,7 +142,8 @@ impl Controller {
                 register == dp::RESET && word == 0
             }
         };
-        if self.estop_asked(at) && words().any(|(register, word)| resets(register, word)) {
+        // A reset ends no emergency stop that is still asked for.
+        if self.estop.asked(at).is_some() && words().any(|(register, word)| resets(register, word)) {
             return Some(false);
         }
         for (register, word) in words() {
@@ -158,11 +159,6 @@ impl Controller {
         }
         self.watch_inputs(at);
         Some(true)
-    }
-
-    /// Whether an emergency stop is asked for right now, so that no reset can end it.
-    fn estop_asked(&self, at: MonoTime) -> bool {
-        [self.estop.forced, self.estop.inputs].into_iter().flatten().any(|since| since <= at)
     }
 
     /// All monitor registers as they stand.

@@ -324,6 +324,17 @@ fn inputs_stop_it_once_pa90_pa92_and_pa93_agree() {
 }
 
 #[test]
+fn a_released_stop_ends_although_another_is_to_come() {
+    let estop_at = Some(Duration::from_secs(60));
+    let parameters = vec![(pa::INPUT_FUNCTIONS, 1), (pa::ESTOP_INPUTS, 1), (pa::INPUT_FILTER, 0)];
+    let mut bench = Bench::new(&Setup { parameters, estop_at, ..Setup::default() });
+    bench.controller.set_inputs(1, at(0));
+    assert_eq!(bench.x(&FRAME).0, 4);
+    bench.controller.set_inputs(0, at(0));
+    assert_eq!((bench.x(&FRAME).0, bench.wait(60_000).x(&FRAME).0), (2, 4));
+}
+
+#[test]
 fn pa91_holds_until_a_reset_or_goes_to_zero() {
     let stop = |way| {
         let mut bench = Bench::with(&[(pa::INPUT_FUNCTIONS, 1), (pa::ESTOP_INPUTS, 1), (pa::ESTOP_WAY, way)]);
