@@ -213,7 +213,8 @@ fn play(link: &Link) -> (Books, Ledger, Traffic) {
     let mut replies = traffic.replies.iter().copied().peekable();
     let mut now_us = SECOND_US;
     while sends.peek().is_some() || replies.peek().is_some() {
-        now_us += if dice.percent(1) { dice.below(2 * SECOND_US) } else { 1 + dice.below(10_000) };
+        // A second of frames and their duplicates has room in the books.
+        now_us += if dice.percent(1) { dice.below(SECOND_US) } else { 1 + dice.below(10_000) };
         let mut read = Vec::new();
         while let Some((at_us, frame, code)) = replies.next_if(|&(at_us, ..)| at_us < now_us) {
             read.push((at_us, frame, code));

@@ -1,5 +1,6 @@
 //! One play in the foreground: from a cue and a configuration to the report.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -7,10 +8,10 @@ use std::time::Duration;
 
 use super::prepare::{Preparation, Prepared};
 use super::report::{ControllerReport, LatencyReport, RealTimeReport, Report};
-use crate::config::{Config, Controller};
-use crate::cue::CueFaults;
+use crate::config::{Config, Controller, Misfit};
+use crate::cue::{CueFaults, Place};
 use crate::engine::{Ending, Engine, Headroom, Show, TickGrid};
-use crate::fanout::{FanOutFault, Lane, Manner, lanes};
+use crate::fanout::{Lane, Manner, lanes};
 use crate::net::{DrainGrid, NetError, Ports, Sender};
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, To};
 use crate::rt::{Accounts, AckLoop, Ended, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
@@ -26,12 +27,17 @@ const RUN_UP: Duration = Duration::from_millis(20);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlayError {
-    /// The cue and the controllers do not fit.
-    #[error("{}", list(.0))]
-    FanOut(Vec<FanOutFault>),
-    /// The cue leaves the stroke of a seat.
-    #[error(transparent)]
-    Stroke(CueFaults),
+    /// The hall cannot do what the cue asks; each with its place in the file.
+    #[error("{}", list(cue, misfits))]
+    Misfit {
+        /// The cue's file.
+        cue: PathBuf,
+        /// Where the file asks for what.
+        misfits: Vec<(Place, Misfit)>,
+    },
+    /// The cue leaves the stroke of some seats.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Stroke(Vec<CueFaults>),
     /// No move leads onto the cue.
     #[error(transparent)]
     Plan(PlanError),
@@ -40,8 +46,9 @@ pub enum PlayError {
     Net(NetError),
 }
 
-fn list(faults: &[FanOutFault]) -> String {
-    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
+    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", cue.display());
+    misfits.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// A play that fits: cue, controllers and the first move are proved; nothing is open yet.
@@ -76,8 +83,8 @@ impl Play {
     /// # Errors
     /// Everything that [`PlayError`] names but the network.
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
-        let lanes = lanes(&config, timeline.cue(), manner).map_err(PlayError::FanOut)?;
-        fit_strokes(&config, &timeline)?;
+        fit(&config, &timeline)?;
+        let lanes = lanes(&config, &timeline, manner);
         let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };
@@ -139,16 +146,14 @@ impl Play {
     }
 }
 
-/// Each controller's own axes have to stay within its seat's stroke.
-fn fit_strokes(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
-    for controller in &config.controllers {
-        let first = controller.axis_offset;
-        let last = (first + controller.seat.axes).min(timeline.cue().axes());
-        if let Some(faults) = timeline.fits_stroke(first.min(last)..last, Some(&controller.seat)).faults {
-            return Err(PlayError::Stroke(faults));
-        }
+fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
+    let place = |misfit: Misfit| (timeline.cue().column_place(&misfit.column()), misfit);
+    let misfits: Vec<_> = config.misfits(timeline).into_iter().map(place).collect();
+    let strokes = config.fits_stroke(timeline).faults;
+    if !misfits.is_empty() {
+        return Err(PlayError::Misfit { cue: timeline.cue().path().to_path_buf(), misfits });
     }
-    Ok(())
+    if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
 }
 
 /// What the threads of a play share out among themselves.

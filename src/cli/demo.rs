@@ -38,7 +38,7 @@ struct Seat {
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Ticks per second, 1 to 1000.
-    #[arg(long, value_name = "HZ", value_parser = super::play::parse_rate, default_value = "100")]
+    #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
     rate: f64,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]

@@ -12,11 +12,11 @@ use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::times::{parse_level, parse_time};
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, print};
 use crate::app::{Play, PlayError, Played};
-use crate::config::{self, Config, from_to_args};
-use crate::cue::{self, CueFaults, FaultClass, Source};
+use crate::config::{Config, from_to_args};
 use crate::engine::{Rate, Show};
 use crate::fanout::Manner;
 use crate::rt::Live;
@@ -24,22 +24,24 @@ use crate::time::ShowTime;
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 
-const EXAMPLES: &str = "\
-Examples:
-  kinocue play cues/bench-ride.csv --to 127.0.0.1:7408
-  kinocue play cues/coaster.csv --to 192.168.15.201:7408,name=A1 --to 192.168.15.202:7408,name=A2 --rate 250
-  kinocue play cues/voyage.csv --to 127.0.0.1:7408,axes=6 --to 127.0.0.1:7409,axes=6,offset=6
-  kinocue play storm.mcap --config hall.toml --start 01:30 --json > report.json
-
-Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. This is no emergency stop: that one is
-hard-wired.";
+const EXAMPLES: [&str; 4] = [
+    "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
+    "kinocue play cues/coaster.csv --to 192.168.15.201:7408,name=A1 --to 192.168.15.202:7408,name=A2 --rate 250",
+    "kinocue play cues/voyage.csv --to 127.0.0.1:7408,axes=6 --to 127.0.0.1:7409,axes=6,offset=6",
+    "kinocue play storm.mcap --config hall.toml --start 01:30 --json > report.json",
+];
 
 /// Plays one cue to the controllers, and reports what became of every frame.
+///
+/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. This is no emergency stop: that one is
+/// hard-wired.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = after_help(&EXAMPLES))]
 pub(super) struct Args {
     /// The cue: CSV or MCAP.
     cue: PathBuf,
+    #[command(flatten)]
+    source: SourceArgs,
     /// A controller: HOST:PORT[,name=A1][,axes=6][,offset=0][,fan_out=slice|shared][,dialect=smc|mbox]; repeatable.
     #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
     to: Vec<String>,
@@ -75,13 +77,8 @@ pub(super) struct Args {
     json: bool,
 }
 
-pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
-    let hz: f64 = text.parse().map_err(|_| format!("{text:?} is not a number of ticks per second"))?;
-    if (1.0..=1000.0).contains(&hz) { Ok(hz) } else { Err(format!("{hz} Hz is outside 1..=1000 Hz")) }
-}
-
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let timeline = load_cue(&args.cue, &Source::Native)?;
+    let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);
     let config = configuration(args, timeline.cue().axes())?;
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
@@ -128,28 +125,9 @@ fn uses_effects(timeline: &Timeline) -> bool {
     !timeline.effect_names().is_empty()
 }
 
-/// Reads a cue whole and solves its curve.
-pub(super) fn load_cue(path: &Path, source: &Source) -> Result<Timeline, Failure> {
-    match cue::load(path, source) {
-        Ok(cue) => Ok(Timeline::new(cue)),
-        Err(faults) => {
-            let exit = cue_exit(&faults);
-            Err(faults).or_exit(exit)
-        }
-    }
-}
-
-pub(super) fn cue_exit(faults: &CueFaults) -> Exit {
-    match faults.class() {
-        FaultClass::NoInput => Exit::NoInput,
-        FaultClass::Io => Exit::Io,
-        _ => Exit::BadCue,
-    }
-}
-
 fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     let mut config = match &args.config {
-        Some(path) => config::load(path).or_exit(Exit::Config)?,
+        Some(path) => load::config(path)?,
         None => from_to_args(&args.to, &args.effect, axes).or_exit(Exit::Usage)?,
     };
     if let Some(hz) = args.rate {
@@ -169,9 +147,9 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
 /// The exit code of a play that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
     let exit = if matches!(error, PlayError::Net(_)) { Exit::System } else { Exit::BadCue };
+    let names_cue = !matches!(error, PlayError::Plan(_));
     let error = anyhow::Error::new(error);
-    let error = if exit == Exit::BadCue { error.context(cue.display().to_string()) } else { error };
-    Failure { exit, error }
+    Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
 }
 
 /// A flag that the first Ctrl-C or SIGTERM sets; a second Ctrl-C ends the program at once.
@@ -191,8 +169,7 @@ fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
         eprintln!("kinocue: {line}");
     }
     if json {
-        let object = serde_json::to_string(&played.report).expect("a report has only names and numbers");
-        println!("{object}");
+        print::json(&played.report)?;
     } else {
         eprintln!("\n{}", played.report.text());
     }

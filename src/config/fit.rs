@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::cue::CueFaults;
 use crate::motion::SeatType;
 use crate::timeline::{Held, Timeline};
+use crate::wire::motion_channel_and_slots;
 
 use super::section::did_you_mean;
 use super::{Config, Controller, Dialect, FanOut};
@@ -114,10 +115,11 @@ impl Config {
 
 /// Why the controller cannot shake as the cue asks, named by the first axis that does.
 fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
-    let (seen, axes) = match controller.fan_out {
-        FanOut::Slice => (controller.window(), controller.seat.axes),
-        FanOut::Shared => (0..timeline.axes(), timeline.axes()),
+    let seen = match controller.fan_out {
+        FanOut::Slice => controller.window(),
+        FanOut::Shared => 0..timeline.axes(),
     };
+    let (_, axes) = motion_channel_and_slots(controller.frame_axes(timeline.axes()));
     let axis = 1 + seen.into_iter().find(|&axis| timeline.vibrates(axis))?;
     let controller_name = controller.name.clone();
     match controller.dialect {

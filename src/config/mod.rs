@@ -194,6 +194,15 @@ impl Config {
 }
 
 impl Controller {
+    /// Axes that its frames have to carry of a cue of `cue_axes` axes: just its own, or all up to its last.
+    #[must_use]
+    pub fn frame_axes(&self, cue_axes: usize) -> usize {
+        match self.fan_out {
+            FanOut::Slice => self.seat.axes,
+            FanOut::Shared => cue_axes.max(self.window().end).min(MAX_AXES),
+        }
+    }
+
     /// Whether axis `axis` of the cue, counted from 0, is one of its own.
     #[must_use]
     pub fn takes(&self, axis: usize) -> bool {

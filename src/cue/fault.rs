@@ -36,6 +36,20 @@ pub enum Place {
     Octet(u64),
 }
 
+impl fmt::Display for Place {
+    /// To be put between the file's name with a colon, and what is said of the place.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => write!(f, " "),
+            Self::Text { line, column } => write!(f, "{line}:{column}: "),
+            Self::Message { topic, number, log_time } => {
+                write!(f, " {topic} message {number}, log_time {log_time} ns: ")
+            }
+            Self::Octet(octet) => write!(f, " octet {octet}: "),
+        }
+    }
+}
+
 /// One thing that is wrong with a cue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
@@ -50,17 +64,9 @@ pub struct Fault {
 impl fmt::Display for Fault {
     /// The place and the problem, to be put behind the file's name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.place {
-            Place::File => write!(f, " ")?,
-            Place::Text { line, column } => write!(f, "{line}:{column}: ")?,
-            Place::Message { topic, number, log_time } => {
-                write!(f, " {topic} message {number}, log_time {log_time} ns: ")?;
-            }
-            Place::Octet(octet) => write!(f, " octet {octet}: ")?,
-        }
         match &self.column {
-            Some(column) => write!(f, "{column}: {}", self.problem),
-            None => write!(f, "{}", self.problem),
+            Some(column) => write!(f, "{}{column}: {}", self.place, self.problem),
+            None => write!(f, "{}{}", self.place, self.problem),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use super::fault::Place;
-use super::table::{Cells, Lines, column_of};
+use super::table::{Lines, Splitter, column_of};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -83,8 +83,8 @@ fn column_in_header(path: &Path, column: &str) -> Option<Place> {
         if text.trim_start().starts_with('#') {
             continue;
         }
-        let mut cells = Cells::new();
-        cells.split(text).ok()?;
+        let mut splitter = Splitter::new();
+        let cells = splitter.split(text).ok()?;
         let index = (0..cells.count()).find(|&index| cells.get(index) == column)?;
         return Some(Place::Text { line: number, column: column_of(text, index) });
     }

@@ -3,7 +3,7 @@
 
 mod lanes;
 
-pub use lanes::{FanOutFault, Manner, lanes};
+pub use lanes::{Manner, lanes};
 
 use crate::cue;
 use crate::engine::Beat;

@@ -74,11 +74,13 @@ impl Virtual {
     }
 
     pub fn timeline(&self) -> Timeline {
-        Timeline::new(cue::read(Path::new("show.csv"), self.cue.as_bytes(), &Source::Native).unwrap())
+        Timeline::new(
+            cue::read(Path::new("show.csv"), self.cue.as_bytes(), &Source::Native).expect("the cue is sound"),
+        )
     }
 
     pub fn config(&self) -> Config {
-        from_to_args(&self.to, &[], self.timeline().cue().axes()).unwrap()
+        from_to_args(&self.to, &[], self.timeline().cue().axes()).expect("the addresses are sound")
     }
 
     /// Plays it to its end.
@@ -86,14 +88,13 @@ impl Virtual {
         let timeline = Arc::new(self.timeline());
         let rate = Rate::from_hz(self.rate_hz);
         let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
-        let lanes =
-            lanes(&self.config(), timeline.cue(), Manner { level: self.level, silent: false }).unwrap();
+        let lanes = lanes(&self.config(), &timeline, Manner { level: self.level, silent: false });
         let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };
         let mut planner = Planner::new(windows.clone(), rate.hz());
         let request = Request { from: From::Park, to: To::Cue, start: self.start, serial: 1 };
-        let course = Box::new(planner.plan(request, &curve).unwrap());
+        let course = Box::new(planner.plan(request, &curve).expect("there is a join"));
         let join = ShowTime::from_nanos(course.settled().as_nanos() - self.start.as_nanos());
         let headroom = Headroom::measure(&windows, &curve, rate);
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
@@ -178,7 +179,7 @@ struct Link<'a> {
 
 impl FrameSink for Link<'_> {
     fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
-        let request = MotionRequest::parse(datagram).unwrap();
+        let request = MotionRequest::parse(datagram).expect("only frames are sent");
         self.frames.push(Frame { lane, at: self.now.get(), request, octets: datagram.to_vec() });
         Delivery::Sent
     }
@@ -263,13 +264,14 @@ impl Played {
 pub fn swell(axes: u32, seconds: u32, mm: f64, hz: f64) -> String {
     use std::fmt::Write as _;
     let mut text = "time_ms".to_owned();
-    (1..=axes).for_each(|axis| write!(text, ",a{axis}").unwrap());
+    (1..=axes).for_each(|axis| write!(text, ",a{axis}").expect("a String takes what is written to it"));
     for row in 0..=50 * seconds {
         let t = f64::from(row) * 0.02;
-        write!(text, "\n{}", row * 20).unwrap();
+        write!(text, "\n{}", row * 20).expect("a String takes what is written to it");
         for axis in 0..axes {
             let turn = t * hz + f64::from(axis) / f64::from(axes);
-            write!(text, ",{:.6}", 0.5 + mm / 150.0 * (turn * std::f64::consts::TAU).sin()).unwrap();
+            write!(text, ",{:.6}", 0.5 + mm / 150.0 * (turn * std::f64::consts::TAU).sin())
+                .expect("a String takes what is written to it");
         }
     }
     text.push('\n');
