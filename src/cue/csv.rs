@@ -4,9 +4,10 @@ use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::fault::{Collector, CueFaults, Place, Problem};
+use super::fault::{Collector, CueFaults, Place};
 use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
+use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
 use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, value};
 use crate::motion::MAX_AXES;
@@ -98,14 +99,15 @@ impl Declared {
             "kinocue-csv" if text == "1" => Ok(()),
             "kinocue-csv" => Err("this program reads version 1".to_owned()),
             "title" => {
-                self.title = Some(text.to_owned());
+                self.title = Some(text.to_owned()).filter(|title| !title.is_empty());
                 Ok(())
             }
             "units" => parsed(text).map(|unit| self.unit = unit),
             "interpolation" => parsed(text).map(|interpolation| self.interpolation = interpolation),
             _ => return,
         };
-        let column = line.find(text).map_or(1, |at| line[..at].chars().count() as u64 + 1);
+        // The value is the end of the line.
+        let column = (line.trim_end().chars().count() - text.chars().count()) as u64 + 1;
         let place = Place::Text { line: number, column };
         if self.seen.contains(&key) {
             faults.add(place, Some(&key), Problem::DeclaredTwice);

@@ -4,8 +4,9 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::fault::{Collector, CueFaults, Place, Problem};
+use super::fault::{Collector, CueFaults, Place};
 use super::limits::{MAX_ROWS, MAX_TIME};
+use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
 use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps, value};
 use crate::motion::MAX_AXES;
@@ -193,7 +194,7 @@ mod tests {
              3:3: time_ms: a row's duration of -5 is not above 0\n\
              5:6: the row ends after 3 of 4 cells\n\
              6:1: line: \"x\" is not a number\n\
-             6:7: y: -1 is outside the stroke, 0 to 100000 mm"
+             6:7: y: -1 is outside 0 to 100000 mm; positions count from the stroke's lower end"
         );
         assert_eq!(faults(""), " is empty; a cue needs at least two rows");
         assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");

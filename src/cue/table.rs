@@ -3,8 +3,9 @@
 use std::cmp::Ordering;
 use std::io::{BufRead as _, BufReader, Read};
 
-use super::fault::{Place, Problem};
+use super::fault::Place;
 use super::limits::{MAX_FILE, MAX_LINE};
+use super::problem::Problem;
 
 /// Room for more cells than any header can have; a line with more is wrong in any case.
 const MAX_CELLS: usize = 128;

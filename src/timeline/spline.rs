@@ -48,9 +48,8 @@ fn forward(cue: &Cue, bends: &mut [f32]) -> Vec<f64> {
     let axes = cue.axes();
     let mut uppers = vec![0.0; cue.rows()];
     let (mut upper, mut before, mut slope) = (0.0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
-    let per_second = seconds(cue, 0).recip();
-    for axis in 0..axes {
-        slope[axis] = (cue.row(1)[axis] - cue.row(0)[axis]) * per_second;
+    for (slope, (y0, y1)) in slope.iter_mut().zip(cue.row(0).iter().zip(cue.row(1))) {
+        *slope = (y1 - y0) / seconds(cue, 0);
     }
     for row in 1..cue.rows() - 1 {
         let (below, on, above) = coefficients(cue, row);
