@@ -32,7 +32,7 @@ const CUE: &str = "# kinocue-csv: 1\n# title: Storm\n# units: mm\n# interpolatio
 fn a_cue_comes_back_from_mcap_as_it_was() {
     let folder = folder_with("a.csv", CUE);
     let (code, said) = convert(folder.path(), &["a.csv", "b.mcap"]);
-    assert_eq!((code, said.as_str()), (Some(0), "b.mcap: 2 rows, 1 axes, 00:00.016\n"));
+    assert_eq!((code, said.as_str()), (Some(0), "b.mcap: 2 rows, 1 axis, 00:00.016\n"));
     assert_eq!(convert(folder.path(), &["b.mcap", "c.csv"]).0, Some(0));
     assert_eq!(fs::read_to_string(folder.path().join("c.csv")).unwrap(), CUE);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "no other file is left");

@@ -83,7 +83,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     write(&cue, &args.output, target)?;
     let (rows, axes, length) = (cue.rows(), cue.axes(), cue.duration());
-    eprintln!("{}: {rows} rows, {axes} axes, {length}", args.output.display());
+    let axes_in_words = if axes == 1 { "1 axis".to_owned() } else { format!("{axes} axes") };
+    eprintln!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display());
     Ok(Exit::Done)
 }
 

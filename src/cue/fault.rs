@@ -162,14 +162,12 @@ impl Collector {
         self.told.is_empty()
     }
 
-    /// `value` where no fault was met, else the faults of the file at `path`.
-    pub(crate) fn finish<T>(self, path: &Path, value: T) -> Result<T, CueFaults> {
-        match self.into_faults(path) {
-            Some(faults) => Err(faults),
-            None => Ok(value),
-        }
+    /// The faults of the file at `path`; this one where none was met.
+    pub(crate) fn or(self, path: &Path, problem: Problem) -> CueFaults {
+        self.into_faults(path).unwrap_or_else(|| CueFaults::one(path, problem))
     }
 
+    /// The faults of the file at `path`, where any were met.
     pub(crate) fn into_faults(self, path: &Path) -> Option<CueFaults> {
         (!self.told.is_empty()).then(|| CueFaults { path: path.to_owned(), told: self.told, more: self.more })
     }

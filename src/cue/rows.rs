@@ -2,6 +2,7 @@
 //! durations up to its own, and at time 0 the cue stands at the first row.
 
 use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::fault::{Collector, CueFaults, Place};
@@ -20,32 +21,24 @@ pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
     let mut reading: Option<Reading> = None;
-    loop {
-        match (lines.next(), &mut reading) {
-            (Ok(Some((number, line))), Some(reading)) => {
-                if reading.cue.times.len() > MAX_ROWS {
-                    faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
-                    break;
-                }
-                reading.take(number, line, &mut faults);
+    lines.each(&mut faults, |number, line, faults| {
+        match &mut reading {
+            Some(reading) if reading.cue.rows() > MAX_ROWS => {
+                faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
+                return ControlFlow::Break(());
             }
-            (Ok(Some((number, line))), None) => match Reading::new(path, unit, number, line, &mut faults) {
+            Some(reading) => reading.take(number, line, faults),
+            None => match Reading::new(path, unit, number, line, faults) {
                 Some(begun) => reading = Some(begun),
-                None => break,
+                None => return ControlFlow::Break(()),
             },
-            (Ok(None), _) => break,
-            (Err(fault), _) => {
-                faults.add(fault.place, None, fault.problem);
-                if fault.fatal {
-                    break;
-                }
-            }
         }
+        ControlFlow::Continue(())
+    });
+    match reading.map(|reading| reading.cue) {
+        Some(cue) if faults.is_empty() && cue.rows() > 0 => Ok(cue),
+        _ => Err(faults.or(path, Problem::Empty)),
     }
-    if faults.is_empty() && reading.as_ref().is_none_or(|reading| reading.cue.rows() == 0) {
-        faults.add(Place::File, None, Problem::Empty);
-    }
-    faults.finish(path, reading.map(|reading| reading.cue).unwrap_or_else(|| Cue::blank(path)))
 }
 
 struct Reading {

@@ -35,7 +35,7 @@ fn coefficients(cue: &Cue, row: usize) -> (f64, f64, f64) {
     let (h0, h1) = (seconds(cue, row - 1), seconds(cue, row));
     let (below, on, above) = (h0, 2.0 * (h0 + h1), h1);
     if row == 1 {
-        ((0.0), on + h0 * (1.0 + h0 / h1), above - h0 * h0 / h1)
+        (0.0, on + h0 * (1.0 + h0 / h1), above - h0 * h0 / h1)
     } else if row == cue.rows() - 2 {
         (below - h1 * h1 / h0, on + h1 * (1.0 + h1 / h0), 0.0)
     } else {
