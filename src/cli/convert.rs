@@ -1,11 +1,203 @@
 //! `kinocue convert`.
 
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, anyhow};
+use indicatif::{ProgressBar, ProgressStyle};
+
 use super::{Exit, Failure, OrExit as _};
+use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, FaultClass, Problem, Source, limits};
 
 /// Turns a cue from one format into another.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+#[command(after_help = format!("\
+Examples:
+  kinocue convert storm.csv storm.mcap
+  kinocue convert ride.csv storm.csv --from rows --units mm --title Storm
+  kinocue convert ride.bin storm.csv --from u8 --axes 3 --rate 20
+  kinocue convert --recover cut.mcap saved.mcap
 
-pub(super) fn run(_args: &Args) -> Result<Exit, Failure> {
-    Err(anyhow::anyhow!("not built yet")).or_exit(Exit::Internal)
+A cue may have {}.", limits::IN_WORDS))]
+pub(super) struct Args {
+    /// The cue to read, CSV or MCAP, or a file of the format given with --from
+    input: PathBuf,
+    /// The file to write; its name ends in .csv or .mcap
+    output: PathBuf,
+    /// Format of the field to read: rows are line,time_ms,x,y,z,u,v,w, where time_ms is how long a row takes; u8 are
+    /// raw octets, one an axis, 0 to 255 over the stroke
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    from: Option<Format>,
+    /// Unit of the positions in rows: mm, percent, fraction or pulse
+    #[arg(long, value_name = "UNIT", requires = "from", required_if_eq("from", "rows"))]
+    units: Option<DeclaredUnit>,
+    /// Axes in u8, 1 to 12
+    #[arg(long, value_name = "N", requires = "from", required_if_eq("from", "u8"))]
+    axes: Option<usize>,
+    /// Rows a second in u8
+    #[arg(long, value_name = "HZ", requires = "from", required_if_eq("from", "u8"))]
+    rate: Option<f64>,
+    /// Save the complete messages of an MCAP that is cut short or damaged
+    #[arg(long, conflicts_with = "from")]
+    recover: bool,
+    /// Give the cue this title
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
+    /// Replace OUTPUT where it exists
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Format {
+    Rows,
+    U8,
+}
+
+/// What is written, by the name of the output.
+#[derive(Debug, Clone, Copy)]
+enum Target {
+    Csv,
+    Mcap,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let target = target(&args.output).or_exit(Exit::Usage)?;
+    if !args.force && args.output.try_exists().or_exit(Exit::Io)? {
+        let error = anyhow!("{} exists; --force replaces it", args.output.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
+    let mut cue = match read(args) {
+        Ok((cue, lost)) => {
+            tell_lost(&cue, lost.as_ref());
+            cue
+        }
+        Err(faults) => {
+            eprintln!("{faults}");
+            return Ok(exit_of(&faults));
+        }
+    };
+    if let Some(title) = &args.title {
+        cue.set_title(title.clone());
+    }
+    write(&cue, &args.output, target)?;
+    let (rows, axes, length) = (cue.rows(), cue.axes(), cue.duration());
+    let axes_in_words = if axes == 1 { "1 axis".to_owned() } else { format!("{axes} axes") };
+    eprintln!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display());
+    Ok(Exit::Done)
+}
+
+fn target(output: &Path) -> anyhow::Result<Target> {
+    let named = |extension| output.extension().is_some_and(|it| it.eq_ignore_ascii_case(extension));
+    if named("csv") {
+        Ok(Target::Csv)
+    } else if named("mcap") {
+        Ok(Target::Mcap)
+    } else {
+        Err(anyhow!("{}: the name of what is written ends in .csv or .mcap", output.display()))
+    }
+}
+
+/// The cue, and why the rest of it is lost where it had to be recovered.
+fn read(args: &Args) -> Result<(Cue, Option<Problem>), CueFaults> {
+    let source = match args.from {
+        None => Source::Native,
+        Some(Format::Rows) => Source::Rows { unit: args.units.unwrap_or_default() },
+        Some(Format::U8) => {
+            Source::U8 { axes: args.axes.unwrap_or_default(), rate_hz: args.rate.unwrap_or_default() }
+        }
+    };
+    let file = cue::open(&args.input)?;
+    let length = file.metadata().map_or(0, |metadata| metadata.len());
+    let bar = ProgressBar::new(length).with_style(style("reading {bar:40} {bytes} of {total_bytes}"));
+    let input = bar.wrap_read(file);
+    let cue = if args.recover {
+        cue::recover(&args.input, input)
+    } else {
+        cue::read(&args.input, input, &source).map(|cue| (cue, None))
+    };
+    bar.finish_and_clear();
+    cue
+}
+
+fn tell_lost(cue: &Cue, lost: Option<&Problem>) {
+    if let Some(lost) = lost {
+        let what = match lost {
+            Problem::Damaged(what) => format!("damaged: {what}"),
+            _ => "cut short".to_owned(),
+        };
+        let (rows, last) = (cue.rows(), cue.duration());
+        eprintln!("{} is {what}; {rows} rows up to {last} are saved, the rest is lost", cue.path().display());
+    }
+}
+
+fn exit_of(faults: &CueFaults) -> Exit {
+    match faults.class() {
+        FaultClass::NoInput => Exit::NoInput,
+        FaultClass::Io => Exit::Io,
+        FaultClass::BadCue => Exit::BadCue,
+    }
+}
+
+/// Writes beside the output and renames, so that there is the old file or the whole new one at any time.
+fn write(cue: &Cue, output: &Path, target: Target) -> Result<(), Failure> {
+    let part = Part::create(output).or_exit(Exit::Io)?;
+    let bar = ProgressBar::no_length().with_style(style("writing {bytes}"));
+    let mut out = BufWriter::new(bar.wrap_write(&part.file));
+    match target {
+        Target::Csv => {
+            if !cue.markers().is_empty() {
+                eprintln!("csv has no place for markers; {} are left out", cue.markers().len());
+            }
+            cue::write_csv(cue, &mut out).map_err(|error| match error {
+                CsvError::Io(error) => failure(error, Exit::Io, output),
+                refused => failure(refused, Exit::BadCue, cue.path()),
+            })?;
+        }
+        Target::Mcap => cue::write_mcap(cue, &mut out).map_err(|error| failure(error, Exit::Io, output))?,
+    }
+    out.flush().map_err(|error| failure(error, Exit::Io, output))?;
+    drop(out);
+    bar.finish_and_clear();
+    part.rename().map_err(|error| failure(error, Exit::Io, output))
+}
+
+fn failure(error: impl Into<anyhow::Error>, exit: Exit, path: &Path) -> Failure {
+    Failure { exit, error: error.into().context(path.display().to_string()) }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+/// A file on its way to its name; gone again unless it gets there.
+struct Part {
+    file: File,
+    path: PathBuf,
+    output: PathBuf,
+}
+
+impl Part {
+    fn create(output: &Path) -> anyhow::Result<Self> {
+        let mut name = std::ffi::OsString::from(".");
+        name.push(output.file_name().unwrap_or_default());
+        name.push(format!(".{}.part", std::process::id()));
+        let path = output.with_file_name(name);
+        let file = OpenOptions::new().write(true).create_new(true).open(&path);
+        let file = file.with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(Self { file, path, output: output.to_owned() })
+    }
+
+    fn rename(self) -> io::Result<()> {
+        self.file.sync_all()?;
+        fs::rename(&self.path, &self.output)
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        // After the rename there is nothing left under this name, which is no error here.
+        let _ = fs::remove_file(&self.path);
+    }
 }

@@ -42,7 +42,8 @@ pub(super) struct Args {
     cue: PathBuf,
     #[command(flatten)]
     source: SourceArgs,
-    /// A controller: HOST:PORT[,name=A1][,axes=6][,offset=0][,fan_out=slice|shared][,dialect=smc|mbox]; repeatable.
+    /// A controller: HOST:PORT, and after commas name=A1, axes=6, offset=0, fan_out=slice or shared, dialect=smc or mbox;
+    /// repeatable.
     #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
     to: Vec<String>,
     /// Controllers, seats and show settings from a file.

@@ -3,8 +3,9 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::fault::{CueFaults, Problem};
+use super::fault::CueFaults;
 use super::limits::{MAX_ROWS, MAX_TIME};
+use super::problem::Problem;
 use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;

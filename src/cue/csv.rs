@@ -1,12 +1,14 @@
 //! Our own CSV cues: declarations in comments, a header row, rows. Streamed; nothing but the rows' values is kept.
 
 use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::fault::{Collector, CueFaults, Place, Problem};
+use super::fault::{Collector, CueFaults, Place};
 use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
+use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
 use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, value};
 use crate::motion::MAX_AXES;
@@ -21,32 +23,23 @@ fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cu
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
     let Some((declared, header)) = read_head(&mut lines, &mut faults) else {
-        return faults.finish(path, Cue::blank(path));
+        return Err(faults.or(path, Problem::Empty));
     };
     let mut rows = Rows::new(path, &declared, header);
-    loop {
-        match lines.next() {
-            Ok(Some((number, line))) => {
-                if rows.cue.times.len() == rows_at_most {
-                    faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
-                    break;
-                }
-                rows.take(number, line, &mut faults);
-            }
-            Ok(None) => break,
-            Err(fault) => {
-                faults.add(fault.place, None, fault.problem);
-                if fault.fatal {
-                    break;
-                }
-            }
+    lines.each(&mut faults, |number, line, faults| {
+        if rows.cue.rows() == rows_at_most {
+            faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
+            return ControlFlow::Break(());
         }
-    }
+        rows.take(number, line, faults);
+        ControlFlow::Continue(())
+    });
     let cue = rows.cue;
-    if faults.is_empty() && cue.rows() < 2 {
-        faults.add(Place::File, None, Problem::TooFewRows(cue.rows()));
+    if faults.is_empty() && cue.rows() >= 2 {
+        Ok(cue)
+    } else {
+        Err(faults.or(path, Problem::TooFewRows(cue.rows())))
     }
-    faults.finish(path, cue)
 }
 
 /// What the comment lines before the header say.
@@ -58,36 +51,22 @@ struct Declared {
     interpolation: Interpolation,
 }
 
-/// Reads up to the header row; nothing where rows cannot be understood after what was found.
+/// Reads up to the header row; nothing where there is none, or rows cannot be understood after what was found.
 fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(Declared, Header)> {
     let mut declared = Declared::default();
-    loop {
-        match lines.next() {
-            Ok(Some((number, line))) => {
-                if let Some(comment) = line.trim_start().strip_prefix('#') {
-                    declared.take(number, line, comment, faults);
-                    continue;
-                }
-                let mut splitter = Splitter::new();
-                let header = match splitter.split(line) {
-                    Ok(cells) => Header::read(line, number, cells, faults),
-                    Err((column, problem)) => {
-                        faults.add(Place::Text { line: number, column }, None, problem);
-                        return None;
-                    }
-                };
-                return faults.is_empty().then_some((declared, header));
-            }
-            Ok(None) => {
-                faults.add(Place::File, None, Problem::Empty);
-                return None;
-            }
-            Err(fault) => {
-                faults.add(fault.place, None, fault.problem);
-                return None;
-            }
+    let mut header = None;
+    lines.each(faults, |number, line, faults| {
+        if let Some(comment) = line.trim_ascii_start().strip_prefix('#') {
+            declared.take(number, line, comment, faults);
+            return ControlFlow::Continue(());
         }
-    }
+        match Splitter::new().split(line) {
+            Ok(cells) => header = Some(Header::read(line, number, cells, faults)),
+            Err((column, problem)) => faults.add(Place::Text { line: number, column }, None, problem),
+        }
+        ControlFlow::Break(())
+    });
+    header.filter(|_| faults.is_empty()).map(|header| (declared, header))
 }
 
 impl Declared {
@@ -98,14 +77,15 @@ impl Declared {
             "kinocue-csv" if text == "1" => Ok(()),
             "kinocue-csv" => Err("this program reads version 1".to_owned()),
             "title" => {
-                self.title = Some(text.to_owned());
+                self.title = Some(text.to_owned()).filter(|title| !title.is_empty());
                 Ok(())
             }
             "units" => parsed(text).map(|unit| self.unit = unit),
             "interpolation" => parsed(text).map(|interpolation| self.interpolation = interpolation),
             _ => return,
         };
-        let column = line.find(text).map_or(1, |at| line[..at].chars().count() as u64 + 1);
+        // The value is the end of the line.
+        let column = (line.trim_end().chars().count() - text.chars().count()) as u64 + 1;
         let place = Place::Text { line: number, column };
         if self.seen.contains(&key) {
             faults.add(place, Some(&key), Problem::DeclaredTwice);

@@ -1,7 +1,8 @@
 //! The header row of a cue: which column carries what.
 
-use super::fault::{Collector, Place, Problem};
+use super::fault::{Collector, Place};
 use super::limits::MAX_EFFECTS;
+use super::problem::Problem;
 use super::table::{Cells, column_of};
 use crate::motion::MAX_AXES;
 

@@ -12,6 +12,8 @@ pub const MAX_FILE: u64 = 2 * 1024 * 1024 * 1024;
 pub const MAX_EFFECTS: usize = 32;
 /// The most markers of a cue.
 pub const MAX_MARKERS: usize = 10_000;
+/// The most octets of a marker's name.
+pub const MAX_MARKER_NAME: usize = 256;
 /// The last show time a row may have: a day.
 pub const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);
 /// The greatest position in mm, far beyond any seat.
@@ -22,3 +24,18 @@ pub(super) const MAX_PULSES: f64 = i32::MAX as f64;
 pub const MIN_VIBRATION_HZ: f64 = 0.1221;
 /// The fastest vibration, Hz: a period of 0.125 ms (SMC manual 2.2.2.9).
 pub const MAX_VIBRATION_HZ: f64 = 8_000.0;
+
+/// The limits that a person may meet, for `--help`.
+pub const IN_WORDS: &str =
+    "at most 8 million rows (two hours at 1 kHz), 12 axes, 64 KiB a line and 2 GiB a file";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_words_are_those_of_the_numbers() {
+        assert_eq!((MAX_ROWS, crate::motion::MAX_AXES), (8_000_000, 12));
+        assert_eq!((MAX_LINE, MAX_FILE), (64 << 10, 2 << 30));
+    }
+}

@@ -1,5 +1,5 @@
 //! Cues: from a file (CSV, MCAP, or a format of the field) to motion in memory, whole, before anything moves. Control
-//! thread. Every fault of a file is named with its place; see `DESIGN` of the format in `cues/README.md`.
+//! thread. Every fault of a file is named with its place. `cues/README.md` teaches our own formats.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -14,6 +14,7 @@ pub mod limits;
 mod mcap;
 mod number;
 mod place;
+mod problem;
 mod rows;
 mod steps;
 mod table;
@@ -22,9 +23,10 @@ mod value;
 
 pub use csv_write::{CsvError, write as write_csv};
 pub(crate) use fault::Collector;
-pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place, Problem};
+pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place};
 pub use mcap::{recover, write as write_mcap};
 use place::Origin;
+pub use problem::Problem;
 pub use steps::{Step, Steps};
 pub use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation, UnknownUnit};
 
@@ -251,7 +253,8 @@ pub fn load(path: &Path, source: &Source) -> Result<Cue, CueFaults> {
 /// Opens a cue file.
 ///
 /// # Errors
-/// A fault of class [`FaultClass::NoInput`] where there is none, it is a folder, or the system refuses.
+/// A fault of class [`FaultClass::NoInput`] where there is none, it is a folder, or the system refuses; one of class
+/// [`FaultClass::BadCue`] where it is over [`limits::MAX_FILE`].
 pub fn open(path: &Path) -> Result<File, CueFaults> {
     let file = File::open(path).map_err(|error| {
         let problem = match error.kind() {
@@ -260,10 +263,11 @@ pub fn open(path: &Path) -> Result<File, CueFaults> {
         };
         CueFaults::one(path, problem)
     })?;
-    if file.metadata().is_ok_and(|metadata| metadata.is_dir()) {
-        return Err(CueFaults::one(path, Problem::Folder));
+    match file.metadata() {
+        Ok(metadata) if metadata.is_dir() => Err(CueFaults::one(path, Problem::Folder)),
+        Ok(metadata) if metadata.len() > limits::MAX_FILE => Err(CueFaults::one(path, Problem::FileTooLarge)),
+        _ => Ok(file),
     }
-    Ok(file)
 }
 
 /// Reads a whole cue from `input`; `path` names it in faults.
@@ -290,4 +294,55 @@ fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
     let begins_so = front == mcap::MAGIC;
     let input = front.as_slice().chain(input);
     if named_so || begins_so { mcap::read(path, input) } else { csv::read(path, input) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::timeline::Timeline;
+
+    #[test]
+    fn a_missing_file_and_a_folder_are_told_from_bad_data() {
+        let folder = tempfile::tempdir().unwrap();
+        let class = |path: &Path| load(path, &Source::Native).unwrap_err().class();
+        assert_eq!(class(&folder.path().join("none.csv")), FaultClass::NoInput);
+        assert_eq!(class(folder.path()), FaultClass::NoInput);
+        let path = folder.path().join("empty.csv");
+        File::create(&path).unwrap();
+        assert_eq!(class(&path), FaultClass::BadCue);
+        File::create(&path).unwrap().set_len(limits::MAX_FILE + 1).unwrap(); // a hole, it takes no space
+        let faults = load(&path, &Source::Native).unwrap_err();
+        assert!(
+            faults.to_string().ends_with("holds over 2147483648 octets, the most that is read"),
+            "{faults}"
+        );
+    }
+
+    #[test]
+    fn a_failing_disk_is_told_from_bad_data() {
+        struct Failing;
+        impl Read for Failing {
+            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+                Err(io::Error::other("gone"))
+            }
+        }
+        for (name, source) in [("a.csv", Source::Native), ("a.u8", Source::U8 { axes: 1, rate_hz: 1.0 })] {
+            let begun = "time_ms,a1\n0,0\n".as_bytes().chain(Failing);
+            let faults = read(Path::new(name), begun, &source).unwrap_err();
+            assert_eq!(faults.class(), FaultClass::Io, "{faults}");
+        }
+    }
+
+    #[test]
+    fn what_is_found_after_loading_still_has_its_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        std::fs::write(&path, "# units: mm\ntime_ms,fx_air,a1,a2\n0,0,1,1\n\n10,0,2, 160\n").unwrap();
+        let timeline = Timeline::new(load(&path, &Source::Native).unwrap());
+        let seat = crate::motion::SeatType::bench3(2);
+        let faults = timeline.fits_stroke(0..2, Some(&seat)).faults.unwrap();
+        assert_eq!(faults.told()[0].to_string(), "5:9: a2: 160 is outside the stroke, 0 to 150 mm");
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(timeline.cue().place(1, 1), Place::Text { line: 5, column: 1 });
+    }
 }

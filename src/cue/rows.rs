@@ -2,10 +2,12 @@
 //! durations up to its own, and at time 0 the cue stands at the first row.
 
 use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 
-use super::fault::{Collector, CueFaults, Place, Problem};
+use super::fault::{Collector, CueFaults, Place};
 use super::limits::{MAX_ROWS, MAX_TIME};
+use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
 use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps, value};
 use crate::motion::MAX_AXES;
@@ -19,32 +21,24 @@ pub(super) fn read(path: &Path, input: impl Read, unit: DeclaredUnit) -> Result<
     let mut lines = Lines::new(input);
     let mut faults = Collector::default();
     let mut reading: Option<Reading> = None;
-    loop {
-        match (lines.next(), &mut reading) {
-            (Ok(Some((number, line))), Some(reading)) => {
-                if reading.cue.times.len() > MAX_ROWS {
-                    faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
-                    break;
-                }
-                reading.take(number, line, &mut faults);
+    lines.each(&mut faults, |number, line, faults| {
+        match &mut reading {
+            Some(reading) if reading.cue.rows() > MAX_ROWS => {
+                faults.add(Place::Text { line: number, column: 1 }, None, Problem::TooManyRows);
+                return ControlFlow::Break(());
             }
-            (Ok(Some((number, line))), None) => match Reading::new(path, unit, number, line, &mut faults) {
+            Some(reading) => reading.take(number, line, faults),
+            None => match Reading::new(path, unit, number, line, faults) {
                 Some(begun) => reading = Some(begun),
-                None => break,
+                None => return ControlFlow::Break(()),
             },
-            (Ok(None), _) => break,
-            (Err(fault), _) => {
-                faults.add(fault.place, None, fault.problem);
-                if fault.fatal {
-                    break;
-                }
-            }
         }
+        ControlFlow::Continue(())
+    });
+    match reading.map(|reading| reading.cue) {
+        Some(cue) if faults.is_empty() && cue.rows() > 0 => Ok(cue),
+        _ => Err(faults.or(path, Problem::Empty)),
     }
-    if faults.is_empty() && reading.as_ref().is_none_or(|reading| reading.cue.rows() == 0) {
-        faults.add(Place::File, None, Problem::Empty);
-    }
-    faults.finish(path, reading.map(|reading| reading.cue).unwrap_or_else(|| Cue::blank(path)))
 }
 
 struct Reading {
@@ -193,7 +187,7 @@ mod tests {
              3:3: time_ms: a row's duration of -5 is not above 0\n\
              5:6: the row ends after 3 of 4 cells\n\
              6:1: line: \"x\" is not a number\n\
-             6:7: y: -1 is outside the stroke, 0 to 100000 mm"
+             6:7: y: -1 is outside 0 to 100000 mm; positions count from the stroke's lower end"
         );
         assert_eq!(faults(""), " is empty; a cue needs at least two rows");
         assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");

@@ -1,4 +1,4 @@
-//! Values that hold until they change: vibration, effects, markers' neighbours in time.
+//! Values that hold until they change: vibration, effects.
 
 use crate::time::ShowTime;
 

@@ -2,9 +2,11 @@
 
 use std::cmp::Ordering;
 use std::io::{BufRead as _, BufReader, Read};
+use std::ops::ControlFlow;
 
-use super::fault::{Place, Problem};
+use super::fault::{Collector, Place};
 use super::limits::{MAX_FILE, MAX_LINE};
+use super::problem::Problem;
 
 /// Room for more cells than any header can have; a line with more is wrong in any case.
 const MAX_CELLS: usize = 128;
@@ -41,6 +43,28 @@ impl<R: Read> Lines<R> {
             }
         }
         Ok(None)
+    }
+
+    /// Hands every line to come to `take` until that breaks off or reading cannot go on; lines that are none go to
+    /// `faults`.
+    pub(super) fn each(
+        &mut self,
+        faults: &mut Collector,
+        mut take: impl FnMut(u64, &str, &mut Collector) -> ControlFlow<()>,
+    ) {
+        loop {
+            let flow = match self.next() {
+                Ok(Some((number, line))) => take(number, line, faults),
+                Ok(None) => ControlFlow::Break(()),
+                Err(LineFault { place, problem, fatal }) => {
+                    faults.add(place, None, problem);
+                    if fatal { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                }
+            };
+            if flow.is_break() {
+                return;
+            }
+        }
     }
 
     /// Reads one line and takes off its end; false at the end of the file.

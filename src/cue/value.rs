@@ -1,8 +1,8 @@
 //! Single values: from text to numbers, and whether a cue may have them.
 
-use super::fault::Problem;
 use super::limits::{MAX_TIME, MAX_VIBRATION_HZ, MIN_VIBRATION_HZ};
-use super::unit::DeclaredUnit;
+use super::problem::Problem;
+use super::unit::{DeclaredUnit, Unit};
 use crate::time::ShowTime;
 
 /// A finite number.
@@ -27,8 +27,10 @@ pub(super) fn position(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
     let high = unit.ceiling();
     if (0.0..=high).contains(&value) {
         Ok(unit.in_memory(value))
-    } else {
+    } else if unit.unit() == Unit::Fraction {
         Err(Problem::OutsideStroke { value, high, unit: unit.suffix() })
+    } else {
+        Err(Problem::NoPosition { value, high, unit: unit.suffix() })
     }
 }
 

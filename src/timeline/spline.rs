@@ -35,7 +35,7 @@ fn coefficients(cue: &Cue, row: usize) -> (f64, f64, f64) {
     let (h0, h1) = (seconds(cue, row - 1), seconds(cue, row));
     let (below, on, above) = (h0, 2.0 * (h0 + h1), h1);
     if row == 1 {
-        ((0.0), on + h0 * (1.0 + h0 / h1), above - h0 * h0 / h1)
+        (0.0, on + h0 * (1.0 + h0 / h1), above - h0 * h0 / h1)
     } else if row == cue.rows() - 2 {
         (below - h1 * h1 / h0, on + h1 * (1.0 + h1 / h0), 0.0)
     } else {
@@ -48,9 +48,8 @@ fn forward(cue: &Cue, bends: &mut [f32]) -> Vec<f64> {
     let axes = cue.axes();
     let mut uppers = vec![0.0; cue.rows()];
     let (mut upper, mut before, mut slope) = (0.0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
-    let per_second = seconds(cue, 0).recip();
-    for (slope, (first, second)) in slope.iter_mut().zip(cue.row(0).iter().zip(cue.row(1))) {
-        *slope = (second - first) * per_second;
+    for (slope, (y0, y1)) in slope.iter_mut().zip(cue.row(0).iter().zip(cue.row(1))) {
+        *slope = (y1 - y0) / seconds(cue, 0);
     }
     for row in 1..cue.rows() - 1 {
         let (below, on, above) = coefficients(cue, row);

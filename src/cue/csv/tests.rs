@@ -91,7 +91,7 @@ fn positions_outside_the_stroke_are_refused_in_the_unit_of_the_file() {
     );
     assert_eq!(
         faults("# units: mm\ntime_ms,a1\n0,-1\n1,0"),
-        "3:3: a1: -1 is outside the stroke, 0 to 100000 mm"
+        "3:3: a1: -1 is outside 0 to 100000 mm; positions count from the stroke's lower end"
     );
 }
 

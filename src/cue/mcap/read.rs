@@ -7,9 +7,10 @@ use std::path::Path;
 use mcap::records::op;
 use serde::Deserialize;
 
-use super::super::fault::{Collector, CueFaults, Place, Problem};
+use super::super::fault::{Collector, CueFaults, Place};
 use super::super::header::is_effect_name;
-use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKERS, MAX_ROWS, MAX_TIME};
+use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME};
+use super::super::problem::Problem;
 use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, Vibration, value};
 use super::{METADATA, Topic, VERSION, message, record};
 use crate::motion::MAX_AXES;
@@ -238,6 +239,9 @@ impl Reading {
     fn marker(&mut self, at: At, marker: message::Marker) -> Result<(), Problem> {
         if self.cue.markers.len() == MAX_MARKERS {
             return Err(Problem::TooManyMarkers);
+        }
+        if marker.name.len() > MAX_MARKER_NAME {
+            return Err(Problem::MarkerName(marker.name.len()));
         }
         self.cue.markers.push(Marker { at: at.time(), name: marker.name });
         Ok(())

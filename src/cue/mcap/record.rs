@@ -7,8 +7,8 @@ use std::io::Read;
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::super::fault::Problem;
 use super::super::limits::MAX_FILE;
+use super::super::problem::Problem;
 
 /// The longest record that is taken into memory; indexes of foreign writers can be some MB.
 const MAX_RECORD: usize = 64 * 1024 * 1024;

@@ -1,0 +1,125 @@
+//! `kinocue convert`, as a person runs it: exit codes, messages, and what is on the disk afterwards.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use tempfile::{TempDir, tempdir};
+
+/// Runs `kinocue convert` in a folder; returns its exit code and what it said.
+fn convert(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output = Command::cargo_bin("kinocue")
+        .expect("the program is built")
+        .arg("convert")
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the program runs");
+    assert!(output.stdout.is_empty(), "human text goes to stderr");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+fn folder_with(name: &str, content: impl AsRef<[u8]>) -> TempDir {
+    let folder = tempdir().expect("there is room for a folder");
+    fs::write(folder.path().join(name), content).expect("there is room for a file");
+    folder
+}
+
+const CUE: &str = "# kinocue-csv: 1\n# title: Storm\n# units: mm\n# interpolation: spline\n\
+                   time_ms,a1,v1_hz,v1_amp,fx_air\n0,0.1,0,0,1\n16.666667,0.30000000000000004,20,1.5,0\n";
+
+#[test]
+fn a_cue_comes_back_from_mcap_as_it_was() {
+    let folder = folder_with("a.csv", CUE);
+    let (code, said) = convert(folder.path(), &["a.csv", "b.mcap"]);
+    assert_eq!((code, said.as_str()), (Some(0), "b.mcap: 2 rows, 1 axis, 00:00.016\n"));
+    assert_eq!(convert(folder.path(), &["b.mcap", "c.csv"]).0, Some(0));
+    assert_eq!(fs::read_to_string(folder.path().join("c.csv")).unwrap(), CUE);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "no other file is left");
+}
+
+#[test]
+fn rows_and_octets_are_imported() {
+    let folder = folder_with("r.csv", "line,time_ms,x,y\n1,1000,0,10\n2,500,150,20\n");
+    let (code, _) =
+        convert(folder.path(), &["r.csv", "o.csv", "--from", "rows", "--units", "mm", "--title", "T"]);
+    assert_eq!(code, Some(0));
+    assert_eq!(
+        fs::read_to_string(folder.path().join("o.csv")).unwrap(),
+        "# kinocue-csv: 1\n# title: T\n# units: mm\n# interpolation: linear\n\
+         time_ms,a1,a2\n0,0,10\n1000,0,10\n1500,150,20\n"
+    );
+    let folder = folder_with("r.u8", [0, 255, 51, 0]);
+    assert_eq!(
+        convert(folder.path(), &["r.u8", "o.csv", "--from", "u8", "--axes", "2", "--rate", "20"]).0,
+        Some(0)
+    );
+    assert_eq!(
+        fs::read_to_string(folder.path().join("o.csv")).unwrap(),
+        "# kinocue-csv: 1\n# units: fraction\n# interpolation: monotone\ntime_ms,a1,a2\n0,0,1\n50,0.2,0\n"
+    );
+}
+
+#[test]
+fn nothing_is_guessed_and_nothing_overwritten() {
+    let folder = folder_with("a.csv", CUE);
+    fs::write(folder.path().join("b.csv"), "old").unwrap();
+    for (args, expected) in [
+        (&["a.csv", "c.csv", "--from", "rows"][..], "--units"),
+        (&["a.csv", "c.csv", "--from", "u8", "--axes", "3"], "--rate"),
+        (&["a.csv", "c.csv", "--units", "mm"], "--from"),
+        (
+            &["a.csv", "c.csv", "--from", "rows", "--units", "cm"],
+            "units are fraction, percent, u8, mm or pulse",
+        ),
+        (&["a.csv", "c.xml"], "ends in .csv or .mcap"),
+        (&["a.csv", "b.csv"], "b.csv exists; --force replaces it"),
+    ] {
+        let (code, said) = convert(folder.path(), args);
+        assert!(code == Some(64) && said.contains(expected), "{args:?}: {code:?} {said}");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("b.csv")).unwrap(), "old");
+    assert_eq!(convert(folder.path(), &["a.csv", "b.csv", "--force"]).0, Some(0));
+    assert_eq!(fs::read_to_string(folder.path().join("b.csv")).unwrap(), CUE);
+}
+
+#[test]
+fn bad_input_is_named_and_writes_nothing() {
+    let folder = folder_with("a.csv", "time_ms,a1\n0,0\n1,2\n2,x\n");
+    let (code, said) = convert(folder.path(), &["a.csv", "b.mcap"]);
+    assert_eq!(code, Some(65));
+    assert_eq!(
+        said,
+        "a.csv:3:3: a1: 2 is outside the stroke, 0 to 1\na.csv:4:3: a1: \"x\" is not a number\n"
+    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    assert_eq!(
+        convert(folder.path(), &["none.csv", "b.csv"]),
+        (Some(66), "none.csv: no such file\n".to_owned())
+    );
+    assert_eq!(
+        convert(folder.path(), &[".", "b.csv"]),
+        (Some(66), ".: is a folder, not a cue file\n".to_owned())
+    );
+    fs::write(folder.path().join("a.csv"), CUE).unwrap();
+    let (code, said) = convert(folder.path(), &["a.csv", "nowhere/b.csv"]);
+    assert!(code == Some(74) && said.starts_with("kinocue: cannot write nowhere/"), "{said}");
+}
+
+#[test]
+fn a_cut_file_is_recovered_on_request() {
+    let rows: String =
+        (0..5000).map(|k| format!("{},{}\n", k * 10, (f64::from(k) * 0.618).fract())).collect();
+    let folder = folder_with("a.csv", format!("time_ms,a1\n{rows}"));
+    assert_eq!(convert(folder.path(), &["a.csv", "b.mcap"]).0, Some(0));
+    let whole = fs::read(folder.path().join("b.mcap")).unwrap();
+    fs::write(folder.path().join("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
+    let (code, said) = convert(folder.path(), &["cut.mcap", "c.csv"]);
+    assert!(
+        code == Some(65) && said.starts_with("cut.mcap: the file is cut short; `kinocue convert --recover`"),
+        "{said}"
+    );
+    let (code, said) = convert(folder.path(), &["--recover", "cut.mcap", "c.csv"]);
+    assert!(code == Some(0) && said.contains("the rest is lost"), "{said}");
+    assert!(fs::read_to_string(folder.path().join("c.csv")).unwrap().lines().count() > 1000);
+}
