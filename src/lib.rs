@@ -37,6 +37,7 @@ pub mod sim;
 pub mod app;
 
 pub mod net;
+pub mod observe;
 pub mod tracker;
 
 pub mod sys;

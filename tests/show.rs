@@ -61,6 +61,20 @@ fn a_cue_that_starts_and_ends_at_rest_in_the_park_pose_is_played_row_by_row() {
     assert_gentle(&played);
 }
 
+/// Octets that leave for a cue of two axes with vibration and an effect; written once by this test and read by a person.
+const GOLDEN: &str = include_str!("golden/show.hex");
+
+#[test]
+fn the_octets_of_a_small_show_are_those_on_record() {
+    let cue = "time_ms,a1,a2,v2_hz,v2_amp,fx_water\n0,0,0,0,0,0\n200,0,0,0,0,0\n400,0.01,0.005,20,0.002,1\n\
+               600,0.02,0.005,20,0.002,1\n800,0.01,0,0,0,0\n1000,0,0,0,0,0\n1200,0,0,0,0,0\n";
+    let played = Virtual::new(cue).at_rate(20.0).play();
+    let hex = |octets: &[u8]| octets.iter().map(|octet| format!("{octet:02x}")).collect::<String>();
+    let sent: Vec<String> = played.frames.iter().map(|frame| hex(&frame.octets)).collect();
+    let recorded: Vec<&str> = GOLDEN.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(sent, recorded, "sent:\n{}", sent.join("\n"));
+}
+
 #[test]
 fn parking_is_no_faster_than_50_mm_a_second_and_effects_are_off() {
     let cue = "time_ms,a1,fx_air\n0,0.8,1\n3000,0.8,1\n";

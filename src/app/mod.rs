@@ -3,6 +3,8 @@
 mod play;
 mod prepare;
 mod report;
+mod stage;
+mod sum_up;
 
 pub use play::{Play, PlayError, Played};
-pub use report::{ControllerReport, LatencyReport, RealTimeReport, Report};
+pub use report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};

@@ -2,26 +2,24 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use super::prepare::{Preparation, Prepared};
-use super::report::{ControllerReport, LatencyReport, RealTimeReport, Report};
+use super::prepare::Preparation;
+use super::report::Report;
+use super::stage::Stage;
+use super::sum_up::sum_up;
 use crate::config::{Config, Controller, Misfit};
 use crate::cue::{CueFaults, Place};
-use crate::engine::{Ending, Engine, Headroom, Show, TickGrid};
+use crate::engine::{Headroom, Show};
 use crate::fanout::{Lane, Manner, lanes};
-use crate::net::{DrainGrid, NetError, Ports, Sender};
+use crate::net::{NetError, Ports};
+use crate::observe::Watched;
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, To};
-use crate::rt::{Accounts, AckLoop, Ended, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use crate::rt::{AckLoop, Live, MailEnds, PlanLoop, mailboxes};
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime::{self, RealTime};
-use crate::time::Clock;
+use crate::sys::realtime;
 use crate::timeline::{Hint, Timeline};
-
-/// From the end of preparing to tick 0: time to start the other threads.
-const RUN_UP: Duration = Duration::from_millis(20);
 
 /// Why nothing was played. Nothing has moved then.
 #[derive(Debug, thiserror::Error)]
@@ -116,7 +114,8 @@ impl Play {
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let (mail, ends) = mailboxes(self.lanes.len(), self.show.rate, live);
         let MailEnds { sent, ticks, requests, answers, retired } = ends;
-        let mut acks = AckLoop::new(receiver, sent, ticks);
+        let watched = self.config.controllers.iter().map(watched).collect();
+        let mut acks = AckLoop::new(receiver, watched, sent, ticks);
         let prepared = Preparation {
             clock: &Monotonic,
             sender: &sender,
@@ -142,7 +141,7 @@ impl Play {
             sender,
         };
         let run = stage.run(acks, plans, mail, stop);
-        Ok(sum_up(&self.config.controllers, &self.show, self.manner.silent, &prepared, run))
+        Ok(sum_up(&self.config.controllers, &self.show, self.manner.silent, &prepared, &run))
     }
 }
 
@@ -156,121 +155,10 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
 }
 
-/// What the threads of a play share out among themselves.
-struct Stage {
-    show: Show,
-    timeline: Arc<Timeline>,
-    headroom: Headroom,
-    lanes: Vec<Lane>,
-    course: Box<Course>,
-    sender: Sender,
-}
-
-/// What the threads of a play came back with.
-struct Run {
-    ended: Ended,
-    accounts: Accounts,
-    granted: RealTime,
-    refusals: Vec<PlanError>,
-    cue: String,
-}
-
-impl Stage {
-    /// The calling thread becomes the tick thread. Everything it touches has been made by now, so that memory can be
-    /// locked; the threads started after it are ordinary ones.
-    fn run(self, acks: AckLoop, mut plans: PlanLoop, mut mail: crate::rt::Mail, stop: &AtomicBool) -> Run {
-        let cue = self.timeline.cue().path().display().to_string();
-        let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
-        let granted = realtime::request();
-        thread::scope(|scope| {
-            let origin = Monotonic.now() + RUN_UP;
-            let drains = DrainGrid::new(origin, self.show.rate.period());
-            let sent_all = &sent_all;
-            let ack_thread = scope.spawn(move || {
-                let _ = realtime::normal_priority();
-                acks.run(&Monotonic, drains, || sent_all.load(Ordering::Acquire))
-            });
-            let plan_thread = scope.spawn(|| {
-                let _ = realtime::normal_priority();
-                plans.run(&done)
-            });
-            mail.wakes(plan_thread.thread().clone());
-            let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
-            let grid = TickGrid::new(origin, self.show.rate);
-            let engine = Engine::new(self.show, self.timeline, self.headroom, windows, self.course);
-            let mut ticks = TickLoop {
-                clock: &Monotonic,
-                grid,
-                engine,
-                lanes: self.lanes,
-                sink: self.sender,
-                mail,
-                stop,
-            };
-            let ended = ticks.run();
-            sent_all.store(true, Ordering::Release);
-            done.store(true, Ordering::Release);
-            plan_thread.thread().unpark();
-            let refusals = plan_thread.join().expect("the planner does not panic");
-            let mut accounts = ack_thread.join().expect("the ack thread does not panic");
-            accounts.close(ticks.lanes.iter().map(Lane::last_frame), Monotonic.now());
-            Run { ended, accounts, granted, refusals, cue }
-        })
+fn watched(controller: &Controller) -> Watched {
+    Watched {
+        address: controller.address,
+        dialect: controller.dialect,
+        estop_inputs: controller.estop_inputs,
     }
-}
-
-fn sum_up(controllers: &[Controller], show: &Show, silent: bool, prepared: &Prepared, run: Run) -> Played {
-    let tracker = run.accounts.books.tracker();
-    let entries = controllers.iter().enumerate().map(|(index, controller)| {
-        let counts = tracker.counts(index);
-        ControllerReport {
-            name: controller.name.clone(),
-            address: controller.address.to_string(),
-            sent: counts.sent,
-            asked: counts.asked,
-            acked: counts.acked,
-            refused: counts.refused(),
-            lost: counts.lost,
-            homing: prepared.homing[index],
-            duplicate: counts.duplicate,
-            stale: counts.stale,
-            stray: counts.stray,
-            send_failed: counts.send_failed,
-            port_closed: counts.port_closed,
-            ack_us: LatencyReport::of(tracker.latency(index)),
-        }
-    });
-    let report = Report {
-        cue: run.cue,
-        result: match run.ended.ending {
-            Ending::Completed => "completed",
-            Ending::Stopped => "stopped",
-            Ending::Fault => "fault",
-        },
-        ticks: run.ended.ticks,
-        missed_ticks: run.ended.missed,
-        rate_hz: show.rate.hz(),
-        lateness_us: LatencyReport::of(&run.accounts.lateness),
-        realtime: RealTimeReport::from(&run.granted),
-        strangers: run.accounts.strangers,
-        controllers: entries.collect(),
-    };
-    let mut notes: Vec<String> = run.refusals.iter().map(ToString::to_string).collect();
-    notes.extend(prepared.hurried.iter().map(|&index| {
-        let seat = &controllers[index].seat;
-        format!(
-            "{}: its stroke of {} mm was crossed in 3 s at the most (PA0b), so its way to park may have been faster \
-             than 50 mm/s",
-            controllers[index].name, seat.stroke_mm
-        )
-    }));
-    if run.ended.unposted > 0 {
-        notes.push(format!(
-            "{} records found no room and were inferred from frame numbers",
-            run.ended.unposted
-        ));
-    }
-    let lost = (0..controllers.len()).filter(|&index| !silent && tracker.lost_at_end(index));
-    let silent = lost.map(|index| controllers[index].name.clone()).collect();
-    Played { report, refusals: run.granted.refusals, notes, silent }
 }

@@ -11,7 +11,7 @@ use crate::net::{Delivery, Sender};
 use crate::plan::PARK_VELOCITY_MM_S;
 use crate::rt::{AckLoop, Sent};
 use crate::time::{Clock, MonoTime};
-use crate::wire::{Code, MAX_LEN, RegisterReply, position_reads, positions};
+use crate::wire::{Code, MAX_LEN, PerAxis, RegisterReply, position_reads, positions};
 
 /// Tries of a position read, and how long each waits.
 const READ_TRIES: usize = 3;
@@ -50,6 +50,11 @@ impl<C: Clock> Preparation<'_, C> {
     /// Brings every seat to its park pose, as far as it can be known.
     pub(super) fn run(&mut self, ask: bool) -> Prepared {
         let told = if ask { self.read_positions() } else { vec![Told::default(); self.lanes.len()] };
+        for (lane, told) in told.iter().enumerate().filter(|(_, told)| told[0].is_some()) {
+            let known = told.iter().take_while(|place| place.is_some()).count();
+            let positions = PerAxis::from_fn(known, |axis| told[axis].unwrap_or_default());
+            self.acks.on_positions(lane, positions, self.clock.now());
+        }
         let count = self.lanes.len();
         let mut prepared = Prepared { homing: vec![0; count], hurried: Vec::new() };
         if self.stopped() {

@@ -6,7 +6,9 @@ use comfy_table::{CellAlignment, Table, presets};
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
+use crate::observe::ControllerState;
 use crate::sys::realtime::RealTime;
+use crate::time::MonoTime;
 
 /// What became of a play. Fields may be added, never changed.
 #[derive(Debug, Clone, Serialize)]
@@ -29,6 +31,64 @@ pub struct Report {
     pub strangers: u64,
     /// One entry for each controller.
     pub controllers: Vec<ControllerReport>,
+    /// What happened to the controllers, oldest first.
+    pub events: Vec<EventReport>,
+}
+
+/// Something that happened to a controller.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EventReport {
+    /// The controller's name.
+    pub controller: String,
+    /// Seconds from tick 0, below zero before it.
+    pub at_s: f64,
+    /// What, in words.
+    pub what: String,
+}
+
+/// The last known state of a controller; null where it never told.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateReport {
+    /// Seconds since it was last heard.
+    pub heard_s_ago: Option<f64>,
+    /// Whether an emergency stop is in effect.
+    pub emergency_stop: bool,
+    /// Its error number (chapter 6 of the manuals); 0 for none.
+    pub error: Option<u16>,
+    /// Error number of each drive; 0 for none.
+    pub servo_errors: Option<Vec<u16>>,
+    /// Inputs, bit 0 = X01.
+    pub inputs: Option<u16>,
+    /// Outputs, bit 0 = Y01, as it reports them.
+    pub outputs: Option<u16>,
+    /// Measured positions, pulses; an echo of the command is none.
+    pub measured: Option<Vec<i32>>,
+    /// Seconds since they were measured.
+    pub measured_s_ago: Option<f64>,
+    /// Force of each axis, in the drive's own unit.
+    pub forces: Option<Vec<i16>>,
+    /// Reports that it sent unasked.
+    pub reports: u64,
+}
+
+impl StateReport {
+    /// The state as it was known at `now`.
+    #[must_use]
+    pub fn of(state: &ControllerState, now: MonoTime) -> Self {
+        let seconds = |at: MonoTime| now.since(at).as_secs_f64();
+        Self {
+            heard_s_ago: state.heard_at.map(seconds),
+            emergency_stop: state.emergency_stop(),
+            error: state.error.map(|heard| heard.value),
+            servo_errors: state.servo_errors.map(|heard| heard.value.to_vec()),
+            inputs: state.inputs.map(|heard| heard.value),
+            outputs: state.outputs.map(|heard| heard.value),
+            measured: state.measured.map(|heard| heard.value.iter().map(|pulses| pulses.0).collect()),
+            measured_s_ago: state.measured.map(|heard| seconds(heard.at)),
+            forces: state.forces.map(|heard| heard.value.to_vec()),
+            reports: state.reports,
+        }
+    }
 }
 
 /// Percentiles in µs; null where nothing was counted.
@@ -111,6 +171,8 @@ pub struct ControllerReport {
     pub port_closed: u64,
     /// Ack latency, µs.
     pub ack_us: LatencyReport,
+    /// What it last said of itself.
+    pub state: StateReport,
 }
 
 impl Report {
@@ -147,6 +209,11 @@ impl Report {
         }
         text.push('\n');
         text.push_str(&self.table().to_string());
+        for event in &self.events {
+            let EventReport { controller, at_s, what } = event;
+            write!(text, "\n{at_s:>9.3} s  {controller}: {what}")
+                .expect("a String takes what is written to it");
+        }
         text
     }
 

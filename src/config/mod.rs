@@ -124,6 +124,8 @@ pub struct Controller {
     pub accept: Accept,
     /// The effects it switches; `None` for all of them and every bit of a raw output word.
     pub effects: Option<Vec<String>>,
+    /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where only its replies tell.
+    pub estop_inputs: u16,
 }
 
 /// Who applies the axis offset (PA95).

@@ -245,6 +245,7 @@ fn controller<'t>(
     let dialect = section.choice("dialect", &[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)]);
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
+    let estop_inputs = inputs_of(&mut section, "estop_inputs");
     section.finish();
     let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
     if let Err(reason) = check_window(axis_offset, seat.axes, fan_out) {
@@ -261,7 +262,15 @@ fn controller<'t>(
         dialect: dialect.unwrap_or(Dialect::Smc),
         accept,
         effects,
+        estop_inputs,
     })
+}
+
+/// A list of inputs, X01 to X12, as a word.
+fn inputs_of(section: &mut Section<'_, '_, '_>, key: &'static str) -> u16 {
+    let Some(entries) = section.get(key).and_then(|entry| entry.array(section.faults)) else { return 0 };
+    let inputs = entries.iter().filter_map(|entry| entry.whole_in(1..=12, section.faults));
+    inputs.fold(0, |word, input: u8| word | 1 << (input - 1))
 }
 
 fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<SeatType>> {

@@ -170,6 +170,7 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
         dialect: options.dialect,
         accept: Accept::All,
         effects: None,
+        estop_inputs: 0,
     })
 }
 

@@ -286,3 +286,11 @@ const FRAGMENTS: [&str; 22] = [
     "= ",
     "]]\n",
 ];
+
+#[test]
+fn emergency_stop_inputs_are_a_list_of_inputs() {
+    assert_eq!(with("estop_inputs = [1, 12]").unwrap().controllers[0].estop_inputs, 0b1000_0000_0001);
+    let faults = with("estop_inputs = [0, 13]").unwrap_err();
+    assert_eq!(faults.len(), 2, "{faults:?}");
+    assert!(faults[0].ends_with("estop_inputs: 0 is outside 1..=12"), "{faults:?}");
+}

@@ -1,13 +1,17 @@
 //! The ack thread: drains replies by a timer, never woken by one, and keeps the books of every frame.
 
+use std::net::SocketAddrV4;
+
 use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
 use super::{Sent, TickReport};
+use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
+use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply};
+use crate::wire::{FrameNo, MotionReply, PerAxis, Report, Status};
 
 /// Everything that was counted.
 #[derive(Debug)]
@@ -16,15 +20,22 @@ pub struct Accounts {
     pub books: Books,
     /// Lateness of every tick that sent, nanoseconds.
     pub lateness: Histogram<u64>,
+    /// What the controllers said of themselves.
+    pub observer: Observer,
     /// Datagrams from nobody we sent to.
     pub strangers: u64,
 }
 
 impl Accounts {
-    /// Empty accounts of that many controllers.
+    /// Empty accounts of these controllers.
     #[must_use]
-    pub fn new(controllers: usize) -> Self {
-        Self { books: Books::new(Tracker::new(controllers)), lateness: histogram(), strangers: 0 }
+    pub fn new(watched: Vec<Watched>) -> Self {
+        Self {
+            books: Books::new(Tracker::new(watched.len())),
+            lateness: histogram(),
+            observer: Observer::new(watched),
+            strangers: 0,
+        }
     }
 
     /// Closes the accounts at `at`: every frame meets its fate. `last` are the controllers' last frames, whose records
@@ -51,8 +62,13 @@ pub struct AckLoop {
 impl AckLoop {
     /// A loop over the replies to what `sent` tells of.
     #[must_use]
-    pub fn new(receiver: Receiver, sent: Consumer<Sent>, ticks: Consumer<TickReport>) -> Self {
-        let accounts = Accounts::new(receiver.lanes());
+    pub fn new(
+        receiver: Receiver,
+        watched: Vec<Watched>,
+        sent: Consumer<Sent>,
+        ticks: Consumer<TickReport>,
+    ) -> Self {
+        let accounts = Accounts::new(watched);
         Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default() }
     }
 
@@ -70,22 +86,26 @@ impl AckLoop {
         self.accounts
     }
 
-    /// Reads all that came: replies to frames go to the books, `other` may take what else a controller sent, and what
-    /// it does not take is stray.
+    /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
+    /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
         let Self { receiver, accounts, sent, ticks, last_sent } = self;
-        let Accounts { books, lateness, strangers } = accounts;
+        let Accounts { books, lateness, observer, strangers } = accounts;
         let began = receiver.drain(|origin, octets, at| {
-            let Origin::Controller(controller) = origin else {
-                *strangers += 1;
-                return;
+            let controller = match origin {
+                Origin::Controller(controller) => controller,
+                Origin::Stranger(from) => {
+                    *strangers += u64::from(!hear_elsewhere(observer, from, octets, at));
+                    return;
+                }
             };
             match MotionReply::parse(octets) {
-                Ok(MotionReply { frame, code, .. }) => {
-                    let reply = Reply { controller, frame, code, at };
+                Ok(reply) => {
+                    observer.on_reply(controller, &reply, at);
+                    let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
                     books.on_reply(reply, |tracker| take_records(sent, tracker, last_sent));
                 }
-                Err(_) if other(controller, octets) => {}
+                Err(_) if hear_report(observer, controller, octets, at) || other(controller, octets) => {}
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
@@ -98,10 +118,34 @@ impl AckLoop {
         }
     }
 
+    /// Notes positions that were read from registers before the tick loop runs.
+    pub fn on_positions(&mut self, controller: usize, positions: PerAxis<Pulses>, at: MonoTime) {
+        self.accounts.observer.on_positions(controller, positions, at);
+    }
+
     /// Notes a frame that is about to be sent before the tick loop runs.
     pub fn on_sent(&mut self, sent: Sent) {
         record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
     }
+}
+
+/// Hears a report that a controller sent unasked; says whether it was one.
+fn hear_report(observer: &mut Observer, controller: usize, octets: &[u8], at: MonoTime) -> bool {
+    if let Ok(status) = Status::parse(octets) {
+        return observer.on_status(controller, &status, at);
+    }
+    let report = Report::parse(octets);
+    report.is_ok_and(|report| {
+        observer.on_report(controller, &report, at);
+        true
+    })
+}
+
+/// Hears a report that came from a port that is no controller's frame port; says whether it was one.
+fn hear_elsewhere(observer: &mut Observer, from: SocketAddrV4, octets: &[u8], at: MonoTime) -> bool {
+    let station = Status::parse(octets).ok().map(|status| status.station);
+    let controller = observer.sender_of_report(*from.ip(), station);
+    controller.is_some_and(|controller| hear_report(observer, controller, octets, at))
 }
 
 fn take_records(sent: &mut Consumer<Sent>, tracker: &mut Tracker, last_sent: &mut MonoTime) {

@@ -1,0 +1,94 @@
+//! The threads of one play: tick, ack and planner, from the first tick to the last reply.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use crate::engine::{Engine, Headroom, Show, TickGrid};
+use crate::fanout::Lane;
+use crate::net::{DrainGrid, Sender};
+use crate::plan::{Course, PlanError};
+use crate::rt::{Accounts, AckLoop, Ended, Mail, PlanLoop, TickLoop};
+use crate::sys::clock::Monotonic;
+use crate::sys::realtime::{self, RealTime};
+use crate::time::{Clock, MonoTime};
+use crate::timeline::Timeline;
+
+/// From the end of preparing to tick 0: time to start the other threads.
+const RUN_UP: Duration = Duration::from_millis(20);
+
+/// What the threads of a play share out among themselves.
+pub(super) struct Stage {
+    pub(super) show: Show,
+    pub(super) timeline: Arc<Timeline>,
+    pub(super) headroom: Headroom,
+    pub(super) lanes: Vec<Lane>,
+    pub(super) course: Box<Course>,
+    pub(super) sender: Sender,
+}
+
+/// What the threads of a play came back with.
+pub(super) struct Run {
+    pub(super) ended: Ended,
+    pub(super) accounts: Accounts,
+    pub(super) granted: RealTime,
+    pub(super) refusals: Vec<PlanError>,
+    pub(super) cue: String,
+    /// The instant of tick 0.
+    pub(super) origin: MonoTime,
+    /// The instant at which the accounts were closed.
+    pub(super) closed_at: MonoTime,
+}
+
+impl Run {
+    /// Seconds from tick 0, below zero before it.
+    pub(super) fn seconds_from_origin(&self, at: MonoTime) -> f64 {
+        at.since(self.origin).as_secs_f64() - self.origin.since(at).as_secs_f64()
+    }
+}
+
+impl Stage {
+    /// The calling thread becomes the tick thread. Everything it touches has been made by now, so that memory can be
+    /// locked; the threads started after it are ordinary ones.
+    pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, mut mail: Mail, stop: &AtomicBool) -> Run {
+        let cue = self.timeline.cue().path().display().to_string();
+        let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
+        let granted = realtime::request();
+        thread::scope(|scope| {
+            let origin = Monotonic.now() + RUN_UP;
+            let drains = DrainGrid::new(origin, self.show.rate.period());
+            let sent_all = &sent_all;
+            let ack_thread = scope.spawn(move || {
+                let _ = realtime::normal_priority();
+                acks.run(&Monotonic, drains, || sent_all.load(Ordering::Acquire))
+            });
+            let plan_thread = scope.spawn(|| {
+                let _ = realtime::normal_priority();
+                plans.run(&done)
+            });
+            mail.wakes(plan_thread.thread().clone());
+            let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
+            let grid = TickGrid::new(origin, self.show.rate);
+            let engine = Engine::new(self.show, self.timeline, self.headroom, windows, self.course);
+            let mut ticks = TickLoop {
+                clock: &Monotonic,
+                grid,
+                engine,
+                lanes: self.lanes,
+                sink: self.sender,
+                mail,
+                stop,
+            };
+            let ended = ticks.run();
+            sent_all.store(true, Ordering::Release);
+            done.store(true, Ordering::Release);
+            plan_thread.thread().unpark();
+            let refusals = plan_thread.join().expect("the planner does not panic");
+            let mut accounts = ack_thread.join().expect("the ack thread does not panic");
+            let closed_at = Monotonic.now();
+            accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
+            Run { ended, accounts, granted, refusals, cue, origin, closed_at }
+        })
+    }
+}

@@ -1,0 +1,90 @@
+//! What a play comes to: the report, and what a person should hear beside it.
+
+use super::play::Played;
+use super::prepare::Prepared;
+use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
+use super::stage::Run;
+use crate::config::Controller;
+use crate::engine::{Ending, Show};
+
+/// Sums up a play of these controllers, whose accounts are closed; `silent` where no frame asked for a reply.
+pub(super) fn sum_up(
+    controllers: &[Controller],
+    show: &Show,
+    silent: bool,
+    prepared: &Prepared,
+    run: &Run,
+) -> Played {
+    let events = run.accounts.observer.events().map(|event| EventReport {
+        controller: controllers[event.controller].name.clone(),
+        at_s: run.seconds_from_origin(event.at),
+        what: event.what.to_string(),
+    });
+    let report = Report {
+        cue: run.cue.clone(),
+        result: match run.ended.ending {
+            Ending::Completed => "completed",
+            Ending::Stopped => "stopped",
+            Ending::Fault => "fault",
+        },
+        ticks: run.ended.ticks,
+        missed_ticks: run.ended.missed,
+        rate_hz: show.rate.hz(),
+        lateness_us: LatencyReport::of(&run.accounts.lateness),
+        realtime: RealTimeReport::from(&run.granted),
+        strangers: run.accounts.strangers,
+        controllers: (0..controllers.len())
+            .map(|index| entry(index, &controllers[index], prepared, run))
+            .collect(),
+        events: events.collect(),
+    };
+    let tracker = run.accounts.books.tracker();
+    let lost = (0..controllers.len()).filter(|&index| !silent && tracker.lost_at_end(index));
+    Played {
+        report,
+        refusals: run.granted.refusals.clone(),
+        notes: notes(controllers, prepared, run),
+        silent: lost.map(|index| controllers[index].name.clone()).collect(),
+    }
+}
+
+fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) -> ControllerReport {
+    let tracker = run.accounts.books.tracker();
+    let counts = tracker.counts(index);
+    ControllerReport {
+        name: controller.name.clone(),
+        address: controller.address.to_string(),
+        sent: counts.sent,
+        asked: counts.asked,
+        acked: counts.acked,
+        refused: counts.refused(),
+        lost: counts.lost,
+        homing: prepared.homing[index],
+        duplicate: counts.duplicate,
+        stale: counts.stale,
+        stray: counts.stray,
+        send_failed: counts.send_failed,
+        port_closed: counts.port_closed,
+        ack_us: LatencyReport::of(tracker.latency(index)),
+        state: StateReport::of(&run.accounts.observer.states()[index], run.closed_at),
+    }
+}
+
+fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<String> {
+    let mut notes: Vec<String> = run.refusals.iter().map(ToString::to_string).collect();
+    notes.extend(prepared.hurried.iter().map(|&index| {
+        let stroke = controllers[index].seat.stroke_mm;
+        let name = &controllers[index].name;
+        format!(
+            "{name}: its stroke of {stroke} mm was crossed in 3 s at the most (PA0b), so its way to park may have been \
+             faster than 50 mm/s"
+        )
+    }));
+    if run.ended.unposted > 0 {
+        notes.push(format!(
+            "{} records found no room and were inferred from frame numbers",
+            run.ended.unposted
+        ));
+    }
+    notes
+}

@@ -1,0 +1,70 @@
+//! What happened to a controller, as far as it tells.
+
+use std::fmt;
+
+use crate::time::MonoTime;
+use crate::wire::DeviceError;
+
+/// Something that happened to a controller, with the instant at which the kernel received word of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Event {
+    /// Which controller, counted from 0 in the order of the lanes.
+    pub controller: usize,
+    /// When.
+    pub at: MonoTime,
+    /// What.
+    pub what: What,
+}
+
+/// How an emergency stop showed first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// A reply with x = 4.
+    Reply,
+    /// One of the inputs that the configuration names.
+    Inputs,
+}
+
+/// What can happen to a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum What {
+    /// An emergency stop is in effect.
+    EmergencyStop {
+        /// How it showed first.
+        cause: Cause,
+    },
+    /// No sign of an emergency stop is left.
+    EmergencyStopOver,
+    /// The controller's error number changed; 0 is none.
+    Error(u16),
+    /// A drive's error number changed.
+    ServoError {
+        /// Its axis, from 1.
+        axis: usize,
+        /// The number; 0 is none.
+        error: u16,
+    },
+    /// It reported registers unasked (0x1001).
+    Report {
+        /// The first of them.
+        start: u16,
+        /// What stands in it.
+        first: u16,
+    },
+}
+
+impl fmt::Display for What {
+    /// A sentence part for people.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::EmergencyStop { cause: Cause::Reply } => f.write_str("emergency stop in effect (x = 4)"),
+            Self::EmergencyStop { cause: Cause::Inputs } => f.write_str("emergency stop in effect (inputs)"),
+            Self::EmergencyStopOver => f.write_str("emergency stop over"),
+            Self::Error(0) => f.write_str("error gone"),
+            Self::Error(error) => write!(f, "{}", DeviceError(error)),
+            Self::ServoError { axis, error: 0 } => write!(f, "drive of axis {axis}: error gone"),
+            Self::ServoError { axis, error } => write!(f, "drive of axis {axis}: error {error}"),
+            Self::Report { start, first } => write!(f, "report of register {start:02x}: {first:#06x}"),
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! What the controllers say of themselves: the last known state of each, how old it is, and what happened to them.
+//! Ack thread; told of messages and of the time; its memory is made at the start.
+//!
+//! One structure that the report, the API and the console read alike.
+
+mod event;
+mod state;
+
+pub use event::{Cause, Event, What};
+pub use state::{ControllerState, Heard};
+
+use std::collections::VecDeque;
+use std::net::{Ipv4Addr, SocketAddrV4};
+
+use crate::motion::Pulses;
+use crate::time::MonoTime;
+use crate::wire::{Code, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status};
+
+/// Events that are kept; of more the oldest go.
+const EVENTS_KEPT: usize = 1_000;
+
+/// What has to be known of a controller to understand it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Watched {
+    /// Where it is; the last two octets of the address are its control ID (PA12, PA13).
+    pub address: SocketAddrV4,
+    /// Its message set.
+    pub dialect: Dialect,
+    /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where none does.
+    pub estop_inputs: u16,
+}
+
+impl Watched {
+    fn station(&self) -> Code {
+        Code::station(self.address.ip().octets())
+    }
+}
+
+/// The states of all controllers, counted from 0 in the order of their lanes, and the events that led to them.
+#[derive(Debug)]
+pub struct Observer {
+    watched: Vec<Watched>,
+    states: Vec<ControllerState>,
+    events: VecDeque<Event>,
+    /// Events that are no longer kept.
+    forgotten: u64,
+}
+
+impl Observer {
+    /// Nothing known yet of these controllers.
+    #[must_use]
+    pub fn new(watched: Vec<Watched>) -> Self {
+        Self {
+            states: vec![ControllerState::default(); watched.len()],
+            events: VecDeque::with_capacity(EVENTS_KEPT),
+            forgotten: 0,
+            watched,
+        }
+    }
+
+    /// The last known states.
+    #[must_use]
+    pub fn states(&self) -> &[ControllerState] {
+        &self.states
+    }
+
+    /// What happened, oldest first; the last [`EVENTS_KEPT`] of it.
+    pub fn events(&self) -> impl Iterator<Item = &Event> {
+        self.events.iter()
+    }
+
+    /// Events that are no longer kept.
+    #[must_use]
+    pub const fn forgotten(&self) -> u64 {
+        self.forgotten
+    }
+
+    /// Hears a reply to a motion frame.
+    pub fn on_reply(&mut self, controller: usize, reply: &MotionReply, at: MonoTime) {
+        let watched = self.watched[controller];
+        let state = &mut self.states[controller];
+        state.reply = Some(Heard { value: reply.code, at });
+        state.echoed = Some(Heard { value: reply.positions, at });
+        // An MBOX controller says with x = 4 that a frame was too short, and has no error numbers in motion replies.
+        let smc = watched.dialect == Dialect::Smc;
+        let stopped = smc && reply.code == ReplyCode::EmergencyStop;
+        self.note_stop(controller, Cause::Reply, stopped, at);
+        if smc && reply.code != ReplyCode::Running {
+            self.states[controller].error_by_reply = true;
+            self.note_error(controller, reply.error, at);
+        } else if std::mem::take(&mut self.states[controller].error_by_reply) {
+            self.note_error(controller, 0, at);
+        }
+        self.note_inputs(controller, reply.inputs, at);
+    }
+
+    /// Hears a status report; one of another station is not taken. Says whether it was.
+    pub fn on_status(&mut self, controller: usize, status: &Status, at: MonoTime) -> bool {
+        if status.station != self.watched[controller].station() {
+            return false;
+        }
+        let state = &mut self.states[controller];
+        state.reports += 1;
+        state.outputs = Some(Heard { value: status.outputs, at });
+        state.forces = Some(Heard { value: status.forces, at });
+        let before = state.servo_errors.replace(Heard { value: status.servo_errors, at });
+        for (axis, error) in status.servo_errors.iter().enumerate() {
+            let known = before.and_then(|before| before.value.get(axis).copied()).unwrap_or(0);
+            if *error != known {
+                self.happened(controller, at, What::ServoError { axis: axis + 1, error: *error });
+            }
+        }
+        self.note_error(controller, status.error, at);
+        self.note_inputs(controller, status.inputs, at);
+        self.on_positions(controller, status.positions, at);
+        true
+    }
+
+    /// Hears registers that an IMAX or MBOX controller reports unasked.
+    pub fn on_report(&mut self, controller: usize, report: &Report<'_>, at: MonoTime) {
+        let state = &mut self.states[controller];
+        state.reports += 1;
+        state.heard_at = Some(at);
+        let first = report.data.get(0).unwrap_or(0);
+        self.happened(controller, at, What::Report { start: report.start, first });
+    }
+
+    /// Hears positions that were measured: position registers, or a status report.
+    pub fn on_positions(&mut self, controller: usize, positions: PerAxis<Pulses>, at: MonoTime) {
+        let state = &mut self.states[controller];
+        state.measured = Some(Heard { value: positions, at });
+        state.heard_at = Some(at);
+    }
+
+    /// Which controller sent a report from a port that is none of the frame ports: the one at that address, where there
+    /// are several the one whose control ID it says. None where that leaves it open.
+    #[must_use]
+    pub fn sender_of_report(&self, from: Ipv4Addr, station: Option<Code>) -> Option<usize> {
+        let may_be =
+            |one: &Watched| *one.address.ip() == from && station.is_none_or(|it| it == one.station());
+        let mut found =
+            self.watched.iter().enumerate().filter(|(_, one)| may_be(one)).map(|(index, _)| index);
+        let controller = found.next()?;
+        found.next().is_none().then_some(controller)
+    }
+
+    fn note_inputs(&mut self, controller: usize, inputs: u16, at: MonoTime) {
+        let state = &mut self.states[controller];
+        state.heard_at = Some(at);
+        state.inputs = Some(Heard { value: inputs, at });
+        let pressed = inputs & self.watched[controller].estop_inputs;
+        self.note_stop(controller, Cause::Inputs, pressed != 0, at);
+    }
+
+    /// An emergency stop begins with the first of its signs and is over with the last.
+    fn note_stop(&mut self, controller: usize, cause: Cause, active: bool, at: MonoTime) {
+        let state = &mut self.states[controller];
+        let before = state.emergency_stop();
+        match cause {
+            Cause::Reply => state.stopped_by_reply = active,
+            Cause::Inputs => state.stopped_by_inputs = active,
+        }
+        match (before, state.emergency_stop()) {
+            (false, true) => self.happened(controller, at, What::EmergencyStop { cause }),
+            (true, false) => self.happened(controller, at, What::EmergencyStopOver),
+            _ => {}
+        }
+    }
+
+    fn note_error(&mut self, controller: usize, error: u16, at: MonoTime) {
+        let before = self.states[controller].error.replace(Heard { value: error, at });
+        if before.map_or(0, |before| before.value) != error {
+            self.happened(controller, at, What::Error(error));
+        }
+    }
+
+    fn happened(&mut self, controller: usize, at: MonoTime, what: What) {
+        if self.events.len() == EVENTS_KEPT {
+            self.events.pop_front();
+            self.forgotten += 1;
+        }
+        self.events.push_back(Event { controller, at, what });
+    }
+}
+
+#[cfg(test)]
+mod tests;

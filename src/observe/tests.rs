@@ -1,0 +1,168 @@
+use super::*;
+use crate::wire::{FrameNo, Timing, Words};
+
+const X01: u16 = 0b0001;
+const STATION: Code = Code(0x0fc9);
+
+fn at(ms: u64) -> MonoTime {
+    MonoTime::from_nanos(ms * 1_000_000)
+}
+
+fn observer(dialect: Dialect) -> Observer {
+    Observer::new(vec![Watched {
+        address: "192.168.15.201:7408".parse().unwrap(),
+        dialect,
+        estop_inputs: X01,
+    }])
+}
+
+fn reply(code: ReplyCode, error: u16, inputs: u16) -> MotionReply {
+    MotionReply {
+        timing: Timing::Relative,
+        code,
+        channel: 0,
+        error,
+        frame: FrameNo::FIRST,
+        time_ms: 10,
+        positions: PerAxis::new(&[Pulses(7); 3]),
+        inputs,
+        extend: 0,
+        vibration: None,
+    }
+}
+
+fn status(station: Code, error: u16, servo_errors: [u16; 3]) -> Status {
+    Status {
+        station,
+        positions: PerAxis::new(&[Pulses(100), Pulses(200), Pulses(300)]),
+        forces: PerAxis::new(&[1, -2, 3]),
+        servo_errors: PerAxis::new(&servo_errors),
+        error,
+        outputs: 0b11,
+        inputs: 0,
+    }
+}
+
+fn happened(observer: &Observer) -> Vec<(u64, String)> {
+    observer.events().map(|event| (event.at.as_nanos() / 1_000_000, event.what.to_string())).collect()
+}
+
+#[test]
+fn an_emergency_stop_is_one_event_however_many_replies_say_so() {
+    let mut observer = observer(Dialect::Smc);
+    for ms in 0..5 {
+        observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 0, 0), at(ms));
+    }
+    assert!(observer.states()[0].emergency_stop());
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(9));
+    assert!(!observer.states()[0].emergency_stop());
+    let words = ["emergency stop in effect (x = 4)", "emergency stop over"].map(str::to_owned);
+    assert_eq!(happened(&observer), [(0, words[0].clone()), (9, words[1].clone())]);
+}
+
+#[test]
+fn a_configured_input_means_an_emergency_stop_until_its_last_sign_is_gone() {
+    let mut observer = observer(Dialect::Smc);
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, X01), at(1));
+    observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 0, X01), at(2));
+    observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 0, 0), at(3));
+    assert!(observer.states()[0].emergency_stop(), "the replies still say so");
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(4));
+    let words: Vec<u64> = happened(&observer).into_iter().map(|(ms, _)| ms).collect();
+    assert_eq!(words, [1, 4]);
+}
+
+#[test]
+fn other_inputs_mean_nothing() {
+    let mut observer = observer(Dialect::Smc);
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, !X01), at(1));
+    assert!(!observer.states()[0].emergency_stop() && happened(&observer).is_empty());
+}
+
+#[test]
+fn on_mbox_x_4_is_no_emergency_stop() {
+    let mut observer = observer(Dialect::Mbox);
+    observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 17, 0), at(1));
+    assert!(!observer.states()[0].emergency_stop() && happened(&observer).is_empty());
+}
+
+#[test]
+fn a_status_report_is_measured_and_a_reply_only_echoes() {
+    let mut observer = observer(Dialect::Smc);
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(1));
+    assert_eq!(observer.states()[0].measured, None);
+    assert!(observer.on_status(0, &status(STATION, 0, [0; 3]), at(2)));
+    let state = &observer.states()[0];
+    assert_eq!(state.measured.unwrap().value[..], [Pulses(100), Pulses(200), Pulses(300)]);
+    assert_eq!(state.echoed.unwrap().value[..], [Pulses(7); 3]);
+    assert_eq!((state.outputs.unwrap().value, state.reports), (0b11, 1));
+    assert_eq!(state.measured.unwrap().age(at(7)), std::time::Duration::from_millis(5));
+}
+
+#[test]
+fn a_report_of_another_station_is_not_taken() {
+    let mut observer = observer(Dialect::Smc);
+    assert!(!observer.on_status(0, &status(Code(0x0fca), 12, [0; 3]), at(2)));
+    assert_eq!(observer.states()[0], ControllerState::default());
+}
+
+#[test]
+fn errors_come_and_go_as_events_in_words() {
+    let mut observer = observer(Dialect::Smc);
+    observer.on_status(0, &status(STATION, 12, [0, 33, 0]), at(1));
+    observer.on_status(0, &status(STATION, 12, [0, 33, 0]), at(2));
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(3));
+    observer.on_status(0, &status(STATION, 0, [0; 3]), at(4));
+    observer.on_reply(0, &reply(ReplyCode::Fault, 21, 0), at(5));
+    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(6));
+    let expected = [
+        (1, "drive of axis 2: error 33"),
+        (1, "Err12: alarm of the servo of axis 3"),
+        (4, "drive of axis 2: error gone"),
+        (4, "error gone"),
+        (5, "Err21: UDP data buffer overflow; needs a reset"),
+        (6, "error gone"),
+    ];
+    assert_eq!(happened(&observer), expected.map(|(ms, words)| (ms, words.to_owned())));
+}
+
+#[test]
+fn a_report_of_registers_is_an_event() {
+    let mut observer = observer(Dialect::Mbox);
+    let data = [0x0011];
+    let report = Report {
+        channel: 0,
+        accept: Code::NONE,
+        reply: Code::NONE,
+        start: 0xfe,
+        data: Words::from(&data[..]),
+    };
+    observer.on_report(0, &report, at(5));
+    assert_eq!(happened(&observer), [(5, "report of register fe: 0x0011".to_owned())]);
+}
+
+#[test]
+fn of_too_many_events_the_oldest_go_and_are_counted() {
+    let mut observer = observer(Dialect::Smc);
+    for ms in 0..1_001 {
+        let code = if ms % 2 == 0 { ReplyCode::EmergencyStop } else { ReplyCode::Running };
+        observer.on_reply(0, &reply(code, 0, 0), at(ms));
+    }
+    assert_eq!((observer.events().count(), observer.forgotten()), (1_000, 1));
+}
+
+#[test]
+fn a_report_from_another_port_is_its_senders_unless_two_could_have_sent_it() {
+    let watched = |host: u8, port: u16| Watched {
+        address: SocketAddrV4::new(Ipv4Addr::new(192, 168, 15, host), port),
+        dialect: Dialect::Smc,
+        estop_inputs: 0,
+    };
+    let observer =
+        Observer::new(vec![watched(201, 7408), watched(202, 7408), watched(203, 1), watched(203, 2)]);
+    let sender = |host: u8, station| observer.sender_of_report(Ipv4Addr::new(192, 168, 15, host), station);
+    assert_eq!(sender(202, Some(Code(0x0fca))), Some(1));
+    assert_eq!(sender(202, None), Some(1));
+    assert_eq!(sender(202, Some(Code(0x0fc9))), None, "it says that it is another");
+    assert_eq!((sender(203, Some(Code(0x0fcb))), sender(99, None)), (None, None));
+}
