@@ -191,7 +191,7 @@ impl Clock for Drains<'_> {
 fn answer(peer: &UdpSocket, pace: &Pace) {
     let (mut octets, mut buf) = ([0; MAX_LEN], [0; MAX_LEN]);
     loop {
-        let (len, from) = peer.recv_from(&mut octets).unwrap();
+        let (len, from) = peer.recv_from(&mut octets).expect("loopback works");
         let Ok(frame) = MotionRequest::parse(&octets[..len]) else { return };
         let MotionRequest { timing, channel, frame, time_ms, positions, extend, vibration, .. } = frame;
         let code = ReplyCode::Running;
@@ -207,7 +207,7 @@ fn answer(peer: &UdpSocket, pace: &Pace) {
             extend,
             vibration,
         };
-        peer.send_to(reply.emit(&mut buf), from).unwrap();
+        peer.send_to(reply.emit(&mut buf), from).expect("loopback works");
         pace.answered.fetch_add(1, Ordering::AcqRel);
     }
 }
