@@ -125,6 +125,7 @@ impl Play {
             retired,
         };
         let stage = Stage {
+            silent: self.manner.silent,
             show: self.show.clone(),
             timeline: self.timeline,
             headroom: self.headroom,
@@ -151,6 +152,8 @@ fn fit_strokes(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
 
 /// What the threads of a play share out among themselves.
 struct Stage {
+    /// Whether no replies are to come.
+    silent: bool,
     show: Show,
     timeline: Arc<Timeline>,
     headroom: Headroom,
@@ -176,7 +179,9 @@ impl Stage {
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
-            let drains = DrainGrid::new(origin, self.show.rate.period());
+            let period = self.show.rate.period();
+            let drains =
+                if self.silent { DrainGrid::rare(origin, period) } else { DrainGrid::new(origin, period) };
             let sent_all = &sent_all;
             let ack_thread = scope.spawn(move || {
                 let _ = realtime::normal_priority();
