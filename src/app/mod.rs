@@ -4,7 +4,9 @@ mod play;
 mod prepare;
 mod report;
 mod stage;
+mod staged;
 mod sum_up;
 
 pub use play::{Play, PlayError, Played};
 pub use report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
+pub use staged::Staged;

@@ -8,18 +8,19 @@ use std::time::Duration;
 use super::prepare::Preparation;
 use super::report::Report;
 use super::stage::Stage;
+use super::staged::Staged;
 use super::sum_up::sum_up;
-use crate::config::{Config, Controller, Misfit};
+use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
-use crate::engine::{Headroom, Show};
-use crate::fanout::{Lane, Manner, lanes};
+use crate::engine::Show;
+use crate::fanout::Manner;
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
-use crate::plan::{Course, Curve, From, PlanError, Planner, Request, To};
+use crate::plan::PlanError;
 use crate::rt::{AckLoop, Live, MailEnds, PlanLoop, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
-use crate::timeline::{Hint, Timeline};
+use crate::timeline::Timeline;
 
 /// Why nothing was played. Nothing has moved then.
 #[derive(Debug, thiserror::Error)]
@@ -53,13 +54,8 @@ fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
 #[derive(Debug)]
 pub struct Play {
     config: Config,
-    timeline: Arc<Timeline>,
-    show: Show,
     manner: Manner,
-    lanes: Vec<Lane>,
-    headroom: Headroom,
-    planner: Planner,
-    course: Box<Course>,
+    staged: Staged,
 }
 
 /// What came of a play.
@@ -82,21 +78,15 @@ impl Play {
     /// Everything that [`PlayError`] names but the network.
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
-        let lanes = lanes(&config, &timeline, manner);
-        let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
-        let pose = |at| timeline.sample(at, &mut Hint::default());
-        let curve = Curve { pose: &pose, end: timeline.duration() };
-        let mut planner = Planner::new(windows.clone(), show.rate.hz());
-        let request = Request { from: From::Park, to: To::Cue, start: show.start, serial: 1 };
-        let course = Box::new(planner.plan(request, &curve).map_err(PlayError::Plan)?);
-        let headroom = Headroom::measure(&windows, &curve, show.rate);
-        Ok(Self { config, timeline: Arc::new(timeline), show, manner, lanes, headroom, planner, course })
+        let staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        Ok(Self { config, manner, staged })
     }
 
     /// How long the first move onto the cue takes.
     #[must_use]
     pub fn join(&self) -> Duration {
-        let span = self.course.settled().as_nanos() - self.course.start.as_nanos();
+        let course = &self.staged.course;
+        let span = course.settled().as_nanos() - course.start.as_nanos();
         Duration::from_nanos(span.unsigned_abs())
     }
 
@@ -112,36 +102,26 @@ impl Play {
         let _ = realtime::raise_open_files();
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
-        let (mail, ends) = mailboxes(self.lanes.len(), self.show.rate, live);
+        let show = self.staged.show.clone();
+        let (mail, ends) = mailboxes(self.staged.lanes.len(), show.rate, live);
         let MailEnds { sent, ticks, requests, answers, retired } = ends;
-        let watched = self.config.controllers.iter().map(watched).collect();
+        let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, sent, ticks);
         let prepared = Preparation {
             clock: &Monotonic,
             sender: &sender,
             acks: &mut acks,
             controllers: &self.config.controllers,
-            lanes: &mut self.lanes,
+            lanes: &mut self.staged.lanes,
             stop,
         }
         .run(!self.manner.silent);
-        let plans = PlanLoop {
-            planner: self.planner,
-            timeline: Arc::clone(&self.timeline),
-            requests,
-            answers,
-            retired,
-        };
-        let stage = Stage {
-            show: self.show.clone(),
-            timeline: self.timeline,
-            headroom: self.headroom,
-            lanes: self.lanes,
-            course: self.course,
-            sender,
-        };
-        let run = stage.run(acks, plans, mail, stop);
-        Ok(sum_up(&self.config.controllers, &self.show, self.manner.silent, &prepared, &run))
+        let (engine, lanes, planner, timeline) = self.staged.split();
+        let cue = timeline.cue().path().display().to_string();
+        let plans = PlanLoop { planner, timeline, requests, answers, retired };
+        let stage = Stage { silent: self.manner.silent, rate: show.rate, engine, lanes, sender, mail };
+        let run = stage.run(acks, plans, stop);
+        Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
     }
 }
 
@@ -153,12 +133,4 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
         return Err(PlayError::Misfit { cue: timeline.cue().path().to_path_buf(), misfits });
     }
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
-}
-
-fn watched(controller: &Controller) -> Watched {
-    Watched {
-        address: controller.address,
-        dialect: controller.dialect,
-        estop_inputs: controller.estop_inputs,
-    }
 }

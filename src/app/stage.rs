@@ -1,31 +1,30 @@
 //! The threads of one play: tick, ack and planner, from the first tick to the last reply.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crate::engine::{Engine, Headroom, Show, TickGrid};
+use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
-use crate::plan::{Course, PlanError};
+use crate::plan::PlanError;
 use crate::rt::{Accounts, AckLoop, Ended, Mail, PlanLoop, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime};
-use crate::timeline::Timeline;
 
 /// From the end of preparing to tick 0: time to start the other threads.
 const RUN_UP: Duration = Duration::from_millis(20);
 
 /// What the threads of a play share out among themselves.
 pub(super) struct Stage {
-    pub(super) show: Show,
-    pub(super) timeline: Arc<Timeline>,
-    pub(super) headroom: Headroom,
+    /// Whether no replies are to come.
+    pub(super) silent: bool,
+    pub(super) rate: Rate,
+    pub(super) engine: Engine,
     pub(super) lanes: Vec<Lane>,
-    pub(super) course: Box<Course>,
     pub(super) sender: Sender,
+    pub(super) mail: Mail,
 }
 
 /// What the threads of a play came back with.
@@ -34,7 +33,6 @@ pub(super) struct Run {
     pub(super) accounts: Accounts,
     pub(super) granted: RealTime,
     pub(super) refusals: Vec<PlanError>,
-    pub(super) cue: String,
     /// The instant of tick 0.
     pub(super) origin: MonoTime,
     /// The instant at which the accounts were closed.
@@ -51,13 +49,15 @@ impl Run {
 impl Stage {
     /// The calling thread becomes the tick thread. Everything it touches has been made by now, so that memory can be
     /// locked; the threads started after it are ordinary ones.
-    pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, mut mail: Mail, stop: &AtomicBool) -> Run {
-        let cue = self.timeline.cue().path().display().to_string();
+    pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, stop: &AtomicBool) -> Run {
+        let Self { silent, rate, engine, lanes, sender, mut mail } = self;
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
         let granted = realtime::request();
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
-            let drains = DrainGrid::new(origin, self.show.rate.period());
+            let period = rate.period();
+            let drains =
+                if silent { DrainGrid::rare(origin, period) } else { DrainGrid::new(origin, period) };
             let sent_all = &sent_all;
             let ack_thread = scope.spawn(move || {
                 let _ = realtime::normal_priority();
@@ -68,18 +68,8 @@ impl Stage {
                 plans.run(&done)
             });
             mail.wakes(plan_thread.thread().clone());
-            let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
-            let grid = TickGrid::new(origin, self.show.rate);
-            let engine = Engine::new(self.show, self.timeline, self.headroom, windows, self.course);
-            let mut ticks = TickLoop {
-                clock: &Monotonic,
-                grid,
-                engine,
-                lanes: self.lanes,
-                sink: self.sender,
-                mail,
-                stop,
-            };
+            let grid = TickGrid::new(origin, rate);
+            let mut ticks = TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, stop };
             let ended = ticks.run();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);
@@ -88,7 +78,7 @@ impl Stage {
             let mut accounts = ack_thread.join().expect("the ack thread does not panic");
             let closed_at = Monotonic.now();
             accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-            Run { ended, accounts, granted, refusals, cue, origin, closed_at }
+            Run { ended, accounts, granted, refusals, origin, closed_at }
         })
     }
 }

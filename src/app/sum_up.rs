@@ -9,6 +9,7 @@ use crate::engine::{Ending, Show};
 
 /// Sums up a play of these controllers, whose accounts are closed; `silent` where no frame asked for a reply.
 pub(super) fn sum_up(
+    cue: String,
     controllers: &[Controller],
     show: &Show,
     silent: bool,
@@ -21,7 +22,7 @@ pub(super) fn sum_up(
         what: event.what.to_string(),
     });
     let report = Report {
-        cue: run.cue.clone(),
+        cue,
         result: match run.ended.ending {
             Ending::Completed => "completed",
             Ending::Stopped => "stopped",

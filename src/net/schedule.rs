@@ -6,6 +6,8 @@ use crate::time::{MonoTime, nanos};
 
 /// The longest time between two drains.
 const LONGEST: Duration = Duration::from_millis(5);
+/// About how long a show that asks for no replies leaves between two drains; its records wait for two seconds.
+const RARE: Duration = Duration::from_millis(100);
 
 /// The instants at which replies are drained.
 ///
@@ -28,6 +30,19 @@ impl DrainGrid {
         assert!(!period.is_zero(), "ticks have a period");
         let parts = nanos(period).div_ceil(nanos(LONGEST));
         Self { origin, period_ns: i128::from(nanos(period)), parts: i128::from(parts) }
+    }
+
+    /// Drains of a show that asks for no replies: rare, and in the middle between two ticks as well.
+    ///
+    /// # Panics
+    /// If the period is zero.
+    #[must_use]
+    pub fn rare(origin: MonoTime, period: Duration) -> Self {
+        assert!(!period.is_zero(), "ticks have a period");
+        let period_ns = i128::from(nanos(period));
+        // The middle of an odd number of periods is the middle of one.
+        let odd = i128::from(nanos(RARE)).div_euclid(period_ns) | 1;
+        Self { origin, period_ns: odd * period_ns, parts: 1 }
     }
 
     /// The first drain later than `now`.
@@ -73,6 +88,14 @@ mod tests {
         assert_eq!(drains(grid, us(0), 4), [2_500, 7_500, 12_500, 17_500]);
         let grid = DrainGrid::new(us(0), Duration::from_nanos(16_666_667));
         assert_eq!(drains(grid, us(0), 5), [2_083, 6_250, 10_416, 14_583, 18_750]);
+    }
+
+    #[test]
+    fn without_replies_drains_are_rare_and_still_off_the_ticks() {
+        let millis = |ms| DrainGrid::rare(us(0), Duration::from_millis(ms));
+        assert_eq!(drains(millis(1), us(0), 2), [50_500, 151_500]);
+        assert_eq!(drains(millis(10), us(0), 2), [55_000, 165_000]);
+        assert_eq!(drains(millis(1_000), us(0), 2), [500_000, 1_500_000]);
     }
 
     #[test]

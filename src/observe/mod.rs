@@ -12,6 +12,7 @@ pub use state::{ControllerState, Heard};
 use std::collections::VecDeque;
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use crate::config::Controller;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{Code, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status};
@@ -31,6 +32,16 @@ pub struct Watched {
 }
 
 impl Watched {
+    /// What the configuration says of a controller.
+    #[must_use]
+    pub fn of(controller: &Controller) -> Self {
+        Self {
+            address: controller.address,
+            dialect: controller.dialect,
+            estop_inputs: controller.estop_inputs,
+        }
+    }
+
     fn station(&self) -> Code {
         Code::station(self.address.ip().octets())
     }

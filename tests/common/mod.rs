@@ -9,16 +9,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use kinocue::app::Staged;
 use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
-use kinocue::engine::{Engine, Headroom, Rate, Show, TickGrid};
-use kinocue::fanout::{Manner, lanes};
+use kinocue::engine::{Rate, Show, TickGrid};
+use kinocue::fanout::Manner;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
-use kinocue::plan::{Curve, From, Planner, Request, To};
 use kinocue::rt::{Ended, FrameSink, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
 use kinocue::time::{Clock, MonoTime, ShowTime};
-use kinocue::timeline::{Hint, Timeline};
+use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
 
 /// Something that happens at a tick.
@@ -85,24 +85,17 @@ impl Virtual {
 
     /// Plays it to its end.
     pub fn play(&self) -> Played {
-        let timeline = Arc::new(self.timeline());
         let rate = Rate::from_hz(self.rate_hz);
         let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
-        let lanes = lanes(&self.config(), &timeline, Manner { level: self.level, silent: false });
-        let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
-        let pose = |at| timeline.sample(at, &mut Hint::default());
-        let curve = Curve { pose: &pose, end: timeline.duration() };
-        let mut planner = Planner::new(windows.clone(), rate.hz());
-        let request = Request { from: From::Park, to: To::Cue, start: self.start, serial: 1 };
-        let course = Box::new(planner.plan(request, &curve).expect("there is a join"));
-        let join = ShowTime::from_nanos(course.settled().as_nanos() - self.start.as_nanos());
-        let headroom = Headroom::measure(&windows, &curve, rate);
+        let manner = Manner { level: self.level, silent: false };
+        let staged = Staged::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
+        let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
+        let (engine, lanes, planner, timeline) = staged.split();
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
         let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired } = ends;
         let plans = PlanLoop { planner, timeline: Arc::clone(&timeline), requests, answers, retired };
         let stop = AtomicBool::new(false);
         let clock = Stage::new(plans, &stop, &self.script, self.at_most);
-        let engine = Engine::new(show, Arc::clone(&timeline), headroom, windows, course);
         let grid = TickGrid::new(clock.now(), rate);
         let sink = Link { now: &clock.now, frames: Vec::new() };
         let mut tick_loop = TickLoop { clock: &clock, grid, engine, lanes, sink, mail, stop: &stop };

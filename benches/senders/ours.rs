@@ -1,0 +1,111 @@
+//! kinocue's own sender: engine, lanes, mailboxes, sockets, tick loop and ack loop, on the threads that `kinocue play`
+//! has.
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use kinocue::engine::TickGrid;
+use kinocue::fanout::Lane;
+use kinocue::net::{DrainGrid, Ports, Sender};
+use kinocue::rt::{Accounts, AckLoop, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::sys::clock::{Monotonic, thread_cpu_time};
+use kinocue::sys::realtime::{RealTime, normal_priority, request};
+use kinocue::time::Clock as _;
+use kinocue::tracker::histogram;
+
+use super::outcome::{Outcome, Quantiles, each};
+use crate::common::stage::{ride, stage};
+
+/// From here to tick 0: time to start the threads.
+const RUN_UP: Duration = Duration::from_millis(20);
+
+/// What the threads found.
+struct Run {
+    ticks: u64,
+    missed: u64,
+    accounts: Accounts,
+    send_time: Duration,
+    receive_time: Duration,
+    granted: RealTime,
+}
+
+/// Plays a ride of that many seconds.
+pub(crate) fn run(seconds: u32, to: &[SocketAddrV4]) -> Outcome {
+    let (staged, watched) = stage(ride(seconds, 0.0), to);
+    let rate = staged.show.rate;
+    let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
+    let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
+    let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
+    let MailEnds { sent, ticks, requests, answers, retired } = ends;
+    let acks = AckLoop::new(receiver, watched, sent, ticks);
+    let (engine, lanes, planner, timeline) = staged.split();
+    let plans = PlanLoop { planner, timeline, requests, answers, retired };
+    let origin = Monotonic.now() + RUN_UP;
+    let grid = TickGrid::new(origin, rate);
+    let drains = DrainGrid::new(origin, rate.period());
+    let never = AtomicBool::new(false);
+    let tick_loop = TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, stop: &never };
+    outcome(to.len(), run_threads(tick_loop, acks, plans, drains))
+}
+
+/// The calling thread becomes the tick thread, once the others have been started.
+fn run_threads(
+    mut tick_loop: TickLoop<'_, Monotonic, Sender>,
+    acks: AckLoop,
+    mut plans: PlanLoop,
+    drains: DrainGrid,
+) -> Run {
+    let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
+    thread::scope(|scope| {
+        let sent_all = &sent_all;
+        let ack_thread = scope.spawn(move || {
+            let _ = normal_priority();
+            let accounts = acks.run(&Monotonic, drains, || sent_all.load(Ordering::Acquire));
+            (accounts, thread_cpu_time())
+        });
+        let plan_thread = scope.spawn(|| {
+            let _ = normal_priority();
+            plans.run(&done)
+        });
+        tick_loop.mail.wakes(plan_thread.thread().clone());
+        let granted = request();
+        let before = thread_cpu_time();
+        let ended = tick_loop.run();
+        let send_time = thread_cpu_time().saturating_sub(before);
+        sent_all.store(true, Ordering::Release);
+        done.store(true, Ordering::Release);
+        plan_thread.thread().unpark();
+        let (mut accounts, receive_time) = ack_thread.join().expect("the ack thread does not panic");
+        accounts.close(tick_loop.lanes.iter().map(Lane::last_frame), Monotonic.now());
+        assert!(plan_thread.join().is_ok_and(|refusals| refusals.is_empty()), "the ride is gentle");
+        Run { ticks: ended.ticks, missed: ended.missed, accounts, send_time, receive_time, granted }
+    })
+}
+
+fn outcome(controllers: usize, run: Run) -> Outcome {
+    let tracker = run.accounts.books.tracker();
+    let mut ack = histogram();
+    let (mut sent, mut acked) = (0, 0);
+    for controller in 0..controllers {
+        let counts = tracker.counts(controller);
+        assert_eq!(counts.asked, counts.acked + counts.refused() + counts.lost, "the books balance");
+        sent += counts.sent;
+        acked += counts.acked;
+        ack.add(tracker.latency(controller)).expect("all have the same bounds");
+    }
+    Outcome {
+        lateness: Quantiles::of(&run.accounts.lateness),
+        ack: Quantiles::of(&ack),
+        ticks: run.ticks,
+        missed: run.missed,
+        sent,
+        acked,
+        send_us: each(run.send_time, sent),
+        receive_us: each(run.receive_time, acked),
+        policy: run.granted.policy.to_string(),
+        locked: run.granted.memory_locked,
+    }
+}

@@ -1,0 +1,140 @@
+//! What one tick costs before anything is sent: sample, course and encode for 64 six-axis controllers, against 64 bare
+//! sends to loopback in the same run, tick by tick in turns.
+//!
+//! `cargo bench --bench tick -- [--rounds N] [--quick]`
+
+mod common {
+    pub(crate) mod spread;
+    pub(crate) mod stage;
+}
+
+use std::hint::black_box;
+use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
+use std::time::Duration;
+
+use common::spread::{Spread, verdict};
+use common::stage::{ride, stage};
+use kinocue::sys::clock::Monotonic;
+use kinocue::time::Clock as _;
+use kinocue::wire::MAX_LEN;
+
+const CONTROLLERS: usize = 64;
+const GOAL: f64 = 0.25;
+/// Ticks of one round: the join lasts 1.5 s, the ride fills the rest.
+const TICKS: u32 = 4_500;
+const SECONDS: u32 = 6;
+
+/// What the ticks of one round took, µs for all controllers: those on the join and those on the cue, each with the sends
+/// beside it.
+#[derive(Default)]
+struct Round {
+    joining: Phase,
+    following: Phase,
+}
+
+#[derive(Default)]
+struct Phase {
+    tick_us: Vec<f64>,
+    sends_us: Vec<f64>,
+}
+
+impl Phase {
+    /// Median tick, median sends, and the first over the second.
+    fn figures(&self) -> [f64; 3] {
+        let [tick, sends] = [&self.tick_us, &self.sends_us].map(|us| Spread::of(us.iter().copied()).median);
+        [tick, sends, tick / sends]
+    }
+}
+
+fn main() {
+    let rounds = rounds();
+    let links: Vec<Link> = (0..CONTROLLERS).map(|_| Link::open()).collect();
+    let rounds: Vec<Round> = (0..rounds).map(|_| round(&links)).collect();
+    println!(
+        "one tick for {CONTROLLERS} six-axis controllers, median of {} rounds (least..greatest)",
+        rounds.len()
+    );
+    println!("{:<10} {:>20} {:>22} {:>22}  goal", "", "tick, us", "64 bare sends, us", "tick / sends");
+    tell("following", rounds.iter().map(|round| &round.following));
+    tell("joining", rounds.iter().map(|round| &round.joining));
+}
+
+/// `--rounds N`, `--quick`; other arguments are the bench runner's own.
+fn rounds() -> usize {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let given = arguments.iter().skip_while(|argument| *argument != "--rounds").nth(1);
+    let usual = if arguments.iter().any(|argument| argument == "--quick") { 3 } else { 15 };
+    given.map_or(usual, |count| count.parse::<usize>().expect("--rounds takes a number")).max(1)
+}
+
+fn tell<'a>(name: &str, phases: impl Iterator<Item = &'a Phase>) {
+    let figures: Vec<[f64; 3]> = phases.map(Phase::figures).collect();
+    let [tick, sends, ratio] = [0, 1, 2].map(|place: usize| Spread::of(figures.iter().map(|of| of[place])));
+    let columns = [format!("{tick:.1}"), format!("{sends:.1}"), format!("{ratio:.3}")];
+    let [tick_us, sends_us, share] = columns;
+    println!("{name:<10} {tick_us:>20} {sends_us:>22} {share:>22}  <= {GOAL}: {}", verdict(ratio, GOAL));
+}
+
+/// A connected socket and the one that it sends to.
+struct Link {
+    from: UdpSocket,
+    to: UdpSocket,
+}
+
+impl Link {
+    fn open() -> Self {
+        let [from, to] = [0; 2].map(|_| UdpSocket::bind("127.0.0.1:0").expect("loopback has a free port"));
+        from.connect(to.local_addr().expect("it is bound")).expect("loopback can be reached");
+        to.set_nonblocking(true).expect("any socket can be");
+        Self { from, to }
+    }
+
+    fn address(&self) -> SocketAddrV4 {
+        match self.to.local_addr() {
+            Ok(SocketAddr::V4(address)) => address,
+            other => unreachable!("bound to an IPv4 address, not {other:?}"),
+        }
+    }
+}
+
+/// One play, flat out: each tick is followed by as many bare sends, which nobody counts twice because the receivers are
+/// emptied outside the measurement.
+fn round(links: &[Link]) -> Round {
+    let addresses: Vec<SocketAddrV4> = links.iter().map(Link::address).collect();
+    let (staged, _) = stage(ride(SECONDS, 0.1), &addresses);
+    let settled = staged.course.settled();
+    let (mut engine, mut lanes, _planner, _timeline) = staged.split();
+    let (mut round, mut buf) = (Round::default(), [0; MAX_LEN]);
+    for _ in 0..TICKS {
+        let joining = engine.playhead() < settled;
+        let tick_us = timed(|| {
+            let beat = engine.tick(0).expect("the ride is longer");
+            for (lane, pose) in lanes.iter_mut().zip(engine.poses()) {
+                black_box(lane.encode(&beat, pose, &mut buf));
+            }
+        });
+        let sends_us = timed(|| send_all(links));
+        links.iter().for_each(|link| empty(&link.to));
+        let phase = if joining { &mut round.joining } else { &mut round.following };
+        phase.tick_us.push(tick_us);
+        phase.sends_us.push(sends_us);
+    }
+    round
+}
+
+fn timed(work: impl FnOnce()) -> f64 {
+    let start = Monotonic.now();
+    work();
+    Monotonic.now().since(start).div_duration_f64(Duration::from_micros(1))
+}
+
+fn send_all(links: &[Link]) {
+    let frame = [0x55; 50];
+    for link in links {
+        link.from.send(&frame).expect("its receiver is there");
+    }
+}
+
+fn empty(socket: &UdpSocket) {
+    while socket.recv(&mut [0; 64]).is_ok() {}
+}
