@@ -45,6 +45,9 @@ pub(super) fn sheet(octets: &[u8], reading: Reading) -> Result<Sheet, WireError>
     Ok(sheet)
 }
 
+/// Octets of a message about registers before its words.
+const WORDS: usize = 16;
+
 impl Sheet {
     fn message(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect) {
         match message {
@@ -56,6 +59,7 @@ impl Sheet {
                 let space = Space::of_read(read.channel);
                 self.channel(read.channel, space_name(space));
                 self.asked(read.start, read.num, space);
+                self.surplus(octets, WORDS);
             }
             Message::Write(write) => {
                 self.head(octets, "write registers", true);
@@ -63,6 +67,7 @@ impl Sheet {
                 let space = Space::of_write(write.channel, dialect);
                 self.channel(write.channel, space_name(space));
                 self.registers(write.start, write.data, space);
+                self.surplus(octets, WORDS + 2 * write.data.len());
             }
             Message::RegisterReply(reply) => {
                 let (what, space) = match reply.access {
@@ -77,6 +82,7 @@ impl Sheet {
                 if reply.access == Access::Read && space == Some(Space::Monitor) {
                     self.monitored_positions(reply.start, reply.data, dialect);
                 }
+                self.surplus(octets, WORDS + 2 * reply.data.len());
             }
             Message::ServoRead(_) | Message::ServoWrite(_) | Message::ServoReply(_) => {
                 self.servo(octets, message, dialect);
@@ -87,6 +93,7 @@ impl Sheet {
                 let space = Space::of_read(report.channel);
                 self.channel(report.channel, space_name(space));
                 self.registers(report.start, report.data, space);
+                self.surplus(octets, WORDS + 2 * report.data.len());
             }
         }
     }
@@ -130,12 +137,14 @@ impl Sheet {
                         format!("a controller answers at most {MAX_SERVO_READ} registers at once"),
                     );
                 }
+                self.surplus(octets, WORDS);
             }
             Message::ServoWrite(write) => {
                 self.head(octets, "write servo registers", true);
                 self.codes(write.accept, write.reply);
                 self.numbered("servo", u32::from(write.servo));
                 self.registers(write.start, write.data, None);
+                self.surplus(octets, WORDS + 2 * write.data.len());
             }
             Message::ServoReply(reply) => {
                 let what = match reply.access {
@@ -150,6 +159,7 @@ impl Sheet {
                     self.error(reply.error);
                 }
                 self.told(reply.start, reply.num, reply.data, None);
+                self.surplus(octets, WORDS + 2 * reply.data.len());
             }
             _ => {}
         }
