@@ -14,7 +14,8 @@ use std::time::Duration;
 use common::Virtual;
 use kinocue::motion::Pulses;
 use kinocue::wire::{
-    Code, MAX_LEN, Message, MotionReply, PerAxis, ReplyCode, Status, Vibration, WireError, Words,
+    Access, Code, MAX_LEN, Message, MotionReply, PerAxis, RegisterReply, ReplyCode, Status, Vibration,
+    WireError, Words,
 };
 use pcap::Pcap;
 use serde::Deserialize;
@@ -307,12 +308,26 @@ fn golden() -> Vec<Vec<u8>> {
     golden.vectors.iter().map(|vector| octets(&vector.hex)).collect()
 }
 
+/// Replies to reads of the monitor registers, with positions among them, and one with a whole table.
+fn monitored() -> Vec<Vec<u8>> {
+    let words: Vec<u16> = (0..256).map(|word| word * 257).collect();
+    let reads = [(0x06, 8), (0x08, 6), (0x0a, 6), (0x0b, 2), (0x21, 5), (0x23, 8), (0x25, 1), (0x00, 256)];
+    let reply = |(start, num): (u16, usize)| {
+        let data = Words::from(&words[..num]);
+        let num = u16::try_from(num).unwrap();
+        let (access, code) = (Access::Read, ReplyCode::Running);
+        let reply = RegisterReply { access, code, channel: 0, error: 0, start, num, data };
+        reply.emit(&mut [0; MAX_LEN]).to_vec()
+    };
+    reads.into_iter().map(reply).collect()
+}
+
 #[test]
 fn golden_messages_are_dissected_as_they_are_parsed() {
     if !tshark_runs() {
         return;
     }
-    let datagrams = golden();
+    let datagrams = [golden(), monitored()].concat();
     assert_agreed(&captured(&datagrams), &datagrams);
 }
 
@@ -378,6 +393,32 @@ fn a_show_and_its_replies_are_dissected_whole_on_any_port() {
 }
 
 #[test]
+fn a_reply_names_the_packet_that_it_answers_and_the_time_it_took() {
+    if !tshark_runs() {
+        return;
+    }
+    let everyone = "192.168.15.255:7408".parse().unwrap();
+    let golden = golden();
+    let find = |function: [u8; 2]| golden.iter().find(|octets| octets[4..6] == function).unwrap();
+    let (request, mut reply) = (find([0x14, 1]), find([0x14, 2]).clone());
+    reply[12..16].copy_from_slice(&request[12..16]);
+    let mut pcap = Pcap::new();
+    pcap.datagram(Duration::from_micros(0), host(), everyone, request);
+    pcap.datagram(Duration::from_micros(700), seat(), host(), &reply);
+    pcap.datagram(Duration::from_micros(900), "192.168.15.202:7408".parse().unwrap(), host(), &reply);
+    reply[15] = reply[15].wrapping_add(1);
+    pcap.datagram(Duration::from_micros(950), seat(), host(), &reply);
+    let lines = tshark(&pcap, &["-e", "kinocue.answers", "-e", "kinocue.latency"]);
+    let told = |line: &str| {
+        let (packet, ms) = line.split_once('\t').unwrap();
+        (packet.to_owned(), ms.parse::<f64>().ok().map(|ms| (ms * 1e3).round()))
+    };
+    let expected = [(String::new(), None), ("1".to_owned(), Some(700.0)), ("1".to_owned(), Some(900.0))];
+    assert_eq!(lines[..3].iter().map(|line| told(line)).collect::<Vec<_>>(), expected);
+    assert_eq!(told(&lines[3]), (String::new(), None), "no frame of that number was sent");
+}
+
+#[test]
 fn what_only_looks_like_a_message_on_another_port_is_left_alone() {
     if !tshark_runs() {
         return;
@@ -421,7 +462,7 @@ fn the_info_column_says_what_decode_says_in_both_dialects() {
     if !tshark_runs() {
         return;
     }
-    let mut datagrams = golden();
+    let mut datagrams = [golden(), monitored()].concat();
     datagrams.retain(|octets| Message::parse(octets).is_ok());
     let capture = captured(&datagrams);
     let folder = tempfile::tempdir().unwrap();

@@ -108,6 +108,8 @@ local f = {
   force = ProtoField.int16("kinocue.force", "Force", base.DEC),
   servo_error = ProtoField.uint16("kinocue.servo.error", "Servo error", base.DEC),
   surplus = ProtoField.bytes("kinocue.surplus", "Octets after the layout"),
+  answers = ProtoField.framenum("kinocue.answers", "Answers", base.NONE, frametype.REQUEST),
+  latency = ProtoField.double("kinocue.latency", "Ack latency (ms)"),
   bad_octet = ProtoField.uint32("kinocue.malformed.octet", "Malformed at octet", base.DEC),
   bad_why = ProtoField.string("kinocue.malformed.why", "Malformed because"),
 }
@@ -301,6 +303,43 @@ local function read(tvb)
     return read_status(tvb, message)
   end
   return read_registers(tvb, message)
+end
+
+-- Replies and what they answer --------------------------------------------------------------------------------
+
+local asked -- the packet and the time of the latest request, by who asked and what
+local answered -- the request's packet and the milliseconds since, by the packet of the reply
+
+function kinocue.init()
+  asked, answered = {}, {}
+end
+
+-- Told by the host's end alone, since a request may be for every station: a frame by its number, registers by place.
+local function key_of(tvb, message, address, port)
+  local family = math.floor(message.code / 256)
+  return string.format("%s:%d %02x %08x", tostring(address), port, family, tvb(12, 4):uint())
+end
+
+-- Packets are seen in order the first time, and in any order after that.
+local function match_reply(tvb, pinfo, message)
+  if pinfo.visited or not message.is.request then
+    return
+  elseif message.low == 1 then
+    asked[key_of(tvb, message, pinfo.src, pinfo.src_port)] = { packet = pinfo.number, at = pinfo.rel_ts }
+    return
+  end
+  local request = asked[key_of(tvb, message, pinfo.dst, pinfo.dst_port)]
+  if request then
+    answered[pinfo.number] = { packet = request.packet, ms = (pinfo.rel_ts - request.at) * 1000 }
+  end
+end
+
+local function add_answered(tree, pinfo)
+  local request = answered[pinfo.number]
+  if request then
+    tree:add(f.answers, request.packet):set_generated()
+    tree:add(f.latency, request.ms):set_generated()
+  end
 end
 
 -- Showing --------------------------------------------------------------------------------------------------------
@@ -546,7 +585,13 @@ function kinocue.dissector(tvb, pinfo, tree)
     subtree:add_proto_expert_info(e.cut, info)
   else
     local message, bad = read(tvb)
-    info = message and show(subtree, tvb, message) or show_malformed(subtree, tvb, bad)
+    if message then
+      match_reply(tvb, pinfo, message)
+      info = show(subtree, tvb, message)
+      add_answered(subtree, pinfo)
+    else
+      info = show_malformed(subtree, tvb, bad)
+    end
   end
   subtree:append_text(", " .. info)
   pinfo.cols.info = info
