@@ -20,6 +20,8 @@ pub mod motion;
 
 pub mod wire;
 
+pub mod capture;
+
 pub mod cue;
 pub mod timeline;
 

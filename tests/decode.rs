@@ -1,42 +1,239 @@
-//! `kinocue decode` as the program: exit codes and streams.
+//! `kinocue decode`: the built program on hex, captures, the standard input, and on what is malformed.
+
+#![allow(clippy::unwrap_used, reason = "whatever fails here fails the test")]
+
+#[path = "common/pcap.rs"]
+mod pcap;
+
+use std::net::SocketAddrV4;
+use std::path::PathBuf;
+use std::time::Duration;
 
 use assert_cmd::Command;
+use pcap::{Pcap, ethernet};
+use serde_json::{Value, json};
 
-fn decode(args: &[&str], input: impl Into<Vec<u8>>) -> (Option<i32>, String, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
-    let output = command.arg("decode").args(args).write_stdin(input).output().expect("the program runs");
-    let text = |octets| String::from_utf8(octets).expect("text");
-    (output.status.code(), text(output.stdout), text(output.stderr))
+const READ: &str = "55aa000011010001ffffffff00020001";
+const READ_REPLY: &str = "55aa00001102000100000000000200010006";
+const FRAME: &str = "55aa000014010000ffffffff000000070000003200000001fffffffe00000003080200000000";
+const ACK: &str = "55aa0000140200000000000000000007000000320000000100000000000000000001deadbeef";
+const TRUNCATED: &str = "55aa000012010001ffffffff002000020001";
+
+struct Ran {
+    code: i32,
+    out: String,
+    err: String,
 }
 
-#[test]
-fn a_message_goes_to_the_standard_output_however_it_is_given() {
-    let (code, lines, _) = decode(&["55aa0000", "12:01:00:02", "ffffffff", "0x0000", "0001", "0000"], "");
-    assert_eq!(code, Some(0));
-    assert!(
-        lines.contains("message    write registers\n") && lines.contains("DPF0       0 (0x0000)\n"),
-        "{lines}"
-    );
-    assert_eq!(
-        decode(&["-"], "55 aa 00 00 12 01 00 02 ff ff ff ff\n00 00 00 01 00 00\n"),
-        (code, lines, String::new())
-    );
-}
-
-#[test]
-fn octets_that_are_no_message_end_with_65_and_say_where() {
-    let (code, json, error) = decode(&["--json", "55aa000013010009ffffffff00"], "");
-    assert_eq!(code, Some(65));
-    assert!(error.contains("octet 13: ends after 13 octets; this message takes 62"), "{error}");
-    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-    assert_eq!(json["malformed"]["octet"], 13);
-}
-
-#[test]
-fn what_is_no_hex_ends_with_64() {
-    for args in [&["5"][..], &["xy"], &["-"], &[]] {
-        let (code, out, error) = decode(args, [0xff, b'5']);
-        assert_eq!((code, out.as_str()), (Some(64), ""), "{args:?}");
-        assert!(!error.is_empty());
+impl Ran {
+    fn json(&self) -> Vec<Value> {
+        self.out.lines().map(|line| serde_json::from_str(line).expect("every line is JSON")).collect()
     }
+}
+
+fn decode(args: &[&str], stdin: &[u8]) -> Ran {
+    let output = Command::cargo_bin("kinocue").unwrap().arg("decode").args(args).write_stdin(stdin).output();
+    let output = output.unwrap();
+    Ran {
+        code: output.status.code().unwrap(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+fn octets(hex: &str) -> Vec<u8> {
+    (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
+}
+
+fn host() -> SocketAddrV4 {
+    "192.168.15.101:8410".parse().unwrap()
+}
+
+fn seat() -> SocketAddrV4 {
+    "192.168.15.201:7408".parse().unwrap()
+}
+
+fn at(ms: u64) -> Duration {
+    Duration::from_secs(1_700_000_000) + Duration::from_millis(ms)
+}
+
+/// A frame, its reply, a truncated write, and packets of every other sort.
+fn capture() -> Pcap {
+    let mut pcap = Pcap::new();
+    pcap.datagram(at(0), host(), seat(), &octets(FRAME));
+    pcap.datagram(at(2), seat(), host(), &octets(ACK));
+    pcap.datagram(at(20), host(), seat(), &octets(TRUNCATED));
+    let stranger = "10.0.0.1:53".parse().unwrap();
+    pcap.datagram(at(21), stranger, "10.0.0.2:5353".parse().unwrap(), b"who is there");
+    pcap.datagram(at(22), stranger, "10.0.0.2:7402".parse().unwrap(), &octets(READ));
+    pcap.packet(at(30), &ethernet(host(), seat(), &octets(FRAME), 0), 60);
+    pcap.packet(at(31), &ethernet(host(), seat(), &[0; 40], 0x2000), usize::MAX);
+    pcap.packet(at(32), &[0; 60], usize::MAX);
+    pcap
+}
+
+fn file(name: &str, content: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, content).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn hex_is_told_field_by_field() {
+    let ran = decode(&["55aa0000", "11010001ffffffff", "00020001"], b"");
+    assert_eq!((ran.code, ran.err.as_str()), (0, ""));
+    assert!(ran.out.starts_with("message    read registers\n"), "{}", ran.out);
+    assert!(ran.out.contains("first      PA02\n"), "{}", ran.out);
+}
+
+#[test]
+fn a_malformed_message_says_where_and_why_and_the_next_is_told_all_the_same() {
+    let ran = decode(&[TRUNCATED, READ], b"");
+    assert_eq!(ran.code, 65);
+    assert!(
+        ran.out.starts_with("malformed: octet 18: ends after 18 octets; this message takes 20: 55aa"),
+        "{}",
+        ran.out
+    );
+    assert!(ran.out.contains("read registers"), "{}", ran.out);
+    let ran = decode(&[TRUNCATED, READ, "--json"], b"");
+    assert_eq!(ran.code, 65);
+    let lines = ran.json();
+    assert_eq!((&lines[0]["malformed"]["octet"], &lines[1]["function"]), (&json!(18), &json!("0x1101")));
+}
+
+#[test]
+fn what_is_neither_hex_nor_a_file_is_wrong_use() {
+    let ran = decode(&["55zz"], b"");
+    assert_eq!(ran.code, 64);
+    assert!(ran.err.contains("'z' after 2 hex digits"), "{}", ran.err);
+    assert_eq!(decode(&[READ, "show.pcap"], b"").code, 64);
+    assert_eq!(decode(&["--all", "--port", "1", READ], b"").code, 64);
+}
+
+#[test]
+fn a_missing_file_and_a_folder_are_no_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("missing.pcap");
+    for path in [missing.as_path(), folder.path()] {
+        let ran = decode(&[path.to_str().unwrap()], b"");
+        assert_eq!(ran.code, 66, "{}", ran.err);
+        assert!(ran.err.contains(path.to_str().unwrap()), "{}", ran.err);
+    }
+}
+
+#[test]
+fn a_capture_is_told_a_line_for_each_message_and_counted() {
+    let (_folder, path) = file("show.pcap", capture().octets());
+    let ran = decode(&[path.to_str().unwrap()], b"");
+    assert_eq!((ran.code, ran.err.as_str()), (65, ""));
+    assert_eq!(
+        ran.out.trim_start(),
+        "\
+    0.000000  192.168.15.101:8410 -> 192.168.15.201:7408  motion, relative time: frame 7, in 50 ms, positions 1 -2 3, outputs Y02 Y12
+    0.002000  192.168.15.201:7408 -> 192.168.15.101:8410  reply to motion, relative time: received, running normally, frame 7, in 50 ms, positions 1 0 0, inputs X01
+    0.020000  192.168.15.101:8410 -> 192.168.15.201:7408  malformed: octet 18: ends after 18 octets; this message takes 20: 55aa000012010001ffffffff002000020001
+    0.030000  192.168.15.101:8410 -> 192.168.15.201:7408  cut: the capture kept 18 of 38 octets
+    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from octet 0 of it on; not put together
+
+2 messages in 0.032 s from 2023-11-14 22:13:20 UTC
+       1  0x1401 motion, relative time
+       1  0x1402 reply to motion, relative time
+       1  malformed
+       1  cut short by the capture
+       1  fragments of datagrams, not put together
+       2  other datagrams
+       1  other packets
+"
+    );
+}
+
+#[test]
+fn ports_may_be_chosen_and_all_ports_are_told_by_how_a_message_opens() {
+    let (_folder, path) = file("show.pcap", capture().octets());
+    let path = path.to_str().unwrap();
+    let ran = decode(&[path, "--port", "7402"], b"");
+    assert_eq!(ran.code, 0, "{}", ran.out);
+    assert!(ran.out.contains("10.0.0.2:7402  read registers: PA02\n"), "{}", ran.out);
+    assert!(ran.out.contains("1 message "), "{}", ran.out);
+    let ran = decode(&[path, "--all"], b"");
+    assert!(ran.out.contains("3 messages") && ran.out.contains("1  other datagrams"), "{}", ran.out);
+}
+
+#[test]
+fn verbose_tells_all_fields_of_a_capture() {
+    let (_folder, path) = file("show.pcap", capture().octets());
+    let ran = decode(&[path.to_str().unwrap(), "--verbose"], b"");
+    assert!(
+        ran.out.contains("192.168.15.201:7408 -> 192.168.15.101:8410\nmessage    reply to motion"),
+        "{}",
+        ran.out
+    );
+    assert!(ran.out.contains("\na2         -2 pulses\n"), "{}", ran.out);
+}
+
+#[test]
+fn json_names_packet_time_and_ends_of_each_message_and_ends_with_the_counts() {
+    let ran = decode(&["--json"], capture().octets());
+    let lines = ran.json();
+    assert_eq!((ran.code, lines.len()), (65, 6));
+    let frame = &lines[0];
+    assert_eq!(frame["packet"], 1);
+    assert_eq!(frame["time_ns"], 1_700_000_000_000_000_000_u64);
+    assert_eq!(frame["source"], "192.168.15.101:8410");
+    assert_eq!(frame["positions"], json!([1, -2, 3]));
+    assert_eq!(lines[2]["malformed"]["octet"], 18);
+    assert_eq!(lines[3]["cut"], json!({ "kept": 18, "octets": 38 }));
+    assert_eq!(lines[5]["summary"]["messages"], json!({ "0x1401": 1, "0x1402": 1 }));
+}
+
+#[test]
+fn lines_of_hex_are_a_message_each_and_bad_ones_are_counted() {
+    let lines = format!("{READ}\n\n{}\nnot hex\n{TRUNCATED}\n", READ_REPLY.to_uppercase());
+    let ran = decode(&["-"], lines.as_bytes());
+    assert_eq!(ran.code, 65);
+    assert_eq!(
+        ran.out,
+        "\
+line 1  read registers: PA02
+line 3  reply to read registers: received, running normally, PA02 = 6
+line 4  not hex: 'n' after 0 hex digits is no hex digit; give the message as 0-9 and a-f
+line 5  malformed: octet 18: ends after 18 octets; this message takes 20: 55aa000012010001ffffffff002000020001
+
+2 messages
+       1  0x1101 read registers
+       1  0x1102 reply to read registers
+       1  malformed
+       1  lines that are no hex
+"
+    );
+    let (_folder, path) = file("lines.txt", lines.as_bytes());
+    assert_eq!(decode(&[path.to_str().unwrap()], b"").out, ran.out);
+}
+
+#[test]
+fn a_capture_cut_off_is_told_as_far_as_it_goes() {
+    let whole = capture();
+    let ran = decode(&["-"], &whole.octets()[..150]);
+    assert_eq!(ran.code, 65);
+    assert!(ran.out.contains("frame 7") && ran.out.contains("1 message "), "{}", ran.out);
+    assert!(ran.err.contains("standard input: octet 150: the capture ends inside a packet"), "{}", ran.err);
+}
+
+#[test]
+fn what_is_neither_a_capture_nor_hex_is_refused() {
+    let ran = decode(&["-"], b"\x89PNG\r\n\x1a\n and so on");
+    assert_eq!((ran.code, ran.out.as_str()), (65, "0 messages\n"));
+    assert!(ran.err.contains("89504e47 opens neither pcap nor pcapng"), "{}", ran.err);
+    let ran = decode(&["-"], b"\n");
+    assert_eq!(ran.code, 65);
+    assert!(ran.err.contains("neither hex nor a capture"), "{}", ran.err);
+}
+
+#[test]
+fn an_error_of_an_mbox_is_not_read_from_the_slot_of_the_channel() {
+    let refused = "55aa00001203000a00000000005500010005";
+    assert!(decode(&[refused], b"").out.contains("Err10"));
+    assert!(decode(&[refused, "--dialect", "mbox"], b"").out.contains("channel    10"));
 }

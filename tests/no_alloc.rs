@@ -250,7 +250,7 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
     let rate = staged.show.rate;
     let (engine, lanes, planner, timeline) = staged.split();
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
-    let (sender, receiver) = Ports::open(any, addresses).unwrap().split();
+    let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::default());
     let (mut mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
     let MailEnds { sent, ticks, requests, answers, retired } = ends;
@@ -275,7 +275,7 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
         let calls = Calls::so_far().since(before);
         pace.wait_for_answers_to(ended.ticks, 0);
         pace.over.store(true, Ordering::Release);
-        let mut accounts = ack_thread.join().unwrap();
+        let mut accounts = ack_thread.join().expect("the ack thread does not panic");
         accounts.close(tick_loop.lanes.iter().map(Lane::last_frame), clock.now());
         Outcome { ended, calls, laps: clock.laps.get(), accounts }
     })

@@ -1,129 +1,139 @@
 //! `kinocue decode`.
 
-use std::io::{Read as _, Write as _};
+use std::ffi::OsString;
+use std::io::{self, BufWriter, Write};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _};
+use crate::capture::{CaptureError, Datagram, Fragment};
 
+mod desk;
+mod input;
+mod message;
 mod names;
 mod sheet;
+mod tally;
 
-use sheet::Reading;
+use desk::{Desk, Halt, Manner};
+use input::{Input, Stream};
+use message::Reading;
 
-/// The most octets a datagram can carry; more hex than that is none.
-const MAX_OCTETS: usize = 65_507;
+/// Where controllers (PA14) and hosts (PA24) listen.
+const PORTS: [u16; 2] = [7408, 8410];
 
-/// Puts a message of the protocol in words.
+/// Puts messages of the protocol in words.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   kinocue decode 55aa000012010002ffffffff000000010000
   kinocue decode 55:aa:00:00 12:01:00:02 ff:ff:ff:ff 00:00:00:01 00:00
-  xxd -p frame.bin | kinocue decode - --json
+  kinocue decode show.pcapng --verbose
+  kinocue decode show.pcapng --port 7402 --json
+  tcpdump -i eth0 -w - udp port 7408 | kinocue decode
+  xxd -p -c 256 frame.bin | kinocue decode -
 
-Ends with 64 where the hex is none, with 65 where the octets are no message; the place and the reason are told.")]
+Ends with 0, with 65 where anything was malformed, cut short or no capture, with 66 where the file is missing, and with
+64 where the hex is none.")]
 pub(super) struct Args {
-    /// The message as hex digits; spaces, colons and 0x are let pass, several words are joined, - reads them from
-    /// the standard input
-    #[arg(required = true, value_name = "HEX")]
-    hex: Vec<String>,
+    /// Hex, a capture, or - for the standard input
+    ///
+    /// Hex digits with or without spaces, colons and 0x; words are joined, and a word that opens with 55aa0000 or
+    /// 33cc0000 begins another message. A file, or the standard input, is a pcap or pcapng capture or lines of hex, a
+    /// message each.
+    #[arg(value_name = "HEX|FILE")]
+    input: Vec<OsString>,
 
-    /// Which family's manual the message is read by: imax is the layout as its manual prints it, which no known
-    /// program sends
+    /// Which family's manual messages are read by: imax is the layout as its manual prints it, which no known program
+    /// sends
     #[arg(long, value_enum, default_value_t = Reading::Smc)]
     dialect: Reading,
 
-    /// One JSON object on the standard output
+    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; may be given several times
+    #[arg(long, value_name = "N", conflicts_with = "all")]
+    port: Vec<u16>,
+
+    /// Of a capture, read the datagrams of all ports that open like a message
+    #[arg(long)]
+    all: bool,
+
+    /// All fields of each message of a file or of the standard input, rather than one line
+    #[arg(short, long)]
+    verbose: bool,
+
+    /// One JSON object a line on the standard output; after a file or the standard input one with the counts
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let text = gather(&args.hex)?;
-    let octets = octets(&text).or_exit(Exit::Usage)?;
-    match sheet::sheet(&octets, args.dialect) {
-        Ok(sheet) if args.json => print(&format!("{}\n", sheet.json()))?,
-        Ok(sheet) => print(&sheet.text())?,
-        Err(error) => {
-            if args.json {
-                let place = serde_json::json!({ "octet": error.offset(), "why": error.to_string() });
-                print(&format!("{}\n", serde_json::json!({ "malformed": place })))?;
-            }
-            let hint = match args.dialect {
-                Reading::Imax => "",
-                _ if sheet::sheet(&octets, Reading::Imax).is_ok() => "; with --dialect imax it is one",
-                _ => "",
-            };
-            return Err(anyhow::anyhow!("not a message: {error}{hint}")).or_exit(Exit::BadCue);
+    let manner = Manner { reading: args.dialect, json: args.json, full: args.verbose };
+    match Input::of(&args.input)? {
+        Input::Messages(messages) => {
+            let mut desk = Desk::new(io::stdout().lock(), Manner { full: true, ..manner });
+            let written = desk.messages(&messages);
+            end(written.and_then(|()| desk.finish()))
+        }
+        Input::File(path) => {
+            let desk = Desk::new(BufWriter::new(io::stdout().lock()), manner);
+            stream(desk, Stream::open(&path)?, args, &path.display().to_string())
+        }
+        // Unlike a file it may come slowly, so that each line is written at once.
+        Input::Stdin => {
+            stream(Desk::new(io::stdout().lock(), manner), Stream::stdin()?, args, "standard input")
         }
     }
-    Ok(Exit::Done)
 }
 
-/// Writes to the standard output, which may have been closed.
-fn print(text: &str) -> Result<(), Failure> {
-    let written = std::io::stdout().write_all(text.as_bytes());
-    written.context("cannot write to the standard output").or_exit(Exit::Io)
-}
-
-/// All hex there is, in the order of the arguments.
-fn gather(words: &[String]) -> Result<String, Failure> {
-    let mut all = String::new();
-    for word in words {
-        if word == "-" {
-            let limit = 16 * MAX_OCTETS as u64; // digits, separators and line ends of the longest datagram
-            let mut input = Vec::new();
-            let read = std::io::stdin().lock().take(limit).read_to_end(&mut input);
-            read.context("cannot read hex from the standard input").or_exit(Exit::Io)?;
-            all.push_str(&String::from_utf8_lossy(&input));
-        } else {
-            all.push_str(word);
+fn stream(mut desk: Desk<impl Write>, stream: Stream, args: &Args, name: &str) -> Result<Exit, Failure> {
+    let filter = Filter { ports: if args.port.is_empty() { &PORTS } else { &args.port }, all: args.all };
+    let halted = match stream {
+        Stream::Capture(input) => desk.capture(input, filter),
+        Stream::Lines(input) => desk.lines(input),
+    };
+    let halted = match halted {
+        Err(Halt::Output(error)) => return end(Err(error)),
+        Err(Halt::Input(error)) | Err(Halt::Capture(CaptureError::Io(error))) => {
+            Err(error).with_context(|| format!("cannot read {name}")).or_exit(Exit::Io)
         }
-        all.push(' ');
-    }
-    Ok(all)
+        Err(Halt::Empty) => Err(anyhow!("{name}: neither hex nor a capture")).or_exit(Exit::BadCue),
+        Err(Halt::Capture(error)) => Err(anyhow!("{name}: {error}")).or_exit(Exit::BadCue),
+        Ok(()) => Ok(()),
+    };
+    let exit = end(desk.summary().and_then(|()| desk.finish()))?;
+    halted.map(|()| exit)
 }
 
-/// The octets that hex digits mean.
-fn octets(text: &str) -> anyhow::Result<Vec<u8>> {
-    let mut digits = Vec::new();
-    for word in text.split(|c: char| c.is_whitespace() || matches!(c, ':' | ',' | '-')) {
-        let word = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X")).unwrap_or(word);
-        for c in word.chars() {
-            let Some(digit) = c.to_digit(16).and_then(|digit| u8::try_from(digit).ok()) else {
-                bail!(
-                    "{c:?} after {} hex digits is no hex digit; give the message as 0-9 and a-f",
-                    digits.len()
-                );
-            };
-            digits.push(digit);
-        }
+/// The end of the program, by whether all was written and every message could be read. A reader that went away has
+/// seen what it wanted.
+fn end(written: io::Result<bool>) -> Result<Exit, Failure> {
+    match written {
+        Ok(true) => Ok(Exit::Done),
+        Ok(false) => Ok(Exit::BadCue),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(Exit::Done),
+        Err(error) => Err(error).context("cannot write to the standard output").or_exit(Exit::Io),
     }
-    if digits.is_empty() || digits.len() % 2 != 0 {
-        bail!("{} hex digits are no whole octets; give two for each octet", digits.len());
-    }
-    if digits.len() > 2 * MAX_OCTETS {
-        bail!("{} octets are more than a datagram holds; give at most {MAX_OCTETS}", digits.len() / 2);
-    }
-    Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Which datagrams of a capture are read.
+#[derive(Debug, Clone, Copy)]
+struct Filter<'a> {
+    ports: &'a [u16],
+    all: bool,
+}
 
-    #[test]
-    fn hex_is_taken_however_it_is_spelt() {
-        for text in ["55aa0001", "55 AA 00 01", "55:aa:00:01", "0x55 0xaa, 0x0001\n", "55-aa-00-01"] {
-            assert_eq!(octets(text).unwrap(), [0x55, 0xaa, 0, 1], "{text}");
-        }
+impl Filter<'_> {
+    fn takes(self, datagram: &Datagram<'_>) -> bool {
+        let opens_like_a_message =
+            matches!(datagram.payload, [0x55, 0xaa, 0, 0, ..] | [0x33, 0xcc, 0, 0, ..]);
+        self.has(datagram.source.port(), datagram.destination.port()) || self.all && opens_like_a_message
     }
 
-    #[test]
-    fn what_is_no_hex_is_named_with_its_place() {
-        assert!(octets("55 ag").unwrap_err().to_string().starts_with("'g' after 3 hex digits"));
-        assert!(octets("55a").unwrap_err().to_string().starts_with("3 hex digits"));
-        assert!(octets(" ").is_err());
+    fn takes_fragment(self, fragment: &Fragment) -> bool {
+        self.all || fragment.ports.is_some_and(|(source, destination)| self.has(source, destination))
+    }
+
+    fn has(self, source: u16, destination: u16) -> bool {
+        self.ports.contains(&source) || self.ports.contains(&destination)
     }
 }

@@ -1,0 +1,66 @@
+//! Why a capture cannot be read, or not further.
+
+use std::io;
+
+/// Why octets are no capture, or no more of one; places are counted from 0 at the start of the capture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CaptureError {
+    /// It opens like no capture.
+    #[error("octet 0: {} opens neither pcap nor pcapng", hex(found))]
+    Magic {
+        /// What it opens with.
+        found: [u8; 4],
+    },
+    /// It ends where more must follow, as after a capture that was cut off.
+    #[error("octet {at}: the capture ends inside a packet or header")]
+    Ends {
+        /// Octets there are.
+        at: u64,
+    },
+    /// A packet that is longer than any can be.
+    #[error("octet {at}: a packet of {found} octets; at most {max} are possible")]
+    PacketLength {
+        /// Where its block begins.
+        at: u64,
+        /// The length that stands there.
+        found: u32,
+        /// The most there can be.
+        max: u32,
+    },
+    /// A block of pcapng that cannot have this length.
+    #[error("octet {at}: a block of {found} octets, where {why}")]
+    BlockLength {
+        /// Where the block begins.
+        at: u64,
+        /// The length that stands there.
+        found: u32,
+        /// What is wrong with that.
+        why: &'static str,
+    },
+    /// A section of pcapng whose byte-order mark is none.
+    #[error("octet {at}: {} is no byte-order mark of pcapng", hex(found))]
+    ByteOrder {
+        /// Where the mark stands.
+        at: u64,
+        /// What stands there.
+        found: [u8; 4],
+    },
+    /// A packet of an interface that pcapng has not described.
+    #[error("octet {at}: a packet of interface {found}, of {known} described")]
+    Interface {
+        /// Where its block begins.
+        at: u64,
+        /// The interface that it names.
+        found: u32,
+        /// How many there are.
+        known: usize,
+    },
+    /// The system cannot read it.
+    #[error("cannot read the capture")]
+    Io(#[source] io::Error),
+}
+
+fn hex(octets: &[u8; 4]) -> String {
+    format!("{:08x}", u32::from_be_bytes(*octets))
+}

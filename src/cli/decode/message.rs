@@ -1,0 +1,292 @@
+//! The messages of the protocol to their sheets.
+
+use super::names::{motion_name, space_name};
+use super::sheet::Sheet;
+use crate::wire::{
+    Access, Dialect, ImaxMotion, ImaxRegisters, MAX_SERVO_READ, Message, MotionReply, MotionRequest,
+    ReplyCode, Space, Status, WireError,
+};
+
+/// How to read a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Reading {
+    Smc,
+    Mbox,
+    Imax,
+}
+
+impl Reading {
+    const fn dialect(self) -> Dialect {
+        match self {
+            Self::Smc => Dialect::Smc,
+            Self::Mbox | Self::Imax => Dialect::Mbox,
+        }
+    }
+}
+
+/// The fields of a message.
+///
+/// # Errors
+/// At which octet, and why, these octets are none.
+pub(super) fn sheet(octets: &[u8], reading: Reading) -> Result<Sheet, WireError> {
+    let mut sheet = Sheet::default();
+    if reading == Reading::Imax {
+        if let Ok(motion) = ImaxMotion::parse(octets) {
+            sheet.imax_motion(octets, &motion);
+            return Ok(sheet);
+        }
+        if let Ok(reply) = ImaxRegisters::parse(octets) {
+            sheet.imax_registers(octets, &reply);
+            return Ok(sheet);
+        }
+    }
+    let message = Message::parse(octets)?;
+    sheet.message(octets, &message, reading.dialect());
+    Ok(sheet)
+}
+
+/// Octets of a message about registers before its words.
+const WORDS: usize = 16;
+
+impl Sheet {
+    fn message(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect) {
+        match message {
+            Message::Motion(motion) => self.motion(octets, motion),
+            Message::MotionReply(reply) => self.motion_reply(octets, reply, dialect),
+            Message::Read(read) => {
+                self.head(octets, "read registers", true);
+                self.codes(read.accept, read.reply);
+                let space = Space::of_read(read.channel);
+                self.channel(read.channel, space_name(space));
+                self.asked(read.start, read.num, space);
+                self.surplus(octets, WORDS);
+            }
+            Message::Write(write) => {
+                self.head(octets, "write registers", true);
+                self.codes(write.accept, write.reply);
+                let space = Space::of_write(write.channel, dialect);
+                self.channel(write.channel, space_name(space));
+                self.registers(write.start, write.data, space);
+                self.surplus(octets, WORDS + 2 * write.data.len());
+            }
+            Message::RegisterReply(reply) => {
+                let (what, space) = match reply.access {
+                    Access::Read => ("reply to read registers", Space::of_read(reply.channel)),
+                    Access::Write => ("reply to write registers", Space::of_write(reply.channel, dialect)),
+                };
+                let space = space.filter(|_| reply.code == ReplyCode::Running);
+                self.head(octets, what, false);
+                self.answer(reply.code, dialect);
+                self.slot(reply.code, reply.channel, space_name(space), reply.error, dialect);
+                self.told(reply.start, reply.num, reply.data, space);
+                if reply.access == Access::Read && space == Some(Space::Monitor) {
+                    self.monitored_positions(reply.start, reply.data, dialect);
+                }
+                self.surplus(octets, WORDS + 2 * reply.data.len());
+            }
+            Message::ServoRead(_) | Message::ServoWrite(_) | Message::ServoReply(_) => {
+                self.servo(octets, message, dialect);
+            }
+            Message::Status(status) => self.status(octets, status),
+            Message::Report(report) => {
+                self.head(octets, "report of registers", false);
+                let space = Space::of_read(report.channel);
+                self.channel(report.channel, space_name(space));
+                self.registers(report.start, report.data, space);
+                self.surplus(octets, WORDS + 2 * report.data.len());
+            }
+        }
+    }
+
+    fn motion(&mut self, octets: &[u8], motion: &MotionRequest) {
+        self.head(octets, motion_name(motion.timing, motion.vibration.is_some()), true);
+        self.codes(motion.accept, motion.reply);
+        self.channel(motion.channel, &format!("{} axes", motion.positions.len()));
+        self.numbered("frame", motion.frame.0);
+        self.time(motion.timing, motion.time_ms);
+        self.positions(&motion.positions);
+        self.bits("outputs", 'Y', u32::from(motion.outputs));
+        self.tail(motion.extend, motion.vibration.as_deref());
+        self.surplus(octets, motion.layout_len());
+    }
+
+    fn motion_reply(&mut self, octets: &[u8], reply: &MotionReply, dialect: Dialect) {
+        let what = format!("reply to {}", motion_name(reply.timing, reply.vibration.is_some()));
+        self.head(octets, &what, false);
+        self.answer(reply.code, dialect);
+        let axes = format!("{} axes", reply.positions.len());
+        self.slot(reply.code, reply.channel, &axes, reply.error, dialect);
+        self.numbered("frame", reply.frame.0);
+        self.time(reply.timing, reply.time_ms);
+        self.positions(&reply.positions);
+        self.bits("inputs", 'X', u32::from(reply.inputs));
+        self.tail(reply.extend, reply.vibration.as_deref());
+        self.surplus(octets, reply.layout_len());
+    }
+
+    fn servo(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect) {
+        match message {
+            Message::ServoRead(read) => {
+                self.head(octets, "read servo registers", true);
+                self.codes(read.accept, read.reply);
+                self.numbered("servo", u32::from(read.servo));
+                self.asked(read.start, read.num, None);
+                if read.num > MAX_SERVO_READ {
+                    self.line(
+                        "note",
+                        format!("a controller answers at most {MAX_SERVO_READ} registers at once"),
+                    );
+                }
+                self.surplus(octets, WORDS);
+            }
+            Message::ServoWrite(write) => {
+                self.head(octets, "write servo registers", true);
+                self.codes(write.accept, write.reply);
+                self.numbered("servo", u32::from(write.servo));
+                self.registers(write.start, write.data, None);
+                self.surplus(octets, WORDS + 2 * write.data.len());
+            }
+            Message::ServoReply(reply) => {
+                let what = match reply.access {
+                    Access::Read => "reply to read servo registers",
+                    Access::Write => "reply to write servo registers",
+                };
+                self.head(octets, what, false);
+                self.answer(reply.code, dialect);
+                if reply.code == ReplyCode::Running {
+                    self.numbered("servo", u32::from(reply.servo));
+                } else {
+                    self.error(reply.error);
+                }
+                self.told(reply.start, reply.num, reply.data, None);
+                self.surplus(octets, WORDS + 2 * reply.data.len());
+            }
+            _ => {}
+        }
+    }
+
+    fn status(&mut self, octets: &[u8], status: &Status) {
+        self.head(octets, "status report", false);
+        self.station(status.station);
+        self.positions(&status.positions);
+        self.forces(&status.forces);
+        self.servo_errors(&status.servo_errors);
+        match status.error {
+            0 => self.field("error", "none", 0),
+            number => self.error(number),
+        }
+        self.bits("outputs", 'Y', u32::from(status.outputs));
+        self.bits("inputs", 'X', u32::from(status.inputs));
+    }
+
+    fn imax_motion(&mut self, octets: &[u8], motion: &ImaxMotion) {
+        let name = motion_name(motion.timing, false);
+        let reply = if motion.code.is_some() { "reply to " } else { "" };
+        self.head(
+            octets,
+            &format!("{reply}{name}, IMAX layout without a frame number"),
+            motion.code.is_none(),
+        );
+        match motion.code {
+            Some(code) => self.answer(code, Dialect::Mbox),
+            None => self.codes(motion.accept, motion.reply),
+        }
+        self.channel(motion.channel, &format!("{} axes", motion.positions.len()));
+        self.time(motion.timing, motion.time_ms);
+        self.positions(&motion.positions);
+        match motion.code {
+            Some(_) => self.bits("inputs", 'X', motion.port),
+            None => self.bits("outputs", 'Y', motion.port),
+        }
+        self.field("analogue outputs", format!("0x{:08x}", motion.dac), motion.dac);
+    }
+
+    fn imax_registers(&mut self, octets: &[u8], reply: &ImaxRegisters<'_>) {
+        let what = match reply.access {
+            Access::Read => "reply to read registers, IMAX layout of 32 bits",
+            Access::Write => "reply to write registers, IMAX layout of 32 bits",
+        };
+        self.head(octets, what, false);
+        self.answer(reply.code, Dialect::Mbox);
+        self.field("channel", reply.channel, reply.channel);
+        self.asked(reply.start, reply.num, None);
+        self.wide_registers(reply.start, &reply.values().collect::<Vec<_>>());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn read(hex: &str, reading: Reading) -> Sheet {
+        let octets: Vec<u8> =
+            (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect();
+        sheet(&octets, reading).unwrap()
+    }
+
+    #[test]
+    fn a_frame_with_vibration_is_told_field_by_field() {
+        let sheet = read(
+            "55aa000019010000ffff00000000000300000032ffffffff00000000000000018802\
+             0190000a0000000000000000",
+            Reading::Smc,
+        );
+        assert_eq!(
+            sheet.text(),
+            "\
+message    motion with vibration, relative time
+function   0x1901
+direction  host to controller
+octets     46
+accept     ffff: every station
+reply      0000: nobody answers
+channel    0: 3 axes
+frame      3
+time       50 ms to reach the positions
+a1         -1 pulses
+a2         0 pulses
+a3         1 pulses
+outputs    Y02 Y12 (0x8802)
+v1         20.00 Hz, 10 pulses (period 400 x 0.125 ms)
+v2         none
+v3         none
+"
+        );
+    }
+
+    #[test]
+    fn a_refusal_is_told_with_its_error_in_words() {
+        let text = read("55aa00001203000a00000000005500010005", Reading::Smc).text();
+        assert!(text.contains("x = 3: running with an error"), "{text}");
+        assert!(text.contains("Err10: alarm of the servo of axis 1"), "{text}");
+    }
+
+    #[test]
+    fn position_registers_are_told_as_positions_too() {
+        let hex = "55aa00001102000000000000000600041a800006ff9cffff";
+        let text = read(hex, Reading::Smc).text();
+        assert!(text.contains("DP06       6784 (0x1a80)"), "{text}");
+        assert!(
+            text.contains("a1         400000 pulses") && text.contains("a2         -100 pulses"),
+            "{text}"
+        );
+        let json = read(hex, Reading::Smc).into_object();
+        assert_eq!(json["words"], json!([6784, 6, 65436, 65535]));
+    }
+
+    #[test]
+    fn the_same_write_means_another_table_in_another_dialect() {
+        let hex = "55aa000012010000ffffffff009000010001";
+        assert!(read(hex, Reading::Smc).text().contains("DP90"));
+        assert!(read(hex, Reading::Mbox).text().contains("PA90"));
+    }
+
+    #[test]
+    fn the_printed_imax_layout_is_read_where_asked_for() {
+        let hex = "55aa000014010000ffffffff000000320000000100000002fffffffd0000000000000000";
+        let text = read(hex, Reading::Imax).text();
+        assert!(text.contains("IMAX layout") && text.contains("a3                -3 pulses"), "{text}");
+    }
+}
