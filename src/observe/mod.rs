@@ -75,7 +75,7 @@ impl Observer {
         &self.states
     }
 
-    /// What happened, oldest first; the last [`EVENTS_KEPT`] of it.
+    /// What happened, oldest first; the last 1,000 of it.
     pub fn events(&self) -> impl Iterator<Item = &Event> {
         self.events.iter()
     }

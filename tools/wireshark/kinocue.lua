@@ -114,8 +114,9 @@ local f = {
   bad_why = ProtoField.string("kinocue.malformed.why", "Malformed because"),
 }
 
+-- There are twelve of each; the bits past them mean nothing and show in the word alone.
 local bits = { output = {}, input = {} }
-for bit = 1, 16 do
+for bit = 1, 12 do
   local mask = 2 ^ (bit - 1)
   for word, letter in pairs({ output = "y", input = "x" }) do
     local name = string.format("%s%02d", letter, bit)
