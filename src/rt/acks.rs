@@ -83,7 +83,7 @@ impl AckLoop {
             }
             clock.sleep_until(drains.next_after(clock.now()));
         }
-        self.accounts
+        self.into_accounts()
     }
 
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
@@ -116,6 +116,12 @@ impl AckLoop {
         while let Ok(report) = ticks.pop() {
             lateness.saturating_record(report.late_ns);
         }
+    }
+
+    /// The accounts, still open, once nothing more is to be drained.
+    #[must_use]
+    pub fn into_accounts(self) -> Accounts {
+        self.accounts
     }
 
     /// Notes positions that were read from registers before the tick loop runs.
