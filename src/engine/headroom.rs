@@ -1,8 +1,8 @@
 //! How much faster than the film the cue may run, tenth of a second by tenth: what its motion leaves of the limits.
 
-use super::slew::MAX_SPEED_UP;
+use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
 use crate::engine::Rate;
-use crate::motion::{Measure, Readings, Spacing, Window};
+use crate::motion::{Measure, Reading, Readings, Spacing, Window};
 use crate::plan::Curve;
 use crate::time::ShowTime;
 
@@ -13,6 +13,8 @@ const SPAN: i64 = 100_000_000;
 const AHEAD: usize = 4;
 /// One unit of an entry.
 const UNIT: f64 = MAX_SPEED_UP / 255.0;
+/// Over which time the measure sees a change of pace begin or end, seconds: the shorter of its distances, 16 ms and more.
+const MEASURED_OVER_S: f64 = 0.016;
 /// Two hours are measured in a second at this rate, and what the measure sees hardly depends on it.
 const MEASURED_AT: f64 = 100.0;
 
@@ -26,10 +28,9 @@ pub struct Headroom {
 impl Headroom {
     /// Measures the cue on every different slot of the windows.
     #[must_use]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255 after the clamp")]
     pub fn measure(windows: &[Window], curve: &Curve<'_>, rate: Rate) -> Self {
         let spans = usize::try_from(curve.end.as_nanos().max(0) / SPAN).unwrap_or(0) + 1;
-        let mut loads = vec![0.0_f64; spans];
+        let mut loads = vec![Load::default(); spans];
         let rate = Rate::from_hz(rate.hz().min(MEASURED_AT));
         let slots = different_slots(windows);
         let mut measures = vec![Measure::new(Spacing::at_rate(rate.hz())); slots.len()];
@@ -40,12 +41,10 @@ impl Headroom {
             }
             let pose = (curve.pose)(at);
             for ((axis, slot), measure) in slots.iter().zip(&mut measures) {
-                let readings = measure.push(at, slot.place(pose[*axis]));
-                note(&mut loads, &readings, slot.limits);
+                note(&mut loads, &measure.push(at, slot.place(pose[*axis])), slot.limits);
             }
         }
-        let left = |load: f64| ((1.0 / load - 1.0) / UNIT).clamp(0.0, 255.0) as u8;
-        Self { entries: loads.into_iter().map(left).collect() }
+        Self { entries: loads.iter().map(Load::leaves).collect() }
     }
 
     /// The greatest speed-up from `at` on. Never allocates.
@@ -70,18 +69,45 @@ fn different_slots(windows: &[Window]) -> Vec<(usize, crate::motion::Slot)> {
     slots
 }
 
-/// Keeps, where each reading was taken, by what factor time could shrink at the most: speed grows with the factor,
-/// acceleration with its square, jerk with its cube.
-fn note(loads: &mut [f64], readings: &Readings, limits: crate::motion::Limits) {
-    let factors = [
-        (readings.velocity.at, readings.velocity.value.abs() / limits.velocity),
-        (readings.acceleration.at, (readings.acceleration.value.abs() / limits.acceleration).sqrt()),
-        (readings.jerk.at, (readings.jerk.value.abs() / limits.jerk).cbrt()),
-    ];
-    for (at, factor) in factors {
-        let index = usize::try_from(at.as_nanos() / SPAN).unwrap_or(0).min(loads.len() - 1);
-        loads[index] = loads[index].max(factor);
+/// The greatest share of each limit in a tenth of a second.
+#[derive(Debug, Clone, Copy, Default)]
+struct Load {
+    velocity: f64,
+    acceleration: f64,
+    jerk: f64,
+    /// What changing the pace adds to acceleration and to jerk at the greatest speed.
+    acceleration_added: f64,
+    jerk_added: f64,
+}
+
+impl Load {
+    /// How much faster time may run: speed grows with the pace, acceleration with its square, jerk with its cube.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255 after the clamp")]
+    fn leaves(&self) -> u8 {
+        let paces = [
+            1.0 / self.velocity,
+            ((1.0 - self.acceleration_added).max(0.0) / self.acceleration).sqrt(),
+            ((1.0 - self.jerk_added).max(0.0) / self.jerk).cbrt(),
+        ];
+        let pace = paces.into_iter().filter(|pace| pace.is_finite()).fold(1.0 + MAX_SPEED_UP, f64::min);
+        ((pace - 1.0) / UNIT).clamp(0.0, 255.0) as u8
     }
+}
+
+/// Keeps the loads where each reading was taken.
+fn note(loads: &mut [Load], readings: &Readings, limits: crate::motion::Limits) {
+    let last = loads.len() - 1;
+    let index = |reading: &Reading| usize::try_from(reading.at.as_nanos() / SPAN).unwrap_or(0).min(last);
+    let Readings { velocity, acceleration, jerk, .. } = readings;
+    let speed = velocity.value.abs();
+    let load = &mut loads[index(velocity)];
+    load.velocity = load.velocity.max(speed / limits.velocity);
+    load.acceleration_added = load.acceleration_added.max(speed * CHANGE_PER_S / limits.acceleration);
+    load.jerk_added = load.jerk_added.max(speed * CHANGE_PER_S / MEASURED_OVER_S / limits.jerk);
+    let load = &mut loads[index(acceleration)];
+    load.acceleration = load.acceleration.max(acceleration.value.abs() / limits.acceleration);
+    let load = &mut loads[index(jerk)];
+    load.jerk = load.jerk.max(jerk.value.abs() / limits.jerk);
 }
 
 #[cfg(test)]

@@ -98,6 +98,8 @@ pub struct Engine {
     ending: Ending,
     course: Box<Course>,
     switch: Option<Switch>,
+    /// What was to follow the end of the cue, while a stop is asked for.
+    spare: Option<Switch>,
     retired: Retired,
     serial: u32,
     plays_left: Option<u32>,
@@ -131,6 +133,7 @@ impl Engine {
             phase: if settles { Phase::Settling } else { Phase::Riding },
             ending: Ending::Completed,
             switch: None,
+            spare: None,
             retired: Retired::default(),
             serial: course.serial,
             plays_left: show.plays.checked_sub(1),
@@ -184,22 +187,17 @@ impl Engine {
     /// Serves one tick: sets the poses and says what their frames carry. None once the play has ended.
     pub fn tick(&mut self, missed: u64) -> Option<Beat> {
         self.count_missed(missed);
-        self.take_switch();
-        match self.phase {
-            Phase::Done => return None,
-            Phase::Closing(0) => {
-                self.phase = Phase::Done;
-                return None;
-            }
-            _ => {}
+        if matches!(self.phase, Phase::Closing(0) | Phase::Done) {
+            self.phase = Phase::Done;
+            return None;
         }
         let time_ms = self.show.rate.time_ms(self.frames);
         self.frames += 1;
-        let (show, phase) = (self.playhead, self.phase);
+        let show = self.playhead;
         self.move_on(millis(time_ms));
         let (timing, time_ms) = self.stamps.next(time_ms);
         let mut beat = Beat::still(timing, time_ms);
-        if matches!(phase, Phase::Riding | Phase::Stalled) {
+        if matches!(self.phase, Phase::Riding | Phase::Stalled) {
             // They act when the frame comes, not when its pose is reached.
             beat.vibration = self.timeline.vibration(show, &mut self.hint);
             beat.effects = self.timeline.effects(show, &mut self.hint);
@@ -211,23 +209,37 @@ impl Engine {
     /// Advances show time by one frame and sets the poses.
     fn move_on(&mut self, time: Duration) {
         match self.phase {
-            Phase::Settling => self.phase = Phase::Riding,
-            Phase::Stalled => self.playhead += time,
-            Phase::Closing(left) => {
-                self.phase = Phase::Closing(left - 1);
-                if left == 1 {
-                    self.stamps.break_off(); // whoever plays next starts its sum after a relative frame
-                }
+            Phase::Settling => {
+                self.phase = Phase::Riding;
+                return;
             }
-            Phase::Riding | Phase::Parking | Phase::Done => {
-                let ceiling = if self.phase == Phase::Riding { self.headroom.at(self.playhead) } else { 0.0 };
-                self.playhead += self.slew.advance(time, ceiling);
-                self.reached = self.playhead;
-                let cue = self.timeline.sample(self.reached, &mut self.hint);
-                for (lane, (pose, window)) in self.poses.iter_mut().zip(&self.windows).enumerate() {
-                    *pose = self.course.pose(lane, self.reached, window, &cue);
-                }
+            Phase::Closing(left) => return self.close(left),
+            Phase::Done => return,
+            Phase::Stalled | Phase::Riding | Phase::Parking => {
+                let passed = self.pass(time);
+                self.playhead += passed;
             }
+        }
+        // Before the poses: one past the change of course is the new course's.
+        self.take_switch();
+        if self.phase == Phase::Stalled {
+            return;
+        }
+        self.reached = self.playhead;
+        let cue = self.timeline.sample(self.reached, &mut self.hint);
+        for (lane, (pose, window)) in self.poses.iter_mut().zip(&self.windows).enumerate() {
+            *pose = self.course.pose(lane, self.reached, window, &cue);
+        }
+        if let Phase::Closing(left) = self.phase {
+            self.close(left);
+        }
+    }
+
+    /// Counts a hold frame.
+    fn close(&mut self, left: u8) {
+        self.phase = Phase::Closing(left - 1);
+        if left == 1 {
+            self.stamps.break_off(); // whoever plays next starts its sum after a relative frame
         }
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// The most that show time runs faster than the clock.
 pub const MAX_SPEED_UP: f64 = 0.02;
 /// How quickly that may change, per second: 0.2 % per 10 ms.
-const CHANGE_PER_S: f64 = 0.2;
+pub(super) const CHANGE_PER_S: f64 = 0.2;
 
 /// The lag of the show behind its grid, and how fast it is being taken back.
 #[derive(Debug, Clone, Default)]
@@ -31,9 +31,21 @@ impl Slew {
         *self = Self::default();
     }
 
-    /// Show time was moved on by `span`.
+    /// Show time was moved on by `span`, and runs no faster than the clock from here on.
     pub(super) fn skip(&mut self, span: Duration) {
         self.lag_s = (self.lag_s - span.as_secs_f64()).max(0.0);
+        self.speed_up = 0.0;
+    }
+
+    /// How fast show time runs, as a multiple of the clock.
+    pub(super) fn pace(&self) -> f64 {
+        1.0 + self.speed_up
+    }
+
+    /// How much show time passes in a frame of that Time at the present pace.
+    pub(super) fn coast(&mut self, time: Duration) -> Duration {
+        self.lag_s -= self.speed_up * time.as_secs_f64();
+        time.mul_f64(self.pace())
     }
 
     /// How much show time passes in a frame of that Time, at most `ceiling` (0 to [`MAX_SPEED_UP`]) faster than it.

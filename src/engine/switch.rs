@@ -12,8 +12,10 @@ pub(super) enum Goal {
     Rejoin,
     /// From the end of the cue onto its beginning.
     Again,
-    /// To park, and then the end.
+    /// From the end of the cue to park, and then the end.
     Home,
+    /// To park at once, and then the end.
+    Stop,
 }
 
 /// A change of course under way.
@@ -22,6 +24,9 @@ pub(super) struct Switch {
     pub(super) goal: Goal,
     /// The show time, as it runs now, at which the course changes.
     pub(super) at: ShowTime,
+    /// How fast show time runs until then, as a multiple of the clock; the new course begins with what that makes of the
+    /// old one's motion.
+    pub(super) pace: f64,
     /// What show time gains on its grid by the change.
     pub(super) skipped: Duration,
     pub(super) request: Request,

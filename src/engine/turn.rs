@@ -11,8 +11,8 @@ use crate::time::ShowTime;
 const LAG_HOLD: Duration = Duration::from_millis(50);
 /// A course is asked for at least this long before it is to begin, and at least two ticks.
 const LEAD: Duration = Duration::from_millis(20);
-/// The course that follows the end of the cue is asked for this long before it.
-const END_LEAD: Duration = Duration::from_secs(1);
+/// In this time show time surely comes back to the pace of the clock.
+const SLOWING: Duration = Duration::from_millis(150);
 /// Hold frames that close a play.
 const CLOSING_FRAMES: u8 = 3;
 
@@ -37,60 +37,84 @@ impl Engine {
         }
     }
 
+    /// How much show time passes in a frame of that Time.
+    pub(super) fn pass(&mut self, time: Duration) -> Duration {
+        match (self.phase, &self.switch) {
+            (Phase::Stalled, _) => time,
+            (Phase::Riding, Some(switch)) if switch.pace > 1.0 => self.slew.coast(time),
+            (Phase::Riding, Some(switch)) if switch.at <= self.playhead + SLOWING => {
+                self.slew.advance(time, 0.0)
+            }
+            (Phase::Riding, _) => self.slew.advance(time, self.headroom.at(self.playhead)),
+            _ => self.slew.advance(time, 0.0),
+        }
+    }
+
     /// Asks for the course that the present state will need, if it needs one.
     pub(super) fn look_ahead(&mut self) {
         let asked = self.switch.as_ref().map(|switch| switch.goal);
+        let soonest = self.playhead + self.lead();
         match self.phase {
             Phase::Parking if self.reached >= self.course.settled() => {
                 self.phase = Phase::Closing(CLOSING_FRAMES)
             }
-            Phase::Riding | Phase::Stalled if self.homeward && asked == Some(Goal::Home) => {}
-            Phase::Riding | Phase::Stalled if self.homeward => {
-                let at = self.playhead + self.lead();
-                self.ask(Goal::Home, at, at);
-            }
-            Phase::Stalled if asked.is_none() => {
-                let at = self.playhead + self.lead();
-                self.ask(Goal::Rejoin, at, at);
-            }
-            Phase::Riding if asked.is_none() => self.look_ahead_riding(),
+            Phase::Riding | Phase::Stalled if self.homeward && self.stopping() => {}
+            // The old course ends before a way home can begin on it: home from the one that follows.
+            Phase::Riding if self.homeward && self.turns_between(self.playhead, soonest) => {}
+            Phase::Riding | Phase::Stalled if self.homeward => self.ask(Goal::Stop, soonest, soonest),
+            Phase::Stalled if asked.is_none() => self.ask(Goal::Rejoin, soonest, soonest),
+            Phase::Riding => self.look_ahead_riding(asked, soonest),
             _ => {}
         }
     }
 
-    fn look_ahead_riding(&mut self) {
-        let soonest = self.playhead + self.lead();
+    /// Whether the way home that was asked for is a stop, not the one that follows the end of the cue.
+    fn stopping(&self) -> bool {
+        self.switch.as_ref().is_some_and(|switch| switch.goal == Goal::Stop)
+    }
+
+    fn turns_between(&self, from: ShowTime, to: ShowTime) -> bool {
+        let mut turns = self.switch.iter().chain(&self.spare);
+        turns.any(|switch| (from..=to).contains(&switch.at))
+    }
+
+    fn look_ahead_riding(&mut self, asked: Option<Goal>, soonest: ShowTime) {
         let lag = self.slew.lag();
         if lag > LAG_HOLD && lag > self.show.rate.period() {
-            // Many small gaps: the lanes are moving, so they join from the lagging cue onto the true one.
-            self.ask(Goal::Rejoin, soonest, soonest + lag);
-            return;
-        }
-        let end = self.timeline.duration().max(self.course.settled());
-        if self.playhead + END_LEAD >= end || soonest >= end {
-            let at = end.max(soonest);
+            if asked != Some(Goal::Rejoin) {
+                // Many small gaps: the lanes are moving, so they join from the lagging cue onto the true one.
+                self.ask(Goal::Rejoin, soonest, soonest + lag);
+            }
+        } else if asked.is_none() {
+            // What follows the end is known all along, so that the planner has all the time there is.
+            let end = self.timeline.duration().max(self.course.settled()).max(soonest);
             if self.plays_left == Some(0) {
-                self.ask(Goal::Home, at, at);
+                self.ask(Goal::Home, end, end);
             } else {
-                self.ask(Goal::Again, at, ShowTime::ZERO);
+                self.ask(Goal::Again, end, ShowTime::ZERO);
             }
         }
     }
 
     /// Asks for a course that takes over when show time, as it runs now, is `at`, and calls that instant `start`.
     fn ask(&mut self, goal: Goal, at: ShowTime, start: ShowTime) {
+        // Should the planner be slow, and the cue end before the lanes are on their way home, they go on as was planned.
+        let spare = if goal == Goal::Stop { self.spare.take().or_else(|| self.switch.take()) } else { None };
         self.drop_switch();
+        self.spare = spare;
         let serial = self.course.serial;
+        // Given the time, the pace is brought back to the clock's; at short notice it is kept.
+        let pace = if at > self.playhead + SLOWING { 1.0 } else { self.slew.pace() };
         let from = match self.phase {
-            Phase::Stalled => From::Stalled(serial, self.reached),
-            _ => From::Course(serial, at),
+            Phase::Stalled => From::Stalled { serial, at: self.reached },
+            _ => From::Course { serial, at, pace },
         };
-        let to = if goal == Goal::Home { To::Park } else { To::Cue };
+        let to = if matches!(goal, Goal::Home | Goal::Stop) { To::Park } else { To::Cue };
         self.serial = self.serial.wrapping_add(1);
         let request = Request { from, to, start, serial: self.serial };
         let gained = if goal == Goal::Rejoin { start.as_nanos() - at.as_nanos() } else { 0 };
         let skipped = Duration::from_nanos(gained.unsigned_abs());
-        self.switch = Some(Switch { goal, at, skipped, request, unsent: true, course: None });
+        self.switch = Some(Switch { goal, at, pace, skipped, request, unsent: true, course: None });
     }
 
     /// The request that the planner has not seen yet.
@@ -123,7 +147,7 @@ impl Engine {
         };
         self.ending = Ending::Fault;
         self.homeward = true;
-        if switch.goal == Goal::Home {
+        if switch.goal == Goal::Stop {
             self.phase = Phase::Closing(CLOSING_FRAMES);
         }
         self.switch = None;
@@ -136,12 +160,10 @@ impl Engine {
 
     /// Takes up the new course when its time has come.
     pub(super) fn take_switch(&mut self) {
-        let Some(switch) =
-            self.switch.take_if(|switch| switch.course.is_some() && self.playhead >= switch.at)
-        else {
-            return;
-        };
+        let due = |switch: &mut Switch| switch.course.is_some() && self.playhead > switch.at;
+        let Some(switch) = self.switch.take_if(due).or_else(|| self.spare.take_if(due)) else { return };
         let Some(course) = switch.course else { return };
+        self.drop_switch();
         let over = self.playhead.as_nanos() - switch.at.as_nanos();
         self.playhead = ShowTime::from_nanos(course.start.as_nanos() + over);
         self.slew.skip(switch.skipped);
@@ -150,8 +172,8 @@ impl Engine {
             self.plays_left = self.plays_left.map(|left| left.saturating_sub(1));
         }
         self.phase = match switch.goal {
-            Goal::Home if course.settled() <= course.start => Phase::Closing(CLOSING_FRAMES),
-            Goal::Home => Phase::Parking,
+            Goal::Home | Goal::Stop if course.settled() <= course.start => Phase::Closing(CLOSING_FRAMES),
+            Goal::Home | Goal::Stop => Phase::Parking,
             Goal::Again | Goal::Rejoin => Phase::Riding,
         };
         let old = std::mem::replace(&mut self.course, course);
@@ -159,8 +181,9 @@ impl Engine {
     }
 
     fn drop_switch(&mut self) {
-        let switch = self.switch.take();
-        self.retired.put(switch.and_then(|switch| switch.course));
+        for switch in [self.switch.take(), self.spare.take()] {
+            self.retired.put(switch.and_then(|switch| switch.course));
+        }
     }
 
     /// The time a planner is given: at least two ticks and 20 ms, twice as long after each answer that came too late.

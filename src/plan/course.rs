@@ -51,11 +51,7 @@ impl Course {
         if self.then == After::Cue && seconds >= plan.seconds() {
             return window.place(cue);
         }
-        let mut pose = window.park();
-        for ((slot, _), position) in window.moving().zip(plan.position_at(seconds)) {
-            pose[slot] = *position;
-        }
-        pose
+        plan.pose_at(at, self.start, window)
     }
 
     /// How each moving slot of a lane moves at a show time.

@@ -1,9 +1,10 @@
 //! Joins: a move from where a lane is onto the moving cue, met at its position, velocity and acceleration.
 
+use super::seam::{Before, SLACK, roughness_around, roughness_of_leaving};
 use super::solve::{Problem, to_position};
 use super::states::following;
 use super::{AxisState, Curve, Plan, PlanError};
-use crate::motion::{Limits, Measure, Spacing, Window};
+use crate::motion::{Limits, Window};
 use crate::time::ShowTime;
 
 /// The shortest join, seconds.
@@ -16,19 +17,19 @@ const LATER: f64 = 0.010;
 const SHARE: f64 = 0.9;
 /// How many later meetings are tried to find one whose seam the measure does not see.
 const SMOOTHER: usize = 50;
-/// What the measure allows over the limits.
-const SLACK: f64 = 1.001;
 
-/// Plans a join that starts at show time `start` from the states `from`, one for each moving slot of the window.
+/// Plans a join that starts at show time `start` from the states `from`, one for each moving slot of the window; `before`
+/// is what the lane does until then, where it does not rest.
 ///
 /// # Errors
 /// [`PlanError::NoJoin`] where the solver finds no move of up to 10 s.
-pub fn join(
+pub(super) fn join(
     window: &Window,
     from: &[AxisState],
     cue: &Curve<'_>,
     start: ShowTime,
     rate_hz: f64,
+    mut before: Option<Before<'_, '_>>,
 ) -> Result<Plan, PlanError> {
     let mut least_rough: Option<(f64, Plan)> = None;
     let (mut meeting, mut smoother) = (JOIN_MIN, 0);
@@ -40,7 +41,7 @@ pub fn join(
                 meeting = plan.seconds() + LATER;
             }
             Ok(mut plan) => {
-                let roughness = seam(window, &mut plan, cue, start, rate_hz);
+                let roughness = roughness(window, &mut plan, cue, start, rate_hz, before.as_deref_mut());
                 if roughness <= SLACK {
                     return Ok(plan);
                 }
@@ -63,12 +64,12 @@ pub fn join(
 /// Whether a lane at rest in its park pose can take up the cue at `start` without a move: the cue stands there in that
 /// pose, to a pulse, and leaves it within the limits.
 #[must_use]
-pub fn joins_without_a_move(window: &Window, cue: &Curve<'_>, start: ShowTime, rate_hz: f64) -> bool {
+pub(super) fn joins_without_a_move(window: &Window, cue: &Curve<'_>, start: ShowTime, rate_hz: f64) -> bool {
     let (park, first) = (window.park(), window.place(&(cue.pose)(start)));
     let there =
         window.moving().all(|(slot, axis)| (first[slot] - park[slot]).abs() * axis.stroke_pulses <= 1.0);
     let pose = |at: ShowTime| if at <= start { park } else { window.place(&(cue.pose)(at)) };
-    there && roughness_around(window, pose, start, rate_hz) <= SLACK
+    there && roughness_around(window, start, rate_hz, pose) <= SLACK
 }
 
 fn attempt(
@@ -98,46 +99,24 @@ fn raised(limits: Limits, from: &AxisState, to: &AxisState) -> Limits {
     Limits { velocity, acceleration, jerk }
 }
 
-/// How far the measure is over the limits where the join meets the cue: 1 is just within them.
-fn seam(window: &Window, plan: &mut Plan, cue: &Curve<'_>, start: ShowTime, rate_hz: f64) -> f64 {
+/// How rough the seams of the move are: where it leaves what the lane did before, and where it meets the cue.
+fn roughness(
+    window: &Window,
+    plan: &mut Plan,
+    cue: &Curve<'_>,
+    start: ShowTime,
+    rate_hz: f64,
+    before: Option<Before<'_, '_>>,
+) -> f64 {
     let length = ShowTime::from_secs_f64(plan.seconds());
     let meeting = ShowTime::from_nanos(start.as_nanos() + length.as_nanos());
-    let pose = |at: ShowTime| {
-        let mut pose = window.place(&(cue.pose)(at));
-        if at < meeting {
-            let seconds = ShowTime::from_nanos(at.as_nanos() - start.as_nanos()).as_secs_f64();
-            for ((slot, _), position) in window.moving().zip(plan.position_at(seconds)) {
-                pose[slot] = *position;
-            }
-        }
-        pose
-    };
-    roughness_around(window, pose, meeting, rate_hz)
-}
-
-/// The worst of acceleration and jerk over their limits, around an instant.
-fn roughness_around(
-    window: &Window,
-    mut pose: impl FnMut(ShowTime) -> crate::motion::Pose,
-    middle: ShowTime,
-    rate_hz: f64,
-) -> f64 {
-    let spacing = Spacing::at_rate(rate_hz);
-    let reach = i64::try_from(3 * spacing.m + 1).expect("at most 82");
-    let period = ShowTime::from_secs_f64(1.0 / rate_hz).as_nanos();
-    let mut measures: Vec<Measure> = window.moving().map(|_| Measure::new(spacing)).collect();
-    let mut worst = 0.0_f64;
-    for k in -reach..=reach {
-        let at = ShowTime::from_nanos(middle.as_nanos() + k * period);
-        let pose = pose(at);
-        for ((slot, axis), measure) in window.moving().zip(&mut measures) {
-            let readings = measure.push(at, pose[slot]);
-            worst = worst
-                .max(readings.acceleration.value.abs() / axis.limits.acceleration)
-                .max(readings.jerk.value.abs() / axis.limits.jerk);
-        }
+    let met = roughness_around(window, meeting, rate_hz, |at| {
+        if at < meeting { plan.pose_at(at, start, window) } else { window.place(&(cue.pose)(at)) }
+    });
+    match before {
+        Some(before) => met.max(roughness_of_leaving(window, plan, start, rate_hz, before)),
+        None => met,
     }
-    worst
 }
 
 #[cfg(test)]
@@ -167,7 +146,8 @@ mod tests {
     #[test]
     fn a_join_from_park_meets_the_moving_cue_within_the_limits() {
         let window = three_axes();
-        let mut plan = join(&window, &[AxisState::default(); 3], &cue(), ShowTime::ZERO, 100.0).unwrap();
+        let mut plan =
+            join(&window, &[AxisState::default(); 3], &cue(), ShowTime::ZERO, 100.0, None).unwrap();
         assert!(plan.seconds() >= JOIN_MIN - 1e-9, "{}", plan.seconds());
         let at = ShowTime::from_secs_f64(plan.seconds());
         let target = following(&window, &cue(), at);
@@ -176,7 +156,7 @@ mod tests {
             assert!((end.position - target.position).abs() < 1e-6, "axis {axis}: {end:?} {target:?}");
             assert!((end.velocity - target.velocity).abs() < 1e-6, "axis {axis}: {end:?} {target:?}");
         }
-        assert!(seam(&window, &mut plan, &cue(), ShowTime::ZERO, 100.0) <= SLACK);
+        assert!(roughness(&window, &mut plan, &cue(), ShowTime::ZERO, 100.0, None) <= SLACK);
     }
 
     #[test]
@@ -189,7 +169,7 @@ mod tests {
         let cue = Curve { pose: &leap, end: ShowTime::from_millis(60_000) };
         let seat = SeatType::bench3(1);
         let window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
-        let outcome = join(&window, &[AxisState::at_rest(0.5)], &cue, ShowTime::ZERO, 100.0);
+        let outcome = join(&window, &[AxisState::at_rest(0.5)], &cue, ShowTime::ZERO, 100.0, None);
         // Either refused, or planned no faster than the cue itself is.
         if let Err(error) = outcome {
             assert!(error.to_string().contains("no move of up to 10 s"), "{error}");

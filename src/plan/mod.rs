@@ -7,17 +7,18 @@ mod course;
 mod join;
 mod park;
 mod planner;
+mod seam;
 mod solve;
 mod states;
 
 pub use course::{After, Course};
-pub use join::{JOIN_MIN, join, joins_without_a_move};
-pub use park::{PARK_VELOCITY_MM_S, park};
+pub use join::JOIN_MIN;
+pub use park::PARK_VELOCITY_MM_S;
 pub use planner::{From, Planner, Request, To};
 
 use rsruckig::prelude::{DataArrayOrVec, Trajectory};
 
-use crate::motion::Pose;
+use crate::motion::{Pose, Window};
 use crate::time::ShowTime;
 
 /// The cue as the planner sees it.
@@ -45,6 +46,13 @@ impl AxisState {
     #[must_use]
     pub const fn at_rest(position: f64) -> Self {
         Self { position, velocity: 0.0, acceleration: 0.0 }
+    }
+}
+
+impl AxisState {
+    /// The same motion run through `pace` times as fast.
+    fn at_pace(self, pace: f64) -> Self {
+        Self { velocity: self.velocity * pace, acceleration: self.acceleration * pace * pace, ..self }
     }
 }
 
@@ -106,6 +114,17 @@ impl Plan {
             *position = position.clamp(0.0, 1.0);
         }
         &self.positions
+    }
+
+    /// Where a lane's slots are at a show time, if the move starts at `start`; slots that do not move rest at park. Never
+    /// allocates.
+    fn pose_at(&mut self, at: ShowTime, start: ShowTime, window: &Window) -> Pose {
+        let seconds = ShowTime::from_nanos(at.as_nanos().saturating_sub(start.as_nanos())).as_secs_f64();
+        let mut pose = window.park();
+        for ((slot, _), position) in window.moving().zip(self.position_at(seconds)) {
+            pose[slot] = *position;
+        }
+        pose
     }
 
     /// The state of each moving slot `seconds` after the start, clamped likewise.

@@ -1,50 +1,96 @@
 //! Parking: from wherever a lane is and however it moves to rest in its park pose, no faster than 50 mm/s.
 
+use super::seam::{Before, SLACK, roughness_of_leaving};
 use super::solve::{Problem, to_position, to_velocity};
 use super::{AxisState, Plan, PlanError};
 use crate::motion::{Limits, Window};
+use crate::time::ShowTime;
 
 /// The greatest speed of a seat on its way to park, mm/s.
 pub const PARK_VELOCITY_MM_S: f64 = 50.0;
 
+/// What of the seat's own acceleration and jerk a move is planned with: all but what rounding to pulses adds, less only
+/// where its seam with what the lane did before would be rough.
+const SHARES: [f64; 5] = [0.99, 0.9, 0.8, 0.7, 0.6];
+
 /// Plans the move from the states `from`, one for each moving slot of the window, to rest in its park pose: straight
-/// where that can be had, else a stop where the lane is and then to park.
-///
-/// Acceleration and jerk are the seat's own: with lower ones a moving seat cannot stop inside its stroke.
+/// where that can be had, else a stop where the lane is and then to park. It starts at show time `start`; `before` is what
+/// the lane does until then, where it does not rest, at `pace` times the clock.
 ///
 /// # Errors
 /// [`PlanError::NoStop`] where the solver refuses everything.
-pub fn park(window: &Window, from: &[AxisState]) -> Result<Plan, PlanError> {
-    let target: Vec<AxisState> = window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect();
-    if let Ok(plan) = straight(window, from, &target) {
-        return Ok(plan);
+pub(super) fn park(
+    window: &Window,
+    from: &[AxisState],
+    start: ShowTime,
+    rate_hz: f64,
+    pace: f64,
+    mut before: Option<Before<'_, '_>>,
+) -> Result<Plan, PlanError> {
+    let mut least_rough: Option<(f64, Plan)> = None;
+    let mut refused = None;
+    // Where the pace was changing, that shows as jerk too.
+    let shares = if pace == 1.0 { &SHARES[..] } else { &SHARES[1..] };
+    for &share in shares {
+        // With less than all a seat may not be able to stop inside its stroke.
+        let planned = match straight(window, from, share) {
+            Err(_) if least_rough.is_none() => {
+                straight(window, from, 1.0).or_else(|_| stop_first(window, from))
+            }
+            planned => planned,
+        };
+        let mut plan = match planned {
+            Ok(plan) => plan,
+            Err(refusal) => {
+                refused.get_or_insert(refusal);
+                continue;
+            }
+        };
+        let leaving = before
+            .as_deref_mut()
+            .map(|before| roughness_of_leaving(window, &mut plan, start, rate_hz, before));
+        let roughness = leaving.unwrap_or(0.0);
+        if roughness <= SLACK {
+            return Ok(plan);
+        }
+        if least_rough.as_ref().is_none_or(|(least, _)| roughness < *least) {
+            least_rough = Some((roughness, plan));
+        }
     }
+    least_rough.map(|(_, plan)| plan).ok_or_else(|| PlanError::NoStop(refused.unwrap_or_default()))
+}
+
+fn target(window: &Window) -> Vec<AxisState> {
+    window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect()
+}
+
+/// As fast a stop as the seat's own limits allow, wherever that ends, and from there to park.
+fn stop_first(window: &Window, from: &[AxisState]) -> Result<Plan, String> {
     let limits: Vec<Limits> =
-        window.moving().zip(from).map(|((_, slot), from)| stopping(slot.limits, from)).collect();
-    let mut stop = to_velocity(&Problem { from, to: &target, limits: &limits, minimum_s: 0.001 })
-        .map_err(PlanError::NoStop)?;
+        window.moving().zip(from).map(|((_, slot), from)| stopping(slot.limits, from, 1.0)).collect();
+    let mut stop = to_velocity(&Problem { from, to: &target(window), limits: &limits, minimum_s: 0.001 })?;
     let ends = stop.seconds();
     let stopped: Vec<AxisState> =
         stop.position_at(ends).iter().map(|position| AxisState::at_rest(*position)).collect();
-    let rest = straight(window, &stopped, &target).map_err(PlanError::NoStop)?;
-    Ok(stop.then(rest))
+    Ok(stop.then(straight(window, &stopped, 1.0)?))
 }
 
-fn straight(window: &Window, from: &[AxisState], target: &[AxisState]) -> Result<Plan, String> {
+fn straight(window: &Window, from: &[AxisState], share: f64) -> Result<Plan, String> {
     let limits: Vec<Limits> = window
         .moving()
         .zip(from)
         .map(|((_, slot), from)| Limits {
             velocity: slot.limits.velocity.min(PARK_VELOCITY_MM_S / slot.stroke_mm),
-            ..stopping(slot.limits, from)
+            ..stopping(slot.limits, from, share)
         })
         .collect();
-    to_position(&Problem { from, to: target, limits: &limits, minimum_s: 0.001 })
+    to_position(&Problem { from, to: &target(window), limits: &limits, minimum_s: 0.001 })
 }
 
-/// The seat's own limits, raised to the acceleration it has.
-fn stopping(limits: Limits, from: &AxisState) -> Limits {
-    Limits { acceleration: limits.acceleration.max(from.acceleration.abs()), ..limits }
+/// A share of the seat's own limits, raised to the acceleration it has.
+fn stopping(limits: Limits, from: &AxisState, share: f64) -> Limits {
+    let acceleration = (share * limits.acceleration).max(from.acceleration.abs());
+    Limits { acceleration, jerk: share * limits.jerk, ..limits }
 }
 
 #[cfg(test)]
@@ -60,7 +106,7 @@ mod tests {
     #[test]
     fn a_seat_at_rest_parks_at_no_more_than_50_mm_a_second() {
         let (window, _) = one_axis();
-        let mut plan = park(&window, &[AxisState::at_rest(1.0)]).unwrap();
+        let mut plan = park(&window, &[AxisState::at_rest(1.0)], ShowTime::ZERO, 100.0, 1.0, None).unwrap();
         // 150 mm at 50 mm/s, and the time to gather and to lose the speed.
         assert!(plan.seconds() > 3.0 && plan.seconds() < 3.2, "{}", plan.seconds());
         let fastest =
@@ -73,7 +119,7 @@ mod tests {
     fn a_seat_at_full_speed_slows_down_within_its_own_limits_first() {
         let (window, limits) = one_axis();
         let from = AxisState { position: 0.5, velocity: -limits.velocity, acceleration: 0.0 };
-        let mut plan = park(&window, &[from]).unwrap();
+        let mut plan = park(&window, &[from], ShowTime::ZERO, 100.0, 1.0, None).unwrap();
         for ms in 0..4000 {
             let state = plan.states_at(f64::from(ms) * 1e-3)[0];
             assert!(state.acceleration.abs() <= limits.acceleration * 1.000_001, "{state:?}");
@@ -85,7 +131,7 @@ mod tests {
     fn a_seat_that_cannot_stop_inside_its_stroke_stops_as_fast_as_it_may_and_then_parks() {
         let (window, limits) = one_axis();
         let from = AxisState { position: 0.99, velocity: limits.velocity, acceleration: 0.0 };
-        let mut plan = park(&window, &[from]).unwrap();
+        let mut plan = park(&window, &[from], ShowTime::ZERO, 100.0, 1.0, None).unwrap();
         let halted =
             (0..200).map(|ms| plan.states_at(f64::from(ms) * 1e-3)[0].velocity).any(|v| v.abs() < 0.02);
         assert!(halted, "a seat at its full 240 mm/s is slow within 200 ms");
@@ -102,7 +148,13 @@ mod tests {
     fn a_parked_seat_parks_again_without_a_refusal() {
         let (window, _) = one_axis();
         for off in [0.0, 1e-16, 1e-15, 1e-13, 1e-11, 1e-9, 1e-6] {
-            assert!(park(&window, &[AxisState::at_rest(off)]).unwrap().seconds() < 0.1, "{off}");
+            assert!(
+                park(&window, &[AxisState::at_rest(off)], ShowTime::ZERO, 100.0, 1.0, None)
+                    .unwrap()
+                    .seconds()
+                    < 0.1,
+                "{off}"
+            );
         }
     }
 }

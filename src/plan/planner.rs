@@ -3,7 +3,10 @@
 
 use std::collections::VecDeque;
 
-use super::{After, AxisState, Course, Curve, Plan, PlanError, join, joins_without_a_move, park};
+use super::join::{join, joins_without_a_move};
+use super::park::park;
+use super::seam::Before;
+use super::{After, AxisState, Course, Curve, Plan, PlanError};
 use crate::motion::Window;
 use crate::time::ShowTime;
 
@@ -11,14 +14,26 @@ use crate::time::ShowTime;
 const REMEMBERED: usize = 4;
 
 /// How the lanes are as the new course begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum From {
     /// In their park pose, at rest: the beginning of a play.
     Park,
-    /// On the course of that serial, at that show time, under way.
-    Course(u32, ShowTime),
-    /// Where that course was at that show time, but at rest: frames stopped coming there.
-    Stalled(u32, ShowTime),
+    /// Under way on another course.
+    Course {
+        /// Its serial.
+        serial: u32,
+        /// The show time that it has reached.
+        at: ShowTime,
+        /// How fast show time runs on it, as a multiple of the clock.
+        pace: f64,
+    },
+    /// Where another course was at that show time, but at rest: frames stopped coming there.
+    Stalled {
+        /// Its serial.
+        serial: u32,
+        /// The show time that it had reached.
+        at: ShowTime,
+    },
 }
 
 /// Where the new course leads.
@@ -31,7 +46,7 @@ pub enum To {
 }
 
 /// A request for a course.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     /// How the lanes are as it begins.
     pub from: From,
@@ -63,16 +78,17 @@ impl Planner {
     /// # Errors
     /// [`PlanError`] where a lane's move cannot be planned; nothing is remembered then.
     pub fn plan(&mut self, request: Request, curve: &Curve<'_>) -> Result<Course, PlanError> {
+        let mut old = self.course_of(request.from);
         let mut moves: Vec<Option<Plan>> = Vec::with_capacity(self.windows.len());
         let mut states: Vec<Vec<AxisState>> = Vec::with_capacity(self.windows.len());
-        for lane in 0..self.windows.len() {
-            states.push(self.states(lane, request.from, curve));
+        for (lane, window) in self.windows.iter().enumerate() {
+            states.push(states_of(old.as_mut(), request.from, lane, window, curve));
             // The seats of a hall are mostly alike: what was planned for one serves all like it.
-            let twin = (0..lane)
-                .find(|&other| self.windows[other] == self.windows[lane] && states[other] == states[lane]);
+            let twin =
+                (0..lane).find(|&other| self.windows[other] == *window && states[other] == states[lane]);
             let planned = match twin {
                 Some(twin) => moves[twin].clone(),
-                None => self.lane_move(lane, &states[lane], request, curve)?,
+                None => self.lane_move(lane, &states[lane], request, curve, old.as_mut())?,
             };
             moves.push(planned);
         }
@@ -91,34 +107,63 @@ impl Planner {
         from: &[AxisState],
         request: Request,
         curve: &Curve<'_>,
+        old: Option<&mut Course>,
     ) -> Result<Option<Plan>, PlanError> {
-        let window = &self.windows[lane];
+        let (window, start, rate_hz) = (&self.windows[lane], request.start, self.rate_hz);
         let parked =
             window.moving().zip(from).all(|((_, slot), from)| *from == AxisState::at_rest(slot.park));
+        let mut along = old.zip(under_way(request.from)).map(|(course, (until, pace))| {
+            move |at: ShowTime| {
+                // Show time may jump with the change of course; what was before goes on backwards from there.
+                let since = ShowTime::from_nanos(at.as_nanos() - start.as_nanos()).as_secs_f64();
+                let at =
+                    ShowTime::from_nanos(until.as_nanos() + ShowTime::from_secs_f64(since * pace).as_nanos());
+                course.pose(lane, at, window, &(curve.pose)(at))
+            }
+        });
+        let pace = under_way(request.from).map_or(1.0, |(_, pace)| pace);
+        let before = along.as_mut().map(|along| along as Before<'_, '_>);
         match request.to {
             _ if from.is_empty() => Ok(None),
             To::Park if parked => Ok(None),
-            To::Park => park(window, from).map(Some),
-            To::Cue if parked && joins_without_a_move(window, curve, request.start, self.rate_hz) => Ok(None),
-            To::Cue => join(window, from, curve, request.start, self.rate_hz).map(Some),
+            To::Park => park(window, from, start, rate_hz, pace, before).map(Some),
+            To::Cue if parked && joins_without_a_move(window, curve, start, rate_hz) => Ok(None),
+            To::Cue => join(window, from, curve, start, rate_hz, before).map(Some),
         }
     }
 
-    fn states(&mut self, lane: usize, from: From, curve: &Curve<'_>) -> Vec<AxisState> {
-        let window = &self.windows[lane];
-        let (serial, at, stalled) = match from {
-            From::Park => (None, ShowTime::ZERO, true),
-            From::Course(serial, at) => (Some(serial), at, false),
-            From::Stalled(serial, at) => (Some(serial), at, true),
-        };
-        let Some(course) = self.given.iter_mut().find(|course| Some(course.serial) == serial) else {
-            return window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect();
-        };
-        let mut states = course.states(lane, at, window, curve);
-        if stalled {
-            states.iter_mut().for_each(|state| *state = AxisState::at_rest(state.position));
+    fn course_of(&self, from: From) -> Option<Course> {
+        let (From::Course { serial, .. } | From::Stalled { serial, .. }) = from else { return None };
+        self.given.iter().find(|course| course.serial == serial).cloned()
+    }
+}
+
+/// The show time up to which lanes follow their old course, and their pace on it, where they do not rest.
+const fn under_way(from: From) -> Option<(ShowTime, f64)> {
+    match from {
+        From::Course { at, pace, .. } => Some((at, pace)),
+        From::Park | From::Stalled { .. } => None,
+    }
+}
+
+/// How each moving slot of a lane moves as the new course begins.
+fn states_of(
+    old: Option<&mut Course>,
+    from: From,
+    lane: usize,
+    window: &Window,
+    curve: &Curve<'_>,
+) -> Vec<AxisState> {
+    match (old, from) {
+        (Some(course), From::Course { at, pace, .. }) => {
+            let states = course.states(lane, at, window, curve);
+            states.into_iter().map(|state| state.at_pace(pace)).collect()
         }
-        states
+        (Some(course), From::Stalled { at, .. }) => {
+            let states = course.states(lane, at, window, curve);
+            states.into_iter().map(|state| AxisState::at_rest(state.position)).collect()
+        }
+        _ => window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect(),
     }
 }
 
@@ -150,7 +195,8 @@ mod tests {
         let mut planner = planner(2);
         let mut ride = planner.plan(request(1, From::Park, To::Cue, 0), &curve).unwrap();
         let at = ShowTime::from_nanos(5 * SECOND);
-        let mut home = planner.plan(request(2, From::Course(1, at), To::Park, 5), &curve).unwrap();
+        let mut home =
+            planner.plan(request(2, From::Course { serial: 1, at, pace: 1.0 }, To::Park, 5), &curve).unwrap();
         let window = planner.windows[0].clone();
         let before = ride.pose(0, at, &window, &heave(at));
         let after = home.pose(0, at, &window, &heave(at));
@@ -163,7 +209,7 @@ mod tests {
         let curve = Curve { pose: &heave, end: ShowTime::from_millis(20_000) };
         let mut planner = planner(1);
         planner.plan(request(1, From::Park, To::Cue, 0), &curve).unwrap();
-        let stalled = From::Stalled(1, ShowTime::from_nanos(4 * SECOND + SECOND / 2));
+        let stalled = From::Stalled { serial: 1, at: ShowTime::from_nanos(4 * SECOND + SECOND / 2) };
         let mut again = planner.plan(request(2, stalled, To::Cue, 6), &curve).unwrap();
         let window = planner.windows[0].clone();
         let start = again.pose(0, again.start, &window, &heave(again.start));

@@ -4,6 +4,7 @@
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its own part")]
 
 use std::cell::{Cell, RefCell};
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,6 +21,9 @@ use kinocue::rt::{Ended, FrameSink, Live, MailEnds, PlanLoop, TickLoop, mailboxe
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
+
+/// When tick 0 is due.
+pub const ORIGIN: MonoTime = MonoTime::from_nanos(1_000_000_000);
 
 /// Something that happens at a tick.
 #[derive(Debug, Clone, Copy)]
@@ -119,7 +123,7 @@ struct Stage<'a> {
 impl<'a> Stage<'a> {
     fn new(plans: PlanLoop, stop: &'a AtomicBool, script: &'a [(u64, Event)], at_most: u64) -> Self {
         Self {
-            now: Cell::new(MonoTime::from_nanos(1_000_000_000)),
+            now: Cell::new(ORIGIN),
             wake_ups: Cell::new(0),
             plans: RefCell::new(plans),
             planner_delay: Cell::new(0),
@@ -206,6 +210,18 @@ pub struct Worst {
     pub step: f64,
 }
 
+impl Worst {
+    /// The worse of the two, part by part.
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            velocity: self.velocity.max(other.velocity),
+            acceleration: self.acceleration.max(other.acceleration),
+            jerk: self.jerk.max(other.jerk),
+            step: self.step.max(other.step),
+        }
+    }
+}
+
 impl Played {
     /// The frames of one lane.
     pub fn lane(&self, lane: usize) -> impl Iterator<Item = &Frame> {
@@ -220,33 +236,41 @@ impl Played {
 
     /// What the frames make the first lane do from rest in its park pose.
     pub fn worst(&self) -> Worst {
-        self.worst_of(0, |_| 0.0)
+        self.worst_until(self.frames.len())
     }
 
-    /// What the frames from `first` on make the first lane do, if it was at rest in the pose of the first of them.
-    pub fn worst_from_rest(&self, first: usize) -> Worst {
-        self.worst_of(first, |mm| mm)
+    /// What the frames before `end` make the first lane do from rest in its park pose.
+    pub fn worst_until(&self, end: usize) -> Worst {
+        self.worst_of(0..end, |_| 0.0)
+    }
+
+    /// What the frames from `first` to before `end` make the first lane do, if it was at rest in the pose of the first.
+    pub fn worst_from_rest(&self, first: usize, end: usize) -> Worst {
+        self.worst_of(first..end, |mm| mm)
     }
 
     /// By the measure of what is sent, over the limits of the bench seat; before the first frame the seat rested where
     /// `before` puts it.
-    fn worst_of(&self, first: usize, before: impl Fn(f64) -> f64) -> Worst {
+    fn worst_of(&self, frames: Range<usize>, before: impl Fn(f64) -> f64) -> Worst {
         let seat = SeatType::bench3(1);
         let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / self.rate.hz()).max(0.005);
         let mut worst = Worst::default();
         for axis in 0..self.frames[0].request.positions.len() {
             let sent = self.positions_mm(0, axis);
-            let rest = std::iter::repeat_n(before(sent[first]), 100);
             let mut measure = Measure::new(Spacing::at_rate(self.rate.hz()));
             let mut at = ShowTime::ZERO;
-            for (index, mm) in (0..).zip(rest.chain(sent[first..].iter().copied())) {
-                let seen = measure.push(at, mm);
+            for _ in 0..100 {
+                measure.push(at, before(sent[frames.start]));
+                at += self.rate.period();
+            }
+            for frame in frames.clone() {
+                let seen = measure.push(at, sent[frame]);
+                at += Duration::from_millis(u64::from(self.rate.time_ms(frame as u64 + 1)));
                 worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
                 worst.acceleration =
                     worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
                 worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
                 worst.step = worst.step.max(seen.step.value.abs() / step);
-                at += Duration::from_millis(u64::from(self.rate.time_ms(index)));
             }
         }
         worst
