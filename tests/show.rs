@@ -62,6 +62,13 @@ fn a_cue_that_starts_and_ends_at_rest_in_the_park_pose_is_played_row_by_row() {
 }
 
 #[test]
+fn a_stop_before_the_first_frame_sends_none() {
+    let played = Virtual::new(swell(1, 6, 40.0, 0.4)).with(0, Event::Stop).play();
+    assert_eq!((played.ended.ending, played.ended.ticks), (Ending::Stopped, 0));
+    assert!(played.frames.is_empty());
+}
+
+#[test]
 fn parking_is_no_faster_than_50_mm_a_second_and_effects_are_off() {
     let cue = "time_ms,a1,fx_air\n0,0.8,1\n3000,0.8,1\n";
     let played = Virtual::new(cue).play();
