@@ -36,6 +36,7 @@ struct Seat {
 ///
 /// Two of the controllers are a pair that shares one frame (PA95). Everything stays on this machine.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json")]
 pub(super) struct Args {
     /// Ticks per second, 1 to 1000.
     #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
