@@ -4,7 +4,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use std::path::Path;
 
 use super::play::play;
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, print};
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::engine::{Rate, Show};
@@ -55,11 +55,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     config.show.bind = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let controllers: Vec<String> =
         config.controllers.iter().map(|one| format!("{} {}", one.name, one.address)).collect();
-    eprintln!(
-        "playing {CUE_NAME} ({}) to virtual controllers {}",
-        timeline.duration(),
-        controllers.join(", ")
-    );
+    let (length, controllers) = (timeline.duration(), controllers.join(", "));
+    print::tell(&format!("playing {CUE_NAME} ({length}) to virtual controllers {controllers}"));
     let show =
         Show { rate: Rate::from_hz(args.rate), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
     let played = play(config, timeline, show, Manner { level: 1.0, silent: false }, args.json);

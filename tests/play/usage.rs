@@ -1,7 +1,9 @@
 //! The command line: help, wrong use, and what is refused with 64.
 
+use std::process::{Command, Stdio};
+
 use super::Folder;
-use super::process::{kinocue, play};
+use super::process::{Sim, kinocue, play};
 
 #[test]
 fn every_command_has_a_help_with_examples() {
@@ -77,4 +79,30 @@ fn vibration_that_a_frame_has_no_room_for_is_refused() {
         assert_eq!((run.code, run.stdout.as_str()), (Some(65), ""), "{run:?}");
         assert!(run.stderr.contains("nod.csv:1:30: v1_hz"), "{}", run.stderr);
     }
+}
+
+/// Runs the program with both its outputs leading nowhere, and says how it ends.
+fn unheard(args: &[&str]) -> Option<i32> {
+    let (gone, closed) = std::io::pipe().expect("a pipe");
+    drop(gone);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+    command.args(args).stdin(Stdio::null()).stdout(closed.try_clone().expect("a handle")).stderr(closed);
+    command.status().expect("the program runs").code()
+}
+
+#[test]
+fn closed_pipes_change_no_exit_code() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let [cue, bad] = [folder.nod(&[0.1]), folder.write("bad.csv", "time_ms,a1\n0,0\n10,2\n")];
+    let [cue, bad] = [&cue, &bad].map(|path| path.to_str().expect("text"));
+    let to = sim.addresses[0].as_str();
+    let play = ["play", cue, "--bind", "127.0.0.1:0", "--to", to];
+    assert_eq!(unheard(&play), Some(0));
+    assert_eq!(unheard(&[&play[..], &["--json", "--start", "0.4"]].concat()), Some(0));
+    assert_eq!(unheard(&["play", bad, "--to", to]), Some(65));
+    assert_eq!(unheard(&["play", "missing.csv", "--to", to]), Some(66));
+    assert_eq!(unheard(&["check", bad]), Some(65));
+    assert_eq!(unheard(&["info", cue]), Some(0));
+    assert_eq!(unheard(&["play", cue]), Some(64));
+    assert!(sim.end().rest_in_park());
 }
