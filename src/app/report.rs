@@ -157,6 +157,7 @@ impl Report {
             "controller",
             "address",
             "sent",
+            "asked",
             "acked",
             "refused",
             "lost",
@@ -174,6 +175,7 @@ impl Report {
         for one in &self.controllers {
             let counts = [
                 one.sent,
+                one.asked,
                 one.acked,
                 one.refused,
                 one.lost,

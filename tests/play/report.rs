@@ -82,9 +82,13 @@ fn people_read_the_report_on_stderr_and_stdout_stays_empty() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let run = play(&folder.nod(&[0.1]), &sim.to(), &[]);
     assert_eq!((run.code, run.stdout.as_str()), (Some(0), ""));
-    for part in ["completed", "lateness", "real time", "strangers", "acked", "c1", &sim.addresses[0]] {
+    for part in ["completed", "ticks", "lateness", "real time", "strangers", "c1", &sim.addresses[0]] {
         assert!(run.stderr.contains(part), "{part}: {}", run.stderr);
     }
+    let table = run.stderr.lines().find(|line| line.contains("controller ")).expect("a table");
+    let columns: Vec<&str> = table.split_whitespace().collect();
+    let counts = "sent asked acked refused lost homing dup stale stray failed closed";
+    assert!(columns.join(" ").contains(counts), "{table}");
     assert!(!run.stderr.contains('\r') && !run.stderr.contains('\u{1b}'), "no progress in a pipe");
 }
 
