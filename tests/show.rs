@@ -76,6 +76,13 @@ fn the_octets_of_a_small_show_are_those_on_record() {
 }
 
 #[test]
+fn a_stop_before_the_first_frame_sends_none() {
+    let played = Virtual::new(swell(1, 6, 40.0, 0.4)).with(0, Event::Stop).play();
+    assert_eq!((played.ended.ending, played.ended.ticks), (Ending::Stopped, 0));
+    assert!(played.frames.is_empty());
+}
+
+#[test]
 fn parking_is_no_faster_than_50_mm_a_second_and_effects_are_off() {
     let cue = "time_ms,a1,fx_air\n0,0.8,1\n3000,0.8,1\n";
     let played = Virtual::new(cue).play();

@@ -224,6 +224,7 @@ impl Report {
             "controller",
             "address",
             "sent",
+            "asked",
             "acked",
             "refused",
             "lost",
@@ -241,6 +242,7 @@ impl Report {
         for one in &self.controllers {
             let counts = [
                 one.sent,
+                one.asked,
                 one.acked,
                 one.refused,
                 one.lost,

@@ -64,7 +64,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::json(&report)?;
     } else {
         print::out(&report.text)?;
-        eprint!("{}", report.in_words());
+        if !report.passed {
+            print::tell(report.in_words().trim_end());
+        }
     }
     Ok(WORST_FIRST.into_iter().find(|exit| report.exits.contains(exit)).unwrap_or(Exit::Done))
 }

@@ -4,7 +4,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use std::path::Path;
 
 use super::play::play;
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, print};
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::engine::{Rate, Show};
@@ -36,6 +36,7 @@ struct Seat {
 ///
 /// Two of the controllers are a pair that shares one frame (PA95). Everything stays on this machine.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json")]
 pub(super) struct Args {
     /// Ticks per second, 1 to 1000.
     #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
@@ -54,11 +55,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     config.show.bind = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let controllers: Vec<String> =
         config.controllers.iter().map(|one| format!("{} {}", one.name, one.address)).collect();
-    eprintln!(
-        "playing {CUE_NAME} ({}) to virtual controllers {}",
-        timeline.duration(),
-        controllers.join(", ")
-    );
+    let (length, controllers) = (timeline.duration(), controllers.join(", "));
+    print::tell(&format!("playing {CUE_NAME} ({length}) to virtual controllers {controllers}"));
     let show =
         Show { rate: Rate::from_hz(args.rate), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
     let played = play(config, timeline, show, Manner { level: 1.0, silent: false }, args.json);

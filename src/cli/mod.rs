@@ -56,7 +56,7 @@ pub fn main() -> ExitCode {
     match run(cli.command) {
         Ok(exit) => exit.into(),
         Err(failure) => {
-            eprintln!("kinocue: {failure}");
+            print::tell(&format!("kinocue: {failure}"));
             failure.exit.into()
         }
     }

@@ -108,11 +108,12 @@ pub(super) fn play(
     let length = timeline.duration();
     let for_ever = show.plays == 0;
     for controller in config.without_effects().filter(|_| uses_effects(&timeline)) {
-        eprintln!("{}: effects stay off; name its outputs with --effect NAME=N or effects", controller.name);
+        let name = &controller.name;
+        print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
     let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
     if !play.join().is_zero() {
-        eprintln!("joining the cue takes {:.2} s", play.join().as_secs_f64());
+        print::tell(&format!("joining the cue takes {:.2} s", play.join().as_secs_f64()));
     }
     let stop = stop_on_signals().context("signals cannot be handled").or_exit(Exit::System)?;
     let live = Arc::new(Live::default());
@@ -167,12 +168,12 @@ fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
 
 fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
     for line in played.refusals.iter().chain(&played.notes) {
-        eprintln!("kinocue: {line}");
+        print::tell(&format!("kinocue: {line}"));
     }
     if json {
         print::json(&played.report)?;
     } else {
-        eprintln!("\n{}", played.report.text());
+        print::tell(&format!("\n{}", played.report.text()));
     }
     let refused: Vec<&str> =
         played.report.controllers.iter().filter(|one| one.refused > 0).map(|one| one.name.as_str()).collect();

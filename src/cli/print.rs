@@ -1,4 +1,4 @@
-//! Writing to standard output, where a closed pipe is no fault.
+//! Writing to standard output and standard error, where a closed pipe is no fault.
 
 use std::io::{self, Write as _};
 
@@ -15,6 +15,12 @@ pub(super) fn out(text: &str) -> Result<(), Failure> {
         }),
         _ => Ok(()),
     }
+}
+
+/// Writes a line, or several, for a person to the standard error output. That may be closed or full, which is no reason
+/// to end otherwise, least of all with a show behind us.
+pub(super) fn tell(text: &str) {
+    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
 /// Writes one JSON object and ends the line.

@@ -1,7 +1,7 @@
 //! `kinocue sim`.
 
 use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::Read as _;
 use std::net::SocketAddrV4;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
@@ -10,6 +10,7 @@ use std::time::Duration;
 use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
+use super::print::{self, tell};
 use super::{Exit, Failure, OrExit as _};
 use crate::sim::{Farm, LinkFaults, Options, Outcome, Setup};
 use crate::wire::Dialect;
@@ -119,7 +120,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     signals.wait().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
     let outcomes = farm.stop().context("cannot finish the log").or_exit(Exit::Io)?;
-    report(&outcomes, args.json).context("cannot write to the standard output").or_exit(Exit::Io)?;
+    report(&outcomes, args.json)?;
     Ok(Exit::Done)
 }
 
@@ -161,10 +162,9 @@ fn seed(args: &Args) -> u64 {
     })
 }
 
-fn report(outcomes: &[Outcome], json: bool) -> std::io::Result<()> {
+fn report(outcomes: &[Outcome], json: bool) -> Result<(), Failure> {
     if json {
-        let all = serde_json::json!({ "controllers": outcomes });
-        return writeln!(std::io::stdout(), "{all}");
+        return print::json(&serde_json::json!({ "controllers": outcomes }));
     }
     for outcome in outcomes {
         let (address, counts) = (outcome.address, &outcome.counts);
@@ -176,11 +176,6 @@ fn report(outcomes: &[Outcome], json: bool) -> std::io::Result<()> {
         ));
     }
     Ok(())
-}
-
-/// Writes a line to the standard error output; that may be closed, which is no reason to stop.
-fn tell(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Ctrl-C and SIGTERM as an octet on a socket, which a thread can wait for.

@@ -153,8 +153,14 @@ impl Engine {
     }
 
     /// Asks for the end: park, three hold frames, done. Asking again changes nothing.
+    ///
+    /// Before the first frame it is the end at once: nothing has been set in motion, and the lanes may still be on a
+    /// slow way to park, or where nobody knows.
     pub fn stop(&mut self) {
-        if !self.homeward && matches!(self.phase, Phase::Settling | Phase::Riding | Phase::Stalled) {
+        if self.frames == 0 {
+            self.phase = Phase::Done;
+            self.ending = Ending::Stopped;
+        } else if !self.homeward && matches!(self.phase, Phase::Settling | Phase::Riding | Phase::Stalled) {
             self.homeward = true;
             self.ending = Ending::Stopped;
         }

@@ -1,0 +1,135 @@
+//! Controllers that are dead, deaf, mute, slow or stopped, and strangers.
+
+use std::net::UdpSocket;
+
+use serde_json::Value;
+
+use super::Folder;
+use super::process::{Playing, Relay, Sim, kinocue, play};
+
+fn first(report: &Value) -> &Value {
+    &report["controllers"][0]
+}
+
+#[test]
+fn a_dead_controller_costs_the_live_one_no_frame() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    // Nobody listens at a port that was free a moment ago.
+    let dead = UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port");
+    let run = play(&folder.nod(&[0.1]), &[dead.to_string(), sim.addresses[0].clone()], &["--json"]);
+    let report = run.report_of(69);
+    assert_eq!(report["result"], "completed");
+    let (dead, live) = (first(&report), &report["controllers"][1]);
+    assert_eq!((&dead["acked"], &dead["lost"]), (&0.into(), &dead["asked"]), "{dead}");
+    assert!(dead["port_closed"].as_u64() > Some(0), "{dead}");
+    assert_eq!((&live["acked"], &live["port_closed"]), (&live["sent"], &0.into()), "{live}");
+    assert!(run.stderr.contains("c1"), "{}", run.stderr);
+    assert!(sim.end().rest_in_park());
+}
+
+#[test]
+fn an_emergency_stop_shows_as_refused_frames_and_76() {
+    let (folder, sim) = (Folder::new(), Sim::one(&["--estop-at", "0.4"]));
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]);
+    let report = run.report_of(76);
+    let one = first(&report);
+    assert!(one["refused"].as_u64() > Some(0), "{one}");
+    assert_eq!(one["lost"], 0, "{one}");
+    assert_eq!(sim.end().controllers[0]["refused"]["emergency_stop"], one["refused"]);
+}
+
+#[test]
+fn a_mute_controller_is_homed_and_unavailable() {
+    let (folder, sim) = (Folder::new(), Sim::one(&["--mute"]));
+    let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]).report_of(69);
+    let one = first(&report);
+    assert_eq!(
+        (&one["homing"], &one["lost"], &one["port_closed"]),
+        (&1.into(), &one["sent"], &0.into()),
+        "{one}"
+    );
+    let seen = sim.end();
+    assert_eq!(seen.controllers[0]["motion"], one["sent"], "it obeyed all the same");
+    assert!(seen.rest_in_park());
+}
+
+#[test]
+fn lost_and_repeated_answers_are_counted_and_leave_0() {
+    let (folder, sim) =
+        (Folder::new(), Sim::one(&["--loss", "0.1", "--duplicate", "0.2", "--seed", "11", "--delay", "3ms"]));
+    let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json", "--rate", "500"]).report_of(0);
+    let one = first(&report);
+    let count = |field: &str| one[field].as_u64().expect("a count");
+    assert!(count("lost") > 0 && count("duplicate") > 0 && count("acked") > 0, "{one}");
+    assert_eq!(count("asked"), count("acked") + count("refused") + count("lost"), "{one}");
+    let seen = sim.end();
+    let of = |field: &str| seen.controllers[0][field].as_u64().expect("a count");
+    // Position reads are lost and repeated by the same link; they are no frames.
+    assert!(of("duplicated") >= count("duplicate"));
+    assert!(of("lost_frames") + of("lost_replies") >= count("lost"));
+    assert_eq!(count("acked"), count("sent") - count("lost"));
+}
+
+#[test]
+fn late_answers_are_acks_with_their_latency_up_to_a_second_and_stale_after() {
+    let folder = Folder::new();
+    let cue = folder.nod(&[0.1]);
+    let (slow, asleep) = (Sim::one(&["--delay", "80ms"]), Sim::one(&["--delay", "1.2s"]));
+    let late = Playing::start(&cue, &slow.to(), &["--json"]);
+    let stale = Playing::start(&cue, &asleep.to(), &["--json"]).finish().report_of(69);
+    let late = late.finish().report_of(0);
+    let one = first(&late);
+    assert_eq!(one["acked"], one["sent"], "{one}");
+    assert!(one["ack_us"]["p50"].as_f64() > Some(80_000.0), "{one}");
+    let one = first(&stale);
+    assert_eq!((&one["lost"], &one["acked"]), (&one["asked"], &0.into()), "{one}");
+    assert!(one["stale"].as_u64() > Some(0), "{one}");
+    assert_eq!(one["homing"], 1, "its positions came too late as well: {one}");
+}
+
+#[test]
+fn a_controller_that_goes_silent_mid_show_is_told_by_69() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let relay = Relay::start(&sim.addresses[0]);
+    let playing = Playing::start(&folder.nod(&[0.1]), &[relay.to()], &["--json", "--loop", "3"]);
+    relay.wait_for(|frame| frame.frame.0 == 30);
+    drop(sim);
+    let report = playing.finish().report_of(69);
+    let one = first(&report);
+    assert!(one["acked"].as_u64() >= Some(20) && one["lost"].as_u64() > Some(20), "{one}");
+}
+
+#[test]
+fn strangers_and_strays_are_counted_and_disturb_nothing() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let relay = Relay::start(&sim.addresses[0]);
+    let playing = Playing::start(&folder.nod(&[0.1]), &[relay.to()], &["--json"]);
+    let host = relay.wait_for(|frame| frame.frame.0 == 10);
+    let stranger = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    for octets in [&b"hello"[..], &[0x55, 0xaa, 0, 0, 0x14, 2], &[]] {
+        stranger.send_to(octets, host).expect("loopback takes it");
+        relay.send(octets, host);
+    }
+    let report = playing.finish().report_of(0);
+    let one = first(&report);
+    assert_eq!(report["strangers"], 3, "{report}");
+    assert_eq!((&one["stray"], &one["acked"]), (&3.into(), &one["sent"]), "{one}");
+    drop(stranger);
+}
+
+#[test]
+fn a_second_kinocue_on_the_same_port_is_refused_with_71_and_the_first_loses_nothing() {
+    let (folder, sim) = (Folder::new(), Sim::start(2, &[]));
+    let cue = folder.nod(&[0.1]);
+    let relay = Relay::start(&sim.addresses[0]);
+    let playing = Playing::start(&cue, &[relay.to()], &["--json"]);
+    let host = relay.wait_for(|frame| frame.frame.0 == 2).to_string();
+    let cue = cue.to_str().expect("text");
+    let second = kinocue(&["play", cue, "--bind", &host, "--to", &sim.addresses[1], "--json"]);
+    assert_eq!((second.code, second.stdout.as_str()), (Some(71), ""), "{second:?}");
+    assert!(second.stderr.contains(&host), "{}", second.stderr);
+    let report = playing.finish().report_of(0);
+    let one = first(&report);
+    assert_eq!((&one["acked"], &one["stray"], &report["strangers"]), (&one["sent"], &0.into(), &0.into()));
+    assert_eq!(sim.end().controllers[1]["received"], 0, "the second sent nothing");
+}

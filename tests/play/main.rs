@@ -1,0 +1,81 @@
+//! `kinocue play` from outside: real processes and real sockets, from a cue to what the controllers executed.
+
+#[path = "../common/process.rs"]
+mod process;
+
+mod controllers;
+mod cue_files;
+mod frames;
+mod motion;
+mod report;
+mod stopping;
+mod usage;
+
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+/// Pulses over the stroke of the bench seat, 150 mm.
+const STROKE: f64 = 300_000.0;
+
+/// A folder of its own for the files of one test.
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, octets: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, octets).expect("the folder is ours");
+        path
+    }
+
+    /// A short cue that begins and ends at rest in the park pose, and in between stands at `heights`, fractions of the
+    /// stroke, one an axis, for 0.15 s: long enough to be seen there.
+    fn nod(&self, heights: &[f64]) -> PathBuf {
+        self.nod_with(heights, "", |_| String::new())
+    }
+
+    /// The same with further columns, and their cells at a time in ms.
+    fn nod_with(&self, heights: &[f64], columns: &str, cells: impl Fn(u32) -> String) -> PathBuf {
+        let axes: String = (1..=heights.len()).map(|axis| format!(",a{axis}")).collect();
+        let mut text = format!("time_ms{axes}{columns}\n");
+        for at_ms in (0..=NOD_MS).step_by(10) {
+            let part = nod_part(at_ms);
+            let row: String = heights.iter().map(|height| format!(",{:.9}", part * height)).collect();
+            text += &format!("{at_ms}{row}{}\n", cells(at_ms));
+        }
+        self.write("nod.csv", text)
+    }
+}
+
+/// How long a nod lasts.
+const NOD_MS: u32 = 800;
+/// When it stands at its heights, ms.
+const NOD_TOP: std::ops::Range<u32> = 300..450;
+
+/// How much of its heights a nod has reached.
+fn nod_part(at_ms: u32) -> f64 {
+    let rise = |ms: u32| {
+        let part = f64::from(ms.min(300)) / 300.0;
+        part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part)
+    };
+    rise(at_ms) - rise(at_ms.saturating_sub(NOD_TOP.end))
+}
+
+/// Where the motor of the bench seat stands at a fraction of its stroke.
+#[expect(clippy::cast_possible_truncation, reason = "a stroke is 300,000 pulses")]
+fn pulses(fraction: f64) -> i32 {
+    (fraction * STROKE).round() as i32
+}
+
+/// A cue that ships.
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("cues").join(name)
+}

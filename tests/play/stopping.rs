@@ -1,0 +1,98 @@
+//! Ctrl-C and SIGTERM: where the seats are then, and what is said.
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use super::process::{Playing, Relay, Run, Sim, play};
+use super::{Folder, NOD_TOP, pulses};
+
+/// The frame that a nod's controllers get when they stand at its heights.
+const AT_TOP: u32 = NOD_TOP.start / 10 + 2;
+
+/// Plays a nod and signals at its top: the report, and the simulator.
+fn stopped_by(signals: &[Signal], more: &[&str]) -> (Run, Sim) {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let relay = Relay::start(&sim.addresses[0]);
+    let cue = folder.nod_with(&[0.15, 0.1], ",fx_air", |_| ",1".to_owned());
+    let mut args = vec!["--json"];
+    args.extend(more);
+    let playing = Playing::start(&cue, &[relay.to()], &args);
+    for (signal, frame) in signals.iter().zip(AT_TOP..) {
+        relay.wait_for(|seen| seen.frame.0 == frame);
+        playing.signal(*signal);
+    }
+    (playing.finish(), sim)
+}
+
+#[test]
+fn ctrl_c_and_sigterm_park_the_seats_turn_effects_off_and_report_a_stop() {
+    std::thread::scope(|scope| {
+        for signal in [Signal::INT, Signal::TERM] {
+            scope.spawn(move || {
+                let (run, sim) = stopped_by(&[signal], &[]);
+                let report = run.report_of(0);
+                let one = &report["controllers"][0];
+                assert_eq!(report["result"], "stopped");
+                assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()), "{one}");
+                let seen = sim.end();
+                assert!(seen.rest_in_park(), "{:?}", seen.controllers);
+                assert_eq!(seen.farthest(0), pulses(0.15), "it was at its top");
+                let last = &seen.rows[seen.rows.len() - 4..];
+                assert!(last.iter().all(|row| row.commanded.iter().all(|pulses| *pulses == 0)), "{last:?}");
+                assert!(last[1..].iter().all(|row| row.outputs == 0), "{last:?}");
+            });
+        }
+    });
+}
+
+#[test]
+fn a_second_sigterm_changes_nothing() {
+    let (run, sim) = stopped_by(&[Signal::TERM, Signal::TERM], &[]);
+    assert_eq!(run.report_of(0)["result"], "stopped");
+    assert!(sim.end().rest_in_park());
+}
+
+#[test]
+fn a_second_ctrl_c_ends_at_once_and_the_next_play_brings_the_seat_home_slowly() {
+    let (run, sim) = stopped_by(&[Signal::INT, Signal::INT], &[]);
+    assert_eq!((run.code, run.stdout.as_str()), (Some(130), ""), "{run:?}");
+    let folder = Folder::new();
+    let report = play(&folder.nod(&[0.1, 0.1]), &sim.to(), &["--json", "--time", "absolute"]).report_of(0);
+    let one = &report["controllers"][0];
+    assert_eq!((&one["homing"], &one["acked"]), (&1.into(), &one["sent"]), "{one}");
+    let seen = sim.end();
+    let home = seen.rows.iter().rposition(|row| row.frame == 1).expect("two plays");
+    let [slow, next] = &seen.rows[home..home + 2] else { panic!("frames came") };
+    assert!(slow.executed[0] > pulses(0.1), "it was left in the air: {slow:?}");
+    assert_eq!((slow.function.as_str(), slow.time_ms, slow.outputs), ("0x1401", 3000, 0));
+    assert!(next.at_s - slow.at_s >= 3.0, "tick 0 waits for it");
+    assert!(next.executed.iter().all(|pulses| *pulses == 0), "{next:?}");
+    assert_eq!((next.function.as_str(), next.time_ms, next.frame), ("0x1301", 10, 2));
+}
+
+#[test]
+fn a_stop_while_the_seats_are_brought_home_ends_without_playing() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let relay = Relay::start(&sim.addresses[0]);
+    let playing = Playing::start(&folder.nod(&[0.15]), &[relay.to()], &["--json", "--no-acks"]);
+    relay.wait_for(|frame| frame.time_ms == 3000);
+    playing.signal(Signal::INT);
+    let report = playing.finish().report_of(0);
+    assert_eq!(
+        (&report["result"], &report["controllers"][0]["homing"]),
+        (&"stopped".into(), &Value::from(1))
+    );
+    assert_eq!(report["ticks"], 0);
+    assert_eq!(sim.end().motion(), 1, "nothing follows the slow frame");
+}
+
+#[test]
+fn an_endless_loop_plays_until_it_is_stopped() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let relay = Relay::start(&sim.addresses[0]);
+    let playing = Playing::start(&folder.nod(&[0.15]), &[relay.to()], &["--json", "--loop", "0"]);
+    relay.wait_for(|frame| frame.frame.0 == 200);
+    playing.signal(Signal::INT);
+    assert_eq!(playing.finish().report_of(0)["result"], "stopped");
+    assert!(sim.end().rest_in_park());
+}

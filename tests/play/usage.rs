@@ -1,0 +1,108 @@
+//! The command line: help, wrong use, and what is refused with 64.
+
+use std::process::{Command, Stdio};
+
+use super::Folder;
+use super::process::{Sim, kinocue, play};
+
+#[test]
+fn every_command_has_a_help_with_examples() {
+    let all = kinocue(&["--help"]);
+    assert_eq!(all.code, Some(0));
+    for command in ["demo", "play", "sim", "check", "info", "convert", "decode", "completions"] {
+        assert!(all.stdout.contains(&format!("\n  {command} ")), "{command}: {}", all.stdout);
+        let run = kinocue(&[command, "--help"]);
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{command}");
+        assert!(run.stdout.contains("Example"), "{command}: {}", run.stdout);
+        assert!(run.stdout.contains(&format!("kinocue {command}")), "{command}: {}", run.stdout);
+    }
+}
+
+#[test]
+fn wrong_use_is_64_and_says_what_is_wrong() {
+    let folder = Folder::new();
+    let cue = folder.nod(&[0.1, 0.1]);
+    let cue = cue.to_str().expect("text");
+    let to = "127.0.0.1:9";
+    let twice = format!("{to},axes=1");
+    let cases: &[(&[&str], &str)] = &[
+        (&[], "--to"),
+        (&["--to", to, "--tow", to], "--tow"),
+        (&["--to", to, "--to", &twice], "address"),
+        (&["--to", to, "--config", "hall.toml"], "--config"),
+        (&["--to", "127.0.0.1"], "port"),
+        (&["--to", "127.0.0.1:0"], "port"),
+        (&["--to", "127.0.0.1:7408,axis=2"], "axis"),
+        (&["--to", "127.0.0.1:7408,axes=13"], "12"),
+        (&["--to", "127.0.0.1:7408,offset=2"], "offset"),
+        (&["--to", to, "--rate", "0"], "1000"),
+        (&["--to", to, "--rate", "1001"], "1000"),
+        (&["--to", to, "--rate", "nan"], "1000"),
+        (&["--to", to, "--time", "later"], "relative"),
+        (&["--to", to, "--start", "0.8"], "00:00.800"),
+        (&["--to", to, "--start", "1:99"], "--start"),
+        (&["--to", to, "--level", "150%"], "--level"),
+        (&["--to", to, "--loop", "-1"], "-1"),
+        (&["--to", to, "--effect", "air"], "air"),
+        (&["--to", to, "--effect", "air=13"], "12"),
+        (&["--to", to, "--bind", "here"], "--bind"),
+    ];
+    for (args, said) in cases {
+        let run = kinocue(&[&["play", cue], *args].concat());
+        assert_eq!((run.code, run.stdout.as_str()), (Some(64), ""), "{args:?}: {run:?}");
+        assert!(run.stderr.contains(said), "{said}: {}", run.stderr);
+    }
+    assert_eq!(kinocue(&["serenade"]).code, Some(64));
+    assert_eq!(kinocue(&[]).code, Some(64));
+}
+
+#[test]
+fn a_port_that_is_taken_and_an_address_that_is_not_ours_are_71() {
+    let folder = Folder::new();
+    let cue = folder.nod(&[0.1]);
+    let taken = std::net::UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    let taken = taken.local_addr().expect("it is bound").to_string();
+    for bind in [taken.as_str(), "192.0.2.1:0"] {
+        let cue = cue.to_str().expect("text");
+        let run = kinocue(&["play", cue, "--to", "127.0.0.1:9", "--bind", bind, "--json"]);
+        assert_eq!((run.code, run.stdout.as_str()), (Some(71), ""), "{run:?}");
+        assert!(run.stderr.contains(bind), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn vibration_that_a_frame_has_no_room_for_is_refused() {
+    let folder = Folder::new();
+    let cue = folder.nod_with(&[0.01; 7], ",v1_hz,v1_amp", |_| ",20,0.01".to_owned());
+    for to in ["127.0.0.1:9", "127.0.0.1:9,dialect=mbox"] {
+        let run = play(&cue, &[to.to_owned()], &["--json"]);
+        assert_eq!((run.code, run.stdout.as_str()), (Some(65), ""), "{run:?}");
+        assert!(run.stderr.contains("nod.csv:1:30: v1_hz"), "{}", run.stderr);
+    }
+}
+
+/// Runs the program with both its outputs leading nowhere, and says how it ends.
+fn unheard(args: &[&str]) -> Option<i32> {
+    let (gone, closed) = std::io::pipe().expect("a pipe");
+    drop(gone);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+    command.args(args).stdin(Stdio::null()).stdout(closed.try_clone().expect("a handle")).stderr(closed);
+    command.status().expect("the program runs").code()
+}
+
+#[test]
+fn closed_pipes_change_no_exit_code() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let [cue, bad] = [folder.nod(&[0.1]), folder.write("bad.csv", "time_ms,a1\n0,0\n10,2\n")];
+    let [cue, bad] = [&cue, &bad].map(|path| path.to_str().expect("text"));
+    let to = sim.addresses[0].as_str();
+    let play = ["play", cue, "--bind", "127.0.0.1:0", "--to", to];
+    assert_eq!(unheard(&play), Some(0));
+    assert_eq!(unheard(&[&play[..], &["--json", "--start", "0.4"]].concat()), Some(0));
+    assert_eq!(unheard(&["play", bad, "--to", to]), Some(65));
+    assert_eq!(unheard(&["play", "missing.csv", "--to", to]), Some(66));
+    assert_eq!(unheard(&["check", bad]), Some(65));
+    assert_eq!(unheard(&["info", cue]), Some(0));
+    assert_eq!(unheard(&["play", cue]), Some(64));
+    assert!(sim.end().rest_in_park());
+}
