@@ -101,22 +101,26 @@ pub enum Dialect {
     Mbox,
 }
 
-/// The first 12 octets of a message, pass code and confirm code checked.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Header {
+/// The first 12 octets of a message, pass code and confirm code checked; tells whom even a message is for that is
+/// broken after them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
     /// High octet: the function; low octet: 1 for a request or report, else the reply code.
-    pub(super) function: u16,
+    pub function: u16,
     /// Object channel, servo number, or the error number of an SMC reply with x over 2.
-    pub(super) slot: u16,
+    pub slot: u16,
     /// Who is meant.
-    pub(super) accept: Code,
+    pub accept: Code,
     /// Who shall answer.
-    pub(super) reply: Code,
+    pub reply: Code,
 }
 
 impl Header {
     /// Reads the header at the front of `octets`; functions that do not exist pass.
-    pub(super) fn parse(octets: &[u8]) -> Result<Self, WireError> {
+    ///
+    /// # Errors
+    /// [`WireError::Short`], [`WireError::Confirm`] or [`WireError::Pass`].
+    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
         if octets.len() < LEN {
             return Err(WireError::Short { len: octets.len(), need: LEN });
         }

@@ -21,7 +21,7 @@ mod words;
 
 pub use error::{DeviceError, WireError};
 pub use frame_no::FrameNo;
-pub use header::{Code, Dialect, ReplyCode};
+pub use header::{Code, Dialect, Header, ReplyCode};
 pub use imax::{ImaxMotion, ImaxRegisters};
 pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_slots};
 pub use per_axis::PerAxis;

@@ -147,7 +147,7 @@ impl MotionRequest {
 
     /// Writes the frame to the front of `buf` and returns it, Extend as it is.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let function = request_function(family(self.timing, self.vibration.is_some()));
+        let function = self.function();
         let header = Header { function, slot: self.channel, accept: self.accept, reply: self.reply };
         let body = Body {
             frame: self.frame,
@@ -158,6 +158,12 @@ impl MotionRequest {
             vibration: self.vibration.as_deref(),
         };
         body.emit(header, buf)
+    }
+
+    /// Its function code.
+    #[must_use]
+    pub const fn function(&self) -> u16 {
+        request_function(family(self.timing, self.vibration.is_some()))
     }
 
     /// Octets of its layout; what a datagram has beyond them is surplus.
@@ -216,6 +222,30 @@ impl MotionReply {
             inputs: body.port,
             extend: body.extend,
             vibration: body.vibration,
+        })
+    }
+
+    /// The answer to a frame that is broken, but not before its Time ends: its number, and zeros for positions. None
+    /// for anything else.
+    #[must_use]
+    pub fn to_broken(octets: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
+        let header = Header::parse(octets).ok().filter(|header| header.is_request())?;
+        let (timing, vibrating) = layout(header.family())?;
+        if octets.len() < field::POSITIONS {
+            return None;
+        }
+        let axes = if header.slot == 0 { 3 } else { 6 };
+        Some(Self {
+            timing,
+            code,
+            channel: 0,
+            error,
+            frame: FrameNo(u32_at(octets, field::FRAME)),
+            time_ms: u32_at(octets, field::TIME),
+            positions: PerAxis::from_fn(axes, |_| Pulses(0)),
+            inputs: 0,
+            extend: 0,
+            vibration: vibrating.then(|| PerAxis::from_fn(axes, |_| Vibration::NONE)),
         })
     }
 

@@ -146,6 +146,19 @@ pub struct RegisterReply<'a> {
 }
 
 impl<'a> RegisterReply<'a> {
+    /// The answer to a request that is broken, but not before its count ends. None for anything else.
+    #[must_use]
+    pub fn to_broken(octets: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
+        let header = Header::parse(octets).ok().filter(|header| header.is_request())?;
+        let access = match header.family() {
+            READ => Access::Read,
+            WRITE => Access::Write,
+            _ => return None,
+        };
+        let (start, num) = words::ask(octets).ok()?;
+        Some(Self { access, code, channel: 0, error, start, num, data: Words::EMPTY })
+    }
+
     /// Writes the reply to the front of `buf` and returns it.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let family = match self.access {

@@ -1,0 +1,236 @@
+//! Virtual controllers over real sockets of 127.0.0.1, in the library and as the program.
+
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use kinocue::motion::Pulses;
+use kinocue::sim::{Controller, Farm, FarmError, LinkFaults, Options, Setup};
+use kinocue::time::MonoTime;
+use kinocue::wire::{Code, FrameNo, MAX_LEN, Motion, MotionReply, Timing};
+
+use proptest::prelude::*;
+
+/// Long enough for the slowest machine; nothing waits that long where all is well.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+fn host() -> UdpSocket {
+    let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+    socket.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+    socket
+}
+
+fn setup(host: &UdpSocket) -> Setup {
+    Setup { host_port: host.local_addr().expect("it is bound").port(), ..Setup::default() }
+}
+
+fn send(host: &UdpSocket, to: SocketAddrV4, frame: u32) {
+    let motion = Motion {
+        timing: Timing::Relative,
+        channel: 0,
+        accept: Code::ALL,
+        reply: Code::ALL,
+        frame: FrameNo(frame),
+        time_ms: 1,
+        positions: &[Pulses(10), Pulses(20), Pulses(30)],
+        outputs: 0,
+        vibration: None,
+    };
+    let mut buf = [0; MAX_LEN];
+    host.send_to(motion.emit(&mut buf), to).expect("loopback takes it");
+}
+
+fn answer(host: &UdpSocket) -> FrameNo {
+    let mut buf = [0; MAX_LEN];
+    let len = host.recv(&mut buf).expect("an answer in time");
+    MotionReply::parse(&buf[..len]).expect("a motion reply").frame
+}
+
+#[test]
+fn a_farm_answers_from_each_address_and_counts_what_came() {
+    let host = host();
+    let farm = Farm::start(Options::loopback(vec![setup(&host); 3])).expect("free ports");
+    let addresses = farm.addresses();
+    for frame in 0..30 {
+        for &address in &addresses {
+            send(&host, address, frame);
+            assert_eq!(answer(&host), FrameNo(frame));
+        }
+    }
+    for outcome in farm.stop().expect("no log to fail") {
+        assert_eq!((outcome.counts.received, outcome.counts.accepted, outcome.counts.replied), (30, 30, 30));
+        assert_eq!(outcome.counts.refused.total(), 0);
+    }
+}
+
+#[test]
+fn a_repeating_link_answers_twice_and_a_dead_one_not_at_all() {
+    let host = host();
+    let farm = |loss, duplicate, delay| {
+        let faults = LinkFaults { loss, duplicate, delay };
+        Farm::start(Options { faults, ..Options::loopback(vec![setup(&host)]) }).expect("a free port")
+    };
+    let twice = farm(0.0, 1.0, Duration::from_millis(5));
+    send(&host, twice.addresses()[0], 1);
+    assert_eq!((answer(&host), answer(&host)), (FrameNo(1), FrameNo(1)));
+    assert_eq!(twice.stop().expect("no log to fail")[0].counts.duplicated, 1);
+
+    let (dead, live) = (farm(1.0, 0.0, Duration::ZERO), farm(0.0, 0.0, Duration::ZERO));
+    for frame in 0..20 {
+        send(&host, dead.addresses()[0], frame);
+        send(&host, live.addresses()[0], 100 + frame);
+        assert_eq!(answer(&host), FrameNo(100 + frame), "only the live one answers");
+    }
+    let counts = dead.stop().expect("no log to fail")[0].counts;
+    assert_eq!((counts.received, counts.lost_frames + counts.lost_replies), (20, 20));
+    assert_eq!(counts.received, counts.lost_frames + counts.accepted);
+}
+
+#[test]
+fn a_taken_port_and_ports_past_the_last_are_refused() {
+    let taken = host();
+    let port = taken.local_addr().expect("it is bound").port();
+    let at = |port, count| Options {
+        listen: SocketAddrV4::new(Ipv4Addr::LOCALHOST, port),
+        ..Options::loopback(vec![Setup::default(); count])
+    };
+    assert!(matches!(Farm::start(at(port, 1)), Err(FarmError::Listen { .. })));
+    assert!(matches!(Farm::start(at(65_535, 2)), Err(FarmError::Ports { .. })));
+}
+
+/// The program, killed where a test ends before it does.
+struct Program(Child);
+
+impl Program {
+    fn start(args: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command.arg("sim").args(args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Self(command.spawn().expect("the program starts"))
+    }
+
+    /// The addresses that it says are ready.
+    fn ready(&mut self, count: usize) -> Vec<SocketAddrV4> {
+        let lines = BufReader::new(self.0.stderr.as_mut().expect("piped")).lines().take(count);
+        lines
+            .map(|line| {
+                let line = line.expect("text");
+                let address = line.strip_prefix("ready ").expect("the first lines are these");
+                address.parse().expect("an address")
+            })
+            .collect()
+    }
+
+    /// Asks it to end, and returns its exit code and what it wrote to its standard output.
+    fn end(&mut self, signal: rustix::process::Signal) -> (Option<i32>, String) {
+        let pid = rustix::process::Pid::from_child(&self.0);
+        rustix::process::kill_process(pid, signal).expect("it runs");
+        let mut text = String::new();
+        self.0.stdout.as_mut().expect("piped").read_to_string(&mut text).expect("text");
+        (self.0.wait().expect("it ends").code(), text)
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.0.kill(); // it has ended where all is well
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn the_program_says_when_it_is_ready_logs_and_counts_and_ends_with_0() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("frames.csv");
+    let log_arg = log.to_str().expect("text");
+    let mut sim = Program::start(&[
+        "--listen",
+        "127.0.0.1:0",
+        "--count",
+        "2",
+        "--host-port",
+        "0",
+        "--json",
+        "--log",
+        log_arg,
+    ]);
+    let addresses = sim.ready(2);
+    let host = host();
+    for (frame, &address) in (1..).zip(&addresses) {
+        send(&host, address, frame);
+        assert_eq!(answer(&host), FrameNo(frame));
+    }
+    let (code, text) = sim.end(rustix::process::Signal::TERM);
+    assert_eq!(code, Some(0));
+    let report: serde_json::Value = serde_json::from_str(&text).expect("one JSON object");
+    for (controller, address) in report["controllers"].as_array().expect("a list").iter().zip(addresses) {
+        assert_eq!(controller["address"], address.to_string());
+        assert_eq!((&controller["accepted"], &controller["refused"]["fault"]), (&1.into(), &0.into()));
+    }
+    let rows: Vec<Vec<String>> = std::fs::read_to_string(&log)
+        .expect("a log")
+        .lines()
+        .map(|row| row.split(',').map(str::to_owned).collect())
+        .collect();
+    assert_eq!(rows.len(), 5, "a header, two frames, two ends");
+    assert!(rows.iter().all(|row| row.len() == 7 + 24));
+    assert_eq!(rows[1][2..10], ["1", "0x1401", "1", "2", "0x0000", "10", "20", "30"]);
+}
+
+#[test]
+fn the_program_ends_with_0_on_ctrl_c_too() {
+    let mut sim = Program::start(&["--listen", "127.0.0.1:0"]);
+    sim.ready(1);
+    assert_eq!(sim.end(rustix::process::Signal::INT).0, Some(0));
+}
+
+#[test]
+fn the_program_refuses_a_taken_port_with_71_and_the_lan_with_64() {
+    let taken = host();
+    let address = taken.local_addr().expect("it is bound").to_string();
+    for (args, code) in
+        [(["--listen", &address], 71), (["--listen", "0.0.0.0:0"], 64), (["--pa", "zz=1"], 64)]
+    {
+        let mut sim = Program::start(&args);
+        assert_eq!(sim.0.wait().expect("it ends").code(), Some(code), "{args:?}");
+    }
+}
+
+/// Octets that open as a request does and go on by chance.
+fn request() -> impl Strategy<Value = Vec<u8>> {
+    let family = prop::sample::select(&[0x11_u8, 0x12, 0x13, 0x14, 0x18, 0x19, 0x21, 0x22][..]);
+    let rest = proptest::collection::vec(prop_oneof![0..4_u8, any::<u8>()], 0..120);
+    (family, 0..4_u8, any::<bool>(), rest).prop_map(|(family, channel, answered, rest)| {
+        let confirm = if family > 0x20 { [0x33, 0xcc] } else { [0x55, 0xaa] };
+        let reply = if answered { 0xff } else { 0 };
+        let mut octets = confirm.to_vec();
+        octets.extend([0, 0, family, 1, 0, channel, 0xff, 0xff, reply, reply]);
+        octets.extend(rest);
+        octets
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn whatever_is_sent_the_books_of_a_controller_balance(
+        datagrams in proptest::collection::vec((request(), 0..2_000_u64), 1..300),
+    ) {
+        let from = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 8410);
+        let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 7408);
+        let mut controller = Controller::new(&Setup::default(), address, MonoTime::default());
+        let (mut at_ms, mut answers) = (0, 0);
+        for (octets, after_ms) in &datagrams {
+            at_ms += after_ms;
+            let at = MonoTime::from_nanos(at_ms * 1_000_000);
+            let mut buf = [0xa5; MAX_LEN];
+            let handled = controller.on_datagram(from, octets, at, &mut buf);
+            answers += u64::from(handled.reply.is_some());
+        }
+        let counts = controller.counts();
+        prop_assert_eq!(counts.received, u64::try_from(datagrams.len()).expect("few"));
+        prop_assert_eq!(counts.received, counts.accepted + counts.refused.total());
+        prop_assert_eq!(counts.replied, answers);
+    }
+}
