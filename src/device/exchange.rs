@@ -174,7 +174,8 @@ impl Exchange {
         if one.flight.as_ref().is_some_and(|flight| at < flight.sent + self.patience.timeout) {
             return None;
         }
-        if one.flight.as_ref().is_some_and(|flight| flight.tries >= self.patience.tries) {
+        if one.flight.as_ref().is_some_and(|flight| flight.tries >= flight.request.tries(self.patience.tries))
+        {
             self.give_up(lane);
         }
         let one = &mut self.lanes[lane];

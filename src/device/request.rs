@@ -15,6 +15,8 @@ pub const MAX_READ: u16 = 32;
 /// Object channels of reads (SMC manual 2.2.2.1).
 const READ_DP: u16 = 0;
 const READ_PA: u16 = 1;
+/// DPF2 restarts the controller (SMC manual 2.3.3).
+const REBOOT: u8 = 0xf2;
 /// The object channel of writes to DPF0 and on (both manuals' programs agree).
 const WRITE_CONTROL: u16 = 2;
 
@@ -59,6 +61,15 @@ impl Request {
         match self {
             Self::Read { first, .. } => *first,
             Self::Write { address, .. } => *address,
+        }
+    }
+
+    /// How often it may be sent where it is not answered, `most` being what patience allows. A reboot is asked for once:
+    /// its answer may be lost in it, and a second one would begin it anew.
+    pub(super) const fn tries(&self, most: u32) -> u32 {
+        match self {
+            Self::Write { address: Address::Dp(REBOOT), .. } => 1,
+            _ => most,
         }
     }
 

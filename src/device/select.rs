@@ -208,12 +208,11 @@ fn attached(word: &str) -> Result<Selection, SelectError> {
     if let Some(register) = table().by_name(word) {
         return Ok(Selection { addresses: vec![register.address], single: true });
     }
-    let spaces: [(&str, &'static str, fn(u8) -> Address); 2] =
-        [("pa", "PA", Address::Pa), ("dp", "DP", Address::Dp)];
-    for (prefix, space, of) in spaces {
-        if let Some(numbers) = word.strip_prefix(prefix).filter(|numbers| begins_with_digits(numbers)) {
-            return documented(numbers, space, of);
-        }
+    if let Some(numbers) = word.strip_prefix("pa").filter(|numbers| begins_with_digits(numbers)) {
+        return documented(numbers, "PA", Address::Pa);
+    }
+    if let Some(numbers) = word.strip_prefix("dp").filter(|numbers| begins_with_digits(numbers)) {
+        return documented(numbers, "DP", Address::Dp);
     }
     Err(SelectError::Name { word: word.to_owned(), hint: alike(word) })
 }
