@@ -151,6 +151,14 @@ pub(super) struct Id {
     pub(super) num: u16,
 }
 
+impl Id {
+    /// Whether a reply to the one could pass for a reply to the other: with x over 2 an SMC controller puts its error
+    /// number where channel or drive stood, and may leave out the words.
+    pub(super) fn confusable(self, other: Self) -> bool {
+        self.servo == other.servo && self.access == other.access && self.start == other.start
+    }
+}
+
 /// The fewest reads that tell `addresses`; runs of consecutive registers share one, up to [`MAX_READ`] of a controller
 /// and 6 of a drive.
 #[must_use]

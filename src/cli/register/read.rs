@@ -58,9 +58,10 @@ fn wanted(selections: &[Selection], controller: &Controller) -> anyhow::Result<V
     let has = |address: &Address| table().get(*address).is_none_or(|register| register.dialect.has(dialect));
     let mut wanted = Vec::new();
     for selection in selections {
-        if let Some(address) = selection.addresses.iter().find(|address| selection.single && !has(address)) {
+        if let Some(first) = selection.addresses.first().filter(|_| !selection.addresses.iter().any(has)) {
             let (name, dialect) = (&controller.name, dialect_name(dialect));
-            return Err(anyhow!("{address} is no register of {dialect} controllers, as {name} is one"));
+            let what = if selection.single { "is no register" } else { "and on are no registers" };
+            return Err(anyhow!("{first} {what} of {dialect} controllers, as {name} is one"));
         }
         wanted.extend(selection.addresses.iter().copied().filter(has));
     }

@@ -128,6 +128,21 @@ fn x_3_and_4_tell_of_an_smc_controllers_state_and_refuse_on_mbox() {
 }
 
 #[test]
+fn a_late_refusal_that_does_not_tell_its_channel_is_not_taken_for_another_registers() {
+    let mut exchange = Exchange::new(&[PEER]);
+    let once = Patience { timeout: Duration::from_millis(100), tries: 1 };
+    exchange.begin(vec![(0, Request::read(Address::Dp(7)))], once);
+    let mut late = reply_to(exchange.due(0, at(0)).unwrap());
+    (late[5], late[7]) = (3, 12); // in place of the channel, the error number
+    assert!(exchange.due(0, at(100)).is_none());
+    exchange.begin(vec![(0, Request::read(Address::Pa(7)))], once);
+    assert!(exchange.due(0, at(101)).is_none(), "PA07 is not asked for while DP07 may still be answered");
+    exchange.on_datagram(0, &late, at(150));
+    assert_eq!(exchange.odds(0).late, 1);
+    assert!(exchange.due(0, at(151)).is_some());
+}
+
+#[test]
 fn a_late_reply_is_counted_as_late() {
     let mut exchange = Exchange::new(&[PEER]);
     exchange.begin(
