@@ -25,8 +25,8 @@ Examples:
   kinocue home --config hall.toml --row A --seats-empty
   kinocue home --to 192.168.15.201:7408 --timeout 120
 
-PA0e decides what a controller does: 0 searches zero, 1 goes to zero without a search, which is only right where the
-controller has found it before since it was switched on.")]
+PA0e decides what a controller does: 0 searches zero; 1 goes to zero without a search,
+which is right only where it has found zero since it was switched on.")]
 pub(super) struct Args {
     /// The controllers [default: all].
     #[arg(value_name = "NAME")]
@@ -125,9 +125,7 @@ fn move_home(
 ) -> Vec<Result<Duration, HomeError>> {
     let lanes: Vec<_> = ready.iter().map(|&lane| (lane, targets.controllers[lane].dialect)).collect();
     let mut display = Display::new(targets, ready);
-    let results = home(talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress));
-    display.close();
-    results
+    home(talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress))
 }
 
 impl<'a> Report<'a> {
@@ -152,8 +150,9 @@ fn tell(error: &HomeError, name: &str, troubles: &mut Troubles) {
     if silent { troubles.miss(name, &error.to_string()) } else { troubles.refuse(name, &error.to_string()) }
 }
 
-/// Progress: a line for each controller on a terminal, kept up to date; elsewhere a line for each step.
+/// Progress: on a terminal a line for each controller on its way, kept up to date; elsewhere a line for each step.
 struct Display {
+    bars: Option<MultiProgress>,
     lines: Vec<Line>,
 }
 
@@ -177,31 +176,27 @@ impl Display {
             }
             Line { lane, name, bar, homing: false }
         };
-        Self { lines: lanes.iter().map(line).collect() }
+        Self { lines: lanes.iter().map(line).collect(), bars }
     }
 
     fn show(&mut self, lane: usize, progress: &Progress) {
         let Some(line) = self.lines.iter_mut().find(|line| line.lane == lane) else { return };
-        let words = words(progress);
+        let (words, ended) =
+            (words(progress), matches!(progress, Progress::Home { .. } | Progress::Failed(_)));
         // In a pipe, a step once: looks at DPF0 come five times a second.
         let again = line.homing && matches!(progress, Progress::Homing { .. });
         line.homing = matches!(progress, Progress::Homing { .. });
-        match &line.bar {
-            Some(bar) if matches!(progress, Progress::Home { .. } | Progress::Failed(_)) => {
-                bar.finish_with_message(words);
+        match (&self.bars, &line.bar) {
+            (Some(bars), Some(bar)) if ended => {
+                bar.finish_and_clear();
+                let _ = bars.println(format!("{}: {words}", line.name)); // a closed terminal stops nothing
             }
-            Some(bar) => {
+            (Some(_), Some(bar)) => {
                 bar.set_message(words);
                 bar.tick();
             }
-            None if again => {}
-            None => eprintln!("{}: {words}", line.name),
-        }
-    }
-
-    fn close(self) {
-        for bar in self.lines.into_iter().filter_map(|line| line.bar) {
-            bar.abandon();
+            _ if again => {}
+            _ => eprintln!("{}: {words}", line.name),
         }
     }
 }
