@@ -327,6 +327,14 @@ mod tests {
         assert!(named("dpf g").contains("0 to f"));
     }
 
+    proptest::proptest! {
+        #[test]
+        fn no_words_panic(words in proptest::collection::vec("(pa|dp|dpf|servo|=|\\.\\.|0x|[0-9a-f]{1,3}|é| |[A-Z-]{0,4}){0,5}", 0..5)) {
+            let _ = selections(&words);
+            let _ = assignments(&words);
+        }
+    }
+
     #[test]
     fn values_stand_behind_their_registers() {
         let given = |text: &str| match assignments(&words(text)) {

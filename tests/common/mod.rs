@@ -86,8 +86,7 @@ impl Virtual {
         let timeline = Arc::new(self.timeline());
         let rate = Rate::from_hz(self.rate_hz);
         let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
-        let lanes =
-            lanes(&self.config(), timeline.cue(), Manner { level: self.level, silent: false }).unwrap();
+        let lanes = lanes(&self.config(), timeline.cue(), Manner { level: self.level, silent: false }).unwrap();
         let windows: Vec<_> = lanes.iter().map(|lane| lane.window.clone()).collect();
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };
