@@ -80,7 +80,8 @@ impl Request {
             Self::Write { .. } => (Access::Write, 1),
         };
         let (servo, channel, start) = match (self.first(), self) {
-            (Address::Servo { servo, number }, _) => (true, servo, number),
+            (Address::Servo { servo, number }, _) if dialect == Dialect::Smc => (true, servo, number),
+            (Address::Servo { .. }, _) => return None, // the SMC manual alone has these messages
             (Address::Pa(number), Self::Read { .. }) => (false, READ_PA, number.into()),
             (Address::Dp(number), Self::Read { .. }) => (false, READ_DP, number.into()),
             (Address::Pa(number), Self::Write { keep, .. }) => {
@@ -207,6 +208,7 @@ mod tests {
         assert_eq!(read(Address::Pa(0x95), 1), "55aa 0000 1101 0001 ffff ffff 0095 0001");
         assert_eq!(read(Address::Dp(0xf0), 1), "55aa 0000 1101 0000 ffff ffff 00f0 0001");
         let servo = Address::Servo { servo: 2, number: 508 };
+        assert_eq!(octets(&Request::read(servo), Dialect::Mbox), None);
         assert_eq!(read(servo, 6), "33cc 0000 2101 0002 ffff ffff 01fc 0006");
     }
 

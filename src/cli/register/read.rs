@@ -55,7 +55,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 /// The registers that a controller is asked for: of ranges, those that its dialect has.
 fn wanted(selections: &[Selection], controller: &Controller) -> anyhow::Result<Vec<Address>> {
     let dialect = controller.dialect;
-    let has = |address: &Address| table().get(*address).is_none_or(|register| register.dialect.has(dialect));
+    let has = |address: &Address| table().has(*address, dialect);
     let mut wanted = Vec::new();
     for selection in selections {
         if let Some(first) = selection.addresses.first().filter(|_| !selection.addresses.iter().any(has)) {

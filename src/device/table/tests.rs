@@ -167,6 +167,16 @@ fn a_register_is_found_by_number_and_by_name() {
 }
 
 #[test]
+fn a_dialect_has_its_own_registers_and_smc_alone_those_of_drives() {
+    let has = |address| [Dialect::Smc, Dialect::Mbox].map(|dialect| table().has(address, dialect));
+    assert_eq!(has(Address::Pa(0x95)), [true, true]);
+    assert_eq!(has(Address::Pa(0x55)), [true, false]);
+    assert_eq!(has(Address::Dp(0x1b)), [false, true]);
+    assert_eq!(has(Address::Pa(0x99)), [false, false]);
+    assert_eq!(has(Address::Servo { servo: 1, number: 508 }), [true, false]);
+}
+
+#[test]
 fn values_are_put_in_words() {
     let says = |parameter, value| table().get(Address::Pa(parameter)).unwrap().says(value);
     assert_eq!(says(0x91, 2), Some("holds until a reset"));
