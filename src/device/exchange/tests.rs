@@ -105,6 +105,25 @@ fn the_right_reply_is_taken_and_only_that() {
 }
 
 #[test]
+fn registers_of_a_drive_are_told_by_that_drive_alone() {
+    let read = Request::Read { first: Address::Servo { servo: 2, number: 508 }, count: 6 };
+    let told = |servo| {
+        run(PEER, &read, |mut reply| {
+            reply[7] = servo;
+            vec![reply]
+        })
+        .0
+        .result
+    };
+    assert_eq!(told(2).unwrap().words, [0x1717; 6]);
+    let Err(Fault::Silent { odd, .. }) = told(1) else { panic!("that was another drive") };
+    assert_eq!(odd, Some(Odd::Foreign { start: 508, num: 6 }));
+    let write = Request::write(Address::Servo { servo: 2, number: 508 }, 7);
+    let (outcome, _) = run(PEER, &write, |reply| vec![reply]);
+    assert_eq!(outcome.result.unwrap().words, [7]);
+}
+
+#[test]
 fn x_3_and_4_tell_of_an_smc_controllers_state_and_refuse_on_mbox() {
     let read = Request::read(Address::Pa(2));
     let with = |peer: Peer, x: u8, slot: u8, words: usize| {
