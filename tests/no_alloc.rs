@@ -220,7 +220,9 @@ fn ride() -> Arc<Timeline> {
         let shaking = if row % 50 < 25 { "20,0.01,1" } else { "0,0,0" };
         text += &format!("{},{swing},{swing},{swing},0.5,0.5,{swing},{shaking}\n", row * 10);
     }
-    Arc::new(Timeline::new(read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).unwrap()))
+    Arc::new(Timeline::new(
+        read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).expect("the ride is well formed"),
+    ))
 }
 
 /// Everything a play is made of, ready to run.
@@ -238,8 +240,8 @@ struct Stage {
 fn stage(addresses: &[SocketAddrV4; 2]) -> Stage {
     let timeline = ride();
     let tos = [format!("{},axes=6", addresses[0]), format!("{},axes=3", addresses[1])];
-    let config = from_to_args(&tos, &[], timeline.axes()).unwrap();
-    let lanes = lanes(&config, timeline.cue(), Manner { level: 1.0, silent: false }).unwrap();
+    let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
+    let lanes = lanes(&config, timeline.cue(), Manner { level: 1.0, silent: false }).expect("the ride fits");
     let windows: Vec<Window> = lanes.iter().map(|lane| lane.window.clone()).collect();
     let show =
         Show { rate: Rate::from_hz(1000.0), timing: Timing::Absolute, start: ShowTime::ZERO, plays: 0 };
@@ -247,7 +249,7 @@ fn stage(addresses: &[SocketAddrV4; 2]) -> Stage {
     let curve = Curve { pose: &pose, end: timeline.duration() };
     let mut planner = Planner::new(windows.clone(), show.rate.hz());
     let first = Request { from: From::Park, to: To::Cue, start: show.start, serial: 1 };
-    let course = Box::new(planner.plan(first, &curve).unwrap());
+    let course = Box::new(planner.plan(first, &curve).expect("the ride is gentle"));
     let headroom = Headroom::measure(&windows, &curve, show.rate);
     Stage { show, timeline, lanes, windows, planner, course, headroom }
 }
@@ -263,7 +265,7 @@ struct Outcome {
 fn play(stage: Stage, addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
     let Stage { show, timeline, lanes, windows, planner, course, headroom } = stage;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
-    let (sender, receiver) = Ports::open(any, addresses).unwrap().split();
+    let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::default());
     let (mut mail, ends) = mailboxes(lanes.len(), show.rate, Arc::clone(&live));
     let MailEnds { sent, ticks, requests, answers, retired } = ends;
@@ -289,7 +291,7 @@ fn play(stage: Stage, addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
         let calls = Calls::so_far().since(before);
         pace.wait_for_answers_to(ended.ticks, 0);
         pace.over.store(true, Ordering::Release);
-        let accounts = ack_thread.join().unwrap();
+        let accounts = ack_thread.join().expect("the ack thread does not panic");
         Outcome { ended, calls, laps: clock.laps.get(), accounts }
     })
 }
