@@ -37,6 +37,7 @@ pub mod rt;
 pub mod sim;
 
 pub mod app;
+pub mod doctor;
 
 pub mod net;
 pub mod observe;

@@ -9,6 +9,7 @@ mod completions;
 mod convert;
 mod decode;
 mod demo;
+mod doctor;
 mod exit;
 mod figures;
 mod info;
@@ -39,6 +40,7 @@ enum Command {
     Info(info::Args),
     Convert(convert::Args),
     Decode(decode::Args),
+    Doctor(doctor::Args),
     Completions(completions::Args),
 }
 
@@ -71,6 +73,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Completions(args) => completions::run(&args),
     }
 }
