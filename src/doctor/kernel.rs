@@ -94,7 +94,9 @@ impl PreemptionSigns<'_> {
         ];
         let set = built.into_iter().find(|(option, _)| option_set(self.config, option) == Some(true));
         set.map(|(_, model)| model).ok_or_else(|| match dynamic {
-            true => "chosen at boot, and only root may read which".to_owned(),
+            true => {
+                "chosen at boot; /sys/kernel/debug/sched/preempt, which tells, could not be read".to_owned()
+            }
             false => "neither the kernel's version nor its configuration tells".to_owned(),
         })
     }
@@ -130,7 +132,11 @@ impl Kernel {
     fn model(&self) -> Line {
         const ID: &str = "preemption";
         match &self.preemption {
-            Err(why) => Line::unknown(ID, why, "cat /sys/kernel/debug/sched/preempt as root"),
+            Err(why) => Line::unknown(
+                ID,
+                why,
+                "as root: cat /sys/kernel/debug/sched/preempt; or: zgrep PREEMPT /proc/config.gz",
+            ),
             Ok(model @ (Preemption::RealTime | Preemption::Full | Preemption::Lazy)) => {
                 Line::ok(ID, model.name())
             }
@@ -182,5 +188,34 @@ impl Kernel {
         } else {
             Line::unknown(ID, "none that can be seen here, but other programs are hidden", LOOK)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_preemption_model_is_read_where_it_is_told_and_not_guessed_where_it_is_not() {
+        let dynamic = PreemptionSigns {
+            version: "Linux version 6.12.0 (a@b) #1 SMP PREEMPT_DYNAMIC Debian",
+            ..PreemptionSigns::default()
+        };
+        assert!(dynamic.model().unwrap_err().starts_with("chosen at boot"));
+        let booted = PreemptionSigns { cmdline: "quiet preempt=full", ..dynamic };
+        assert_eq!(booted.model(), Ok(Preemption::Full));
+        let in_force = PreemptionSigns { in_force: "none (voluntary) full\n", ..booted };
+        assert_eq!(in_force.model(), Ok(Preemption::Voluntary));
+        let config = "CONFIG_PREEMPT_NONE=y\n# CONFIG_PREEMPT is not set\nCONFIG_PREEMPT_DYNAMIC=y\n";
+        assert_eq!(PreemptionSigns { config, ..dynamic }.model(), Ok(Preemption::None));
+    }
+
+    #[test]
+    fn a_kernel_with_one_model_names_it_in_its_version() {
+        let model =
+            |version, cmdline| PreemptionSigns { version, cmdline, ..PreemptionSigns::default() }.model();
+        assert_eq!(model("Linux version 6.12.0-rt #1 SMP PREEMPT_RT", ""), Ok(Preemption::RealTime));
+        assert_eq!(model("Linux version 5.4 #1 SMP PREEMPT", "preempt=none"), Ok(Preemption::Full));
+        assert!(model("Linux version 5.4 #1 SMP", "preempt=full").is_err());
     }
 }

@@ -110,8 +110,8 @@ impl Run {
 pub fn us(ns: u64) -> String {
     let tenths = |ns: u64, unit: u64| format!("{}.{}", ns / unit, ns % unit * 10 / unit);
     match ns {
-        ..1_000_000 => format!("{} µs", tenths(ns, 1_000)),
-        ..1_000_000_000 => format!("{} ms", tenths(ns, 1_000_000)),
+        0..1_000_000 => format!("{} µs", tenths(ns, 1_000)),
+        1_000_000..1_000_000_000 => format!("{} ms", tenths(ns, 1_000_000)),
         _ => format!("{} s", tenths(ns, 1_000_000_000)),
     }
 }

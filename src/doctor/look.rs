@@ -110,38 +110,51 @@ fn may_set_priority() -> Seen<bool> {
     Ok(right && text::is_first_user_namespace(&read("/proc/self/uid_map")?))
 }
 
-/// Where the files of the control group are that rules processor time.
-fn group_folder() -> Seen<(text::ControlGroup, PathBuf)> {
+/// The control group that rules processor time, and the folder of its files and of each group above it, its own first.
+fn group_folders() -> Seen<(text::ControlGroup, Vec<PathBuf>)> {
     let path = "/proc/self/cgroup";
     let group = text::cpu_group(&read(path)?).ok_or("no control group rules processor time")?;
     let mounts = read("/proc/self/mounts")?;
-    let mount =
-        text::group_mount(&mounts, &group).ok_or("the files of the control group are not mounted here")?;
-    let folder = Path::new(mount).join(group.path.trim_start_matches('/'));
-    Ok((group, folder))
+    let hidden = "the files of the control group are not mounted here";
+    let mount = text::group_mount(&mounts, &group).ok_or(hidden)?;
+    let own = Path::new(mount).join(group.path.trim_start_matches('/'));
+    if !own.is_dir() {
+        return Err(hidden.to_owned());
+    }
+    let folders =
+        own.ancestors().take_while(|folder| folder.starts_with(mount)).map(Path::to_path_buf).collect();
+    Ok((group, folders))
 }
 
 fn group(config: &str) -> Seen<Group> {
     let off = text::boot_option(&text_of("/proc/cmdline"), "rt_group_sched") == Some("0");
     let configured = if off { Some(false) } else { text::option_set(config, "CONFIG_RT_GROUP_SCHED") };
-    let (group, folder) = group_folder()?;
-    let file = folder.join("cpu.rt_runtime_us");
+    let (group, folders) = group_folders()?;
+    let file = folders[0].join("cpu.rt_runtime_us");
     let share = text_of(&file).trim().parse().ok().map(|us| (file.display().to_string(), us));
     Ok(Group { path: group.path, share, configured })
 }
 
+/// The tightest limit of the group and of those above it. A group without the file has none.
 fn quota() -> Seen<Option<f64>> {
-    let (group, folder) = group_folder()?;
-    if group.unified {
-        let file = folder.join("cpu.max");
-        // The root group has no such file, and no limit.
-        if group.path == "/" && !file.exists() {
-            return Ok(None);
+    let (group, folders) = group_folders()?;
+    let mut tightest: Option<f64> = None;
+    for folder in folders {
+        let name = if group.unified { "cpu.max" } else { "cpu.cfs_quota_us" };
+        let limit = text_of(folder.join(name));
+        if limit.is_empty() {
+            continue;
         }
-        return text::cpu_max(&read(&file)?).ok_or_else(|| strange("cpu.max"));
+        let quota = if group.unified {
+            text::cpu_max(&limit)
+        } else {
+            text::cfs_quota(&limit, &read(folder.join("cpu.cfs_period_us"))?)
+        };
+        if let Some(cpus) = quota.ok_or_else(|| strange(name))? {
+            tightest = Some(tightest.map_or(cpus, |least| least.min(cpus)));
+        }
     }
-    let (quota, period) = (read(folder.join("cpu.cfs_quota_us"))?, read(folder.join("cpu.cfs_period_us"))?);
-    text::cfs_quota(&quota, &period).ok_or_else(|| strange("cpu.cfs_quota_us"))
+    Ok(tightest)
 }
 
 fn throttle() -> Seen<Throttle> {

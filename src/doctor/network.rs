@@ -1,6 +1,6 @@
 //! Tables and buffers that a hall of many controllers can outgrow.
 
-use super::{Hall, Line, Seen};
+use super::{Hall, Line, Seen, count};
 use crate::sys::machine::Limit;
 
 /// What is known of the network's limits.
@@ -61,8 +61,11 @@ impl Network {
             }
         };
         let found = format!(
-            "{}/{}/{} entries for {} controllers elsewhere and {OTHER_NEIGHBOURS} others",
-            table.kept, table.tidied, table.most, hall.neighbours
+            "{}/{}/{} entries for {} elsewhere and {OTHER_NEIGHBOURS} others",
+            table.kept,
+            table.tidied,
+            table.most,
+            count(hall.neighbours as usize, "controller")
         );
         if hall.neighbours == 0 || need <= table.tidied {
             return Line::ok(ID, found);

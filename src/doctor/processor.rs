@@ -106,10 +106,10 @@ impl Processor {
         match &self.quota {
             Err(why) => Line::unknown(ID, why, "cat /sys/fs/cgroup/cpu.max"),
             Ok(None) => Line::ok(ID, "none"),
-            Ok(Some(cpus)) if granted => Line::warn(
+            Ok(Some(cpus)) if granted || *cpus >= 1.0 => Line::warn(
                 ID,
                 format!(
-                    "{cpus:.2} processors: past it all but the tick thread stand still for the rest of a period"
+                    "{cpus:.2} processors: past it ordinary threads stand still for the rest of a period"
                 ),
                 FIX,
             ),
@@ -210,3 +210,22 @@ impl Processor {
 
 /// What the device tells while nobody holds it (`PM_QOS_CPU_LATENCY_DEFAULT_VALUE`).
 const FREE_US: i32 = 2_000_000_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_virtual_machine_is_told_by_its_processor_or_its_maker() {
+        let x86 = "flags\t\t: fpu vme hypervisor lahf_lm\n";
+        let bare = "flags\t\t: fpu vme lahf_lm\n";
+        let arm = "Features\t: fp asimd\n";
+        let named = |name: &str| Ok(Some(name.to_owned()));
+        assert_eq!(machine(x86, "", "QEMU\n"), named("a virtual machine (QEMU)"));
+        assert_eq!(machine(x86, "", ""), named("a virtual machine"));
+        assert_eq!(machine(x86, "xen\n", "Xen"), named("a virtual machine (xen)"));
+        assert_eq!(machine(bare, "", "Amazon EC2"), Ok(None));
+        assert_eq!(machine(arm, "", "QEMU"), named("a virtual machine (QEMU)"));
+        assert!(machine(arm, "", "Some Board Ltd").is_err());
+    }
+}

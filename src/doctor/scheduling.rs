@@ -129,14 +129,15 @@ impl Scheduling {
             _ if self.limit.hard.is_none_or(|most| most >= u64::from(PRIORITY)) => {
                 Line::bad(ID, found + ", which may be raised", format!("ulimit -r {PRIORITY}"))
             }
-            Ok(false) => Line::bad(ID, found + " and no CAP_SYS_NICE", fix()),
+            Ok(false) => Line::bad(ID, found + ", and no CAP_SYS_NICE that reaches the scheduler", fix()),
             Err(why) => Line::bad(ID, format!("{found}; whether there is CAP_SYS_NICE: {why}"), fix()),
         }
     }
 
     fn control_group(&self) -> Line {
         const ID: &str = "realtime_group";
-        const LOOK: &str = "cat /proc/self/cgroup; grep RT_GROUP_SCHED /boot/config-$(uname -r)";
+        const LOOK: &str =
+            "cat /proc/self/cgroup; zgrep RT_GROUP_SCHED /proc/config.gz /boot/config-$(uname -r)";
         let group = match &self.group {
             Ok(group) => group,
             Err(why) if self.granted() => {
