@@ -32,11 +32,12 @@ Verdicts:
   bad      ticks or frames will be lost: the machine is not ready
   unknown  it could not be seen from here, and is not guessed
 
-Of the measured run, lateness is from a tick's deadline to the wake-up:
-  warn  where one of 100 ticks is over 10 % of the tick (100 µs) late: a frame's Time is a whole tick, so up to there a
-        seat follows as planned; or where any tick is missed
-  bad   where one of 100 is over 50 % late: the work of a tick and the way to the seat take up the rest, and frames begin
-        to meet the next ones; or where more than one of 1,000 ticks is missed, which a seat shows
+Verdicts of a measured run, by how late the loop woke after each tick's deadline:
+  warn  one of 100 ticks is more than 10 % of the tick (100 µs) late, or any tick is missed.
+        A frame's Time is a whole tick; up to a tenth of it a seat follows as planned.
+  bad   one of 100 is more than 50 % late, or more than one of 1,000 is missed.
+        The work of a tick and the way to the seat need the other half, so frames begin to meet
+        the next ones; and a seat shows ticks that are missed this often.
 
 Exit code: 0 ready, 1 not ready: something is bad.
 
