@@ -39,6 +39,7 @@ pub mod sim;
 pub mod device;
 
 pub mod app;
+pub mod doctor;
 
 pub mod net;
 pub mod observe;

@@ -10,6 +10,7 @@ mod completions;
 mod convert;
 mod decode;
 mod demo;
+mod doctor;
 mod exit;
 mod figures;
 mod home;
@@ -45,6 +46,7 @@ enum Command {
     Decode(decode::Args),
     Register(register::Args),
     Home(home::Args),
+    Doctor(doctor::Args),
     Completions(completions::Args),
 }
 
@@ -79,6 +81,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Decode(args) => decode::run(&args),
         Command::Register(args) => register::run(&args),
         Command::Home(args) => home::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Completions(args) => completions::run(&args),
     }
 }

@@ -3,4 +3,5 @@
 
 pub mod batch;
 pub mod clock;
+pub mod machine;
 pub mod realtime;

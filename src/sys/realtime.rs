@@ -153,7 +153,7 @@ fn vm_lck(status: &str) -> u64 {
 
 /// Policy and priority of the calling thread, as the kernel tells them.
 #[expect(unsafe_code, reason = "no safe wrapper of these two calls exists among our dependencies")]
-fn scheduler() -> (Policy, u8) {
+pub(super) fn scheduler() -> (Policy, u8) {
     let mut param = libc::sched_param { sched_priority: 0 };
     // SAFETY: 0 names the calling thread; `param` is a live, writable `sched_param` and outlives the call.
     let (policy, told) = unsafe { (libc::sched_getscheduler(0), libc::sched_getparam(0, &raw mut param)) };
@@ -167,7 +167,7 @@ fn scheduler() -> (Policy, u8) {
 }
 
 #[expect(unsafe_code, reason = "no safe wrapper of this call exists among our dependencies")]
-fn set_scheduler(policy: libc::c_int, priority: libc::c_int) -> io::Result<()> {
+pub(super) fn set_scheduler(policy: libc::c_int, priority: libc::c_int) -> io::Result<()> {
     let param = libc::sched_param { sched_priority: priority };
     // SAFETY: 0 names the calling thread; `param` is a live `sched_param` that the kernel only reads.
     let answer = unsafe { libc::sched_setscheduler(0, policy, &raw const param) };

@@ -1,0 +1,224 @@
+//! `kinocue doctor`.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::{Exit, Failure, load, print};
+use crate::app::LatencyReport;
+use crate::config::Config;
+use crate::doctor::chart::{buckets, draw};
+use crate::doctor::lateness::{Load, RATE_HZ, Run};
+use crate::doctor::measure::measure;
+use crate::doctor::{Hall, Line, Verdict, judge, look, ready};
+use crate::sys::realtime::normal_priority;
+
+/// Tells whether this machine is real-time, and if not, what to change.
+///
+/// First it looks: each line has what was found, whether that will do, and the exact fix. Then it measures: a bare loop on
+/// the clock and with the scheduling of `play`, 1,000 ticks a second. It changes nothing and sends nothing.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Verdicts:
+  ok       as it should be
+  warn     a show will run, but less surely than it could
+  bad      ticks or frames will be lost: the machine is not ready
+  unknown  it could not be seen from here, and is not guessed
+
+Verdicts of a measured run, by how late the loop woke after each tick's deadline:
+  warn  one of 100 ticks is more than 10 % of the tick (100 µs) late, or any tick is missed.
+        A frame's Time is a whole tick; up to a tenth of it a seat follows as planned.
+  bad   one of 100 is more than 50 % late, or more than one of 1,000 is missed.
+        The work of a tick and the way to the seat need the other half, so frames begin to meet
+        the next ones; and a seat shows ticks that are missed this often.
+
+Exit code: 0 ready, 1 not ready: something is bad.
+
+Examples:
+  kinocue doctor                                 looks, and measures for 10 s
+  kinocue doctor --load --seconds 60             measures again with every processor busy
+  kinocue doctor --config hall.toml --seconds 0  looks only, for the controllers of a hall
+  kinocue doctor --json | jq '.lines[] | select(.verdict != \"ok\")'")]
+pub(super) struct Args {
+    /// How long each run takes, in seconds, at most an hour; 0 runs none
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=3600))]
+    seconds: u64,
+
+    /// Measure a second time, with a busy thread of ordinary priority on each processor
+    #[arg(long)]
+    load: bool,
+
+    /// How many controllers it is to play to
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "config", value_parser = clap::value_parser!(u32).range(1..=65535))]
+    controllers: u32,
+
+    /// The configuration whose controllers it is to play to
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let hall = match &args.config {
+        Some(path) => hall(&load::config(path)?),
+        None => Hall { controllers: args.controllers, neighbours: args.controllers },
+    };
+    let mut lines = judge(&look(), hall);
+    let loads: &[Load] = match (args.seconds, args.load) {
+        (0, _) => &[],
+        (_, false) => &[Load::Idle],
+        (_, true) => &[Load::Idle, Load::Loaded],
+    };
+    let runs: Vec<Run> = loads.iter().map(|&load| watched(load, Duration::from_secs(args.seconds))).collect();
+    lines.extend(runs.iter().map(Run::judge));
+    let ready = ready(&lines);
+    if args.json {
+        print::json(&Report {
+            ready,
+            controllers: hall.controllers,
+            runs: runs.iter().map(RunReport::of).collect(),
+            lines,
+        })?;
+    } else {
+        print::out(&text(&lines, &runs, hall))?;
+    }
+    Ok(if ready { Exit::Done } else { Exit::CheckFailed })
+}
+
+fn hall(config: &Config) -> Hall {
+    let addresses = config.controllers.iter().map(|one| *one.address.ip());
+    let elsewhere: HashSet<_> = addresses.filter(|ip| !ip.is_loopback()).collect();
+    let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    Hall { controllers: count(config.controllers.len()), neighbours: count(elsewhere.len()) }
+}
+
+/// Measures on this thread, while another draws how far it is.
+fn watched(load: Load, span: Duration) -> Run {
+    let (done, over) = (AtomicU64::new(0), AtomicBool::new(false));
+    if !std::io::stderr().is_terminal() {
+        return measure(load, span, &done);
+    }
+    thread::scope(|scope| {
+        let drawer = scope.spawn(|| progress(load, span, &done, &over));
+        let run = measure(load, span, &done);
+        over.store(true, Ordering::Relaxed);
+        drawer.thread().unpark();
+        run
+    })
+}
+
+fn progress(load: Load, span: Duration, done: &AtomicU64, over: &AtomicBool) {
+    let _ = normal_priority(); // a line drawn at another priority is no reason to fail
+    let ticks_per_s = Duration::from_secs(1).as_nanos() / u128::from(crate::doctor::lateness::PERIOD_NS);
+    let total = u128::from(span.as_secs()) * ticks_per_s;
+    let bar = ProgressBar::new(u64::try_from(total).unwrap_or(u64::MAX));
+    let style = ProgressStyle::with_template("measuring, {msg} [{wide_bar}] {pos} of {len} ticks");
+    bar.set_style(style.expect("the template is fixed").progress_chars("=> "));
+    bar.set_message(load.word());
+    while !over.load(Ordering::Relaxed) {
+        bar.set_position(done.load(Ordering::Relaxed));
+        thread::park_timeout(Duration::from_millis(100));
+    }
+    bar.finish_and_clear();
+}
+
+/// What programs read. Fields may be added, never changed.
+#[derive(Debug, Serialize)]
+struct Report {
+    ready: bool,
+    controllers: u32,
+    lines: Vec<Line>,
+    runs: Vec<RunReport>,
+}
+
+#[derive(Debug, Serialize)]
+struct RunReport {
+    /// `idle` or `loaded`.
+    load: &'static str,
+    rate_hz: f64,
+    /// `fifo`, `rr` or `other`.
+    policy: String,
+    /// Wake-ups.
+    ticks: u64,
+    missed_ticks: u64,
+    lateness_us: LatencyReport,
+    histogram: Vec<BucketReport>,
+}
+
+/// Some of the wake-ups; the last bucket may have no end.
+#[derive(Debug, Serialize)]
+struct BucketReport {
+    from_us: u64,
+    to_us: Option<u64>,
+    count: u64,
+}
+
+impl RunReport {
+    fn of(run: &Run) -> Self {
+        let histogram = buckets(&run.lateness).into_iter().map(|bucket| BucketReport {
+            from_us: bucket.from_ns / 1_000,
+            to_us: (bucket.to_ns < u64::MAX).then_some(bucket.to_ns / 1_000),
+            count: bucket.count,
+        });
+        Self {
+            load: run.load.word(),
+            rate_hz: RATE_HZ,
+            policy: run.policy.to_string(),
+            ticks: run.ticks,
+            missed_ticks: run.missed,
+            lateness_us: LatencyReport::of(&run.lateness),
+            histogram: histogram.collect(),
+        }
+    }
+}
+
+fn text(lines: &[Line], runs: &[Run], hall: Hall) -> String {
+    let mut text = String::new();
+    for line in lines {
+        append(&mut text, format_args!("{:<8} {:<22} {}\n", line.verdict.word(), line.id, line.found));
+        if let Some(fix) = &line.fix {
+            let what = if line.verdict == Verdict::Unknown { "look" } else { "fix" };
+            append(&mut text, format_args!("{:<31} {what}: {fix}\n", ""));
+        }
+    }
+    for run in runs {
+        append(
+            &mut text,
+            format_args!(
+                "\nlateness at {RATE_HZ:.0} Hz, {}, scheduled as {} (bars grow with each doubling)\n{}",
+                run.load.word(),
+                run.policy,
+                draw(&run.lateness)
+            ),
+        );
+    }
+    let number = |verdict| lines.iter().filter(|line| line.verdict == verdict).count();
+    append(
+        &mut text,
+        format_args!(
+            "\n{} for {} controller{}: {} bad, {} to be warned of, {} not seen, {} ok\n",
+            if ready(lines) { "ready" } else { "not ready" },
+            hall.controllers,
+            if hall.controllers == 1 { "" } else { "s" },
+            number(Verdict::Bad),
+            number(Verdict::Warn),
+            number(Verdict::Unknown),
+            number(Verdict::Ok)
+        ),
+    );
+    text
+}
+
+fn append(text: &mut String, what: std::fmt::Arguments<'_>) {
+    text.write_fmt(what).expect("a String takes what is written to it");
+}

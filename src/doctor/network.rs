@@ -1,0 +1,140 @@
+//! Tables and buffers that a hall of many controllers can outgrow.
+
+use super::{Hall, Line, Seen, count};
+use crate::sys::machine::Limit;
+
+/// What is known of the network's limits.
+#[derive(Debug, Clone)]
+pub struct Network {
+    /// Sizes of the table of neighbours.
+    pub neighbours: Seen<NeighbourTable>,
+    /// Octets that a socket's receive buffer may be asked to have (`rmem_max`).
+    pub receive_max: Seen<u64>,
+    /// Octets that it has unasked (`rmem_default`).
+    pub receive_default: Seen<u64>,
+    /// Pages that all UDP sockets of the machine may fill together (the last of `udp_mem`).
+    pub udp_pages: Seen<u64>,
+    /// Files that the process may have open.
+    pub files: Limit,
+}
+
+/// The kernel's table of link addresses, `net.ipv4.neigh.default.gc_thresh1` to `3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NeighbourTable {
+    /// Below this many entries none is ever dropped.
+    pub kept: u64,
+    /// Above this many those that are older than 5 s are dropped when one is added.
+    pub tidied: u64,
+    /// There are never more than this.
+    pub most: u64,
+}
+
+/// Neighbours that are no controllers: consoles, servers, gateways.
+const OTHER_NEIGHBOURS: u64 = 32;
+/// Files that a play has open beside its sockets.
+const OTHER_FILES: u64 = 64;
+/// Replies of a controller in 5 ms at 1 kHz: how long the thread that reads them may be kept from running.
+const REPLIES: u64 = 5;
+/// Octets that one short datagram takes of a receive buffer: half a page of the network card's driver and the kernel's
+/// own record of it.
+const REPLY_OCTETS: u64 = 2_304;
+/// Octets that a play asks for.
+const ASKED: u64 = 1 << 20;
+/// The smallest page there is.
+const PAGE: u64 = 4_096;
+
+impl Network {
+    /// One line for each.
+    #[must_use]
+    pub fn judge(&self, hall: Hall) -> Vec<Line> {
+        vec![self.neighbour_table(hall), self.receive_buffer(hall), self.open_files(hall)]
+    }
+
+    fn neighbour_table(&self, hall: Hall) -> Line {
+        const ID: &str = "neighbour_table";
+        let need = u64::from(hall.neighbours) + OTHER_NEIGHBOURS;
+        let table = match &self.neighbours {
+            Ok(table) => *table,
+            Err(_) if hall.neighbours == 0 => return Line::ok(ID, "not needed: no controller is elsewhere"),
+            Err(why) => {
+                return Line::unknown(ID, why, "on the host: sysctl -a | grep neigh.default.gc_thresh");
+            }
+        };
+        let found = format!(
+            "{}/{}/{} entries for {} elsewhere and {OTHER_NEIGHBOURS} others",
+            table.kept,
+            table.tidied,
+            table.most,
+            count(hall.neighbours as usize, "controller")
+        );
+        if hall.neighbours == 0 || need <= table.tidied {
+            return Line::ok(ID, found);
+        }
+        let kept = need.next_power_of_two();
+        let fix = format!(
+            "in /etc/sysctl.d/90-kinocue.conf, then sysctl --system: net.ipv4.neigh.default.gc_thresh1={kept}, \
+             gc_thresh2={}, gc_thresh3={}",
+            2 * kept,
+            4 * kept
+        );
+        if need > table.most {
+            Line::bad(ID, found + ": frames to some will find no link address", fix)
+        } else {
+            Line::warn(ID, found + ": idle entries are dropped, and their next frames wait", fix)
+        }
+    }
+
+    fn receive_buffer(&self, hall: Hall) -> Line {
+        const ID: &str = "socket_buffers";
+        const LOOK: &str = "on the host: sysctl net.core.rmem_max net.ipv4.udp_mem";
+        let (most, unasked) = match (&self.receive_max, &self.receive_default) {
+            (Ok(most), Ok(unasked)) => (*most, *unasked),
+            (Err(why), _) | (_, Err(why)) => return Line::unknown(ID, why, LOOK),
+        };
+        let one = REPLIES * REPLY_OCTETS;
+        let all = one * u64::from(hall.controllers);
+        // The kernel doubles what is asked for: its own records count as well.
+        let has = 2 * ASKED.min(most);
+        let found = format!(
+            "{has} octets for each controller's replies (rmem_max {most}, rmem_default {unasked}); 5 ms of them take {one}"
+        );
+        if has < one {
+            return Line::warn(ID, found, format!("sysctl -w net.core.rmem_max={ASKED}"));
+        }
+        match &self.udp_pages {
+            Ok(pages) if pages.saturating_mul(PAGE) < all => Line::warn(
+                ID,
+                format!("{found}; those of all {all}, but UDP has {pages} pages of memory"),
+                format!(
+                    "sysctl -w net.ipv4.udp_mem=\"{0} {1} {2}\"",
+                    all / PAGE,
+                    2 * all / PAGE,
+                    4 * all / PAGE
+                ),
+            ),
+            Ok(_) => Line::ok(ID, format!("{found}, those of all {all}")),
+            Err(why) => {
+                Line::unknown(ID, format!("{found}, those of all {all}; UDP's own memory: {why}"), LOOK)
+            }
+        }
+    }
+
+    fn open_files(&self, hall: Hall) -> Line {
+        const ID: &str = "open_files";
+        let need = u64::from(hall.controllers) + OTHER_FILES;
+        let hard = self.files.hard.map_or_else(|| "unlimited".to_owned(), |most| most.to_string());
+        let found = format!("RLIMIT_NOFILE {hard}, needed {need}");
+        if self.files.hard.is_none_or(|most| most >= need) {
+            return Line::ok(ID, found);
+        }
+        let enough = need.next_power_of_two();
+        Line::bad(
+            ID,
+            found,
+            format!(
+                "LimitNOFILE={enough} in the unit, or `@kinocue - nofile {enough}` in \
+                 /etc/security/limits.d/kinocue.conf and log in anew"
+            ),
+        )
+    }
+}
