@@ -34,6 +34,8 @@ pub mod rt;
 
 pub mod sim;
 
+pub mod device;
+
 pub mod app;
 
 pub mod net;
