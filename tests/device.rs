@@ -178,7 +178,7 @@ fn the_exit_code_tells_silence_from_refusal() {
     let said = run(&dead, &["register", "read", "PA95"]);
     assert_eq!((said.exit, said.err.lines().count()), (69, 1), "{}", said.err);
     let live = farm(vec![Setup::default()]);
-    let refused = run(&live, &["register", "read", "servo", "1", "508"]);
+    let refused = run(&live, &["register", "read", "servo", "9", "508"]);
     assert_eq!((refused.exit, refused.err.lines().count()), (76, 1), "{}", refused.err);
     assert_eq!(run(&live, &["register", "read", "PA999"]).exit, 64);
 }
