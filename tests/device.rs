@@ -123,6 +123,59 @@ fn what_must_not_be_written_is_refused_before_anything_is_sent() {
 }
 
 #[test]
+fn where_one_register_is_refused_none_is_written() {
+    let farm = farm(vec![Setup::default(); 2]);
+    let said = run(&farm, &["register", "write", "PA95=1", "servo", "1", "508=7", "--yes"]);
+    assert_eq!(said.exit, 76, "{}", said.err);
+    assert!(
+        said.err.contains("c2: cannot read servo 1 508") && said.err.contains("nothing was written"),
+        "{}",
+        said.err
+    );
+    let json = run(&farm, &["register", "read", "PA95", "--json"]).json();
+    assert_eq!(json["controllers"][1]["registers"][0]["value"], 0);
+}
+
+#[test]
+fn an_address_is_never_given_to_two_controllers() {
+    let farm = farm(vec![Setup::default(); 2]);
+    let said = run(&farm, &["register", "write", "PA13=7", "--yes", "--force"]);
+    assert_eq!(said.exit, 64);
+    assert!(said.err.contains("one controller at a time"), "{}", said.err);
+}
+
+#[test]
+fn names_and_rows_choose_controllers_of_a_configuration() {
+    let farm = farm(vec![Setup::default(); 3]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("hall.toml");
+    let mut text = String::from(
+        "[seat.s]\naxes = 3\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\n\
+         max_velocity_mm_s = 240.0\nmax_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n",
+    );
+    for ((name, row), address) in [("A1", "A"), ("A2", "A"), ("B1", "B")].into_iter().zip(farm.addresses()) {
+        text += &format!(
+            "[[controller]]\nname = \"{name}\"\nrow = \"{row}\"\nseat = \"s\"\naddress = \"{address}\"\n"
+        );
+    }
+    std::fs::write(&file, text).expect("a file");
+    let config = file.to_str().expect("text");
+    let chosen = |more: &[&str]| {
+        let args = [&["register", "read", "PA02", "--json", "--config", config], more].concat();
+        let said = said(&args, vec![]);
+        assert_eq!(said.exit, 0, "{}", said.err);
+        let json = said.json();
+        let names = json["controllers"].as_array().expect("an array").iter();
+        names.filter_map(|one| one["name"].as_str().map(str::to_owned)).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(chosen(&[]), "A1 A2 B1");
+    assert_eq!(chosen(&["--row", "A"]), "A1 A2");
+    assert_eq!(chosen(&["--name", "B1"]), "B1");
+    let unknown = said(&["register", "read", "PA02", "--config", config, "--row", "C"], vec![]);
+    assert_eq!((unknown.exit, unknown.err.as_str()), (64, "kinocue: no controller stands in row C\n"));
+}
+
+#[test]
 fn settings_are_kept_over_a_power_cycle_where_that_is_asked_for() {
     for dialect in [Dialect::Smc, Dialect::Mbox] {
         let farm = farm(vec![Setup { dialect, ..Setup::default() }]);
@@ -229,5 +282,21 @@ fn a_seat_in_emergency_stop_does_not_home_and_says_so() {
     let farm = farm(vec![Setup { estop_at: Some(Duration::ZERO), ..Setup::default() }]);
     let said = run(&farm, &["home", "--seats-empty"]);
     assert_eq!(said.exit, 76, "{}", said.err);
-    assert!(said.err.contains("an emergency stop is in effect"), "{}", said.err);
+    assert!(said.err.contains("cannot home: an emergency stop is in effect (x = 4)"), "{}", said.err);
+    let outcome = farm.stop().expect("no log to fail").remove(0);
+    assert_eq!(outcome.counts.received, 1, "it was asked how it is, and not told to move");
+}
+
+#[test]
+fn homing_as_json_tells_of_each_seat() {
+    let farm = farm(vec![Setup::default(), Setup { mute: true, ..Setup::default() }]);
+    let said = run(&farm, &["home", "--seats-empty", "--json"]);
+    assert_eq!(said.exit, 69, "{}", said.err);
+    let json = said.json();
+    assert_eq!(json["controllers"][0]["home"], true);
+    assert!(json["controllers"][0]["seconds"].as_f64().is_some_and(|s| s >= 0.5), "{json}");
+    assert!(
+        json["controllers"][1]["fault"].as_str().is_some_and(|line| line.contains("no answer")),
+        "{json}"
+    );
 }

@@ -1,16 +1,17 @@
 //! `kinocue home`.
 
-use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use serde::Serialize;
 
 use super::ask::{agreed, somebody};
 use super::targets::{TargetArgs, Targets, Troubles, state};
-use super::{Exit, Failure};
-use crate::device::home::{HomeError, PA0E, Progress, home};
-use crate::device::{Patience, Request, Talk, table};
+use super::{Exit, Failure, print};
+use crate::config::Controller;
+use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
+use crate::device::{Outcome, Patience, Request, Talk, table};
 
 /// Homes seats: has their controllers find zero (DPF0) and waits until each is there.
 ///
@@ -24,8 +25,8 @@ Examples:
   kinocue home --config hall.toml --row A --seats-empty
   kinocue home --to 192.168.15.201:7408 --timeout 120
 
-PA0e decides what a controller does: 0 searches zero, 1 goes to zero without a search, which is only right where the
-controller has found it before since it was switched on.")]
+PA0e decides what a controller does: 0 searches zero; 1 goes to zero without a search,
+which is right only where it has found zero since it was switched on.")]
 pub(super) struct Args {
     /// The controllers [default: all].
     #[arg(value_name = "NAME")]
@@ -38,6 +39,24 @@ pub(super) struct Args {
     /// How long each may take, seconds, 1 to 3600.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     timeout: u64,
+    /// Print one JSON object at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    controllers: Vec<ControllerReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct ControllerReport<'a> {
+    name: &'a str,
+    address: String,
+    home: bool,
+    /// From the order to the end of homing; null where that was not reached.
+    seconds: Option<f64>,
+    fault: Option<String>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
@@ -47,50 +66,79 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     let mut talk = targets.open()?;
     let mut troubles = Troubles::default();
-    let ready = explain(&mut talk, &targets, &mut troubles);
-    if ready.is_empty() {
-        return Ok(troubles.exit());
-    }
-    let names: Vec<_> = ready.iter().map(|lane| targets.name(*lane)).collect();
-    let question = format!(
-        "{} will move over the whole stroke. Are these seats empty, and is nobody near them?",
-        names.join(", ")
-    );
-    if !agreed(&question, args.seats_empty, "--seats-empty")? {
-        eprintln!("nothing was moved");
-        return Ok(Exit::Done);
-    }
-    let lanes: Vec<_> = ready.iter().map(|&lane| (lane, targets.controllers[lane].dialect)).collect();
-    let mut display = Display::new(&targets, &ready);
-    let timeout = Duration::from_secs(args.timeout);
-    let results = home(&mut talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress));
-    display.close();
-    for (lane, result) in ready.iter().zip(results) {
-        if let Err(error) = result {
-            tell(&error, targets.name(*lane), &mut troubles);
+    let mut results = explain(&mut talk, &targets, &mut troubles);
+    let ready: Vec<usize> = (0..results.len()).filter(|lane| results[*lane].is_ok()).collect();
+    if !ready.is_empty() {
+        if !agreed(&question(&targets, &ready), args.seats_empty, "--seats-empty")? {
+            eprintln!("nothing was moved");
+            return Ok(Exit::Done);
         }
+        let timeout = Duration::from_secs(args.timeout);
+        for (lane, result) in ready.iter().zip(move_home(&mut talk, &targets, &ready, timeout)) {
+            if let Err(error) = &result {
+                tell(error, targets.name(*lane), &mut troubles);
+            }
+            results[*lane] = result.map_err(|error| error.to_string());
+        }
+    }
+    if args.json {
+        print::json(&Report::new(&targets, &results))?;
     }
     Ok(troubles.exit())
 }
 
-/// Asks each controller what its reset does, says so, and gives those that answered.
-fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<usize> {
-    let mut ready = Vec::new();
-    for outcome in talk.ask(targets.each(&[Request::read(PA0E)]), Patience::default()) {
-        let lane = outcome.lane;
-        let Ok((_, answer)) = troubles.sort(targets, outcome) else { continue };
+fn question(targets: &Targets, lanes: &[usize]) -> String {
+    let names: Vec<_> = lanes.iter().map(|lane| targets.name(*lane)).collect();
+    format!(
+        "{} will move over the whole stroke. Are these seats empty, and is nobody near them?",
+        names.join(", ")
+    )
+}
+
+/// Asks each controller what its reset does, and says so; an error for each that cannot home, of which it has told.
+fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<Result<Duration, String>> {
+    let one = |outcome: Outcome| {
+        let (lane, name) = (outcome.lane, targets.name(outcome.lane));
+        let (_, answer) = troubles.sort(targets, outcome)?;
+        let controller = &targets.controllers[lane];
         let value = answer.words.first().copied().unwrap_or(0);
-        let mut line = format!("{}: PA0e = {value}", targets.name(lane));
-        if let Some(meaning) = table().get(PA0E).and_then(|register| register.says(value)) {
-            write!(line, ": {meaning}").expect("a String takes what is written to it");
+        let meaning =
+            table().get(PA0E).and_then(|register| register.says(value)).unwrap_or("not in the manuals");
+        let state = state(controller, &answer).map_or_else(String::new, |state| format!("; now {state}"));
+        eprintln!("{name}: PA0e = {value}: {meaning}{state}");
+        match hindrance(&answer, controller.dialect) {
+            None => Ok(Duration::ZERO),
+            Some(error) => {
+                troubles.refuse(name, &error.to_string());
+                Err(error.to_string())
+            }
         }
-        if let Some(state) = state(&targets.controllers[lane], &answer) {
-            write!(line, "; now {state}").expect("a String takes what is written to it");
-        }
-        eprintln!("{line}");
-        ready.push(lane);
+    };
+    talk.ask(targets.each(&[Request::read(PA0E)]), Patience::default()).into_iter().map(one).collect()
+}
+
+fn move_home(
+    talk: &mut Talk,
+    targets: &Targets,
+    ready: &[usize],
+    timeout: Duration,
+) -> Vec<Result<Duration, HomeError>> {
+    let lanes: Vec<_> = ready.iter().map(|&lane| (lane, targets.controllers[lane].dialect)).collect();
+    let mut display = Display::new(targets, ready);
+    home(talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress))
+}
+
+impl<'a> Report<'a> {
+    fn new(targets: &'a Targets, results: &[Result<Duration, String>]) -> Self {
+        let one = |(controller, result): (&'a Controller, &Result<Duration, String>)| ControllerReport {
+            name: &controller.name,
+            address: controller.address.to_string(),
+            home: result.is_ok(),
+            seconds: result.as_ref().ok().map(Duration::as_secs_f64),
+            fault: result.as_ref().err().cloned(),
+        };
+        Self { controllers: targets.controllers.iter().zip(results).map(one).collect() }
     }
-    ready
 }
 
 fn tell(error: &HomeError, name: &str, troubles: &mut Troubles) {
@@ -102,8 +150,9 @@ fn tell(error: &HomeError, name: &str, troubles: &mut Troubles) {
     if silent { troubles.miss(name, &error.to_string()) } else { troubles.refuse(name, &error.to_string()) }
 }
 
-/// Progress: a line for each controller on a terminal, kept up to date; elsewhere a line for each step.
+/// Progress: on a terminal a line for each controller on its way, kept up to date; elsewhere a line for each step.
 struct Display {
+    bars: Option<MultiProgress>,
     lines: Vec<Line>,
 }
 
@@ -127,31 +176,27 @@ impl Display {
             }
             Line { lane, name, bar, homing: false }
         };
-        Self { lines: lanes.iter().map(line).collect() }
+        Self { lines: lanes.iter().map(line).collect(), bars }
     }
 
     fn show(&mut self, lane: usize, progress: &Progress) {
         let Some(line) = self.lines.iter_mut().find(|line| line.lane == lane) else { return };
-        let words = words(progress);
+        let (words, ended) =
+            (words(progress), matches!(progress, Progress::Home { .. } | Progress::Failed(_)));
         // In a pipe, a step once: looks at DPF0 come five times a second.
         let again = line.homing && matches!(progress, Progress::Homing { .. });
         line.homing = matches!(progress, Progress::Homing { .. });
-        match &line.bar {
-            Some(bar) if matches!(progress, Progress::Home { .. } | Progress::Failed(_)) => {
-                bar.finish_with_message(words);
+        match (&self.bars, &line.bar) {
+            (Some(bars), Some(bar)) if ended => {
+                bar.finish_and_clear();
+                let _ = bars.println(format!("{}: {words}", line.name)); // a closed terminal stops nothing
             }
-            Some(bar) => {
+            (Some(_), Some(bar)) => {
                 bar.set_message(words);
                 bar.tick();
             }
-            None if again => {}
-            None => eprintln!("{}: {words}", line.name),
-        }
-    }
-
-    fn close(self) {
-        for bar in self.lines.into_iter().filter_map(|line| line.bar) {
-            bar.abandon();
+            _ if again => {}
+            _ => eprintln!("{}: {words}", line.name),
         }
     }
 }

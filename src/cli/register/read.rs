@@ -55,12 +55,13 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 /// The registers that a controller is asked for: of ranges, those that its dialect has.
 fn wanted(selections: &[Selection], controller: &Controller) -> anyhow::Result<Vec<Address>> {
     let dialect = controller.dialect;
-    let has = |address: &Address| table().get(*address).is_none_or(|register| register.dialect.has(dialect));
+    let has = |address: &Address| table().has(*address, dialect);
     let mut wanted = Vec::new();
     for selection in selections {
-        if let Some(address) = selection.addresses.iter().find(|address| selection.single && !has(address)) {
+        if let Some(first) = selection.addresses.first().filter(|_| !selection.addresses.iter().any(has)) {
             let (name, dialect) = (&controller.name, dialect_name(dialect));
-            return Err(anyhow!("{address} is no register of {dialect} controllers, as {name} is one"));
+            let what = if selection.single { "is no register" } else { "and on are no registers" };
+            return Err(anyhow!("{first} {what} of {dialect} controllers, as {name} is one"));
         }
         wanted.extend(selection.addresses.iter().copied().filter(has));
     }

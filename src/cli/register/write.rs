@@ -126,6 +126,10 @@ fn wanted(args: &Args, targets: &Targets) -> Result<Vec<Vec<Assignment>>, Failur
         }
     };
     let mut objections: Vec<String> = Vec::new();
+    if let Some(own) = wanted.iter().flatten().find(|one| wanted.len() > 1 && is_own(one.address)) {
+        let address = own.address;
+        objections.push(format!("{address} is each controller's own; write it to one controller at a time"));
+    }
     for (controller, assignments) in targets.controllers.iter().zip(&wanted) {
         for assignment in assignments {
             if let Err(objection) = check(*assignment, controller.dialect, args.force) {
