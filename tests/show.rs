@@ -43,7 +43,11 @@ fn a_show_joins_the_cue_follows_it_parks_and_closes_with_three_hold_frames() {
         let at = ShowTime::from_millis(10 * (i64::try_from(k).unwrap() + 1));
         assert_eq!(frame.request.positions[1].0, pulses_of_cue(&played, 1, at), "frame {k}");
     }
-    let at_rest = frames.iter().rev().take_while(|frame| frame.request.positions.iter().all(|axis| axis.0 == 0)).count();
+    let at_rest = frames
+        .iter()
+        .rev()
+        .take_while(|frame| frame.request.positions.iter().all(|axis| axis.0 == 0))
+        .count();
     assert!((4..10).contains(&at_rest), "the last pose of the way to park, three hold frames: {at_rest}");
 }
 
@@ -85,7 +89,8 @@ fn at_any_rate_distance_and_time_agree() {
 #[test]
 fn after_a_late_wakeup_one_frame_leaves_and_the_lag_is_taken_back_gently() {
     let smooth = Virtual::new(swell(1, 20, 60.0, 0.25)).play();
-    let played = Virtual::new(swell(1, 20, 60.0, 0.25)).with(400, Event::Late(Duration::from_millis(35))).play();
+    let played =
+        Virtual::new(swell(1, 20, 60.0, 0.25)).with(400, Event::Late(Duration::from_millis(35))).play();
     assert_eq!(played.ended.missed, 3);
     // The poses go on from the last one sent; Time stays one period.
     assert!(played.frames.iter().all(|frame| frame.request.time_ms == 10));
@@ -102,7 +107,8 @@ fn after_a_late_wakeup_one_frame_leaves_and_the_lag_is_taken_back_gently() {
 #[test]
 fn after_a_long_stall_the_seat_holds_and_then_joins_the_cue_where_the_film_is() {
     let smooth = Virtual::new(swell(1, 20, 60.0, 0.25)).play();
-    let played = Virtual::new(swell(1, 20, 60.0, 0.25)).with(400, Event::Late(Duration::from_millis(800))).play();
+    let played =
+        Virtual::new(swell(1, 20, 60.0, 0.25)).with(400, Event::Late(Duration::from_millis(800))).play();
     assert_eq!(played.ended.missed, 80);
     let held = played.frames[399].request.positions[0];
     assert_eq!([400, 401].map(|frame| played.frames[frame].request.positions[0]), [held; 2]);
@@ -174,7 +180,8 @@ fn absolute_time_counts_from_one_period_and_is_bridged_by_a_relative_frame_after
     let mut show = Virtual::new(swell(1, 10, 60.0, 0.25)).with(300, Event::Late(Duration::from_millis(500)));
     show.timing = Timing::Absolute;
     let played = show.play();
-    let times: Vec<(Timing, u32)> = played.frames.iter().map(|f| (f.request.timing, f.request.time_ms)).collect();
+    let times: Vec<(Timing, u32)> =
+        played.frames.iter().map(|f| (f.request.timing, f.request.time_ms)).collect();
     assert_eq!(times[..2], [(Timing::Absolute, 10), (Timing::Absolute, 20)]);
     assert_eq!(
         times[299..303],

@@ -98,7 +98,7 @@ pub(super) struct Args {
     #[arg(long)]
     safe: bool,
 
-    /// What happens when, as \"2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot\"; see below
+    /// What happens when, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below
     #[arg(long, value_name = "TIME:COMMAND, …", value_parser = script, default_value = "", hide_default_value = true)]
     script: Script,
 

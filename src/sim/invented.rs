@@ -11,8 +11,8 @@ pub struct Invented {
     pub homing: Duration,
     /// By what the time of a move is divided in fast forward (PA06).
     pub fast_forward: u32,
-    /// The greatest Time of a first absolute frame, ms; a longer one is Err17 where PA0d = 0. PA0b where there is none.
-    pub first_time_max_ms: Option<u32>,
+    /// The greatest Time of a first absolute frame, ms; a longer one is Err17 where PA0d = 0.
+    pub first_time_max_ms: u32,
     /// Datagrams within 100 ms that fill the UDP memory; one more is Err20, until 100 ms have passed without one too
     /// many.
     pub udp_memory: u32,
@@ -52,7 +52,7 @@ impl Default for Invented {
             queue_depth: 200,
             homing: Duration::from_millis(500),
             fast_forward: 2,
-            first_time_max_ms: None,
+            first_time_max_ms: 30_000,
             udp_memory: 1_000,
             auto_reset_unit: Duration::from_millis(1),
             auto_reset: Commands::Motion,

@@ -22,9 +22,9 @@ pub(super) struct Leeway {
     #[arg(long, value_enum, default_value_t = FastForward::Half)]
     fast_forward: FastForward,
 
-    /// The greatest Time of a first absolute frame, ms: a longer one is Err17 where PA0d = 0 [default: PA0b]
-    #[arg(long, value_name = "MS")]
-    first_time_max_ms: Option<u32>,
+    /// The greatest Time of a first absolute frame, ms: a longer one is Err17 where PA0d = 0
+    #[arg(long, value_name = "MS", default_value_t = 30_000)]
+    first_time_max_ms: u32,
 
     /// Datagrams within 100 ms that fill the UDP memory; one more is Err20
     #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..))]

@@ -74,8 +74,7 @@ impl Controller {
     /// (chapter 6: Err17).
     fn begins_too_long(&self, motion: &MotionRequest) -> bool {
         let first = motion.timing == Timing::Absolute && self.last_absolute.is_none();
-        let most = self.invented.first_time_max_ms.unwrap_or_else(|| self.longest_ms());
-        first && self.registers.get(pa::AUTO_RESET) == 0 && motion.time_ms > most
+        first && self.registers.get(pa::AUTO_RESET) == 0 && motion.time_ms > self.invented.first_time_max_ms
     }
 
     /// The longest time of a command, ms.
