@@ -1,10 +1,10 @@
 //! Reading and writing registers of a virtual controller.
 
 use super::monitor::dp;
-use super::{Controller, OUTPUTS};
+use super::{Controller, NEVER, OUTPUTS};
 use crate::device::Address;
 use crate::sim::pa;
-use crate::sim::registers::{has, takes};
+use crate::sim::registers::{TABLE, has, takes};
 use crate::time::MonoTime;
 use crate::wire::{
     Access, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, Space, Words, WriteRequest,
@@ -66,7 +66,7 @@ impl Controller {
     }
 
     /// All parameters as they read.
-    fn parameters(&self, at: MonoTime) -> [u16; 256] {
+    fn parameters(&self, at: MonoTime) -> [u16; TABLE] {
         let mut table = *self.registers.all();
         table[usize::from(pa::RESET)] = u16::from(at < self.homing_until);
         table
@@ -178,7 +178,7 @@ impl Controller {
         self.registers.set(register, value, keep);
         match register {
             pa::MANUAL_OUTPUTS => self.outputs = value & OUTPUTS,
-            pa::AUTO_RESET if value == 0 => self.auto_reset_at = super::NEVER,
+            pa::AUTO_RESET if value == 0 => self.auto_reset_at = NEVER,
             pa::REPORT_INTERVAL | pa::REPORTS | pa::KEEP => self.schedule_reports(at),
             _ => {}
         }

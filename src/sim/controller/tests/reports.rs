@@ -56,6 +56,9 @@ fn without_pa1f_nothing_is_reported_and_pa15_does_not_matter() {
     let mut off = Bench::with(&[(pa::REPORT_INTERVAL, 10)]);
     off.controller.act(&Action::Error(12), at(0));
     assert_eq!(report(off.wait(100)), None);
+    let mut default = Bench::with(&[]);
+    default.controller.act(&Action::Error(12), at(0));
+    assert_eq!(report(&mut default), None);
     let mut on = Bench::with(&[(pa::REPORT_INTERVAL, 10), (pa::ANSWERS, 0)]);
     on.controller.act(&Action::Parameter(pa::REPORTS, 1), at(0));
     assert!(report(on.wait(10)).is_some());
