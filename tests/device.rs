@@ -125,10 +125,10 @@ fn what_must_not_be_written_is_refused_before_anything_is_sent() {
 #[test]
 fn where_one_register_is_refused_none_is_written() {
     let farm = farm(vec![Setup::default(); 2]);
-    let said = run(&farm, &["register", "write", "PA95=1", "servo", "1", "508=7", "--yes"]);
+    let said = run(&farm, &["register", "write", "PA95=1", "servo", "9", "508=7", "--yes"]);
     assert_eq!(said.exit, 76, "{}", said.err);
     assert!(
-        said.err.contains("c2: cannot read servo 1 508") && said.err.contains("nothing was written"),
+        said.err.contains("c2: cannot read servo 9 508") && said.err.contains("nothing was written"),
         "{}",
         said.err
     );
@@ -231,7 +231,7 @@ fn the_exit_code_tells_silence_from_refusal() {
     let said = run(&dead, &["register", "read", "PA95"]);
     assert_eq!((said.exit, said.err.lines().count()), (69, 1), "{}", said.err);
     let live = farm(vec![Setup::default()]);
-    let refused = run(&live, &["register", "read", "servo", "1", "508"]);
+    let refused = run(&live, &["register", "read", "servo", "9", "508"]);
     assert_eq!((refused.exit, refused.err.lines().count()), (76, 1), "{}", refused.err);
     assert_eq!(run(&live, &["register", "read", "PA999"]).exit, 64);
 }

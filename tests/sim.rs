@@ -1,14 +1,19 @@
 //! Virtual controllers over real sockets of 127.0.0.1, in the library and as the program.
 
-use std::io::{BufRead as _, BufReader, Read as _};
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+use std::os::unix::net::UnixStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use kinocue::motion::Pulses;
-use kinocue::sim::{Controller, Farm, FarmError, LinkFaults, Options, Setup};
+use kinocue::sim::{
+    Action, Command as Order, CommandError, Controller, Farm, FarmError, LinkFaults, Options, Setup, pa,
+};
 use kinocue::time::MonoTime;
-use kinocue::wire::{Code, FrameNo, MAX_LEN, Motion, MotionReply, Timing};
+use kinocue::wire::{
+    Code, FrameNo, MAX_LEN, Motion, MotionReply, ReadRequest, RegisterReply, ReplyCode, Status, Timing,
+};
 
 use proptest::prelude::*;
 
@@ -42,9 +47,33 @@ fn send(host: &UdpSocket, to: SocketAddrV4, frame: u32) {
 }
 
 fn answer(host: &UdpSocket) -> FrameNo {
+    reply(host).frame
+}
+
+fn reply(host: &UdpSocket) -> MotionReply {
     let mut buf = [0; MAX_LEN];
     let len = host.recv(&mut buf).expect("an answer in time");
-    MotionReply::parse(&buf[..len]).expect("a motion reply").frame
+    MotionReply::parse(&buf[..len]).expect("a motion reply")
+}
+
+/// Asks a controller for a register.
+fn ask(host: &UdpSocket, to: SocketAddrV4, channel: u16, start: u16) -> u16 {
+    let mut buf = [0; MAX_LEN];
+    let read = ReadRequest { channel, accept: Code::ALL, reply: Code::ALL, start, num: 1 };
+    host.send_to(read.emit(&mut buf), to).expect("loopback takes it");
+    let len = host.recv(&mut buf).expect("an answer in time");
+    RegisterReply::parse(&buf[..len]).expect("a register reply").data.get(0).expect("a word")
+}
+
+/// The next status report.
+fn status(host: &UdpSocket) -> (SocketAddr, Status) {
+    let mut buf = [0; MAX_LEN];
+    let (len, from) = host.recv_from(&mut buf).expect("a report in time");
+    (from, Status::parse(&buf[..len]).expect("a status report"))
+}
+
+fn to(controller: usize, action: Action) -> Order {
+    Order { controller: Some(controller), action }
 }
 
 #[test]
@@ -97,6 +126,57 @@ fn a_taken_port_and_ports_past_the_last_are_refused() {
     };
     assert!(matches!(Farm::start(at(port, 1)), Err(FarmError::Listen { .. })));
     assert!(matches!(Farm::start(at(65_535, 2)), Err(FarmError::Ports { .. })));
+}
+
+#[test]
+fn a_remote_acts_on_one_controller_or_on_all() {
+    let host = host();
+    let farm = Farm::start(Options::loopback(vec![setup(&host); 2])).expect("free ports");
+    let (remote, addresses) = (farm.remote(), farm.addresses());
+    assert_eq!(remote.tell(to(1, Action::Error(12))), Ok(()));
+    let codes = addresses.iter().map(|&address| {
+        send(&host, address, 1);
+        (reply(&host).code, ask(&host, address, 1, 2))
+    });
+    assert_eq!(codes.collect::<Vec<_>>(), [(ReplyCode::Running, 3), (ReplyCode::Fault, 3)]);
+    let all = |action| Order { controller: None, action };
+    assert_eq!(remote.tell(all(Action::Switch { input: 3, closed: true })), Ok(()));
+    assert_eq!(remote.tell(all(Action::Duplicate(1.0))), Ok(()));
+    for &address in &addresses {
+        assert_eq!((ask(&host, address, 0, 0x5e), ask_again(&host)), (4, 4));
+    }
+    assert_eq!(remote.tell(to(2, Action::Reboot)), Err(CommandError::Controller { index: 2, count: 2 }));
+    assert_eq!(remote.tell(all(Action::Error(9))), Err(CommandError::Error(9)));
+    farm.stop().expect("no log to fail");
+    assert_eq!(remote.tell(all(Action::Reboot)), Err(CommandError::Ended));
+}
+
+/// The word of an answer that came once more.
+fn ask_again(host: &UdpSocket) -> u16 {
+    let mut buf = [0; MAX_LEN];
+    let len = host.recv(&mut buf).expect("an answer in time");
+    RegisterReply::parse(&buf[..len]).expect("a register reply").data.get(0).expect("a word")
+}
+
+#[test]
+fn safe_controllers_report_to_the_host_and_a_script_stops_one_of_them() {
+    let host = host();
+    let SocketAddr::V4(address) = host.local_addr().expect("it is bound") else { panic!("IPv4") };
+    let script = vec![(Duration::ZERO, to(0, Action::Switch { input: 1, closed: true }))];
+    let safe = Setup::default().safe(address);
+    let farm = Farm::start(Options { script, ..Options::loopback(vec![safe]) }).expect("a free port");
+    let from = farm.addresses()[0];
+    let stopped = std::iter::repeat_with(|| status(&host)).take(100).find(|(_, status)| status.inputs == 1);
+    let (sender, seen) = stopped.expect("a report with X01");
+    assert_eq!((sender, seen.station, seen.positions.len()), (from.into(), Code(0x0001), 3));
+    assert!(farm.stop().expect("no log to fail")[0].counts.reported > 0);
+}
+
+#[test]
+fn a_script_for_nobody_is_refused() {
+    let script = vec![(Duration::ZERO, to(1, Action::Reboot))];
+    let options = Options { script, ..Options::loopback(vec![Setup::default()]) };
+    assert!(matches!(Farm::start(options), Err(FarmError::Script(CommandError::Controller { .. }))));
 }
 
 /// The program, killed where a test ends before it does.
@@ -196,6 +276,49 @@ fn the_program_refuses_a_taken_port_with_71_and_the_lan_with_64() {
     }
 }
 
+#[test]
+fn the_program_takes_commands_at_its_control_socket_and_removes_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("sim.sock");
+    let path_arg = path.to_str().expect("text");
+    drop(std::os::unix::net::UnixListener::bind(&path).expect("a socket")); // left over from another program
+    let args = ["--listen", "127.0.0.1:0", "--count", "2", "--host-port", "0", "--control", path_arg];
+    let mut sim = Program::start(&args);
+    let addresses = sim.ready(2);
+    let control = UnixStream::connect(&path).expect("it listens");
+    control.set_read_timeout(Some(PATIENCE)).expect("a time-out");
+    let mut lines = BufReader::new(&control);
+    let mut command = |text: &str| {
+        writeln!(&control, "{text}").expect("it takes lines");
+        let mut line = String::new();
+        lines.read_line(&mut line).expect("an answer in time");
+        line
+    };
+    assert_eq!(command("c2@pa95=6"), "ok\n");
+    assert_eq!(command("3@reboot"), "error there is no controller 3; there are 2\n");
+    assert!(command("jump").starts_with("error \"jump\" is no command; commands are X1=1"));
+    let host = host();
+    assert_eq!([0, 1].map(|index| ask(&host, addresses[index], 1, 0x95)), [0, 6]);
+    let second = Program::start(&["--listen", "127.0.0.1:0", "--control", path_arg]).0.wait();
+    assert_eq!(second.expect("it ends").code(), Some(71), "the socket is taken");
+    assert_eq!(sim.end(rustix::process::Signal::TERM).0, Some(0));
+    assert!(!path.exists());
+}
+
+#[test]
+fn the_program_follows_its_script() {
+    let args = ["--listen", "127.0.0.1:0", "--host-port", "0", "--safe", "--script", "0:X1=1, 0:pa02=6"];
+    let mut sim = Program::start(&args);
+    let (address, host) = (sim.ready(1)[0], host());
+    assert_eq!((ask(&host, address, 0, 0x5e), ask(&host, address, 1, 2)), (1, 6));
+    assert_eq!([0x90, 0x91, 0x92, 0x94].map(|number| ask(&host, address, 1, number)), [1, 2, 1, 300]);
+    assert_eq!(sim.end(rustix::process::Signal::TERM).0, Some(0));
+    for wrong in ["1:jump", "1:2@reboot", "X1=1"] {
+        let code = Program::start(&["--listen", "127.0.0.1:0", "--script", wrong]).0.wait();
+        assert_eq!(code.expect("it ends").code(), Some(64), "{wrong}");
+    }
+}
+
 /// Octets that open as a request does and go on by chance.
 fn request() -> impl Strategy<Value = Vec<u8>> {
     let family = prop::sample::select(&[0x11_u8, 0x12, 0x13, 0x14, 0x18, 0x19, 0x21, 0x22][..]);
@@ -210,6 +333,19 @@ fn request() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
+/// What happens in between.
+const ACTIONS: [Action; 9] = [
+    Action::Switch { input: 1, closed: true },
+    Action::Switch { input: 1, closed: false },
+    Action::Error(12),
+    Action::Error(0),
+    Action::Reboot,
+    Action::EmergencyStop(true),
+    Action::EmergencyStop(false),
+    Action::Parameter(pa::INPUT_POLARITY, 0),
+    Action::Parameter(pa::AUTO_RESET, 500),
+];
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
@@ -219,7 +355,7 @@ proptest! {
     ) {
         let from = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 8410);
         let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 7408);
-        let mut controller = Controller::new(&Setup::default(), address, MonoTime::default());
+        let mut controller = Controller::new(&Setup::default().safe(from), address, MonoTime::default());
         let (mut at_ms, mut answers) = (0, 0);
         for (octets, after_ms) in &datagrams {
             at_ms += after_ms;
@@ -227,6 +363,8 @@ proptest! {
             let mut buf = [0xa5; MAX_LEN];
             let handled = controller.on_datagram(from, octets, at, &mut buf);
             answers += u64::from(handled.reply.is_some());
+            controller.act(&ACTIONS[octets.len() % ACTIONS.len()], at);
+            let _ = controller.report(at, &mut buf);
         }
         let counts = controller.counts();
         prop_assert_eq!(counts.received, u64::try_from(datagrams.len()).expect("few"));

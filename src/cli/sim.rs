@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::Read as _;
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,23 +11,41 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::print::{self, tell};
-use super::{Exit, Failure, OrExit as _};
-use crate::sim::{Farm, LinkFaults, Options, Outcome, Setup};
+use super::{Exit, Failure, OrExit as _, times};
+use crate::sim::{Command, Farm, FarmError, LinkFaults, Options, Outcome, Setup};
 use crate::wire::Dialect;
 
+mod control;
+mod leeway;
 mod parse;
+
+/// Where a host is that says nothing else.
+const HOST_PORT: u16 = 8410;
 
 /// Runs virtual controllers.
 ///
-/// They behave as the manual says: accept and reply codes, the queue of moves, resets, emergency stop, outputs,
-/// registers. They run until Ctrl-C or SIGTERM, which end them with 0.
+/// They behave as the manual says: accept and reply codes, registers and their limits, the queue of moves, resets,
+/// emergency stop, errors, outputs, status reports. They start with the manual's defaults, which no preflight passes,
+/// unless --safe is given. They run until Ctrl-C or SIGTERM, which end them with 0.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   kinocue sim                                        one controller of three axes at 127.0.0.1:7408
   kinocue sim --count 4 --axes 6 --json              four of six axes at ports 7408 to 7411, counts at the end
   kinocue sim --loss 0.05 --delay 80ms --seed 7      one frame in twenty unanswered, the other answers late
-  kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame, and logs it")]
+  kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame, and logs it
+  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      somebody presses the emergency stop, and releases it
+  kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
+
+Commands of --script, each with TIME: before it (seconds from the start), and of --control:
+  X1=1, X1=0     the switch at input X01 closes, which pulls it low (active with PA04 = 1), or opens; X1 to X12
+  err=12, err=0  an error comes (1 to 7, 10 to 15, 17, 20, 21), or all go with their causes
+  reboot         the power goes and comes back
+  estop=1        an emergency stop comes that no input asks for; estop=0: it goes
+  mute=1         obeys, but says nothing; mute=0: speaks again
+  pa95=3         somebody sets a parameter at the controller's keys: register in hex, value decimal or 0x
+  loss=0.1, duplicate=0.1, delay=50ms   what the network does from now on
+A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.")]
 pub(super) struct Args {
     /// Where the first controller listens; with port 0 each gets a free one
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408")]
@@ -58,7 +76,7 @@ pub(super) struct Args {
     duplicate: f64,
 
     /// How much later answers leave: 80ms, 1.5s
-    #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = parse::span)]
+    #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = times::parse_duration)]
     delay: Duration,
 
     /// Obey, but never answer
@@ -74,8 +92,20 @@ pub(super) struct Args {
     seed: Option<u64>,
 
     /// The port that frames must come from (PA24); 0 takes any
-    #[arg(long, value_name = "PORT", default_value_t = 8410)]
+    #[arg(long, value_name = "PORT", default_value_t = HOST_PORT)]
     host_port: u16,
+
+    /// Start with settings that are safe for people and pass preflight, reports go to this machine; --pa changes them
+    #[arg(long)]
+    safe: bool,
+
+    /// What happens when, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below
+    #[arg(long, value_name = "TIME:COMMAND, …", value_parser = script, default_value = "", hide_default_value = true)]
+    script: Script,
+
+    /// Take commands at a Unix socket, one per line, each answered with ok or error and why
+    #[arg(long, value_name = "PATH")]
+    control: Option<PathBuf>,
 
     /// Write a CSV row for each motion frame: what was commanded, and where the motors were
     #[arg(long, value_name = "FILE")]
@@ -88,6 +118,16 @@ pub(super) struct Args {
     /// Listen on addresses that other machines reach, too
     #[arg(long)]
     allow_lan: bool,
+
+    #[command(flatten)]
+    leeway: leeway::Leeway,
+}
+
+/// What happens when.
+type Script = std::sync::Arc<[(Duration, Command)]>;
+
+fn script(text: &str) -> anyhow::Result<Script> {
+    parse::script(text).map(Into::into)
 }
 
 /// A family of controllers.
@@ -114,7 +154,15 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         return Err(refusal).or_exit(Exit::Usage);
     }
     let signals = Signals::catch().context("cannot wait for Ctrl-C and SIGTERM").or_exit(Exit::System)?;
-    let farm = Farm::start(options(args)?).or_exit(Exit::System)?;
+    let farm = Farm::start(options(args)?).map_err(|error| {
+        let exit = if matches!(error, FarmError::Script(_)) { Exit::Usage } else { Exit::System };
+        Failure { exit, error: error.into() }
+    })?;
+    let control = args.control.as_deref().map(|path| {
+        let opened = control::Control::open(path, farm.remote());
+        opened.with_context(|| format!("cannot listen at {}", path.display())).or_exit(Exit::System)
+    });
+    let _control = control.transpose()?; // its file goes when this does
     for address in farm.addresses() {
         tell(&format!("ready {address}"));
     }
@@ -132,7 +180,10 @@ fn options(args: &Args) -> Result<Options, Failure> {
         dialect: args.dialect.into(),
         mute: args.mute,
         estop_at: args.estop_at,
+        invented: args.leeway.invented(),
     };
+    let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, args.host_port);
+    let setup = if args.safe { setup.safe(host) } else { setup };
     let log = match &args.log {
         Some(path) => {
             // It is emptied only once the ports are ours: a second sim must not wipe the log of the first.
@@ -148,6 +199,7 @@ fn options(args: &Args) -> Result<Options, Failure> {
         faults: LinkFaults { loss: args.loss, duplicate: args.duplicate, delay: args.delay },
         seed: seed(args),
         log,
+        script: args.script.to_vec(),
     })
 }
 

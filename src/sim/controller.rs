@@ -1,67 +1,66 @@
-//! One virtual controller: takes datagrams, obeys, answers.
+//! One virtual controller: takes datagrams, obeys, answers, and reports unasked.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddrV4;
-use std::time::Duration;
 
-use super::player::{Overflow, Player, Positions};
-use super::registers::{Registers, pa};
-use super::{Counts, Setup};
+use super::errors::{self, Errors, Memory};
+use super::inputs::Inputs;
+use super::player::{Pace, Player};
+use super::registers::Registers;
+use super::{Action, Commands, Counts, Invented, Setup, pa};
 use crate::motion::{MAX_AXES, Pulses};
 use crate::time::MonoTime;
-use crate::wire::{
-    Access, Code, Dialect, MAX_LEN, Message, MotionReply, MotionRequest, PerAxis, ReplyCode, Timing,
-};
+use crate::wire::{Code, Dialect, MAX_LEN, Message, MotionRequest, PerAxis, ReplyCode};
 
 mod access;
+mod functions;
 mod malformed;
+mod monitor;
+mod motion;
+mod report;
+mod reset;
+mod servo;
 
-/// How long a controller homes.
-pub(super) const HOMING: Duration = Duration::from_millis(500);
-/// The error of a queue that ran over; only a reset clears it.
-const ERR_OVERFLOW: u16 = 21;
+use functions::{EmergencyStop, Jog};
+use monitor::Seen;
+
 const NEVER: MonoTime = MonoTime::from_nanos(u64::MAX);
 /// Outputs that there are.
 const OUTPUTS: u16 = 0x0fff;
 
-/// A virtual controller. Told the time; touches neither socket nor clock, and allocates nothing once it is made.
+/// A virtual controller. Told the time; touches neither socket nor clock, and once it is made allocates nothing for
+/// motion.
 #[derive(Debug)]
 pub struct Controller {
     dialect: Dialect,
+    invented: Invented,
     mute: bool,
     registers: Registers,
+    /// What was written to registers of drives.
+    servos: BTreeMap<(u16, u16), u16>,
     player: Player,
     outputs: u16,
-    inputs: u16,
+    inputs: Inputs,
     /// Time of the last motion in absolute time; none where the next one is a first one.
     last_absolute: Option<u32>,
-    /// Error number; 0 for none.
-    error: u16,
+    errors: Errors,
+    memory: Memory,
+    /// Until when too many datagrams are an error.
+    memory_full_until: MonoTime,
     homing_until: MonoTime,
     silent_until: MonoTime,
+    auto_reset_at: MonoTime,
+    report_at: MonoTime,
     estop: EmergencyStop,
-    packets: u16,
-    last_len: u16,
+    /// Moves that had been executed when an emergency stop was released, as long as what follows is slow.
+    released: Option<u64>,
+    jog: Option<Jog>,
+    /// Whether the inputs ask for an emergency reset.
+    reset_asked: bool,
+    /// When something happens by itself next.
+    next_event: MonoTime,
+    seen: Seen,
     counts: Counts,
-}
-
-/// What is known about the emergency stop.
-#[derive(Debug, Clone, Copy, Default)]
-struct EmergencyStop {
-    /// From when on it is in effect by order of the setup.
-    forced: Option<MonoTime>,
-    /// From when on the inputs ask for it, their filter included.
-    inputs: Option<MonoTime>,
-    /// Whether what has to happen when it comes has happened.
-    taken: bool,
-    /// Whether only a reset ends it (PA91 = 2).
-    latched: bool,
-}
-
-impl EmergencyStop {
-    /// Since when it is asked for without a break, if it is.
-    fn asked(&self, at: MonoTime) -> Option<MonoTime> {
-        [self.forced, self.inputs].into_iter().flatten().filter(|&since| since <= at).min()
-    }
 }
 
 /// What a controller did with a datagram.
@@ -87,24 +86,33 @@ impl Controller {
     #[must_use]
     pub fn new(setup: &Setup, address: SocketAddrV4, at: MonoTime) -> Self {
         let registers = Registers::new(setup, address);
-        let estop =
-            EmergencyStop { forced: setup.estop_at.map(|after| at + after), ..EmergencyStop::default() };
-        Self {
+        let mut controller = Self {
             dialect: setup.dialect,
             mute: setup.mute,
             outputs: registers.get(pa::START_OUTPUTS) & OUTPUTS,
+            inputs: Inputs::new(registers.get(pa::INPUT_POLARITY) == 1),
             registers,
-            player: Player::new(at),
-            inputs: 0,
+            servos: BTreeMap::new(),
+            player: Player::new(setup.invented.queue_depth, at),
             last_absolute: None,
-            error: 0,
+            errors: Errors::default(),
+            memory: Memory::new(setup.invented.udp_memory),
+            memory_full_until: NEVER,
             homing_until: at,
             silent_until: at,
-            estop,
-            packets: 0,
-            last_len: 0,
+            auto_reset_at: NEVER,
+            report_at: NEVER,
+            estop: EmergencyStop::new(setup.estop_at.map(|after| at + after)),
+            released: None,
+            jog: None,
+            reset_asked: false,
+            next_event: at,
+            seen: Seen::default(),
             counts: Counts::default(),
-        }
+            invented: setup.invented.clone(),
+        };
+        controller.schedule_reports(at);
+        controller
     }
 
     /// Takes a datagram and writes the answer, where there is one, to the front of `buf`.
@@ -117,12 +125,16 @@ impl Controller {
     ) -> Handled<'b> {
         self.advance(at);
         self.counts.received += 1;
-        self.packets = self.packets.wrapping_add(1);
-        self.last_len = u16::try_from(octets.len()).unwrap_or(u16::MAX);
         let ignored = Handled { reply: None, motion: None };
         if at < self.silent_until {
             self.counts.refused.rebooting += 1;
             return ignored;
+        }
+        self.seen.datagram(octets.len(), at);
+        if self.memory.overflows(at) {
+            self.memory_full_until = at + Memory::WINDOW;
+            self.next_event = self.next_event.min(self.memory_full_until);
+            self.fail(errors::UDP_MEMORY, at);
         }
         let host_port = self.registers.get(pa::HOST_PORT);
         if host_port != 0 && from.port() != host_port {
@@ -151,6 +163,9 @@ impl Controller {
             return nothing;
         }
         let answers = self.answers(reply);
+        if self.invented.auto_reset == Commands::Any && self.auto_reset_at != NEVER {
+            self.put_off_auto_reset(at);
+        }
         let mut motion = None;
         let octets: &[u8] = match message {
             Message::Motion(request) => {
@@ -159,193 +174,126 @@ impl Controller {
                 answer.emit(buf)
             }
             Message::Read(read) => self.on_read(read, at, buf),
-            Message::Write(write) => self.on_write(write, at).emit(buf),
-            Message::ServoRead(read) => self.refuse_servo(Access::Read, read.start, read.num).emit(buf),
-            Message::ServoWrite(write) => {
-                let num = u16::try_from(write.data.len()).unwrap_or(u16::MAX);
-                self.refuse_servo(Access::Write, write.start, num).emit(buf)
-            }
+            Message::Write(write) => self.on_write(write, at, buf),
+            Message::ServoRead(read) => self.on_servo_read(read, buf),
+            Message::ServoWrite(write) => self.on_servo_write(write, buf),
             _ => return nothing,
         };
+        let answers = answers && !octets.is_empty();
+        self.counts.replied += u64::from(answers);
         Handled { reply: answers.then_some(octets), motion }
     }
 
-    /// Whether it answers a request with this reply code, counted as an answer if so.
-    fn answers(&mut self, reply: Code) -> bool {
-        let answers =
-            !self.mute && self.registers.get(pa::ANSWERS) != 0 && reply.matches(self.registers.station());
-        self.counts.replied += u64::from(answers);
-        answers
+    /// Whether it answers a request with this reply code.
+    fn answers(&self, reply: Code) -> bool {
+        !self.mute && self.registers.get(pa::ANSWERS) != 0 && reply.matches(self.registers.station())
     }
 
-    fn on_motion(&mut self, motion: &MotionRequest, at: MonoTime) -> MotionReply {
-        let (mut code, mut error) = self.state();
-        match code {
-            ReplyCode::Running if motion.vibration.is_some() && self.dialect == Dialect::Mbox => {
-                self.counts.refused.command += 1;
-                code = self.command_error();
-            }
-            ReplyCode::Running if at < self.homing_until => self.counts.refused.homing += 1,
-            ReplyCode::Running => {
-                if self.move_to(motion, at) == Err(Overflow) {
-                    (code, error) = self.state();
-                }
-            }
-            ReplyCode::EmergencyStop => self.counts.refused.emergency_stop += 1,
-            ReplyCode::Fault | ReplyCode::Command => self.counts.refused.fault += 1,
-        }
-        let running = code == ReplyCode::Running;
-        MotionReply {
-            timing: motion.timing,
-            code,
-            channel: if running { motion.channel } else { 0 },
-            error: self.error_slot(motion.channel, error),
-            frame: motion.frame,
-            time_ms: motion.time_ms,
-            positions: motion.positions,
-            inputs: self.inputs,
-            extend: motion.extend,
-            vibration: motion.vibration,
-        }
-    }
-
-    /// Obeys a motion frame.
-    fn move_to(&mut self, motion: &MotionRequest, at: MonoTime) -> Result<(), Overflow> {
-        let duration = self.duration(motion);
-        let to = self.target(&motion.positions);
-        let pace = self.registers.pace();
-        if let Err(overflow) = self.player.push(to, duration, at, &pace) {
-            self.player.hold(at, &pace);
-            self.error = ERR_OVERFLOW;
-            self.counts.queue_overflows += 1;
-            self.counts.refused.fault += 1;
-            return Err(overflow);
-        }
-        self.last_absolute = (motion.timing == Timing::Absolute).then_some(motion.time_ms);
-        if self.registers.get(pa::KEEP_OUTPUTS) != 1 {
-            self.outputs = motion.outputs & OUTPUTS;
-        }
-        self.counts.accepted += 1;
-        self.counts.motion += 1;
-        Ok(())
-    }
-
-    /// How long a frame's move takes: its Time, or what absolute time has gone on since the frame before; the fixed
-    /// interval where that is none; cut to the longest there may be.
-    fn duration(&self, motion: &MotionRequest) -> Duration {
-        let interval = u32::from(self.registers.get(pa::INTERVAL));
-        let asked = match (motion.timing, self.last_absolute) {
-            (Timing::Relative, _) => motion.time_ms,
-            (Timing::Absolute, Some(before)) => motion.time_ms.saturating_sub(before),
-            (Timing::Absolute, None) => motion.time_ms.min(interval),
-        };
-        let ms = if asked == 0 { interval } else { asked };
-        let longest = match u32::from(self.registers.get(pa::MAX_TIME)) {
-            0 => u32::MAX,
-            longest => longest,
-        };
-        Duration::from_millis(u64::from(ms.min(longest).max(1)))
-    }
-
-    /// Where the axes go: each takes its own axis of the command, past the axis offset; those that the command does
-    /// not reach, and those that do not work, stay.
-    fn target(&self, commanded: &[Pulses]) -> Positions {
-        let mut to = *self.player.target();
-        let offset = usize::from(self.registers.get(pa::OFFSET));
-        let window = commanded.get(offset..).unwrap_or_default();
-        for (own, position) in to.iter_mut().zip(window).take(self.registers.axes()) {
-            *own = self.scaled(*position);
-        }
-        to
-    }
-
-    /// A position at the amplitude of PA55.
-    #[expect(clippy::cast_possible_truncation, reason = "at most nine tenths of an i32")]
-    fn scaled(&self, position: Pulses) -> Pulses {
-        match self.registers.get(pa::AMPLITUDE) {
-            tenths @ 1..=9 => Pulses((i64::from(position.0) * i64::from(tenths) / 10) as i32),
-            _ => position,
-        }
-    }
-
-    /// What its answers say of its state, and the error number that goes with it.
-    const fn state(&self) -> (ReplyCode, u16) {
-        match (self.estop.taken, self.error, self.dialect) {
-            (true, _, Dialect::Smc) => (ReplyCode::EmergencyStop, 0),
-            (true, _, Dialect::Mbox) => (ReplyCode::Fault, 0),
+    /// What its answers to motion say of its state, and the error number that goes with it. MBOX controllers have no x
+    /// for an emergency stop.
+    fn state(&self) -> (ReplyCode, u16) {
+        match (self.estop.in_effect(), self.errors.shown(), self.dialect) {
+            (true, error, Dialect::Smc) => (ReplyCode::EmergencyStop, error),
+            (true, error, Dialect::Mbox) => (ReplyCode::Fault, error),
             (false, 0, _) => (ReplyCode::Running, 0),
             (false, error, _) => (ReplyCode::Fault, error),
         }
     }
 
-    /// Lets time pass: moves go on, an emergency stop comes into effect or ends.
-    fn advance(&mut self, at: MonoTime) {
-        let pace = self.registers.pace();
-        let due = self.estop.asked(at);
-        if let (Some(due), false) = (due, self.estop.taken) {
-            self.estop.taken = true;
-            self.last_absolute = None;
-            if due < self.homing_until {
-                self.homing_until = NEVER; // cut short, it is only done by another reset
-            }
-            match self.registers.get(pa::ESTOP_WAY) {
-                1 => self.player.go_to_zero(Duration::ZERO, due, &pace),
-                way => {
-                    self.player.hold(due, &pace);
-                    self.estop.latched = way == 2;
-                }
-            }
-        } else if due.is_none() && !self.estop.latched {
-            self.estop.taken = false;
+    /// An error comes: all but a full memory stops the play where it is.
+    fn fail(&mut self, number: u16, at: MonoTime) {
+        if !self.errors.insert(number) {
+            return;
         }
+        if self.errors.stop_play() {
+            let pace = *self.pace();
+            self.player.hold(at, &pace);
+            self.last_absolute = None;
+            self.spoil_homing(at);
+        }
+        self.report_fault(at);
+    }
+
+    /// How moves run now.
+    const fn pace(&self) -> &Pace {
+        if self.released.is_some() { self.registers.release_pace() } else { self.registers.pace() }
+    }
+
+    /// Lets time pass: moves go on, and what happens by itself happens in its order.
+    fn advance(&mut self, at: MonoTime) {
+        while self.next_event <= at {
+            let due = self.next_event;
+            self.run_events(due);
+            self.next_event = self.soonest_event(due);
+        }
+        let pace = *self.pace();
         self.player.advance(at, &pace);
+        if self.released.is_some_and(|executed| self.player.idle() && self.player.executed > executed) {
+            self.released = None;
+        }
     }
 
-    /// Sets which inputs are active, bit 0 = X01. An emergency stop follows where PA90, PA92 and PA93 say so.
-    pub fn set_inputs(&mut self, active: u16, at: MonoTime) {
+    fn run_events(&mut self, at: MonoTime) {
+        if self.memory_full_until <= at {
+            self.memory_full_until = NEVER;
+            self.errors.remove(errors::UDP_MEMORY);
+        }
+        self.run_functions(at);
+        if self.auto_reset_at <= at {
+            self.auto_reset_at = NEVER;
+            self.auto_reset(at);
+        }
+    }
+
+    /// When something happens by itself next, after what happened at `at`.
+    fn soonest_event(&self, at: MonoTime) -> MonoTime {
+        let input = self.inputs.next_change(self.registers.millis(pa::INPUT_FILTER)).unwrap_or(NEVER);
+        debug_assert!(input > at, "what was due has happened");
+        input.min(self.estop.forced_at()).min(self.auto_reset_at).min(self.memory_full_until)
+    }
+
+    /// What somebody or something does to it; those of the network mean nothing to it.
+    pub fn act(&mut self, action: &Action, at: MonoTime) {
         self.advance(at);
-        self.inputs = active;
-        self.watch_inputs(at);
+        match *action {
+            Action::Switch { input, closed } => {
+                let mask = 1_u16.checked_shl(u32::from(input).wrapping_sub(1)).unwrap_or(0);
+                let others = self.inputs.closed() & !mask;
+                self.switch(if closed { others | mask } else { others }, at);
+            }
+            Action::Error(0) => self.errors.clear(),
+            Action::Error(number) => self.fail(number, at),
+            Action::Reboot => self.reboot(at),
+            Action::EmergencyStop(on) => {
+                self.estop.force(on);
+                self.run_functions(at);
+            }
+            Action::Mute(mute) => self.mute = mute,
+            Action::Parameter(pa::RESET, 1) => self.reset(at),
+            Action::Parameter(register, value) => self.set(register, value, true, at),
+            Action::Loss(_) | Action::Duplicate(_) | Action::Delay(_) => {}
+        }
+        self.next_event = self.soonest_event(at);
+    }
+
+    /// Closes these switches, bit 0 for X01, and opens the others. A closed switch pulls its input low, which is
+    /// active with PA04 = 1. What follows, PA90 to PA98 say.
+    pub fn set_switches(&mut self, closed: u16, at: MonoTime) {
         self.advance(at);
-    }
-
-    /// Notes since when the inputs ask for an emergency stop.
-    fn watch_inputs(&mut self, at: MonoTime) {
-        let mask = self.registers.get(pa::ESTOP_INPUTS);
-        let enabled = self.registers.get(pa::INPUT_FUNCTIONS) & 1 == 1 && mask != 0;
-        self.estop.inputs = if enabled && self.inputs & mask == mask {
-            self.estop.inputs.or(Some(at + self.registers.millis(pa::INPUT_FILTER)))
-        } else {
-            None
-        };
-    }
-
-    /// Resets: errors are cleared, then it homes, or goes to zero where PA0E says so.
-    fn reset(&mut self, at: MonoTime) {
-        self.error = 0;
-        self.estop.latched = false;
-        self.advance(at);
-        self.last_absolute = None;
-        let pace = self.registers.pace();
-        let goes_to_zero = self.registers.get(pa::RESET_WAY) == 1;
-        self.player.go_to_zero(if goes_to_zero { Duration::ZERO } else { HOMING }, at, &pace);
-        self.homing_until = if goes_to_zero { self.player.end() } else { at + HOMING };
-    }
-
-    /// Starts again, as after a power cycle: silent for PA3D and while it homes.
-    fn reboot(&mut self, at: MonoTime) {
-        self.registers.restart();
-        self.watch_inputs(at);
-        self.outputs = self.registers.get(pa::START_OUTPUTS) & OUTPUTS;
-        self.reset(at);
-        self.silent_until = self.homing_until + self.registers.millis(pa::START_DELAY);
+        self.switch(closed, at);
+        self.next_event = self.soonest_event(at);
     }
 
     /// Where the axes that work are.
     pub fn positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
         self.advance(at);
-        let positions = self.player.positions(at);
-        PerAxis::new(&positions[..self.registers.axes().min(MAX_AXES)])
+        PerAxis::new(&self.player.positions(at)[..self.registers.axes().min(MAX_AXES)])
+    }
+
+    /// Where the axes that work are, with what shakes them.
+    pub fn shaken_positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
+        self.advance(at);
+        PerAxis::new(&self.player.shaken(at)[..self.registers.axes().min(MAX_AXES)])
     }
 
     /// The outputs that are on, bit 0 = Y01.

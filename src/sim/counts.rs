@@ -15,6 +15,8 @@ pub struct Counts {
     pub refused: Refused,
     /// Answers that it gave, those lost on purpose included.
     pub replied: u64,
+    /// Status and fault reports that it gave unasked, those lost on purpose included.
+    pub reported: u64,
     /// Datagrams that were lost on purpose before they arrived.
     pub lost_frames: u64,
     /// Answers that were lost on purpose.
@@ -25,7 +27,7 @@ pub struct Counts {
     pub send_failed: u64,
     /// Moves that reached their end.
     pub executed: u64,
-    /// Moves that ran in half their time, since more than two were waiting.
+    /// Moves that ran in less than their time, since more than two were waiting.
     pub fast_forwarded: u64,
     /// Times that the queue of moves ran over (Err21).
     pub queue_overflows: u64,
@@ -40,11 +42,11 @@ pub struct Refused {
     pub source_port: u64,
     /// For other stations.
     pub not_addressed: u64,
-    /// While it was starting again (DPF2).
+    /// While it was starting again (DPF2, or its power).
     pub rebooting: u64,
     /// Motion while it was homing; answered with x = 2.
     pub homing: u64,
-    /// Motion while it had an error; x = 3.
+    /// Motion while it had an error, or that made one; x = 3.
     pub fault: u64,
     /// Motion or reset while an emergency stop was in effect; x = 4.
     pub emergency_stop: u64,

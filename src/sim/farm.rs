@@ -2,33 +2,20 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
+use std::net::SocketAddrV4;
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
+use std::sync::mpsc::{self, Sender};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
-use rustix::buffer::spare_capacity;
-use rustix::event::{EventfdFlags, Timespec, epoll, eventfd};
-use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
-use super::link::{Fate, Link};
+use super::keeper::{DELAYED, Keeper, Order, wait_for};
 use super::log::Log;
-use super::{Controller, Counts, Options, Setup};
-use crate::time::MonoTime;
-use crate::wire::MAX_LEN;
-
-/// Longer datagrams are cut; no message is that long.
-const MAX_DATAGRAM: usize = 2048;
-/// Sockets that one wait names at most.
-const EVENTS: usize = 128;
-/// Answers that wait for their time at most; what comes on top is not sent.
-const DELAYED: usize = 65_536;
-/// Datagrams of a socket that are still taken when the end is asked for.
-const BACKLOG: usize = 4_096;
-/// Names the end in place of a controller.
-const STOP: u64 = u64::MAX;
+use super::station::{Station, listen};
+use super::{Command, CommandError, Counts, Options, Setup};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
 
 /// Why virtual controllers cannot start.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +38,9 @@ pub enum FarmError {
         #[source]
         source: io::Error,
     },
+    /// The script has something happen that cannot.
+    #[error("cannot follow the script")]
+    Script(#[source] CommandError),
     /// The system refused something else.
     #[error("cannot wait for {count} sockets")]
     System {
@@ -80,8 +70,15 @@ pub struct Outcome {
 #[derive(Debug)]
 pub struct Farm {
     addresses: Vec<SocketAddrV4>,
-    stop: Arc<OwnedFd>,
+    remote: Remote,
     thread: Option<JoinHandle<io::Result<Vec<Outcome>>>>,
+}
+
+/// Has things happen to the virtual controllers of a farm, from any thread.
+#[derive(Debug, Clone)]
+pub struct Remote {
+    orders: Sender<Order>,
+    bell: Arc<OwnedFd>,
 }
 
 impl Farm {
@@ -90,31 +87,41 @@ impl Farm {
     /// # Errors
     /// [`FarmError`] where a socket cannot be had; then none is kept.
     pub fn start(options: Options) -> Result<Self, FarmError> {
-        let start = now();
+        let start = Monotonic.now();
         let count = options.controllers.len();
+        let script = script(&options, start).map_err(FarmError::Script)?;
         let stations = stations(&options, start)?;
         let addresses = stations.iter().map(|station| station.address).collect();
         let system = |source: io::Error| FarmError::System { count, source };
-        let (epoll, stop) = wait_for(&stations).map_err(|error| system(error.into()))?;
-        let stop = Arc::new(stop);
+        let (epoll, bell) = wait_for(&stations).map_err(|error| system(error.into()))?;
+        let bell = Arc::new(bell);
+        let (sender, orders) = mpsc::channel();
         let keeper = Keeper {
             start,
             stations,
             epoll,
-            _stop: Arc::clone(&stop),
-            delay: options.faults.delay,
-            delayed: VecDeque::new(),
+            bell: Arc::clone(&bell),
+            orders,
+            script,
+            room: DELAYED,
             log: options.log.map(Log::new),
+            due: start,
         };
         let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
         let thread = thread.spawn(move || keeper.run()).map_err(system)?;
-        Ok(Self { addresses, stop, thread: Some(thread) })
+        Ok(Self { addresses, remote: Remote { orders: sender, bell }, thread: Some(thread) })
     }
 
     /// Where the controllers listen, in the order of their setups.
     #[must_use]
     pub fn addresses(&self) -> Vec<SocketAddrV4> {
         self.addresses.clone()
+    }
+
+    /// What has things happen to these controllers.
+    #[must_use]
+    pub fn remote(&self) -> Remote {
+        self.remote.clone()
     }
 
     /// Takes what has come, ends the thread and says what became of each controller.
@@ -127,7 +134,7 @@ impl Farm {
 
     fn end(&mut self) -> io::Result<Vec<Outcome>> {
         let Some(thread) = self.thread.take() else { return Ok(Vec::new()) };
-        rustix::io::write(&*self.stop, &1_u64.to_ne_bytes())?;
+        let _ = self.remote.order(Order::Stop); // a thread that has ended needs no telling
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 }
@@ -140,15 +147,38 @@ impl Drop for Farm {
     }
 }
 
-/// A controller and its socket.
-#[derive(Debug)]
-struct Station {
-    address: SocketAddrV4,
-    socket: UdpSocket,
-    controller: Controller,
-    link: Link,
-    /// What the socket and the link add to the controller's own counts.
-    extra: Counts,
+impl Remote {
+    /// Has something happen, and returns once it has.
+    ///
+    /// # Errors
+    /// [`CommandError`] where the command names what there is not, or the controllers have ended.
+    pub fn tell(&self, command: Command) -> Result<(), CommandError> {
+        command.action.check()?;
+        let (told, answer) = mpsc::sync_channel(1);
+        self.order(Order::Do(command, told))?;
+        answer.recv().map_err(|_| CommandError::Ended)?
+    }
+
+    fn order(&self, order: Order) -> Result<(), CommandError> {
+        self.orders.send(order).map_err(|_| CommandError::Ended)?;
+        rustix::io::write(&*self.bell, &1_u64.to_ne_bytes()).map_err(|_| CommandError::Ended)?;
+        Ok(())
+    }
+}
+
+/// The script with its instants, soonest first.
+fn script(options: &Options, start: MonoTime) -> Result<VecDeque<(MonoTime, Command)>, CommandError> {
+    let count = options.controllers.len();
+    for (_, command) in &options.script {
+        command.action.check()?;
+        if let Some(index) = command.controller.filter(|&index| index >= count) {
+            return Err(CommandError::Controller { index, count });
+        }
+    }
+    let mut script: Vec<_> =
+        options.script.iter().map(|(after, command)| (start + *after, command.clone())).collect();
+    script.sort_by_key(|(at, _)| *at);
+    Ok(script.into())
 }
 
 fn stations(options: &Options, start: MonoTime) -> Result<Vec<Station>, FarmError> {
@@ -160,189 +190,8 @@ fn stations(options: &Options, start: MonoTime) -> Result<Vec<Station>, FarmErro
             port => u16::try_from(usize::from(port) + index).map_err(|_| outside)?,
         };
         let wanted = SocketAddrV4::new(*first.ip(), port);
-        let (socket, address) =
-            listen(wanted).map_err(|source| FarmError::Listen { address: wanted, source })?;
-        Ok(Station {
-            address,
-            socket,
-            controller: Controller::new(setup, address, start),
-            link: Link::new(&options.faults, options.seed, index),
-            extra: Counts::default(),
-        })
+        let socket = listen(wanted).map_err(|source| FarmError::Listen { address: wanted, source })?;
+        Ok(Station::new(options, index, setup, socket, start))
     };
     options.controllers.iter().enumerate().map(station).collect()
-}
-
-fn listen(wanted: SocketAddrV4) -> io::Result<(UdpSocket, SocketAddrV4)> {
-    let socket = UdpSocket::bind(wanted)?;
-    socket.set_nonblocking(true)?;
-    match socket.local_addr()? {
-        SocketAddr::V4(address) => Ok((socket, address)),
-        SocketAddr::V6(_) => Ok((socket, wanted)),
-    }
-}
-
-/// An epoll over all sockets and the event that ends the thread.
-fn wait_for(stations: &[Station]) -> rustix::io::Result<(OwnedFd, OwnedFd)> {
-    let epoll = epoll::create(epoll::CreateFlags::CLOEXEC)?;
-    for (index, station) in (0..).zip(stations) {
-        epoll::add(&epoll, &station.socket, epoll::EventData::new_u64(index), epoll::EventFlags::IN)?;
-    }
-    let stop = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
-    epoll::add(&epoll, &stop, epoll::EventData::new_u64(STOP), epoll::EventFlags::IN)?;
-    Ok((epoll, stop))
-}
-
-/// An answer, and when it leaves.
-#[derive(Debug)]
-struct Answer {
-    due: MonoTime,
-    station: usize,
-    to: SocketAddrV4,
-    copies: u8,
-    len: usize,
-    octets: [u8; MAX_LEN],
-}
-
-/// All that the thread owns.
-#[derive(Debug)]
-struct Keeper {
-    start: MonoTime,
-    stations: Vec<Station>,
-    epoll: OwnedFd,
-    /// Keeps the event open as long as the wait knows it.
-    _stop: Arc<OwnedFd>,
-    delay: Duration,
-    delayed: VecDeque<Answer>,
-    log: Option<Log>,
-}
-
-impl Keeper {
-    fn run(mut self) -> io::Result<Vec<Outcome>> {
-        let mut events = Vec::with_capacity(EVENTS);
-        loop {
-            let timeout = self.delayed.front().map(|answer| timespec(answer.due.since(now())));
-            match epoll::wait(&self.epoll, spare_capacity(&mut events), timeout.as_ref()) {
-                Ok(_) | Err(rustix::io::Errno::INTR) => {}
-                Err(error) => return Err(error.into()),
-            }
-            for event in events.drain(..) {
-                match event.data.u64() {
-                    STOP => return self.end(),
-                    index => {
-                        self.serve(usize::try_from(index).expect("made from a place in a Vec"));
-                    }
-                }
-            }
-            self.send_due();
-        }
-    }
-
-    /// Takes one datagram, if there is one; where more are there, the wait names the socket again.
-    fn serve(&mut self, index: usize) -> bool {
-        let mut datagram = [0; MAX_DATAGRAM];
-        let station = &mut self.stations[index];
-        let Ok((len, SocketAddr::V4(from))) = station.socket.recv_from(&mut datagram) else { return false };
-        let at = now();
-        let fate = station.link.fate();
-        if fate == Fate::LostOnTheWay {
-            station.extra.received += 1;
-            station.extra.lost_frames += 1;
-            return true;
-        }
-        let mut buf = [0; MAX_LEN];
-        let handled = station.controller.on_datagram(from, &datagram[..len], at, &mut buf);
-        let answer = handled.reply.map(<[u8]>::len);
-        if let (Some(log), Some(seen)) = (&mut self.log, &handled.motion) {
-            let executed = station.controller.positions(at);
-            log.frame(at.since(self.start), station.address, seen, answer.is_some(), &executed);
-        }
-        if let Some(len) = answer {
-            let due = at + self.delay;
-            self.answer(fate, Answer { due, station: index, to: from, copies: 1, len, octets: buf });
-        }
-        true
-    }
-
-    /// Sends an answer, now or when it is due, unless the link loses it.
-    fn answer(&mut self, fate: Fate, mut answer: Answer) {
-        let station = &mut self.stations[answer.station];
-        if fate == Fate::AnswerLost {
-            station.extra.lost_replies += 1;
-            return;
-        }
-        if fate == Fate::AnsweredTwice {
-            station.extra.duplicated += 1;
-            answer.copies = 2;
-        }
-        if self.delay.is_zero() {
-            station.send(&answer);
-        } else if self.delayed.len() == DELAYED {
-            station.extra.send_failed += 1;
-        } else {
-            self.delayed.push_back(answer);
-        }
-    }
-
-    fn send_due(&mut self) {
-        while let Some(answer) = self.delayed.pop_front_if(|answer| answer.due <= now()) {
-            self.stations[answer.station].send(&answer);
-        }
-    }
-
-    fn end(mut self) -> io::Result<Vec<Outcome>> {
-        for index in 0..self.stations.len() {
-            let mut left = BACKLOG;
-            while left > 0 && self.serve(index) {
-                left -= 1;
-            }
-        }
-        let at = now();
-        let mut outcomes = Vec::with_capacity(self.stations.len());
-        for station in &mut self.stations {
-            let positions = station.controller.positions(at);
-            let outputs = station.controller.outputs();
-            if let Some(log) = &mut self.log {
-                log.rest(at.since(self.start), station.address, outputs, &positions);
-            }
-            let positions = positions.iter().map(|position| position.0).collect();
-            outcomes.push(Outcome { address: station.address, counts: station.counts(), positions, outputs });
-        }
-        self.log.map_or(Ok(()), Log::close).map(|()| outcomes)
-    }
-}
-
-impl Station {
-    fn send(&mut self, answer: &Answer) {
-        let octets = &answer.octets[..answer.len];
-        for _ in 0..answer.copies {
-            self.extra.send_failed += u64::from(self.socket.send_to(octets, answer.to).is_err());
-        }
-    }
-
-    fn counts(&self) -> Counts {
-        let own = self.controller.counts();
-        Counts {
-            received: own.received + self.extra.received,
-            lost_frames: self.extra.lost_frames,
-            lost_replies: self.extra.lost_replies,
-            duplicated: self.extra.duplicated,
-            send_failed: self.extra.send_failed,
-            ..own
-        }
-    }
-}
-
-/// The monotonic clock.
-fn now() -> MonoTime {
-    let time = clock_gettime(ClockId::Monotonic);
-    let (seconds, nanos) = (time.tv_sec.cast_unsigned(), time.tv_nsec.cast_unsigned());
-    MonoTime::from_nanos(seconds * 1_000_000_000 + nanos)
-}
-
-/// How long to wait, a millisecond up, since that is how fine the wait may be.
-fn timespec(span: Duration) -> Timespec {
-    let span = span + Duration::from_millis(1);
-    let seconds = i64::try_from(span.as_secs()).unwrap_or(i64::MAX);
-    Timespec { tv_sec: seconds, tv_nsec: i64::from(span.subsec_nanos()) }
 }

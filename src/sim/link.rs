@@ -31,6 +31,16 @@ impl Link {
         Self { loss: faults.loss, duplicate: faults.duplicate, state }
     }
 
+    /// Changes the chance of a loss.
+    pub(super) const fn set_loss(&mut self, chance: f64) {
+        self.loss = chance;
+    }
+
+    /// Changes the chance of a repetition.
+    pub(super) const fn set_duplicate(&mut self, chance: f64) {
+        self.duplicate = chance;
+    }
+
     /// The fate of the next datagram.
     pub(super) fn fate(&mut self) -> Fate {
         let (lost, half, twice) = (self.chance(), self.chance(), self.chance());

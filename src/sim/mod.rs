@@ -1,25 +1,36 @@
-//! Virtual controllers that behave as the manual says: the same `wire`, seen from the other end.
+//! Virtual controllers that behave as the manuals say: the same `wire`, seen from the other end.
 //!
 //! ```text
 //!  datagram --> link (loss) --> controller --> player        where the motors are
-//!                                  |   registers             PA, DP, DPF
-//!  answer  <-- link (repeat, delay)+
+//!                                  |   registers             PA, with what the one table of registers says of them
+//!                                  |   inputs, errors        emergency stop, jog, reset; Err1 to Err21
+//!  answer, report <-- link <-------+
+//!  (repeat, delay)                 +--- script, remote       switches, faults, power
 //! ```
 //!
 //! All of it but [`Farm`] is told the time and touches neither socket nor clock. A farm runs many controllers on one
-//! thread of normal priority; once it runs, a datagram costs it no allocation.
+//! thread of normal priority; once it runs, a motion frame costs it no allocation. What the manuals leave open is
+//! [`Invented`], and can be played the other way.
 
+mod command;
 mod controller;
 mod counts;
+mod errors;
 mod farm;
+mod inputs;
+mod invented;
+mod keeper;
 mod link;
 mod log;
+pub mod pa;
 mod player;
 mod registers;
 mod setup;
+mod station;
 
+pub use command::{Action, Command, CommandError};
 pub use controller::{Controller, Handled, MotionSeen};
 pub use counts::{Counts, Refused};
-pub use farm::{Farm, FarmError, Outcome};
-pub use registers::pa;
+pub use farm::{Farm, FarmError, Outcome, Remote};
+pub use invented::{Commands, Invented};
 pub use setup::{LinkFaults, Options, Setup};

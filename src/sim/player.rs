@@ -5,11 +5,13 @@ use std::time::Duration;
 
 use crate::motion::{MAX_AXES, Pulses};
 use crate::time::{MonoTime, nanos};
+use crate::wire::{PerAxis, Vibration};
 
-/// Commands that wait at most; the manuals do not say how many fit.
-pub(super) const QUEUE_DEPTH: usize = 200;
-/// With more waiting than this, moves run in half their time where fast forward is on (PA06).
+/// With more waiting than this, moves run faster where fast forward is on (PA06).
 const FAST_FORWARD_ABOVE: usize = 2;
+
+/// What a vibration's period counts: 0.125 ms.
+const VIBRATION_STEP_NS: u64 = 125_000;
 
 /// Positions of all axes that a controller could have.
 pub(super) type Positions = [Pulses; MAX_AXES];
@@ -17,26 +19,29 @@ pub(super) type Positions = [Pulses; MAX_AXES];
 /// What a controller's parameters say about moves; taken when a move begins.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
-    /// Whether moves run faster when more than two wait (PA06).
-    pub(super) fast_forward: bool,
+    /// By what the time of moves is divided when more than two wait (PA06), where it is.
+    pub(super) fast_forward: Option<u32>,
     /// Greatest speed of each axis, pulses per millisecond.
     pub(super) limits: [f64; MAX_AXES],
 }
 
-/// A move that waits.
+/// A move to come.
 #[derive(Debug, Clone, Copy)]
-struct Waiting {
-    to: Positions,
-    duration: Duration,
+pub(super) struct Leg {
+    /// Where it ends.
+    pub(super) to: Positions,
+    /// How long it takes.
+    pub(super) duration: Duration,
+    /// What shakes the axes meanwhile.
+    pub(super) vibration: PerAxis<Vibration>,
 }
 
 /// A move that runs, or the last one that ran.
 #[derive(Debug, Clone, Copy)]
 struct Move {
     from: Positions,
-    to: Positions,
+    leg: Leg,
     start: MonoTime,
-    duration: Duration,
     arrived: bool,
 }
 
@@ -48,22 +53,29 @@ pub(super) struct Overflow;
 #[derive(Debug)]
 pub(super) struct Player {
     current: Move,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<Leg>,
+    depth: usize,
+    /// Moves wait for a release.
+    paused: bool,
+    /// What is left of the move that a pause cut short.
+    interrupted: Option<Leg>,
     /// Moves that were taken.
     taken: usize,
     /// Moves that reached their end.
     pub(super) executed: u64,
-    /// Moves that ran in half their time.
+    /// Moves that ran in less than their time.
     pub(super) fast_forwarded: u64,
 }
 
 impl Player {
-    /// Motors at rest in zero.
-    pub(super) fn new(at: MonoTime) -> Self {
-        let rest = [Pulses(0); MAX_AXES];
+    /// Motors at rest in zero, and a queue of this many moves.
+    pub(super) fn new(depth: usize, at: MonoTime) -> Self {
         Self {
-            current: Move { from: rest, to: rest, start: at, duration: Duration::ZERO, arrived: true },
-            waiting: VecDeque::with_capacity(QUEUE_DEPTH),
+            current: Move::rest([Pulses(0); MAX_AXES], at),
+            waiting: VecDeque::with_capacity(depth),
+            depth: depth.max(1),
+            paused: false,
+            interrupted: None,
             taken: 0,
             executed: 0,
             fast_forwarded: 0,
@@ -75,28 +87,25 @@ impl Player {
         while !self.current.arrived && self.current.end() <= at {
             self.current.arrived = true;
             self.executed += 1;
-            let fast = pace.fast_forward && self.waiting.len() > FAST_FORWARD_ABOVE;
-            if let Some(next) = self.waiting.pop_front() {
-                let duration = if fast { next.duration / 2 } else { next.duration };
-                self.fast_forwarded += u64::from(fast);
-                self.begin(next.to, duration, self.current.end(), pace);
+            if self.paused {
+                return;
+            }
+            let fast = pace.fast_forward.filter(|_| self.waiting.len() > FAST_FORWARD_ABOVE);
+            if let Some(mut next) = self.waiting.pop_front() {
+                next.duration /= fast.unwrap_or(1).max(1);
+                self.fast_forwarded += u64::from(fast.is_some());
+                self.begin(next, self.current.end(), pace);
             }
         }
     }
 
-    /// Takes a move to where `to` is, after those that wait.
-    pub(super) fn push(
-        &mut self,
-        to: Positions,
-        duration: Duration,
-        at: MonoTime,
-        pace: &Pace,
-    ) -> Result<(), Overflow> {
+    /// Takes a move, after those that wait.
+    pub(super) fn push(&mut self, leg: Leg, at: MonoTime, pace: &Pace) -> Result<(), Overflow> {
         self.advance(at, pace);
         if self.current.arrived {
-            self.begin(to, duration, at, pace);
-        } else if self.waiting.len() < QUEUE_DEPTH {
-            self.waiting.push_back(Waiting { to, duration });
+            self.begin(leg, at, pace);
+        } else if self.waiting.len() < self.depth {
+            self.waiting.push_back(leg);
         } else {
             return Err(Overflow);
         }
@@ -107,15 +116,49 @@ impl Player {
     /// Stops where the motors are and forgets what waits.
     pub(super) fn hold(&mut self, at: MonoTime, pace: &Pace) {
         self.advance(at, pace);
-        let here = self.positions(at);
+        self.current = Move::rest(self.positions(at), at);
         self.waiting.clear();
-        self.current = Move { from: here, to: here, start: at, duration: Duration::ZERO, arrived: true };
+        self.interrupted = None;
+        self.paused = false;
     }
 
-    /// Forgets what waits and moves to zero in `duration`, or as long as the speed limits ask for.
-    pub(super) fn go_to_zero(&mut self, duration: Duration, at: MonoTime, pace: &Pace) {
+    /// Stops where the motors are until [`Player::resume`], or a hold.
+    pub(super) fn pause(&mut self, at: MonoTime, pace: &Pace) {
+        self.advance(at, pace);
+        if !self.current.arrived {
+            let duration = self.current.end().since(at);
+            self.interrupted = Some(Leg { duration, ..self.current.leg });
+        }
+        self.current = Move::rest(self.positions(at), at);
+        self.paused = true;
+    }
+
+    /// Moves to zero, as fast as may be, and pauses there.
+    pub(super) fn pause_in_zero(&mut self, at: MonoTime, pace: &Pace) {
+        self.pause(at, pace);
+        self.begin(Leg::to_zero(Duration::ZERO), at, pace);
+    }
+
+    /// Goes on with the move that was cut short, and then with those that wait.
+    pub(super) fn resume(&mut self, at: MonoTime, pace: &Pace) {
+        self.advance(at, pace);
+        self.paused = false;
+        self.current = Move::rest(self.positions(at), at);
+        if let Some(next) = self.interrupted.take().or_else(|| self.waiting.pop_front()) {
+            self.begin(next, at, pace);
+        }
+    }
+
+    /// Forgets what waits, and from `start` on moves to zero in `duration`, or as long as the speed limits ask for.
+    pub(super) fn go_to_zero(&mut self, duration: Duration, start: MonoTime, at: MonoTime, pace: &Pace) {
         self.hold(at, pace);
-        self.begin([Pulses(0); MAX_AXES], duration, at, pace);
+        self.begin(Leg::to_zero(duration), start, pace);
+    }
+
+    /// Takes where an axis is for zero.
+    pub(super) const fn zero(&mut self, axis: usize) {
+        self.current.from[axis] = Pulses(0);
+        self.current.leg.to[axis] = Pulses(0);
     }
 
     /// Where the motors are; the player has been advanced to `at`.
@@ -123,9 +166,30 @@ impl Player {
         self.current.positions(at)
     }
 
+    /// Where they are with what shakes them, which swings about the position as a sine.
+    pub(super) fn shaken(&self, at: MonoTime) -> Positions {
+        let mut positions = self.positions(at);
+        for (position, shake) in positions.iter_mut().zip(self.current.leg.vibration.iter()) {
+            if shake.period != 0 && shake.amplitude != 0 {
+                position.0 = position.0.saturating_add(shake_pulses(*shake, at));
+            }
+        }
+        positions
+    }
+
+    /// How fast each axis is, pulses per millisecond.
+    pub(super) fn speeds(&self) -> [f64; MAX_AXES] {
+        let ms = self.current.leg.duration.as_secs_f64() * 1e3;
+        let (from, to) = (&self.current.from, &self.current.leg.to);
+        if self.idle() || ms == 0.0 {
+            return [0.0; MAX_AXES];
+        }
+        std::array::from_fn(|axis| (f64::from(to[axis].0) - f64::from(from[axis].0)) / ms)
+    }
+
     /// Where the motors will be when nothing waits any more.
     pub(super) fn target(&self) -> &Positions {
-        self.waiting.back().map_or(&self.current.to, |last| &last.to)
+        self.waiting.back().map_or(&self.current.leg.to, |last| &last.to)
     }
 
     /// When the present move ends.
@@ -133,22 +197,43 @@ impl Player {
         self.current.end()
     }
 
+    /// Whether nothing moves and nothing waits.
+    pub(super) fn idle(&self) -> bool {
+        self.current.arrived && self.waiting.is_empty()
+    }
+
     /// Where in the queue the next move goes, and from where the next one is taken.
     pub(super) fn pointers(&self) -> [u16; 2] {
-        let place = |moves| u16::try_from(moves % QUEUE_DEPTH).expect("below the depth of the queue");
+        let place = |moves: usize| u16::try_from(moves % self.depth).unwrap_or(u16::MAX);
         [place(self.taken), place(self.taken - self.waiting.len())]
     }
 
-    fn begin(&mut self, to: Positions, duration: Duration, start: MonoTime, pace: &Pace) {
+    /// Counts what is taken from the start again.
+    pub(super) const fn restart(&mut self) {
+        self.taken = 0;
+    }
+
+    fn begin(&mut self, leg: Leg, start: MonoTime, pace: &Pace) {
         let from = self.current.positions(start);
-        let duration = duration.max(fastest(&from, &to, pace));
-        self.current = Move { from, to, start, duration, arrived: false };
+        let duration = leg.duration.max(fastest(&from, &leg.to, pace));
+        self.current = Move { from, leg: Leg { duration, ..leg }, start, arrived: false };
+    }
+}
+
+impl Leg {
+    fn to_zero(duration: Duration) -> Self {
+        Self { to: [Pulses(0); MAX_AXES], duration, vibration: PerAxis::default() }
     }
 }
 
 impl Move {
+    fn rest(to: Positions, at: MonoTime) -> Self {
+        let leg = Leg { to, duration: Duration::ZERO, vibration: PerAxis::default() };
+        Self { from: to, leg, start: at, arrived: true }
+    }
+
     fn end(&self) -> MonoTime {
-        self.start + self.duration
+        self.start + self.leg.duration
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "between two i32")]
@@ -157,16 +242,25 @@ impl Move {
         reason = "whole pulses come out right up to 104 days of nanoseconds"
     )]
     fn positions(&self, at: MonoTime) -> Positions {
-        let (gone, whole) = (nanos(at.since(self.start)), nanos(self.duration));
+        let (gone, whole) = (nanos(at.since(self.start)), nanos(self.leg.duration));
         if gone >= whole {
-            return self.to;
+            return self.leg.to;
         }
         let part = gone as f64 / whole as f64;
         std::array::from_fn(|axis| {
-            let (from, to) = (f64::from(self.from[axis].0), f64::from(self.to[axis].0));
+            let (from, to) = (f64::from(self.from[axis].0), f64::from(self.leg.to[axis].0));
             Pulses((from + (to - from) * part).round() as i32)
         })
     }
+}
+
+/// How far a vibration has swung out; all swing with the clock.
+#[expect(clippy::cast_possible_truncation, reason = "at most the amplitude")]
+#[expect(clippy::cast_precision_loss, reason = "less than a period of at most 8 s of nanoseconds")]
+fn shake_pulses(shake: Vibration, at: MonoTime) -> i32 {
+    let period_ns = u64::from(shake.period) * VIBRATION_STEP_NS;
+    let turn = (at.as_nanos() % period_ns) as f64 / period_ns as f64;
+    (f64::from(shake.amplitude) * (turn * std::f64::consts::TAU).sin()).round() as i32
 }
 
 /// The shortest time in which all axes stay within their speed.
@@ -180,93 +274,4 @@ fn fastest(from: &Positions, to: &Positions, pace: &Pace) -> Duration {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PACE: Pace = Pace { fast_forward: true, limits: [500.0; MAX_AXES] };
-
-    fn ms(ms: u64) -> MonoTime {
-        MonoTime::from_nanos(ms * 1_000_000)
-    }
-
-    fn all(position: i32) -> Positions {
-        [Pulses(position); MAX_AXES]
-    }
-
-    fn push(player: &mut Player, to: i32, duration_ms: u64, at_ms: u64) -> Result<(), Overflow> {
-        player.push(all(to), Duration::from_millis(duration_ms), ms(at_ms), &PACE)
-    }
-
-    fn at(player: &mut Player, at_ms: u64) -> i32 {
-        player.advance(ms(at_ms), &PACE);
-        player.positions(ms(at_ms))[0].0
-    }
-
-    #[test]
-    fn a_move_is_a_straight_line_over_its_time() {
-        let mut player = Player::new(ms(0));
-        push(&mut player, 1_000, 100, 50).unwrap();
-        let seen = [50, 75, 100, 149, 150, 500].map(|t| at(&mut player, t));
-        assert_eq!(seen, [0, 250, 500, 990, 1_000, 1_000]);
-        assert_eq!(player.executed, 1);
-    }
-
-    #[test]
-    fn a_waiting_move_begins_where_the_one_before_ends_and_after_a_gap_at_once() {
-        let mut player = Player::new(ms(0));
-        push(&mut player, 100, 10, 0).unwrap();
-        push(&mut player, 200, 10, 8).unwrap();
-        assert_eq!(at(&mut player, 15), 150);
-        push(&mut player, 300, 10, 40).unwrap();
-        assert_eq!([40, 45, 50].map(|t| at(&mut player, t)), [200, 250, 300]);
-    }
-
-    #[test]
-    fn with_more_than_two_waiting_moves_take_half_their_time() {
-        let mut player = Player::new(ms(0));
-        for to in [100, 200, 300, 400] {
-            push(&mut player, to, 10, 0).unwrap();
-        }
-        // Three wait when the first ends: the second is fast; then two wait, and the others are not.
-        assert_eq!([10, 15, 25, 35].map(|t| at(&mut player, t)), [100, 200, 300, 400]);
-        assert_eq!(player.fast_forwarded, 1);
-    }
-
-    #[test]
-    fn fast_forward_can_be_off() {
-        let pace = Pace { fast_forward: false, ..PACE };
-        let mut player = Player::new(ms(0));
-        for to in [100, 200, 300, 400] {
-            player.push(all(to), Duration::from_millis(10), ms(0), &pace).unwrap();
-        }
-        player.advance(ms(20), &pace);
-        assert_eq!(player.positions(ms(20))[0].0, 200);
-    }
-
-    #[test]
-    fn no_axis_is_faster_than_its_limit() {
-        let mut player = Player::new(ms(0));
-        push(&mut player, 50_000, 10, 0).unwrap();
-        assert_eq!(at(&mut player, 10), 5_000);
-        assert_eq!(at(&mut player, 100), 50_000);
-    }
-
-    #[test]
-    fn the_201st_waiting_move_finds_no_room() {
-        let mut player = Player::new(ms(0));
-        for k in 0..=i32::try_from(QUEUE_DEPTH).unwrap() {
-            push(&mut player, k, 10, 0).unwrap();
-        }
-        assert_eq!(push(&mut player, 0, 10, 0), Err(Overflow));
-    }
-
-    #[test]
-    fn a_hold_stays_where_it_came() {
-        let mut player = Player::new(ms(0));
-        push(&mut player, 1_000, 100, 0).unwrap();
-        push(&mut player, 2_000, 100, 0).unwrap();
-        player.hold(ms(50), &PACE);
-        assert_eq!(at(&mut player, 1_000), 500);
-        assert_eq!(player.target()[0].0, 500);
-    }
-}
+mod tests;

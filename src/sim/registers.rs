@@ -1,138 +1,79 @@
 //! The parameters of a virtual controller (PA00 to PAFF) and how fast they let it move.
 
-use std::net::SocketAddrV4;
+use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Duration;
 
-use super::Setup;
 use super::player::Pace;
+use super::{Setup, pa};
+use crate::device::{Address, table};
 use crate::motion::MAX_AXES;
-use crate::wire::Code;
+use crate::wire::{Code, Dialect};
 
 /// Registers of a whole table.
 pub(super) const TABLE: usize = 256;
+/// Axes with registers of their own.
+pub(super) const OWN_REGISTERS: usize = 6;
+/// Milliseconds in a minute.
+pub(super) const MS_PER_MINUTE: f64 = 60_000.0;
+/// The interval of commands without a time where PA09 is 0, ms.
+const INTERVAL_MS: u16 = 100;
 
-/// Numbers of the parameters that a virtual controller heeds (SMC manual 2.3.1).
-pub mod pa {
-    /// Working axes, 1 to 12.
-    pub const AXES: u8 = 0x02;
-    /// 1: speed up when more than two commands wait.
-    pub const FAST_FORWARD: u8 = 0x06;
-    /// Greatest speed, rpm.
-    pub const MAX_RPM: u8 = 0x07;
-    /// Writing 1 resets; reads 0 when done.
-    pub const RESET: u8 = 0x08;
-    /// Time of commands without one, ms.
-    pub const INTERVAL: u8 = 0x09;
-    /// Longest time of a command, ms; 0 for none.
-    pub const MAX_TIME: u8 = 0x0b;
-    /// What a reset does: 0 home, 1 go to zero.
-    pub const RESET_WAY: u8 = 0x0e;
-    /// Writing 1 takes back the defaults, 2 keeps what is set over a power cycle.
-    pub const KEEP: u8 = 0x0f;
-    /// The first of four registers with the controller's address.
-    pub const ADDRESS: u8 = 0x10;
-    /// The third octet of the address: the station's column.
-    pub const COLUMN: u8 = 0x12;
-    /// The fourth octet of the address: the station's row.
-    pub const ROW: u8 = 0x13;
-    /// The controller's port.
-    pub const PORT: u8 = 0x14;
-    /// 0: no answers.
-    pub const ANSWERS: u8 = 0x15;
-    /// The port that frames must come from; 0 takes any.
-    pub const HOST_PORT: u8 = 0x24;
-    /// Silence after a start, ms.
-    pub const START_DELAY: u8 = 0x3d;
-    /// Amplitude: 0 all of it, 1 to 9 tenths.
-    pub const AMPLITUDE: u8 = 0x55;
-    /// The first of six registers with the greatest speed of an axis, rpm; 0 for none.
-    pub const AXIS_RPM: u8 = 0x80;
-    /// Bit 0: emergency stop by input.
-    pub const INPUT_FUNCTIONS: u8 = 0x90;
-    /// What an emergency stop does: 0 hold and go on, 1 go to zero and go on, 2 hold until a reset.
-    pub const ESTOP_WAY: u8 = 0x91;
-    /// Inputs that must all be active for an emergency stop.
-    pub const ESTOP_INPUTS: u8 = 0x92;
-    /// How long inputs must be active, ms.
-    pub const INPUT_FILTER: u8 = 0x93;
-    /// Axis offset: the first axis takes this axis + 1 of a command.
-    pub const OFFSET: u8 = 0x95;
-    /// 1: outputs of motion frames are ignored.
-    pub const KEEP_OUTPUTS: u8 = 0x9d;
-    /// Outputs after a start.
-    pub const START_OUTPUTS: u8 = 0x9f;
-    /// The first of six registers with the acceleration factor of an axis.
-    pub const ACCELERATION_FACTOR: u8 = 0xa0;
-    /// The first of six registers with the acceleration of an axis.
-    pub const ACCELERATION: u8 = 0xb0;
+/// Whether a controller of `dialect` has this register and takes this value.
+pub(super) fn takes(register: Address, value: u16, dialect: Dialect) -> bool {
+    let register = table().get(register).filter(|register| register.dialect.has(dialect));
+    register.is_some_and(|register| register.range().contains(&value))
 }
 
-/// Axes with limits of their own.
-const OWN_LIMITS: usize = 6;
-/// Pulses in one turn of a motor, which the parameters do not tell.
-const PULSES_PER_TURN: f64 = 10_000.0;
-const MS_PER_MINUTE: f64 = 60_000.0;
-
-/// Defaults other than 0: those of the IMAX manual 2.3.1, and of the SMC manual 2.3.1 where it has its own.
-const DEFAULTS: [(u8, u16); 26] = [
-    (pa::AXES, 3),
-    (0x04, 1),
-    (pa::FAST_FORWARD, 1),
-    (pa::MAX_RPM, 3_000),
-    (pa::INTERVAL, 100),
-    (pa::MAX_TIME, 3_000),
-    (0x0c, 1),
-    (0x10, 192),
-    (0x11, 168),
-    (0x12, 15),
-    (0x13, 201),
-    (pa::PORT, 7_408),
-    (pa::ANSWERS, 1),
-    (0x20, 192),
-    (0x21, 168),
-    (0x22, 15),
-    (0x23, 101),
-    (pa::HOST_PORT, 8_410),
-    (pa::START_DELAY, 1_000),
-    (0x3e, 60),
-    (0x3f, 100),
-    (0x40, 100),
-    (0x41, 50),
-    (0x50, 100),
-    (0x51, 4),
-    (pa::INPUT_FILTER, 200),
-];
+/// Whether a controller of `dialect` has this register.
+pub(super) fn has(register: Address, dialect: Dialect) -> bool {
+    table().get(register).is_some_and(|register| register.dialect.has(dialect))
+}
 
 /// The parameters, and what of them a power cycle leaves.
 #[derive(Debug, Clone)]
 pub(super) struct Registers {
     now: [u16; TABLE],
-    kept: [u16; TABLE],
+    saved: [u16; TABLE],
     factory: [u16; TABLE],
+    pulses_per_turn: f64,
+    fast_forward: u32,
+    /// Speed after an emergency stop where PA94 sets none.
+    release_rpm: Option<u16>,
+    /// How moves run with these parameters, and how after an emergency stop.
+    paces: [Pace; 2],
 }
 
 impl Registers {
     /// Defaults, then the address it listens on, then what the setup says.
     pub(super) fn new(setup: &Setup, address: SocketAddrV4) -> Self {
-        let mut now = [0; TABLE];
-        for (register, value) in DEFAULTS {
-            now[usize::from(register)] = value;
-        }
-        for axis in 0..6 {
-            now[usize::from(pa::ACCELERATION_FACTOR) + axis] = 2;
-            now[usize::from(pa::ACCELERATION) + axis] = 1_500;
-            now[0x30 + axis] = 47;
+        let mut factory = [0; TABLE];
+        for register in table().of(setup.dialect) {
+            if let (Address::Pa(number), Some(value)) = (register.address, register.default(setup.dialect)) {
+                factory[usize::from(number)] = value;
+            }
         }
         for (octet, value) in address.ip().octets().into_iter().enumerate() {
-            now[usize::from(pa::ADDRESS) + octet] = u16::from(value);
+            factory[usize::from(pa::ADDRESS) + octet] = u16::from(value);
         }
-        now[usize::from(pa::PORT)] = address.port();
+        factory[usize::from(pa::PORT)] = address.port();
+        let mut now = factory;
         now[usize::from(pa::HOST_PORT)] = setup.host_port;
         now[usize::from(pa::AXES)] = setup.axes;
         for &(register, value) in &setup.parameters {
             now[usize::from(register)] = value;
         }
-        Self { now, kept: now, factory: now }
+        let still = Pace { fast_forward: None, limits: [0.0; MAX_AXES] };
+        let mut registers = Self {
+            now,
+            saved: now,
+            factory,
+            pulses_per_turn: f64::from(setup.invented.pulses_per_turn),
+            fast_forward: setup.invented.fast_forward,
+            release_rpm: setup.invented.release_rpm,
+            paces: [still; 2],
+        };
+        registers.measure_paces();
+        registers
     }
 
     /// The value of a parameter.
@@ -145,19 +86,33 @@ impl Registers {
         &self.now
     }
 
-    /// Sets a parameter, and does what setting PA0F does.
-    pub(super) fn set(&mut self, register: u8, value: u16) {
+    /// Sets a parameter, and does what setting PA0F does: 1 takes back the defaults, all but the address, which a
+    /// virtual controller cannot change; 2 keeps the others over a power cycle. `keep` does so for this one.
+    pub(super) fn set(&mut self, register: u8, value: u16, keep: bool) {
         match (register, value) {
-            (pa::KEEP, 1) => self.now = self.factory,
-            (pa::KEEP, 2) => self.kept = self.now,
+            (pa::KEEP, 1) => (self.now, self.saved) = (self.factory, self.factory),
+            (pa::KEEP, 2) => self.save(),
             (pa::KEEP | pa::RESET, _) => {}
-            _ => self.now[usize::from(register)] = value,
+            _ => {
+                self.now[usize::from(register)] = value;
+                if keep && saved(register) {
+                    self.saved[usize::from(register)] = value;
+                }
+            }
+        }
+        self.measure_paces();
+    }
+
+    fn save(&mut self) {
+        for register in (0..=u8::MAX).filter(|&register| saved(register)) {
+            self.saved[usize::from(register)] = self.get(register);
         }
     }
 
     /// Forgets what was not kept, as a power cycle does.
-    pub(super) const fn restart(&mut self) {
-        self.now = self.kept;
+    pub(super) fn restart(&mut self) {
+        self.now = self.saved;
+        self.measure_paces();
     }
 
     /// Working axes, 1 to 12 whatever PA02 says.
@@ -175,17 +130,52 @@ impl Registers {
         Code::station([0, 0, column, row])
     }
 
+    /// An address and its port, from five registers; none without a port.
+    #[expect(clippy::cast_possible_truncation, reason = "the upper half of the registers means nothing")]
+    pub(super) fn socket(&self, first: u8) -> Option<SocketAddrV4> {
+        let [a, b, c, d] = std::array::from_fn(|octet| self.now[usize::from(first) + octet] as u8);
+        let port = self.now[usize::from(first) + 4];
+        (port != 0).then(|| SocketAddrV4::new(Ipv4Addr::new(a, b, c, d), port))
+    }
+
     /// A parameter in milliseconds.
     pub(super) fn millis(&self, register: u8) -> Duration {
         Duration::from_millis(u64::from(self.get(register)))
     }
 
-    /// How moves run with these parameters.
-    pub(super) fn pace(&self) -> Pace {
-        Pace {
-            fast_forward: self.get(pa::FAST_FORWARD) == 1,
-            limits: std::array::from_fn(|axis| self.max_rpm(axis) * PULSES_PER_TURN / MS_PER_MINUTE),
+    /// The time of commands without one, ms.
+    pub(super) fn interval_ms(&self) -> u32 {
+        match self.get(pa::INTERVAL) {
+            0 => u32::from(INTERVAL_MS),
+            interval => u32::from(interval),
         }
+    }
+
+    /// How moves run with these parameters.
+    pub(super) const fn pace(&self) -> &Pace {
+        &self.paces[0]
+    }
+
+    /// How they run after the release of an emergency stop.
+    pub(super) const fn release_pace(&self) -> &Pace {
+        &self.paces[1]
+    }
+
+    /// A speed in pulses per millisecond.
+    pub(super) fn speed(&self, rpm: u16) -> f64 {
+        f64::from(rpm) * self.pulses_per_turn / MS_PER_MINUTE
+    }
+
+    fn measure_paces(&mut self) {
+        let fast_forward = (self.get(pa::FAST_FORWARD) == 1).then_some(self.fast_forward);
+        let limits = std::array::from_fn(|axis| self.max_rpm(axis) * self.pulses_per_turn / MS_PER_MINUTE);
+        let release = match self.get(pa::RELEASE_RPM) {
+            0 => self.release_rpm,
+            rpm => Some(rpm),
+        };
+        let release = release.map_or(f64::INFINITY, |rpm| self.speed(rpm));
+        let released = limits.map(|limit: f64| limit.min(release));
+        self.paces = [limits, released].map(|limits| Pace { fast_forward, limits });
     }
 
     /// Greatest speed of an axis: the lowest of PA07, PA80.. and PAA0.. x PAB0..; those of 0 set none.
@@ -197,13 +187,18 @@ impl Registers {
             }
         };
         limit(u32::from(self.get(pa::MAX_RPM)));
-        if axis < OWN_LIMITS {
+        if axis < OWN_REGISTERS {
             let own = |first: u8| u32::from(self.now[usize::from(first) + axis]);
             limit(own(pa::AXIS_RPM));
             limit(own(pa::ACCELERATION_FACTOR) * own(pa::ACCELERATION));
         }
         lowest
     }
+}
+
+/// Whether a parameter is one of those that can outlast a power cycle.
+fn saved(register: u8) -> bool {
+    table().get(Address::Pa(register)).is_none_or(|register| register.saved)
 }
 
 #[cfg(test)]
@@ -221,6 +216,19 @@ mod tests {
         assert_eq!(registers.all()[0x10..=0x14], [127, 0, 0, 1, 7500]);
         assert_eq!(registers.station(), Code(0x0001));
         assert_eq!(registers.axes(), 6);
+        assert_eq!(registers.socket(pa::HOST), Some("192.168.15.101:8410".parse().unwrap()));
+        assert_eq!(registers.socket(pa::SECOND_HOST), None);
+    }
+
+    #[test]
+    fn the_defaults_are_those_of_the_dialect() {
+        let of = |dialect| {
+            let setup = Setup { dialect, ..Setup::default() };
+            let registers = Registers::new(&setup, "127.0.0.1:7500".parse().unwrap());
+            [0x02, 0x04, 0x07, 0x0b, 0x30, 0x41, 0x50, 0x93, 0xa0, 0xb5].map(|number| registers.get(number))
+        };
+        assert_eq!(of(Dialect::Smc), [3, 1, 3_000, 3_000, 47, 50, 0, 200, 2, 1_500]);
+        assert_eq!(of(Dialect::Mbox), [3, 1, 3_000, 3_000, 47, 50, 100, 200, 0, 0]);
     }
 
     #[test]
@@ -230,17 +238,26 @@ mod tests {
         assert_eq!(limits(&[(0x81, 600)])[..2], [500.0, 100.0]);
         assert_eq!(limits(&[(0xb0, 300)])[0], 100.0);
         assert_eq!(limits(&[(0x07, 0)])[11], f64::INFINITY);
+        assert_eq!(registers(&[(0x94, 60)]).release_pace().limits, [10.0; MAX_AXES]);
+        assert_eq!(registers(&[]).release_pace().limits[0], 500.0);
     }
 
     #[test]
     fn only_what_was_kept_outlasts_a_power_cycle() {
         let mut registers = registers(&[]);
-        registers.set(0x55, 5);
-        registers.set(pa::KEEP, 2);
-        registers.set(0x55, 7);
+        registers.set(0x55, 5, false);
+        registers.set(pa::KEEP, 2, false);
+        registers.set(0x55, 7, false);
+        registers.set(0x06, 0, true);
         registers.restart();
-        assert_eq!(registers.get(0x55), 5);
-        registers.set(pa::KEEP, 1);
-        assert_eq!(registers.get(0x55), 0);
+        assert_eq!((registers.get(0x55), registers.get(0x06), registers.get(pa::KEEP)), (5, 0, 0));
+    }
+
+    #[test]
+    fn the_factory_settings_come_back_but_for_the_address() {
+        let mut registers = registers(&[(0x55, 5), (0x06, 0)]);
+        registers.set(pa::KEEP, 1, false);
+        registers.restart();
+        assert_eq!([0x55, 0x06, 0x02, 0x24, 0x13].map(|number| registers.get(number)), [0, 1, 3, 8410, 1]);
     }
 }

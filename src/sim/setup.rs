@@ -4,6 +4,7 @@ use std::fs::File;
 use std::net::SocketAddrV4;
 use std::time::Duration;
 
+use super::{Command, Invented, pa};
 use crate::wire::Dialect;
 
 /// One virtual controller.
@@ -11,16 +12,19 @@ use crate::wire::Dialect;
 pub struct Setup {
     /// Working axes, 1 to 12 (PA02).
     pub axes: u16,
-    /// Parameters that differ from the manual's defaults, as (register, value); a later one wins.
+    /// Parameters that differ from the manual's defaults, as (register, value); a later one wins. They count as saved,
+    /// and are not checked: a controller may come with anything.
     pub parameters: Vec<(u8, u16)>,
     /// The port that frames must come from (PA24); 0 takes any.
     pub host_port: u16,
     /// Which family it belongs to.
     pub dialect: Dialect,
-    /// Obeys, but never answers.
+    /// Obeys, but never answers and never reports.
     pub mute: bool,
     /// From when on an emergency stop is in effect, after its start; never where there is none.
     pub estop_at: Option<Duration>,
+    /// What the manuals leave open.
+    pub invented: Invented,
 }
 
 impl Default for Setup {
@@ -33,7 +37,33 @@ impl Default for Setup {
             dialect: Dialect::Smc,
             mute: false,
             estop_at: None,
+            invented: Invented::default(),
         }
+    }
+}
+
+impl Setup {
+    /// Puts settings that are safe for people before its other parameters: an emergency stop at input X01 that holds
+    /// until a reset, quick filter, slow release, speed limits, answers, and status reports to `host` every 100 ms.
+    #[must_use]
+    pub fn safe(mut self, host: SocketAddrV4) -> Self {
+        let mut parameters = vec![
+            (pa::MAX_RPM, 3_000),
+            (pa::ANSWERS, 1),
+            (pa::INPUT_FUNCTIONS, 1),
+            (pa::ESTOP_WAY, 2),
+            (pa::ESTOP_INPUTS, 1),
+            (pa::INPUT_FILTER, 20),
+            (pa::RELEASE_RPM, 300),
+        ];
+        parameters.extend((pa::HOST..).zip(host.ip().octets().map(u16::from)));
+        if self.dialect == Dialect::Smc {
+            let smc = [(pa::MODE, 10), (pa::AUTO_RESET, 0), (pa::REPORT_INTERVAL, 100), (pa::REPORTS, 1)];
+            parameters.extend(smc);
+            parameters.extend((pa::AXIS_RPM..).zip([3_000; 6]));
+        }
+        parameters.append(&mut self.parameters);
+        Self { parameters, host_port: host.port(), ..self }
     }
 }
 
@@ -61,6 +91,8 @@ pub struct Options {
     pub seed: u64,
     /// Takes a CSV row for each motion frame; emptied once all sockets are bound.
     pub log: Option<File>,
+    /// What happens when, counted from the start; in any order.
+    pub script: Vec<(Duration, Command)>,
 }
 
 impl Options {
@@ -73,6 +105,7 @@ impl Options {
             faults: LinkFaults { loss: 0.0, duplicate: 0.0, delay: Duration::ZERO },
             seed: 0,
             log: None,
+            script: Vec::new(),
         }
     }
 }

@@ -2,19 +2,27 @@
 
 use std::time::Duration;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, anyhow, bail};
+
+use crate::cli::times;
+use crate::sim::{Action, Command};
 
 /// `HEX=VALUE`: a parameter register in hex, its value decimal or 0x.
 pub(super) fn parameter(text: &str) -> anyhow::Result<(u8, u16)> {
     let (register, value) = text.split_once('=').context("not HEX=VALUE, as in 95=6")?;
-    let register = u8::from_str_radix(register, 16)
-        .with_context(|| format!("register {register:?} is not hex from 00 to ff"))?;
-    let number = match value.strip_prefix("0x") {
+    Ok((register_number(register)?, value_number(value)?))
+}
+
+fn register_number(text: &str) -> anyhow::Result<u8> {
+    u8::from_str_radix(text, 16).with_context(|| format!("register {text:?} is not hex from 00 to ff"))
+}
+
+fn value_number(text: &str) -> anyhow::Result<u16> {
+    let number = match text.strip_prefix("0x") {
         Some(hex) => u16::from_str_radix(hex, 16),
-        None => value.parse(),
+        None => text.parse(),
     };
-    let value = number.with_context(|| format!("value {value:?} is not 0 to 65535, or 0x0 to 0xffff"))?;
-    Ok((register, value))
+    number.with_context(|| format!("value {text:?} is not 0 to 65535, or 0x0 to 0xffff"))
 }
 
 /// A chance from 0 to 1.
@@ -26,39 +34,80 @@ pub(super) fn chance(text: &str) -> anyhow::Result<f64> {
     Ok(chance)
 }
 
-/// A length of time with its unit: `80ms`, `1.5s`; at most a minute.
-pub(super) fn span(text: &str) -> anyhow::Result<Duration> {
-    const LONGEST_S: f64 = 60.0;
-    let (number, per_second) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
-        (Some(number), _) => (number, 1e-3),
-        (None, Some(number)) => (number, 1.0),
-        (None, None) => bail!("no unit; give it as 80ms or 1.5s"),
-    };
-    let seconds = number.parse::<f64>().with_context(|| format!("{number:?} is not a number"))? * per_second;
-    if !(0.0..=LONGEST_S).contains(&seconds) {
-        bail!("{text} is outside 0ms..={LONGEST_S}s");
-    }
-    Ok(Duration::from_secs_f64(seconds))
+/// A point in time, counted from the start.
+pub(super) fn time(text: &str) -> anyhow::Result<Duration> {
+    let nanos = times::parse_time(text).map_err(|why| anyhow!(why))?.as_nanos();
+    Ok(Duration::from_nanos(u64::try_from(nanos).context("before the start")?))
 }
 
-/// A point in time: `SS[.mmm]`, `MM:SS[.mmm]` or `HH:MM:SS[.mmm]`.
-pub(super) fn time(text: &str) -> anyhow::Result<Duration> {
-    let spelling = "give it as SS[.mmm], MM:SS[.mmm] or HH:MM:SS[.mmm]";
-    let parts: Vec<&str> = text.split(':').collect();
-    let Some((seconds, before)) = parts.split_last().filter(|_| parts.len() <= 3) else {
-        bail!("{spelling}")
+/// A version, `MAJOR.MINOR`.
+pub(super) fn version(text: &str) -> anyhow::Result<[u16; 2]> {
+    let (major, minor) = text.split_once('.').context("not MAJOR.MINOR, as in 1.0")?;
+    Ok([value_number(major)?, value_number(minor)?])
+}
+
+/// `TIME:COMMAND, …`: what happens when.
+pub(super) fn script(text: &str) -> anyhow::Result<Vec<(Duration, Command)>> {
+    let items = text.split(',').map(str::trim).filter(|item| !item.is_empty());
+    items.map(|item| timed_command(item).with_context(|| format!("{item:?}"))).collect()
+}
+
+fn timed_command(text: &str) -> anyhow::Result<(Duration, Command)> {
+    let (at, rest) = text.split_once(':').context("no TIME: before it, as in 2.5:X1=1")?;
+    Ok((time(at.trim())?, command(rest.trim())?))
+}
+
+/// `[NAME@]ACTION`: what happens to one controller, or to all.
+pub(super) fn command(text: &str) -> anyhow::Result<Command> {
+    let (controller, action_text) = match text.split_once('@') {
+        Some((name, action)) => (Some(controller(name.trim())?), action.trim()),
+        None => (None, text),
     };
-    let mut minutes: u32 = 0;
-    for part in before {
-        let number: u32 = part.parse().context(spelling)?;
-        minutes = minutes.checked_mul(60).and_then(|m| m.checked_add(number)).context(spelling)?;
+    let action = action(action_text)?;
+    action.check()?;
+    Ok(Command { controller, action })
+}
+
+/// A controller, counted from 0: `1` and `c1` are the first.
+fn controller(name: &str) -> anyhow::Result<usize> {
+    let number = name.strip_prefix('c').unwrap_or(name).parse::<usize>().ok();
+    let index = number.and_then(|number| number.checked_sub(1));
+    index.with_context(|| format!("{name:?} is no controller; they are 1, 2 … or c1, c2 …"))
+}
+
+fn action(text: &str) -> anyhow::Result<Action> {
+    if text == "reboot" {
+        return Ok(Action::Reboot);
     }
-    let seconds: f64 = seconds.parse().context(spelling)?;
-    let total = f64::from(minutes) * 60.0 + seconds;
-    if before.is_empty() || (0.0..60.0).contains(&seconds) {
-        return Duration::try_from_secs_f64(total).context(spelling);
+    let Some((name, value)) = text.split_once('=').map(|(name, value)| (name.trim(), value.trim())) else {
+        bail!("{text:?} is no command; {COMMANDS}");
+    };
+    let of_register = name.strip_prefix("pa").or_else(|| name.strip_prefix("PA"));
+    Ok(match (name, name.strip_prefix(['X', 'x']), of_register) {
+        ("err", ..) => Action::Error(value_number(value)?),
+        ("estop", ..) => Action::EmergencyStop(switch(value)?),
+        ("mute", ..) => Action::Mute(switch(value)?),
+        ("loss", ..) => Action::Loss(chance(value)?),
+        ("duplicate", ..) => Action::Duplicate(chance(value)?),
+        ("delay", ..) => Action::Delay(times::parse_duration(value).map_err(|why| anyhow!(why))?),
+        (_, Some(input), _) => {
+            let input = input.parse().with_context(|| format!("{name:?} is no input; they are X1 to X12"))?;
+            Action::Switch { input, closed: switch(value)? }
+        }
+        (_, _, Some(register)) => Action::Parameter(register_number(register)?, value_number(value)?),
+        _ => bail!("{text:?} is no command; {COMMANDS}"),
+    })
+}
+
+const COMMANDS: &str =
+    "commands are X1=1, err=12, estop=1, mute=1, loss=0.1, duplicate=0.1, delay=50ms, pa95=3 and reboot";
+
+fn switch(text: &str) -> anyhow::Result<bool> {
+    match text {
+        "0" => Ok(false),
+        "1" => Ok(true),
+        _ => bail!("{text:?} is neither 0 nor 1"),
     }
-    bail!("{seconds} seconds are no part of a minute; {spelling}")
 }
 
 #[cfg(test)]
@@ -75,27 +124,60 @@ mod tests {
     }
 
     #[test]
-    fn a_span_carries_its_unit() {
-        assert_eq!(span("80ms").unwrap(), Duration::from_millis(80));
-        assert_eq!(span("1.5s").unwrap(), Duration::from_millis(1_500));
-        for wrong in ["80", "ms", "-1s", "NaNs", "1h", "1e9s"] {
-            assert!(span(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn a_time_is_seconds_or_a_clock() {
-        assert_eq!(time("90.5").unwrap(), Duration::from_millis(90_500));
-        assert_eq!(time("01:30.5").unwrap(), Duration::from_millis(90_500));
-        assert_eq!(time("01:00:00").unwrap(), Duration::from_secs(3_600));
-        for wrong in ["", "1:60", "a", "1:2:3:4", "-1", "NaN", "1:-1", "4000000000:4000000000:0"] {
-            assert!(time(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
     fn a_chance_lies_between_never_and_always() {
         assert_eq!(chance("0.25").unwrap(), 0.25);
         assert!(chance("1.1").is_err() && chance("NaN").is_err());
+    }
+
+    #[test]
+    fn a_version_is_major_and_minor() {
+        assert_eq!(version("3.12").unwrap(), [3, 12]);
+        assert!(version("3").is_err() && version("3.x").is_err());
+    }
+
+    #[test]
+    fn a_script_is_what_happens_when() {
+        let seconds = Duration::from_secs_f64;
+        let all = |action| Command { controller: None, action };
+        assert_eq!(
+            script("2.0:X1=1, 3.25:x12=0,5:err=12, 8:reboot,").unwrap(),
+            [
+                (seconds(2.0), all(Action::Switch { input: 1, closed: true })),
+                (seconds(3.25), all(Action::Switch { input: 12, closed: false })),
+                (seconds(5.0), all(Action::Error(12))),
+                (seconds(8.0), all(Action::Reboot)),
+            ]
+        );
+        assert_eq!(script("").unwrap(), []);
+        let refusal = format!("{:#}", script("1:X1=1, 2:X13=1").unwrap_err());
+        assert!(refusal.starts_with("\"2:X13=1\": there is no input X13"), "{refusal}");
+        assert!(script("X1=1").is_err() && script("1").is_err() && script("-1:reboot").is_err());
+    }
+
+    #[test]
+    fn a_command_is_for_all_or_for_one() {
+        let to = |text| command(text).unwrap();
+        assert_eq!(to("2@mute=1"), Command { controller: Some(1), action: Action::Mute(true) });
+        assert_eq!(to("c10@pa95=0x3").controller, Some(9));
+        assert_eq!(to("loss=0.1").action, Action::Loss(0.1));
+        assert_eq!(to("duplicate = 1").action, Action::Duplicate(1.0));
+        assert_eq!(to("delay=50ms").action, Action::Delay(Duration::from_millis(50)));
+        assert_eq!(to("estop=1").action, Action::EmergencyStop(true));
+        assert_eq!(to("PA0d=500").action, Action::Parameter(0x0d, 500));
+        for wrong in [
+            "",
+            "0@reboot",
+            "A1@reboot",
+            "err=9",
+            "err=x",
+            "mute=2",
+            "loss=2",
+            "delay=5",
+            "X=1",
+            "paxx=1",
+            "go",
+        ] {
+            assert!(command(wrong).is_err(), "{wrong}");
+        }
     }
 }

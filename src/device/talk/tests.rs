@@ -99,13 +99,13 @@ fn a_controller_in_emergency_stop_is_still_read_and_says_so() {
 #[test]
 fn what_a_controller_refuses_is_told_and_the_next_request_goes_on() {
     let rig = hall(1, |_| false);
-    let servo = Address::Servo { servo: 1, number: 508 };
+    let servo = Address::Servo { servo: 9, number: 508 }; // there are three
     let requests = vec![(0, Request::read(servo)), (0, Request::read(Address::Pa(2)))];
     let outcomes = rig.talk().ask(requests, Patience::default());
     let error = outcomes[0].result.as_ref().unwrap_err();
     assert!(error.refused());
     let text = error.to_string();
-    assert!(text.starts_with("cannot read servo 1 508: refused, the command was wrong"), "{text}");
+    assert!(text.starts_with("cannot read servo 9 508: refused, the command was wrong"), "{text}");
     assert_eq!(outcomes[1].result.as_ref().unwrap().words, [3]);
 }
 

@@ -1,35 +1,26 @@
 //! Reading and writing registers of a virtual controller.
 
-use super::{Controller, OUTPUTS};
-use crate::motion::MAX_AXES;
-use crate::sim::registers::{TABLE, pa};
+use super::monitor::dp;
+use super::{Controller, NEVER, OUTPUTS};
+use crate::device::Address;
+use crate::sim::pa;
+use crate::sim::registers::{TABLE, has, takes};
 use crate::time::MonoTime;
 use crate::wire::{
-    Access, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, ServoReply, Space, Words,
-    WriteRequest, position_words,
+    Access, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, Space, Words, WriteRequest,
 };
 
-/// Monitor registers (SMC manual 2.3.3).
-mod dp {
-    pub(super) const PACKET_LEN: usize = 0x33;
-    pub(super) const PACKETS: usize = 0x34;
-    pub(super) const QUEUE_WRITE: usize = 0x48;
-    pub(super) const QUEUE_READ: usize = 0x49;
-    pub(super) const REMAINING: usize = 0x50; // of axes 1 to 6, ms
-    pub(super) const INPUTS: usize = 0x5e;
-    pub(super) const ACTIVE_OUTPUTS: usize = 0x66;
-    pub(super) const CONTROL: usize = 0xf0; // DPF0
-    pub(super) const RESET: usize = 0xf0;
-    pub(super) const OUTPUTS: usize = 0xf1;
-    pub(super) const REBOOT: usize = 0xf2;
-    pub(super) const AXES: usize = 0xf5;
-    pub(super) const VERSION: usize = 0xff;
-}
+/// The object channel by which an MBOX controller keeps what is written over a power cycle.
+const KEEPING_CHANNEL: u16 = 1;
 
-/// What DPF0 reads while a reset runs, and when it is done.
-const RESETTING: u16 = 1;
-const RESET_DONE: u16 = 2;
-const VERSION: u16 = 1;
+/// Why registers were not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Refusal {
+    /// A register or a value that there is not.
+    Command,
+    /// A reset during an emergency stop that is still asked for.
+    EmergencyStop,
+}
 
 impl Controller {
     /// Writes the answer to the front of `buf` and returns it.
@@ -39,72 +30,100 @@ impl Controller {
         at: MonoTime,
         buf: &'b mut [u8; MAX_LEN],
     ) -> &'b [u8] {
-        let first = usize::from(read.start);
-        let range = first..first + usize::from(read.num);
-        let monitored;
         let table = match Space::of_read(read.channel) {
-            Some(Space::Monitor) => {
-                monitored = self.monitored(at);
-                Some(&monitored)
-            }
-            Some(Space::Parameter) => Some(self.registers.all()),
+            Some(Space::Monitor) => Some(self.monitored(at)),
+            Some(Space::Parameter) => Some(self.parameters(at)),
             _ => None,
         };
-        let (mut code, mut error) = self.state();
-        let words = match table.and_then(|table| table.get(range)) {
-            Some(words) => {
-                self.counts.accepted += 1;
-                words
-            }
-            None => {
-                self.counts.refused.command += 1;
-                (code, error) = (self.command_error(), 0);
-                &[]
-            }
+        let first = usize::from(read.start);
+        let range = first..first + usize::from(read.num);
+        let words = table.as_ref().and_then(|table| table.get(range)).filter(|_| self.readable(read));
+        let (code, error) = if words.is_some() {
+            self.counts.accepted += 1;
+            self.access_state()
+        } else {
+            self.counts.refused.command += 1;
+            (self.command_error(), 0)
         };
-        let answer = RegisterReply {
+        let reply = RegisterReply {
             access: Access::Read,
             code,
             channel: read.channel,
-            error: self.error_slot(read.channel, error),
+            error,
             start: read.start,
             num: read.num,
-            data: Words::from(words),
+            data: Words::from(words.unwrap_or_default()),
         };
-        answer.emit(buf)
+        self.emit(reply, buf)
     }
 
-    pub(super) fn on_write<'a>(&mut self, write: &WriteRequest<'a>, at: MonoTime) -> RegisterReply<'a> {
+    /// Whether all registers of a read are there; whether unused ones are, the manuals leave open.
+    fn readable(&self, read: &ReadRequest) -> bool {
+        let of = if read.channel == 0 { Address::Dp } else { Address::Pa };
+        let mut numbers = read.start..read.start.saturating_add(read.num);
+        self.invented.unused_read
+            || numbers.all(|number| u8::try_from(number).is_ok_and(|number| has(of(number), self.dialect)))
+    }
+
+    /// All parameters as they read.
+    fn parameters(&self, at: MonoTime) -> [u16; TABLE] {
+        let mut table = *self.registers.all();
+        table[usize::from(pa::RESET)] = u16::from(at < self.homing_until);
+        table
+    }
+
+    /// Writes the answer to the front of `buf` and returns it.
+    pub(super) fn on_write<'b>(
+        &mut self,
+        write: &WriteRequest<'_>,
+        at: MonoTime,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> &'b [u8] {
         let space = Space::of_write(write.channel, self.dialect);
-        let (code, error) = match space.and_then(|space| self.write(space, write, at)) {
-            Some(true) => {
+        let written = space.ok_or(Refusal::Command).and_then(|space| self.write(space, write, at));
+        self.next_event = self.soonest_event(at);
+        let (code, error) = match written {
+            Ok(()) => {
                 self.counts.accepted += 1;
-                self.state()
+                self.access_state()
             }
-            Some(false) => {
+            Err(Refusal::EmergencyStop) => {
                 self.counts.refused.emergency_stop += 1;
                 self.state()
             }
-            None => {
+            Err(Refusal::Command) => {
                 self.counts.refused.command += 1;
                 (self.command_error(), 0)
             }
         };
-        RegisterReply {
+        let reply = RegisterReply {
             access: Access::Write,
             code,
             channel: write.channel,
-            error: self.error_slot(write.channel, error),
+            error,
             start: write.start,
             num: u16::try_from(write.data.len()).unwrap_or(u16::MAX),
             data: write.data,
-        }
+        };
+        self.emit(reply, buf)
     }
 
-    /// A controller without drives to ask.
-    pub(super) const fn refuse_servo(&mut self, access: Access, start: u16, num: u16) -> ServoReply<'static> {
-        self.counts.refused.command += 1;
-        ServoReply { access, code: self.command_error(), servo: 0, error: 0, start, num, data: Words::EMPTY }
+    /// Writes an answer as the dialect has it: SMC puts the error number of a refusal into slot 6 (2.2.2.2, 2.2.2.4),
+    /// IMAX and MBOX keep the channel there and put the error where the data stood.
+    fn emit<'b>(&self, reply: RegisterReply<'_>, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        if self.dialect == Dialect::Smc || reply.code == ReplyCode::Running {
+            return reply.emit(buf);
+        }
+        let error = [reply.error];
+        RegisterReply { error: reply.channel, data: Words::from(&error[..]), ..reply }.emit(buf)
+    }
+
+    /// What answers about registers say of its state. On MBOX they tell only of the request.
+    pub(super) fn access_state(&self) -> (ReplyCode, u16) {
+        match self.dialect {
+            Dialect::Smc => self.state(),
+            Dialect::Mbox => (ReplyCode::Running, 0),
+        }
     }
 
     /// The x for commands that name what there is not; MBOX has none of its own.
@@ -115,7 +134,7 @@ impl Controller {
         }
     }
 
-    /// What stands in slot 6 of a refusal.
+    /// What stands in slot 6 of a refusal of motion.
     pub(super) const fn error_slot(&self, channel: u16, error: u16) -> u16 {
         match self.dialect {
             Dialect::Smc => error,
@@ -123,64 +142,56 @@ impl Controller {
         }
     }
 
-    /// Writes all words or none: `None` where a register or value does not exist, `Some(false)` where an emergency
-    /// stop forbids it.
-    fn write(&mut self, space: Space, write: &WriteRequest<'_>, at: MonoTime) -> Option<bool> {
-        let first = usize::from(write.start) + if space == Space::Control { dp::CONTROL } else { 0 };
-        let words = || (first..).zip(write.data.iter());
-        let parameters = space == Space::Parameter;
-        let bad_axes = |word: u16| word == 0 || usize::from(word) > MAX_AXES;
-        if words().any(|(register, word)| {
-            register >= TABLE || parameters && register == usize::from(pa::AXES) && bad_axes(word)
-        }) {
-            return None;
+    /// Writes all words or none.
+    fn write(&mut self, space: Space, write: &WriteRequest<'_>, at: MonoTime) -> Result<(), Refusal> {
+        let base = if space == Space::Control { dp::CONTROL } else { 0 };
+        let of = if space == Space::Parameter { Address::Pa } else { Address::Dp };
+        let words = || (base + usize::from(write.start)..).zip(write.data.iter());
+        let there = |(register, word): (usize, u16)| {
+            u8::try_from(register).is_ok_and(|register| takes(of(register), word, self.dialect))
+        };
+        if !words().all(there) {
+            return Err(Refusal::Command);
         }
-        let resets = |register: usize, word: u16| {
-            if parameters {
-                register == usize::from(pa::RESET) && word == 1
-            } else {
-                register == dp::RESET && word == 0
-            }
+        let resets = |(register, word): (usize, u16)| match space {
+            Space::Parameter => register == usize::from(pa::RESET) && word == 1,
+            Space::Monitor | Space::Control => register == dp::RESET && word == 0,
         };
         // A reset ends no emergency stop that is still asked for.
-        if self.estop.asked(at).is_some() && words().any(|(register, word)| resets(register, word)) {
-            return Some(false);
+        if self.estop.asked() && words().any(resets) {
+            return Err(Refusal::EmergencyStop);
         }
+        let keep = write.channel == KEEPING_CHANNEL && self.dialect == Dialect::Mbox;
         for (register, word) in words() {
-            if resets(register, word) {
-                self.reset(at);
-            } else if parameters {
-                self.registers.set(u8::try_from(register).expect("checked above"), word);
-            } else if register == dp::OUTPUTS {
-                self.outputs = word & OUTPUTS;
-            } else if register == dp::REBOOT && word == 1 {
-                self.reboot(at);
-            } // The other monitor registers are the controller's own.
+            match (space, u8::try_from(register)) {
+                (Space::Parameter, _) if resets((register, word)) => self.reset(at),
+                _ if resets((register, word)) => self.reset_by_dpf0(at),
+                (Space::Parameter, Ok(register)) => self.set(register, word, keep, at),
+                _ => self.control(register, word, at),
+            }
         }
-        self.watch_inputs(at);
-        Some(true)
+        Ok(())
     }
 
-    /// All monitor registers as they stand.
-    fn monitored(&self, at: MonoTime) -> [u16; TABLE] {
-        let mut table = [0; TABLE];
-        let positions = self.player.positions(at);
-        let remaining_ms = u16::try_from(self.player.end().since(at).as_millis()).unwrap_or(u16::MAX);
-        for (axis, register) in DP_POSITIONS.into_iter().enumerate().take(self.registers.axes()) {
-            let [first, second] = position_words(positions[axis], self.dialect);
-            table[usize::from(register)] = first;
-            table[usize::from(register) + 1] = second;
-            table[dp::REMAINING + axis] = remaining_ms;
+    /// Sets a parameter, and lets what hangs on it follow.
+    pub(super) fn set(&mut self, register: u8, value: u16, keep: bool, at: MonoTime) {
+        self.registers.set(register, value, keep);
+        match register {
+            pa::MANUAL_OUTPUTS => self.outputs = value & OUTPUTS,
+            pa::AUTO_RESET if value == 0 => self.auto_reset_at = NEVER,
+            pa::REPORT_INTERVAL | pa::REPORTS | pa::KEEP => self.schedule_reports(at),
+            _ => {}
         }
-        table[dp::PACKET_LEN] = self.last_len;
-        table[dp::PACKETS] = self.packets;
-        [table[dp::QUEUE_WRITE], table[dp::QUEUE_READ]] = self.player.pointers();
-        table[dp::INPUTS] = self.inputs;
-        table[dp::ACTIVE_OUTPUTS] = self.outputs;
-        table[dp::RESET] = if at < self.homing_until { RESETTING } else { RESET_DONE };
-        table[dp::OUTPUTS] = self.outputs;
-        table[dp::AXES] = self.registers.get(pa::AXES);
-        table[dp::VERSION] = VERSION;
-        table
+        self.inputs.polarity(self.registers.get(pa::INPUT_POLARITY) == 1, at);
+        self.run_functions(at);
+    }
+
+    /// Writes a monitor register. All but these are the controller's own: it overwrites them at once.
+    fn control(&mut self, register: usize, word: u16, at: MonoTime) {
+        match (register, word) {
+            (dp::OUTPUTS, _) => self.outputs = word & OUTPUTS,
+            (dp::REBOOT, 1) => self.reboot(at),
+            _ => {}
+        }
     }
 }

@@ -27,6 +27,7 @@ impl Controller {
         if !self.answers(header.reply) {
             return None;
         }
+        self.counts.replied += 1;
         match (motion, access) {
             (Some(answer), _) => Some(answer.emit(buf)),
             (None, Some(answer)) => Some(answer.emit(buf)),
