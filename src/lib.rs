@@ -14,6 +14,12 @@
 //!
 //! The rooms, in the order a motion value passes through them; ARCHITECTURE.md walks through each.
 
+#![deny(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a closed pipe must not end a show: `cli::print`"
+)]
+
 pub mod time;
 
 pub mod motion;

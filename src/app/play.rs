@@ -1,5 +1,6 @@
 //! One play in the foreground: from a cue and a configuration to the report.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -40,6 +41,9 @@ pub enum PlayError {
     /// No move leads onto the cue.
     #[error(transparent)]
     Plan(PlanError),
+    /// The system starts no further thread.
+    #[error("no thread could be started; allow more with `ulimit -u` or TasksMax=")]
+    Thread(#[source] io::Error),
     /// The frame port cannot be had.
     #[error(transparent)]
     Net(NetError),
@@ -93,7 +97,7 @@ impl Play {
     /// Plays, on the calling thread, until the end or until `stop` is set.
     ///
     /// # Errors
-    /// [`PlayError::Net`] where the frame port cannot be had.
+    /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads.
     ///
     /// # Panics
     /// Where one of its threads panicked.
@@ -120,7 +124,7 @@ impl Play {
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };
         let stage = Stage { silent: self.manner.silent, rate: show.rate, engine, lanes, sender, mail };
-        let run = stage.run(acks, plans, stop);
+        let run = stage.run(acks, plans, stop).map_err(PlayError::Thread)?;
         Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
     }
 }

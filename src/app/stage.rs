@@ -1,7 +1,8 @@
 //! The threads of one play: tick, ack and planner, from the first tick to the last reply.
 
+use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
+use std::thread::{self, Builder};
 use std::time::Duration;
 
 use crate::engine::{Engine, Rate, TickGrid};
@@ -49,7 +50,10 @@ impl Run {
 impl Stage {
     /// The calling thread becomes the tick thread. Everything it touches has been made by now, so that memory can be
     /// locked; the threads started after it are ordinary ones.
-    pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, stop: &AtomicBool) -> Run {
+    ///
+    /// # Errors
+    /// That of the system where it starts no further thread; no tick has been sent then.
+    pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, stop: &AtomicBool) -> io::Result<Run> {
         let Self { silent, rate, engine, lanes, sender, mut mail } = self;
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
         let granted = realtime::request();
@@ -59,14 +63,15 @@ impl Stage {
             let drains =
                 if silent { DrainGrid::rare(origin, period) } else { DrainGrid::new(origin, period) };
             let sent_all = &sent_all;
-            let ack_thread = scope.spawn(move || {
+            let ack_thread = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
                 let _ = realtime::normal_priority();
                 acks.run(&Monotonic, drains, || sent_all.load(Ordering::Acquire))
-            });
-            let plan_thread = scope.spawn(|| {
+            })?;
+            let planner = Builder::new().name("planner".to_owned()).spawn_scoped(scope, || {
                 let _ = realtime::normal_priority();
                 plans.run(&done)
             });
+            let plan_thread = planner.inspect_err(|_| sent_all.store(true, Ordering::Release))?;
             mail.wakes(plan_thread.thread().clone());
             let grid = TickGrid::new(origin, rate);
             let mut ticks = TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, stop };
@@ -78,7 +83,7 @@ impl Stage {
             let mut accounts = ack_thread.join().expect("the ack thread does not panic");
             let closed_at = Monotonic.now();
             accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-            Run { ended, accounts, granted, refusals, origin, closed_at }
+            Ok(Run { ended, accounts, granted, refusals, origin, closed_at })
         })
     }
 }

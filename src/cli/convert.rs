@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, FaultClass, Problem, Source, limits};
 
 /// Turns a cue from one format into another.
@@ -74,7 +74,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             cue
         }
         Err(faults) => {
-            eprintln!("{faults}");
+            print::tell(&format!("{faults}"));
             return Ok(exit_of(&faults));
         }
     };
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     write(&cue, &args.output, target)?;
     let (rows, axes, length) = (cue.rows(), cue.axes(), cue.duration());
     let axes_in_words = if axes == 1 { "1 axis".to_owned() } else { format!("{axes} axes") };
-    eprintln!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display());
+    print::tell(&format!("{}: {rows} rows, {axes_in_words}, {length}", args.output.display()));
     Ok(Exit::Done)
 }
 
@@ -128,7 +128,10 @@ fn tell_lost(cue: &Cue, lost: Option<&Problem>) {
             _ => "cut short".to_owned(),
         };
         let (rows, last) = (cue.rows(), cue.duration());
-        eprintln!("{} is {what}; {rows} rows up to {last} are saved, the rest is lost", cue.path().display());
+        print::tell(&format!(
+            "{} is {what}; {rows} rows up to {last} are saved, the rest is lost",
+            cue.path().display()
+        ));
     }
 }
 
@@ -148,7 +151,7 @@ fn write(cue: &Cue, output: &Path, target: Target) -> Result<(), Failure> {
     match target {
         Target::Csv => {
             if !cue.markers().is_empty() {
-                eprintln!("csv has no place for markers; {} are left out", cue.markers().len());
+                print::tell(&format!("csv has no place for markers; {} are left out", cue.markers().len()));
             }
             cue::write_csv(cue, &mut out).map_err(|error| match error {
                 CsvError::Io(error) => failure(error, Exit::Io, output),

@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let ready: Vec<usize> = (0..results.len()).filter(|lane| results[*lane].is_ok()).collect();
     if !ready.is_empty() {
         if !agreed(&question(&targets, &ready), args.seats_empty, "--seats-empty")? {
-            eprintln!("nothing was moved");
+            print::tell("nothing was moved");
             return Ok(Exit::Done);
         }
         let timeout = Duration::from_secs(args.timeout);
@@ -105,7 +105,7 @@ fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<R
         let meaning =
             table().get(PA0E).and_then(|register| register.says(value)).unwrap_or("not in the manuals");
         let state = state(controller, &answer).map_or_else(String::new, |state| format!("; now {state}"));
-        eprintln!("{name}: PA0e = {value}: {meaning}{state}");
+        print::tell(&format!("{name}: PA0e = {value}: {meaning}{state}"));
         match hindrance(&answer, controller.dialect) {
             None => Ok(Duration::ZERO),
             Some(error) => {
@@ -196,7 +196,7 @@ impl Display {
                 bar.tick();
             }
             _ if again => {}
-            _ => eprintln!("{}: {words}", line.name),
+            _ => print::tell(&format!("{}: {words}", line.name)),
         }
     }
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::times::{parse_level, parse_time};
@@ -20,6 +20,7 @@ use crate::config::{Config, from_to_args};
 use crate::engine::{Rate, Show};
 use crate::fanout::Manner;
 use crate::rt::Live;
+use crate::sys::signal;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 use crate::wire::Timing;
@@ -148,13 +149,14 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
 
 /// The exit code of a play that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
-    let exit = if matches!(error, PlayError::Net(_)) { Exit::System } else { Exit::BadCue };
+    let system = matches!(error, PlayError::Net(_) | PlayError::Thread(_));
+    let exit = if system { Exit::System } else { Exit::BadCue };
     let names_cue = !matches!(error, PlayError::Plan(_));
     let error = anyhow::Error::new(error);
     Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
 }
 
-/// A flag that the first Ctrl-C or SIGTERM sets; a second Ctrl-C ends the program at once.
+/// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once.
 fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let interrupted = Arc::new(AtomicBool::new(false));
@@ -163,6 +165,10 @@ fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     signal_hook::flag::register(SIGINT, interrupted)?;
     signal_hook::flag::register(SIGINT, Arc::clone(&stop))?;
     signal_hook::flag::register(SIGTERM, Arc::clone(&stop))?;
+    if !signal::is_ignored(SIGHUP)? {
+        // The terminal is gone; the seats must not be left in the air for that.
+        signal_hook::flag::register(SIGHUP, Arc::clone(&stop))?;
+    }
     Ok(stop)
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::targets::{Targets, Troubles, state};
-use super::{Exit, Failure};
+use super::{Exit, Failure, print};
 use crate::device::{Address, Patience, Request, Talk, reads, settings::Values};
 
 mod diff;
@@ -83,7 +83,7 @@ fn read_values(
     }
     for (lane, one) in found.iter().enumerate() {
         if let Some(state) = &one.state {
-            eprintln!("kinocue: {}: {state}", targets.name(lane));
+            print::tell(&format!("kinocue: {}: {state}", targets.name(lane)));
         }
     }
     found

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, anyhow};
 
-use super::{Exit, Failure, OrExit as _, load};
+use super::{Exit, Failure, OrExit as _, load, print};
 use crate::config::{Controller, Show, from_to_args};
 use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
 use crate::motion::MAX_AXES;
@@ -124,7 +124,7 @@ impl Troubles {
                 self.silent |= !fault.refused();
                 // The silence before it has been told.
                 if !matches!(fault, Fault::Unasked { .. }) {
-                    eprintln!("kinocue: {}: {fault}", targets.name(lane));
+                    print::tell(&format!("kinocue: {}: {fault}", targets.name(lane)));
                 }
                 Err(fault.to_string())
             }
@@ -134,13 +134,13 @@ impl Troubles {
     /// Tells of something else that a controller did not do as asked.
     pub(super) fn refuse(&mut self, name: &str, line: &str) {
         self.refused = true;
-        eprintln!("kinocue: {name}: {line}");
+        print::tell(&format!("kinocue: {name}: {line}"));
     }
 
     /// Tells of a controller that stopped answering.
     pub(super) fn miss(&mut self, name: &str, line: &str) {
         self.silent = true;
-        eprintln!("kinocue: {name}: {line}");
+        print::tell(&format!("kinocue: {name}: {line}"));
     }
 
     /// Whether there were none.

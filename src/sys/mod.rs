@@ -5,3 +5,4 @@ pub mod batch;
 pub mod clock;
 pub mod machine;
 pub mod realtime;
+pub mod signal;

@@ -142,10 +142,10 @@ fn tell(report: &Report<'_>, all: bool) -> Result<(), Failure> {
     if differing > 0 {
         print::out(&format!("{table_of}\n"))?;
     } else if report.same {
-        eprintln!("nothing differs");
+        print::tell("nothing differs");
     }
     if !all {
-        eprintln!("PA10-14 and PA16-1b, which are each controller's own, were not compared; --all does");
+        print::tell("PA10-14 and PA16-1b, which are each controller's own, were not compared; --all does");
     }
     Ok(())
 }

@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         write_file(&args.file, &text(&saved))?;
         let names: Vec<_> = saved.iter().map(|one| one.name.as_str()).collect();
-        eprintln!("saved the parameters of {} to {}", names.join(", "), args.file.display());
+        print::tell(&format!("saved the parameters of {} to {}", names.join(", "), args.file.display()));
     }
     Ok(Exit::Done)
 }

@@ -90,17 +90,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut talk = targets.open()?;
     let mut changes = changes(&mut talk, &targets, &wanted)?;
     if changes.is_empty() {
-        eprintln!("nothing to change: all hold these values already");
+        print::tell("nothing to change: all hold these values already");
         if !args.keep {
             return finish(args, &targets, &changes, false).map(|()| Exit::Done);
         }
     } else {
-        eprintln!("{}", text(&targets, &changes));
+        print::tell(&format!("{}", text(&targets, &changes)));
     }
     warn_of_moves(&changes);
     let question = if changes.is_empty() { "Keep the settings?" } else { "Write this?" };
     if !agreed(question, args.yes, "--yes")? {
-        eprintln!("nothing was written");
+        print::tell("nothing was written");
         return finish(args, &targets, &[], false).map(|()| Exit::Done);
     }
     let mut troubles = Troubles::default();
@@ -111,7 +111,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     finish(args, &targets, &changes, troubles.none() && args.keep)?;
     if troubles.none() {
-        eprintln!("written{}", outlook(&changes, args.keep));
+        print::tell(&format!("written{}", outlook(&changes, args.keep)));
     }
     Ok(troubles.exit())
 }
@@ -200,10 +200,10 @@ fn changes(talk: &mut Talk, targets: &Targets, wanted: &[Vec<Assignment>]) -> Re
 
 fn warn_of_moves(changes: &[Change]) {
     if let Some(change) = changes.iter().find(|change| moves(change.register)) {
-        eprintln!(
+        print::tell(&format!(
             "warning: {} moves the seat, which must be empty; `kinocue home` does this with more care",
             change.register
-        );
+        ));
     }
 }
 
