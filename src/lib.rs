@@ -36,6 +36,8 @@ pub mod rt;
 
 pub mod sim;
 
+pub mod device;
+
 pub mod app;
 
 pub mod net;
