@@ -37,6 +37,7 @@ pub mod rt;
 pub mod sim;
 
 pub mod device;
+pub mod preflight;
 
 pub mod app;
 

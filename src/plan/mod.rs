@@ -12,7 +12,7 @@ mod states;
 
 pub use course::{After, Course};
 pub use join::{JOIN_MIN, join, joins_without_a_move};
-pub use park::{PARK_VELOCITY_MM_S, park};
+pub use park::{PARK_VELOCITY_MM_S, homing_time, park};
 pub use planner::{From, Planner, Request, To};
 
 use rsruckig::prelude::{DataArrayOrVec, Trajectory};

@@ -6,6 +6,8 @@ use crate::motion::{Limits, Window};
 
 /// The greatest speed of a seat on its way to park, mm/s.
 pub const PARK_VELOCITY_MM_S: f64 = 50.0;
+/// The longest Time that a controller executes as it is in the factory (PA0b, IMAX manual 2.3.1).
+const LONGEST_MS: u32 = 3_000;
 
 /// Plans the move from the states `from`, one for each moving slot of the window, to rest in its park pose: straight
 /// where that can be had, else a stop where the lane is and then to park.
@@ -28,6 +30,19 @@ pub fn park(window: &Window, from: &[AxisState]) -> Result<Plan, PlanError> {
         stop.position_at(ends).iter().map(|position| AxisState::at_rest(*position)).collect();
     let rest = straight(window, &stopped, &target).map_err(PlanError::NoStop)?;
     Ok(stop.then(rest))
+}
+
+/// The Time of the one slow frame that brings a seat to park from wherever it stands, ms: its whole stroke at 50 mm/s, at
+/// most 3 s; and whether it had to be cut to that.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a saturating cast is what is wanted"
+)]
+#[must_use]
+pub fn homing_time(stroke_mm: f64) -> (u32, bool) {
+    let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
+    (whole.min(LONGEST_MS), whole > LONGEST_MS)
 }
 
 fn straight(window: &Window, from: &[AxisState], target: &[AxisState]) -> Result<Plan, String> {
@@ -104,5 +119,12 @@ mod tests {
         for off in [0.0, 1e-16, 1e-15, 1e-13, 1e-11, 1e-9, 1e-6] {
             assert!(park(&window, &[AxisState::at_rest(off)]).unwrap().seconds() < 0.1, "{off}");
         }
+    }
+
+    #[test]
+    fn the_way_home_takes_the_stroke_at_50_mm_a_second_and_3_s_at_the_most() {
+        assert_eq!(homing_time(100.0), (2_000, false));
+        assert_eq!(homing_time(150.0), (3_000, false));
+        assert_eq!(homing_time(475.0), (3_000, true));
     }
 }
