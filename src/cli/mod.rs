@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod ask;
 mod check;
 mod completions;
 mod convert;
@@ -11,11 +12,14 @@ mod decode;
 mod demo;
 mod exit;
 mod figures;
+mod home;
 mod info;
 mod load;
 mod play;
 mod print;
+mod register;
 mod sim;
+mod targets;
 pub mod times;
 
 pub use exit::{Exit, Failure, OrExit};
@@ -39,6 +43,8 @@ enum Command {
     Info(info::Args),
     Convert(convert::Args),
     Decode(decode::Args),
+    Register(register::Args),
+    Home(home::Args),
     Completions(completions::Args),
 }
 
@@ -71,6 +77,8 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Register(args) => register::run(&args),
+        Command::Home(args) => home::run(&args),
         Command::Completions(args) => completions::run(&args),
     }
 }

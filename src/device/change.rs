@@ -75,13 +75,17 @@ pub const fn dialect_name(dialect: Dialect) -> &'static str {
 }
 
 /// Checks a value for a controller of `dialect`. `force` lets network settings and the factory reset through, and
-/// nothing else. Registers of drives are not known to the table, and pass.
+/// nothing else. What the registers of a drive take is not known here.
 ///
 /// # Errors
 /// The [`Objection`].
 pub fn check(assignment: Assignment, dialect: Dialect, force: bool) -> Result<(), Objection> {
     let Assignment { address, value } = assignment;
-    let Some(register) = table().get(address) else { return Ok(()) };
+    let Some(register) = table().get(address) else {
+        let name = "a register of a servo drive";
+        let has = table().has(address, dialect);
+        return if has { Ok(()) } else { Err(Objection::Dialect { address, name, dialect }) };
+    };
     let name = register.name.as_str();
     let flags = register.flags;
     if flags.never {
@@ -161,6 +165,7 @@ mod tests {
     fn registers_of_drives_pass_and_keep_what_is_written() {
         let servo = Address::Servo { servo: 1, number: 508 };
         assert_eq!(objection(servo, 65_535, Dialect::Smc, false), None);
+        assert!(objection(servo, 0, Dialect::Mbox, true).unwrap().contains("no register of mbox"));
         assert!(keeps(servo) && !moves(servo));
         assert!(moves(Address::Pa(8)) && moves(Address::Dp(0xf0)) && !keeps(Address::Pa(0x0f)));
     }

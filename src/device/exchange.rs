@@ -2,8 +2,8 @@
 //! neither socket nor clock.
 //!
 //! Register messages carry no number, so a reply is known by function, channel, first register and count alone. That is
-//! why each controller has one request under way, and why a request that was sent again is not followed by an equal one
-//! before a late answer to its first sending could have come: a stale value must never pass for a new one.
+//! why each controller has one request under way, and why a request that was sent again is not followed by one of the same
+//! register before a late answer to its first sending could have come: a stale value must never pass for a new one.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -174,7 +174,8 @@ impl Exchange {
         if one.flight.as_ref().is_some_and(|flight| at < flight.sent + self.patience.timeout) {
             return None;
         }
-        if one.flight.as_ref().is_some_and(|flight| flight.tries >= self.patience.tries) {
+        if one.flight.as_ref().is_some_and(|flight| flight.tries >= flight.request.tries(self.patience.tries))
+        {
             self.give_up(lane);
         }
         let one = &mut self.lanes[lane];
@@ -182,7 +183,7 @@ impl Exchange {
             let (index, request) = self.next(lane)?;
             let one = &mut self.lanes[lane];
             let id = request.id(one.peer.dialect)?;
-            if one.owed.iter().any(|owed| owed.id == id) {
+            if one.owed.iter().any(|owed| owed.id.confusable(id)) {
                 one.queue.push_front((index, request));
                 return None;
             }
@@ -306,8 +307,9 @@ impl Lane {
             return Some(flight.sent + timeout);
         }
         let (_, request) = self.queue.front()?;
-        let id = request.id(self.peer.dialect);
-        let owed = self.owed.iter().filter(|owed| Some(owed.id) == id).map(|owed| owed.until).max();
+        // One that no message says is refused at once.
+        let Some(id) = request.id(self.peer.dialect) else { return Some(MonoTime::default()) };
+        let owed = self.owed.iter().filter(|owed| owed.id.confusable(id)).map(|owed| owed.until).max();
         Some(owed.unwrap_or_default())
     }
 }

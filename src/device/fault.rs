@@ -12,7 +12,7 @@ use crate::wire::{DeviceError, Dialect, ReplyCode, WireError};
 #[non_exhaustive]
 pub enum Fault {
     /// No valid answer came in time.
-    #[error("cannot {request}: no answer in {tries} tries of {} ms{}", timeout.as_millis(), behind(odd.as_ref()))]
+    #[error("cannot {request}: no answer in {tries} tries of {} ms{}", timeout.as_millis(), behind(request, odd.as_ref()))]
     Silent {
         /// What was asked.
         request: Request,
@@ -91,11 +91,15 @@ impl fmt::Display for Odd {
 }
 
 /// The odd thing, or what to look at where nothing came at all.
-fn behind(odd: Option<&Odd>) -> String {
-    odd.map_or_else(
-        || "; check power, cable and address, PA15 = 1, PA20 to PA24".to_owned(),
-        |odd| format!("; {odd}"),
-    )
+fn behind(request: &Request, odd: Option<&Odd>) -> String {
+    let why = odd.map_or_else(
+        || "check power, cable and address, PA15 = 1, PA20 to PA24".to_owned(),
+        ToString::to_string,
+    );
+    match request {
+        Request::Read { .. } => format!("; {why}"),
+        Request::Write { .. } => format!(", and it may have been written all the same; {why}"),
+    }
 }
 
 /// What a reply code other than 2 says, by the controller's dialect (SMC manual 2.2.1 and chapter 6; MBOX as public

@@ -33,7 +33,7 @@ pub enum HomeError {
     #[error(transparent)]
     Order(#[from] Fault),
     /// Something is wrong with it that homing does not mend.
-    #[error("stopped homing: {}", refusal(*code, *error, *dialect))]
+    #[error("cannot home: {}", refusal(*code, *error, *dialect))]
     State {
         /// Its reply code.
         code: ReplyCode,
@@ -144,18 +144,24 @@ fn start<L: Link, C: Clock>(
     seats.collect()
 }
 
+/// What keeps a controller that answered so from homing, where anything does.
+#[must_use]
+pub fn hindrance(answer: &Answer, dialect: Dialect) -> Option<HomeError> {
+    let &Answer { code, error, .. } = answer;
+    let hopeless = match code {
+        ReplyCode::Running => false,
+        ReplyCode::EmergencyStop | ReplyCode::Command => true,
+        // Err17 and Err21 go with the reset, Err20 by itself; an error of a drive stays (chapter 6 of both manuals).
+        ReplyCode::Fault => (1..=15).contains(&error.0),
+    };
+    hopeless.then_some(HomeError::State { code, error, dialect })
+}
+
 impl Seat {
     /// Ends homing where the controller is in a state that it cannot leave by itself.
     fn check(&mut self, answer: &Answer) {
-        let (code, error, dialect) = (answer.code, answer.error, self.dialect);
-        let hopeless = match code {
-            ReplyCode::Running => false,
-            ReplyCode::EmergencyStop | ReplyCode::Command => true,
-            // Err17 and Err21 go with the reset, Err20 by itself; an error of a drive stays (chapter 6 of both manuals).
-            ReplyCode::Fault => (1..=15).contains(&error.0),
-        };
-        if hopeless {
-            self.result = Some(Err(HomeError::State { code, error, dialect }));
+        if let Some(error) = hindrance(answer, self.dialect) {
+            self.result = Some(Err(error));
         }
     }
 
@@ -234,7 +240,7 @@ mod tests {
     fn an_emergency_stop_ends_homing_in_words() {
         let rig = Rig::of(vec![Setup { estop_at: Some(Duration::ZERO), ..Setup::default() }]);
         let error = run(&rig, TIMEOUT)[0].clone().unwrap_err().to_string();
-        assert_eq!(error, "stopped homing: an emergency stop is in effect (x = 4)");
+        assert_eq!(error, "cannot home: an emergency stop is in effect (x = 4)");
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Everything but [`Talk`] is told the time and touches neither socket nor clock. What a register is stands in one
-//! place, [`table`], and nowhere else.
+//! place, [`table()`], and nowhere else.
 
 mod address;
 pub mod change;

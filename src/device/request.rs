@@ -15,6 +15,8 @@ pub const MAX_READ: u16 = 32;
 /// Object channels of reads (SMC manual 2.2.2.1).
 const READ_DP: u16 = 0;
 const READ_PA: u16 = 1;
+/// DPF2 restarts the controller (SMC manual 2.3.3).
+const REBOOT: u8 = 0xf2;
 /// The object channel of writes to DPF0 and on (both manuals' programs agree).
 const WRITE_CONTROL: u16 = 2;
 
@@ -62,6 +64,15 @@ impl Request {
         }
     }
 
+    /// How often it may be sent where it is not answered, `most` being what patience allows. A reboot is asked for once:
+    /// its answer may be lost in it, and a second one would begin it anew.
+    pub(super) const fn tries(&self, most: u32) -> u32 {
+        match self {
+            Self::Write { address: Address::Dp(REBOOT), .. } => 1,
+            _ => most,
+        }
+    }
+
     /// By what the answer is known; none where a controller of this dialect has no way to be asked for it.
     pub(super) fn id(&self, dialect: Dialect) -> Option<Id> {
         let (access, num) = match *self {
@@ -69,7 +80,8 @@ impl Request {
             Self::Write { .. } => (Access::Write, 1),
         };
         let (servo, channel, start) = match (self.first(), self) {
-            (Address::Servo { servo, number }, _) => (true, servo, number),
+            (Address::Servo { servo, number }, _) if dialect == Dialect::Smc => (true, servo, number),
+            (Address::Servo { .. }, _) => return None, // the SMC manual alone has these messages
             (Address::Pa(number), Self::Read { .. }) => (false, READ_PA, number.into()),
             (Address::Dp(number), Self::Read { .. }) => (false, READ_DP, number.into()),
             (Address::Pa(number), Self::Write { keep, .. }) => {
@@ -140,6 +152,14 @@ pub(super) struct Id {
     pub(super) num: u16,
 }
 
+impl Id {
+    /// Whether a reply to the one could pass for a reply to the other: with x over 2 an SMC controller puts its error
+    /// number where channel or drive stood, and may leave out the words.
+    pub(super) fn confusable(self, other: Self) -> bool {
+        self.servo == other.servo && self.access == other.access && self.start == other.start
+    }
+}
+
 /// The fewest reads that tell `addresses`; runs of consecutive registers share one, up to [`MAX_READ`] of a controller
 /// and 6 of a drive.
 #[must_use]
@@ -188,6 +208,7 @@ mod tests {
         assert_eq!(read(Address::Pa(0x95), 1), "55aa 0000 1101 0001 ffff ffff 0095 0001");
         assert_eq!(read(Address::Dp(0xf0), 1), "55aa 0000 1101 0000 ffff ffff 00f0 0001");
         let servo = Address::Servo { servo: 2, number: 508 };
+        assert_eq!(octets(&Request::read(servo), Dialect::Mbox), None);
         assert_eq!(read(servo, 6), "33cc 0000 2101 0002 ffff ffff 01fc 0006");
     }
 

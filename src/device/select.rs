@@ -134,12 +134,12 @@ pub fn assignments(words: &[String]) -> Result<Vec<Assignment>, SelectError> {
     if found.is_empty() { Err(SelectError::Nobody) } else { Ok(found) }
 }
 
-/// Words one after the other, `=` by itself.
+/// Words one after the other, in small letters, `=` by itself.
 struct Words(Vec<String>, usize);
 
 impl Words {
     fn new(words: &[String]) -> Self {
-        let joined = words.join(" ").replace('=', " = ");
+        let joined = words.join(" ").to_lowercase().replace('=', " = ");
         Self(joined.split_whitespace().map(str::to_owned).collect(), 0)
     }
 
@@ -154,7 +154,7 @@ impl Words {
 }
 
 fn selection(words: &mut Words) -> Result<Selection, SelectError> {
-    let word = words.next().ok_or(SelectError::Nobody)?.to_lowercase();
+    let word = words.next().ok_or(SelectError::Nobody)?.to_owned();
     match word.as_str() {
         "pa" => of_table("PA", Address::Pa, words),
         "dp" => of_table("DP", Address::Dp, words),
@@ -189,8 +189,8 @@ fn control(words: &mut Words) -> Result<Selection, SelectError> {
 /// `servo 1 508`, `servo 1 PA508..510`.
 fn servo(words: &mut Words) -> Result<Selection, SelectError> {
     let servo = words.next().and_then(number).filter(|servo| *servo > 0).ok_or(SelectError::Servo)?;
-    let word = words.next().ok_or(SelectError::Servo)?.to_lowercase();
-    let (first, last) = ends(word.trim_start_matches("pa")).ok_or(SelectError::Servo)?;
+    let word = words.next().ok_or(SelectError::Servo)?.to_owned();
+    let (first, last) = ends(word.strip_prefix("pa").unwrap_or(&word)).ok_or(SelectError::Servo)?;
     let (first, last) = (number(first).ok_or(SelectError::Servo)?, number(last).ok_or(SelectError::Servo)?);
     if last < first {
         return Err(SelectError::Backward(word));
@@ -208,12 +208,11 @@ fn attached(word: &str) -> Result<Selection, SelectError> {
     if let Some(register) = table().by_name(word) {
         return Ok(Selection { addresses: vec![register.address], single: true });
     }
-    let spaces: [(&str, &'static str, fn(u8) -> Address); 2] =
-        [("pa", "PA", Address::Pa), ("dp", "DP", Address::Dp)];
-    for (prefix, space, of) in spaces {
-        if let Some(numbers) = word.strip_prefix(prefix).filter(|numbers| begins_with_digits(numbers)) {
-            return documented(numbers, space, of);
-        }
+    if let Some(numbers) = word.strip_prefix("pa").filter(|numbers| begins_with_digits(numbers)) {
+        return documented(numbers, "PA", Address::Pa);
+    }
+    if let Some(numbers) = word.strip_prefix("dp").filter(|numbers| begins_with_digits(numbers)) {
+        return documented(numbers, "DP", Address::Dp);
     }
     Err(SelectError::Name { word: word.to_owned(), hint: alike(word) })
 }
@@ -253,23 +252,24 @@ fn whole(of: fn(u8) -> Address) -> Selection {
 /// First and last of `06..0b`, which may repeat its prefix (`PA80..PA85`); twice the same of a single one.
 fn ends(text: &str) -> Option<(&str, &str)> {
     let (first, last) = text.split_once("..").unwrap_or((text, text));
-    let last = last.trim_start_matches('=').trim_start_matches("pa").trim_start_matches("dp");
+    let last = last.strip_prefix("pa").or_else(|| last.strip_prefix("dp")).unwrap_or(last);
     (!first.is_empty() && !last.is_empty()).then_some((first, last))
 }
 
 fn begins_with_digits(text: &str) -> bool {
     let first = text.split("..").next().unwrap_or_default();
-    !first.is_empty() && first.trim_start_matches("0x").chars().all(|c| c.is_ascii_hexdigit())
+    let digits = first.strip_prefix("0x").unwrap_or(first);
+    !digits.is_empty() && digits.chars().all(|c| c.is_ascii_hexdigit())
 }
 
 fn hex(text: &str) -> Option<u8> {
-    let digits = text.trim_start_matches("0x");
+    let digits = text.strip_prefix("0x").unwrap_or(text);
     (digits.len() <= 2).then(|| u8::from_str_radix(digits, 16).ok()).flatten()
 }
 
 /// A number that is decimal unless it begins with `0x`.
 fn number(text: &str) -> Option<u16> {
-    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+    match text.strip_prefix("0x") {
         Some(digits) => u16::from_str_radix(digits, 16).ok(),
         None => text.parse().ok(),
     }
@@ -325,6 +325,14 @@ mod tests {
         assert!(named("servo 1").starts_with("servo takes"));
         assert!(named("servo 1 0..65535").contains("65536 registers"));
         assert!(named("dpf g").contains("0 to f"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_words_panic(words in proptest::collection::vec("(pa|dp|dpf|servo|=|\\.\\.|0x|[0-9a-f]{1,3}|é| |[A-Z-]{0,4}){0,5}", 0..5)) {
+            let _ = selections(&words);
+            let _ = assignments(&words);
+        }
     }
 
     #[test]

@@ -126,6 +126,16 @@ impl Table {
         self.0.binary_search_by_key(&address, |register| register.address).ok().map(|index| &self.0[index])
     }
 
+    /// Whether controllers of `dialect` have what is at an address. Drives can be asked through SMC controllers only;
+    /// which registers they have, their own manuals say.
+    #[must_use]
+    pub fn has(&self, address: Address, dialect: Dialect) -> bool {
+        match self.get(address) {
+            Some(register) => register.dialect.has(dialect),
+            None => address.is_servo() && dialect == Dialect::Smc,
+        }
+    }
+
     /// The register called `name`; capitals do not matter, and `-` and `_` stand for spaces.
     #[must_use]
     pub fn by_name(&self, name: &str) -> Option<&Register> {

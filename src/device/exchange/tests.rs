@@ -105,6 +105,25 @@ fn the_right_reply_is_taken_and_only_that() {
 }
 
 #[test]
+fn registers_of_a_drive_are_told_by_that_drive_alone() {
+    let read = Request::Read { first: Address::Servo { servo: 2, number: 508 }, count: 6 };
+    let told = |servo| {
+        run(PEER, &read, |mut reply| {
+            reply[7] = servo;
+            vec![reply]
+        })
+        .0
+        .result
+    };
+    assert_eq!(told(2).unwrap().words, [0x1717; 6]);
+    let Err(Fault::Silent { odd, .. }) = told(1) else { panic!("that was another drive") };
+    assert_eq!(odd, Some(Odd::Foreign { start: 508, num: 6 }));
+    let write = Request::write(Address::Servo { servo: 2, number: 508 }, 7);
+    let (outcome, _) = run(PEER, &write, |reply| vec![reply]);
+    assert_eq!(outcome.result.unwrap().words, [7]);
+}
+
+#[test]
 fn x_3_and_4_tell_of_an_smc_controllers_state_and_refuse_on_mbox() {
     let read = Request::read(Address::Pa(2));
     let with = |peer: Peer, x: u8, slot: u8, words: usize| {
@@ -125,6 +144,21 @@ fn x_3_and_4_tell_of_an_smc_controllers_state_and_refuse_on_mbox() {
     let Err(Fault::Refused { error, .. }) = with(mbox, 3, 1, 1) else { panic!("it was refused") };
     assert_eq!(error, DeviceError(0x1717));
     assert!(matches!(with(mbox, 3, 0, 1), Err(Fault::Silent { .. })), "another channel's");
+}
+
+#[test]
+fn a_late_refusal_that_does_not_tell_its_channel_is_not_taken_for_another_registers() {
+    let mut exchange = Exchange::new(&[PEER]);
+    let once = Patience { timeout: Duration::from_millis(100), tries: 1 };
+    exchange.begin(vec![(0, Request::read(Address::Dp(7)))], once);
+    let mut late = reply_to(exchange.due(0, at(0)).unwrap());
+    (late[5], late[7]) = (3, 12); // in place of the channel, the error number
+    assert!(exchange.due(0, at(100)).is_none());
+    exchange.begin(vec![(0, Request::read(Address::Pa(7)))], once);
+    assert!(exchange.due(0, at(101)).is_none(), "PA07 is not asked for while DP07 may still be answered");
+    exchange.on_datagram(0, &late, at(150));
+    assert_eq!(exchange.odds(0).late, 1);
+    assert!(exchange.due(0, at(151)).is_some());
 }
 
 #[test]

@@ -105,14 +105,24 @@ fn every_value_in_words_lies_in_the_range() {
 }
 
 #[test]
-fn parameters_have_a_default_and_monitor_registers_have_none() {
+fn only_parameters_have_defaults_and_outlast_a_power_cycle() {
     for register in table() {
         let parameter = matches!(register.address, Address::Pa(_));
-        assert_eq!(
-            register.default(Dialect::Smc).is_some() || register.default(Dialect::Mbox).is_some(),
-            parameter
-        );
-        assert!(!register.saved || parameter, "{}", register.address);
+        let default = register.default_imax.or(register.default_smc);
+        assert!(parameter || default.is_none(), "{}", register.address);
+        assert_eq!(register.saved, parameter && !register.flags.command, "{}", register.address);
+    }
+}
+
+#[test]
+fn every_default_of_the_imax_manual_is_there() {
+    // Its table ends at PA5f and has PA90 to PA9f besides; the SMC manual's 5.10 has PAa0 to PAb5.
+    let listed = |number: u8| matches!(number, 0x00..=0x5f | 0x90..=0x9f);
+    for register in table() {
+        let Address::Pa(number) = register.address else { continue };
+        assert_eq!(register.default_imax.is_some(), listed(number), "{}", register.address);
+        let accelerates = matches!(number, 0xa0..=0xa5 | 0xb0..=0xb5);
+        assert!(!accelerates || register.default_smc.is_some(), "{}", register.address);
     }
 }
 
@@ -154,6 +164,16 @@ fn a_register_is_found_by_number_and_by_name() {
     assert_eq!(table().by_name("rs-485 homing turns").unwrap().address, Address::Pa(0x3e));
     assert_eq!(table().get(Address::Pa(0x99)), None);
     assert_eq!(table().get(Address::Servo { servo: 1, number: 5 }), None);
+}
+
+#[test]
+fn a_dialect_has_its_own_registers_and_smc_alone_those_of_drives() {
+    let has = |address| [Dialect::Smc, Dialect::Mbox].map(|dialect| table().has(address, dialect));
+    assert_eq!(has(Address::Pa(0x95)), [true, true]);
+    assert_eq!(has(Address::Pa(0x55)), [true, false]);
+    assert_eq!(has(Address::Dp(0x1b)), [false, true]);
+    assert_eq!(has(Address::Pa(0x99)), [false, false]);
+    assert_eq!(has(Address::Servo { servo: 1, number: 508 }), [true, false]);
 }
 
 #[test]

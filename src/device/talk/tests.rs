@@ -172,6 +172,38 @@ fn truncated_long_and_foreign_replies_and_lying_counts_end_in_one_line_that_says
 }
 
 #[test]
+fn a_reboot_is_asked_for_once_though_its_answer_is_lost() {
+    let rig = hall(1, |_| false);
+    rig.filter(|_, _| vec![]);
+    let outcomes = rig.talk().ask(vec![(0, Request::write(Address::Dp(0xf2), 1))], Patience::default());
+    assert!(matches!(outcomes[0].result, Err(Fault::Silent { tries: 1, .. })));
+    assert_eq!(rig.received(), 1);
+}
+
+#[test]
+fn a_controller_that_reboots_halfway_costs_one_silence_and_answers_again_later() {
+    let rig = hall(2, |_| false);
+    let mut talk = rig.talk();
+    let reboot = Request::write(Address::Dp(0xf2), 1);
+    let reads = [2, 7, 9].map(|number| Request::read(Address::Pa(number)));
+    let requests = [
+        (0, reads[0].clone()),
+        (0, reboot),
+        (0, reads[1].clone()),
+        (0, reads[2].clone()),
+        (1, reads[1].clone()),
+    ];
+    let outcomes = talk.ask(requests.to_vec(), Patience::default());
+    assert!(outcomes[1].result.is_ok() && outcomes[4].result.is_ok());
+    assert!(matches!(outcomes[2].result, Err(Fault::Silent { .. })));
+    assert!(matches!(outcomes[3].result, Err(Fault::Unasked { .. })));
+    let until = talk.now() + Duration::from_secs(3);
+    talk.wait(until, &mut |_, _, _| {});
+    let outcomes = talk.ask(vec![(0, reads[2].clone())], Patience::default());
+    assert_eq!(outcomes[0].result.as_ref().unwrap().words, [100]);
+}
+
+#[test]
 fn a_stranger_is_counted_and_not_believed() {
     let rig = hall(1, |_| false);
     rig.filter(|_, _| vec![]);

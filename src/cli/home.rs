@@ -1,0 +1,214 @@
+//! `kinocue home`.
+
+use std::io::IsTerminal as _;
+use std::time::Duration;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::ask::{agreed, somebody};
+use super::targets::{TargetArgs, Targets, Troubles, state};
+use super::{Exit, Failure, print};
+use crate::config::Controller;
+use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
+use crate::device::{Outcome, Patience, Request, Talk, table};
+
+/// Homes seats: has their controllers find zero (DPF0) and waits until each is there.
+///
+/// The seats move by themselves, over their whole stroke, at a speed that the controllers set. Ctrl-C ends the command,
+/// not the movement: to stop that is the emergency stop's, which is hard-wired.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue home --config hall.toml
+  kinocue home A1 A2 --config hall.toml
+  kinocue home --config hall.toml --row A --seats-empty
+  kinocue home --to 192.168.15.201:7408 --timeout 120
+
+PA0e decides what a controller does: 0 searches zero; 1 goes to zero without a search,
+which is right only where it has found zero since it was switched on.")]
+pub(super) struct Args {
+    /// The controllers [default: all].
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    #[command(flatten)]
+    targets: TargetArgs,
+    /// Nobody sits on the seats and nothing lies on or under them: do not ask.
+    #[arg(long)]
+    seats_empty: bool,
+    /// How long each may take, seconds, 1 to 3600.
+    #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
+    timeout: u64,
+    /// Print one JSON object at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    controllers: Vec<ControllerReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct ControllerReport<'a> {
+    name: &'a str,
+    address: String,
+    home: bool,
+    /// From the order to the end of homing; null where that was not reached.
+    seconds: Option<f64>,
+    fault: Option<String>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let targets = args.targets.resolve(&args.names)?;
+    if !args.seats_empty {
+        somebody("Are the seats empty?", "--seats-empty")?;
+    }
+    let mut talk = targets.open()?;
+    let mut troubles = Troubles::default();
+    let mut results = explain(&mut talk, &targets, &mut troubles);
+    let ready: Vec<usize> = (0..results.len()).filter(|lane| results[*lane].is_ok()).collect();
+    if !ready.is_empty() {
+        if !agreed(&question(&targets, &ready), args.seats_empty, "--seats-empty")? {
+            eprintln!("nothing was moved");
+            return Ok(Exit::Done);
+        }
+        let timeout = Duration::from_secs(args.timeout);
+        for (lane, result) in ready.iter().zip(move_home(&mut talk, &targets, &ready, timeout)) {
+            if let Err(error) = &result {
+                tell(error, targets.name(*lane), &mut troubles);
+            }
+            results[*lane] = result.map_err(|error| error.to_string());
+        }
+    }
+    if args.json {
+        print::json(&Report::new(&targets, &results))?;
+    }
+    Ok(troubles.exit())
+}
+
+fn question(targets: &Targets, lanes: &[usize]) -> String {
+    let names: Vec<_> = lanes.iter().map(|lane| targets.name(*lane)).collect();
+    format!(
+        "{} will move over the whole stroke. Are these seats empty, and is nobody near them?",
+        names.join(", ")
+    )
+}
+
+/// Asks each controller what its reset does, and says so; an error for each that cannot home, of which it has told.
+fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<Result<Duration, String>> {
+    let one = |outcome: Outcome| {
+        let (lane, name) = (outcome.lane, targets.name(outcome.lane));
+        let (_, answer) = troubles.sort(targets, outcome)?;
+        let controller = &targets.controllers[lane];
+        let value = answer.words.first().copied().unwrap_or(0);
+        let meaning =
+            table().get(PA0E).and_then(|register| register.says(value)).unwrap_or("not in the manuals");
+        let state = state(controller, &answer).map_or_else(String::new, |state| format!("; now {state}"));
+        eprintln!("{name}: PA0e = {value}: {meaning}{state}");
+        match hindrance(&answer, controller.dialect) {
+            None => Ok(Duration::ZERO),
+            Some(error) => {
+                troubles.refuse(name, &error.to_string());
+                Err(error.to_string())
+            }
+        }
+    };
+    talk.ask(targets.each(&[Request::read(PA0E)]), Patience::default()).into_iter().map(one).collect()
+}
+
+fn move_home(
+    talk: &mut Talk,
+    targets: &Targets,
+    ready: &[usize],
+    timeout: Duration,
+) -> Vec<Result<Duration, HomeError>> {
+    let lanes: Vec<_> = ready.iter().map(|&lane| (lane, targets.controllers[lane].dialect)).collect();
+    let mut display = Display::new(targets, ready);
+    home(talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress))
+}
+
+impl<'a> Report<'a> {
+    fn new(targets: &'a Targets, results: &[Result<Duration, String>]) -> Self {
+        let one = |(controller, result): (&'a Controller, &Result<Duration, String>)| ControllerReport {
+            name: &controller.name,
+            address: controller.address.to_string(),
+            home: result.is_ok(),
+            seconds: result.as_ref().ok().map(Duration::as_secs_f64),
+            fault: result.as_ref().err().cloned(),
+        };
+        Self { controllers: targets.controllers.iter().zip(results).map(one).collect() }
+    }
+}
+
+fn tell(error: &HomeError, name: &str, troubles: &mut Troubles) {
+    let silent = match error {
+        HomeError::Order(fault) => !fault.refused(),
+        HomeError::Timeout { dpf0, .. } => dpf0.is_none(),
+        _ => false,
+    };
+    if silent { troubles.miss(name, &error.to_string()) } else { troubles.refuse(name, &error.to_string()) }
+}
+
+/// Progress: on a terminal a line for each controller on its way, kept up to date; elsewhere a line for each step.
+struct Display {
+    bars: Option<MultiProgress>,
+    lines: Vec<Line>,
+}
+
+struct Line {
+    lane: usize,
+    name: String,
+    bar: Option<ProgressBar>,
+    homing: bool,
+}
+
+impl Display {
+    fn new(targets: &Targets, lanes: &[usize]) -> Self {
+        let bars = std::io::stderr().is_terminal().then(MultiProgress::new);
+        let line = |&lane: &usize| {
+            let name = targets.name(lane).to_owned();
+            let bar = bars.as_ref().map(|bars| bars.add(ProgressBar::new_spinner()));
+            if let Some(bar) = &bar {
+                let style = ProgressStyle::with_template("{spinner} {prefix}: {msg}");
+                bar.set_style(style.expect("the template is fixed"));
+                bar.set_prefix(name.clone());
+            }
+            Line { lane, name, bar, homing: false }
+        };
+        Self { lines: lanes.iter().map(line).collect(), bars }
+    }
+
+    fn show(&mut self, lane: usize, progress: &Progress) {
+        let Some(line) = self.lines.iter_mut().find(|line| line.lane == lane) else { return };
+        let (words, ended) =
+            (words(progress), matches!(progress, Progress::Home { .. } | Progress::Failed(_)));
+        // In a pipe, a step once: looks at DPF0 come five times a second.
+        let again = line.homing && matches!(progress, Progress::Homing { .. });
+        line.homing = matches!(progress, Progress::Homing { .. });
+        match (&self.bars, &line.bar) {
+            (Some(bars), Some(bar)) if ended => {
+                bar.finish_and_clear();
+                let _ = bars.println(format!("{}: {words}", line.name)); // a closed terminal stops nothing
+            }
+            (Some(_), Some(bar)) => {
+                bar.set_message(words);
+                bar.tick();
+            }
+            _ if again => {}
+            _ => eprintln!("{}: {words}", line.name),
+        }
+    }
+}
+
+fn words(progress: &Progress) -> String {
+    match progress {
+        Progress::Started => "has begun".to_owned(),
+        Progress::Homing { since, dpf0: Some(value) } => {
+            format!("homing, {:.1} s, DPF0 reads {value}", since.as_secs_f64())
+        }
+        Progress::Homing { since, dpf0: None } => format!("no answer, {:.1} s", since.as_secs_f64()),
+        Progress::Home { after } => format!("home after {:.1} s", after.as_secs_f64()),
+        Progress::Failed(_) => "not home".to_owned(),
+    }
+}

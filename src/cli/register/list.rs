@@ -1,0 +1,87 @@
+//! `kinocue register list`: the one table of registers, printed.
+
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::device::{Family, Flags, Register, selections, table};
+
+/// Lists the registers that the manuals document: unit, range, default, dialect, whether they are saved, and what their
+/// values mean.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  kinocue register list\n  kinocue register list PA90..98 dpf0\n  kinocue \
+                        register list --json"
+)]
+pub(super) struct Args {
+    /// Registers, or ranges of them [default: all].
+    #[arg(value_name = "REGISTER")]
+    registers: Vec<String>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Listing {
+    registers: Vec<&'static Register>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let selections = selections(&args.registers).or_exit(Exit::Usage)?;
+    let addresses = selections.iter().flat_map(|selection| &selection.addresses);
+    let registers: Vec<_> = addresses.filter_map(|address| table().get(*address)).collect();
+    if args.json {
+        print::json(&Listing { registers })?;
+    } else {
+        print::out(&format!("{}\n", text(&registers)))?;
+    }
+    Ok(Exit::Done)
+}
+
+fn text(registers: &[&Register]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header([
+        "register", "name", "unit", "range", "IMAX", "SMC", "dialect", "saved", "notes", "manual", "meaning",
+    ]);
+    for register in registers {
+        let default = |value: Option<u16>| value.map_or_else(|| "-".to_owned(), |value| value.to_string());
+        table.add_row([
+            register.address.to_string(),
+            register.name.clone(),
+            register.unit.to_owned(),
+            format!("{}..={}", register.min, register.max),
+            default(register.default_imax),
+            default(register.default_smc),
+            dialect(register.dialect).to_owned(),
+            if register.saved { "yes" } else { "no" }.to_owned(),
+            notes(register.flags),
+            register.source.to_owned(),
+            register.meaning.to_owned(),
+        ]);
+    }
+    for column in table.column_iter_mut().skip(4).take(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+const fn dialect(family: Family) -> &'static str {
+    match family {
+        Family::Both => "both",
+        Family::Smc => "smc",
+        Family::Mbox => "mbox",
+    }
+}
+
+fn notes(flags: Flags) -> String {
+    let Flags { network, identity: _, factory, moves, command: _, never } = flags;
+    let notes = [
+        (network, "network: --force"),
+        (factory, "factory reset: --force"),
+        (moves, "moves the seat"),
+        (never, "read only"),
+    ];
+    notes.iter().filter(|(is, _)| *is).map(|(_, note)| *note).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,155 @@
+//! `kinocue register read`.
+
+use anyhow::anyhow;
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+
+use super::{Found, read_values};
+use crate::cli::targets::{TargetArgs, Targets, Troubles};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::config::Controller;
+use crate::device::change::dialect_name;
+use crate::device::{Address, Selection, selections, settings::Values, table};
+use crate::wire::{DP_POSITIONS, position};
+
+/// Reads registers of controllers: PA, DP, DPF0 to DPFF, and those of the servo drives.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue register read PA95 --to 192.168.15.201:7408
+  kinocue register read pa 0x90..98 dp 06..0b dpf0 --config hall.toml --row A
+  kinocue register read servo 1 508..511 --config hall.toml --name A1
+  kinocue register read --config hall.toml --json")]
+pub(super) struct Args {
+    /// What to read: PA95, pa 0x95, dp 06..0b, dpf0, axis-offset, servo 1 508 [default: all PA and DP].
+    #[arg(value_name = "REGISTER")]
+    registers: Vec<String>,
+    #[command(flatten)]
+    targets: TargetArgs,
+    /// The controller of this name; repeatable.
+    #[arg(long, value_name = "NAME")]
+    name: Vec<String>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let selections = selections(&args.registers).or_exit(Exit::Usage)?;
+    let targets = args.targets.resolve(&args.name)?;
+    let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
+        .map(|controller| wanted(&selections, controller))
+        .collect::<Result<_, _>>()
+        .or_exit(Exit::Usage)?;
+    let mut talk = targets.open()?;
+    let mut troubles = Troubles::default();
+    let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
+    if args.json {
+        print::json(&Report::new(&targets, &found))?;
+    } else if found.iter().any(|one| !one.values.is_empty()) {
+        print::out(&format!("{}\n", text(&targets, &found)))?;
+    }
+    Ok(troubles.exit())
+}
+
+/// The registers that a controller is asked for: of ranges, those that its dialect has.
+fn wanted(selections: &[Selection], controller: &Controller) -> anyhow::Result<Vec<Address>> {
+    let dialect = controller.dialect;
+    let has = |address: &Address| table().has(*address, dialect);
+    let mut wanted = Vec::new();
+    for selection in selections {
+        if let Some(first) = selection.addresses.first().filter(|_| !selection.addresses.iter().any(has)) {
+            let (name, dialect) = (&controller.name, dialect_name(dialect));
+            let what = if selection.single { "is no register" } else { "and on are no registers" };
+            return Err(anyhow!("{first} {what} of {dialect} controllers, as {name} is one"));
+        }
+        wanted.extend(selection.addresses.iter().copied().filter(has));
+    }
+    Ok(wanted)
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    controllers: Vec<ControllerReport<'a>>,
+}
+
+#[derive(Serialize)]
+struct ControllerReport<'a> {
+    name: &'a str,
+    address: String,
+    dialect: &'static str,
+    /// Null where it is the normal one, or the controller did not answer.
+    state: Option<&'a str>,
+    registers: Vec<RegisterReport>,
+    faults: &'a [String],
+}
+
+#[derive(Serialize)]
+struct RegisterReport {
+    register: Address,
+    name: &'static str,
+    value: u16,
+    unit: &'static str,
+    says: Option<String>,
+}
+
+impl<'a> Report<'a> {
+    fn new(targets: &'a Targets, found: &'a [Found]) -> Self {
+        let one = |(controller, found): (&'a Controller, &'a Found)| ControllerReport {
+            name: &controller.name,
+            address: controller.address.to_string(),
+            dialect: dialect_name(controller.dialect),
+            state: found.state.as_deref(),
+            registers: registers(controller, &found.values),
+            faults: &found.faults,
+        };
+        Self { controllers: targets.controllers.iter().zip(found).map(one).collect() }
+    }
+}
+
+fn registers(controller: &Controller, values: &Values) -> Vec<RegisterReport> {
+    let one = |(&address, &value)| {
+        let register = table().get(address);
+        RegisterReport {
+            register: address,
+            name: register.map_or("", |register| register.name.as_str()),
+            value,
+            unit: register.map_or("", |register| register.unit),
+            says: says(controller, values, address, value),
+        }
+    };
+    values.iter().map(one).collect()
+}
+
+/// What a value means in words; for the first word of a position, the position.
+fn says(controller: &Controller, values: &Values, address: Address, value: u16) -> Option<String> {
+    if let Address::Dp(number) = address
+        && DP_POSITIONS.contains(&u16::from(number))
+    {
+        let second = values.get(&address.after(1)?)?;
+        return Some(format!("position {}", position([value, *second], controller.dialect).0));
+    }
+    table().get(address)?.says(value).map(str::to_owned)
+}
+
+fn text(targets: &Targets, found: &[Found]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(["controller", "register", "value", "unit", "name", "meaning"]);
+    for (controller, one) in targets.controllers.iter().zip(found) {
+        for register in registers(controller, &one.values) {
+            table.add_row([
+                controller.name.clone(),
+                register.register.to_string(),
+                register.value.to_string(),
+                register.unit.to_owned(),
+                register.name.to_owned(),
+                register.says.unwrap_or_default(),
+            ]);
+        }
+    }
+    for column in table.column_iter_mut().skip(2).take(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}

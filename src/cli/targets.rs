@@ -1,0 +1,180 @@
+//! The controllers a command is for, the frame port to reach them, and what to tell of those that fail.
+
+use std::io;
+use std::net::SocketAddrV4;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, anyhow};
+
+use super::{Exit, Failure, OrExit as _, load};
+use crate::config::{Controller, Show, from_to_args};
+use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
+use crate::motion::MAX_AXES;
+use crate::net::NetError;
+use crate::wire::ReplyCode;
+
+/// Which controllers are meant.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct TargetArgs {
+    /// A controller: HOST:PORT, and behind commas name=A1 and dialect=smc or mbox; repeatable.
+    #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
+    to: Vec<String>,
+    /// The controllers of a configuration: all of them, unless --row or names choose.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// The controllers of a row; repeatable.
+    #[arg(long, value_name = "ROW", requires = "config")]
+    row: Vec<String>,
+    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
+    #[arg(long, value_name = "ADDR")]
+    bind: Option<SocketAddrV4>,
+}
+
+/// The controllers that are meant, and from where they are spoken to.
+#[derive(Debug)]
+pub(super) struct Targets {
+    pub(super) controllers: Vec<Controller>,
+    bind: SocketAddrV4,
+}
+
+impl TargetArgs {
+    /// The controllers that the arguments and `names` mean.
+    pub(super) fn resolve(&self, names: &[String]) -> Result<Targets, Failure> {
+        let (controllers, bind) = match &self.config {
+            Some(path) => {
+                let config = load::config(path)?;
+                (config.controllers, config.show.bind)
+            }
+            None => {
+                // Without a cue nothing limits the axes but the protocol.
+                let config = from_to_args(&self.to, &[], MAX_AXES).or_exit(Exit::Usage)?;
+                (config.controllers, Show::default().bind)
+            }
+        };
+        let controllers = self.choose(controllers, names)?;
+        Ok(Targets { controllers, bind: self.bind.unwrap_or(bind) })
+    }
+
+    /// Those of the rows and of the names, in the order of the configuration; all where neither chooses.
+    fn choose(&self, all: Vec<Controller>, names: &[String]) -> Result<Vec<Controller>, Failure> {
+        if self.row.is_empty() && names.is_empty() {
+            return Ok(all);
+        }
+        for name in names {
+            if !all.iter().any(|one| one.name == *name) {
+                let known: Vec<_> = all.iter().map(|one| one.name.as_str()).collect();
+                let why = anyhow!("no controller is called {name}; there are {}", known.join(", "));
+                return Err(why).or_exit(Exit::Usage);
+            }
+        }
+        for row in &self.row {
+            if !all.iter().any(|one| one.row.as_ref() == Some(row)) {
+                return Err(anyhow!("no controller stands in row {row}")).or_exit(Exit::Usage);
+            }
+        }
+        let chosen = |one: &Controller| {
+            names.contains(&one.name) || one.row.as_ref().is_some_and(|row| self.row.contains(row))
+        };
+        Ok(all.into_iter().filter(chosen).collect())
+    }
+}
+
+impl Targets {
+    /// Takes the frame port; 75 while another program holds it.
+    pub(super) fn open(&self) -> Result<Talk, Failure> {
+        Talk::open(self.bind, &self.controllers).map_err(|error| {
+            let exit = match &error {
+                NetError::Refused { cause, .. } if cause.kind() == io::ErrorKind::AddrInUse => Exit::TryAgain,
+                NetError::Refused { .. } => Exit::System,
+                _ => Exit::Usage,
+            };
+            let held = "this needs the frame port, which nothing else may hold meanwhile, be it a show";
+            let error = anyhow::Error::new(error);
+            Failure { exit, error: if exit == Exit::TryAgain { error.context(held) } else { error } }
+        })
+    }
+
+    /// The name of a controller by its place.
+    pub(super) fn name(&self, lane: usize) -> &str {
+        &self.controllers[lane].name
+    }
+
+    /// The same request for each controller.
+    pub(super) fn each(&self, requests: &[Request]) -> Vec<(usize, Request)> {
+        let lanes = 0..self.controllers.len();
+        lanes.flat_map(|lane| requests.iter().map(move |request| (lane, request.clone()))).collect()
+    }
+}
+
+/// What went wrong with some controllers, told as it is noted; decides how the program ends.
+#[derive(Debug, Default)]
+pub(super) struct Troubles {
+    refused: bool,
+    silent: bool,
+}
+
+impl Troubles {
+    /// Takes an answer apart; tells of the fault where there is none, and gives the line of it.
+    pub(super) fn sort(&mut self, targets: &Targets, outcome: Outcome) -> Result<(Request, Answer), String> {
+        let Outcome { lane, request, result } = outcome;
+        match result {
+            Ok(answer) => Ok((request, answer)),
+            Err(fault) => {
+                self.refused |= fault.refused();
+                self.silent |= !fault.refused();
+                // The silence before it has been told.
+                if !matches!(fault, Fault::Unasked { .. }) {
+                    eprintln!("kinocue: {}: {fault}", targets.name(lane));
+                }
+                Err(fault.to_string())
+            }
+        }
+    }
+
+    /// Tells of something else that a controller did not do as asked.
+    pub(super) fn refuse(&mut self, name: &str, line: &str) {
+        self.refused = true;
+        eprintln!("kinocue: {name}: {line}");
+    }
+
+    /// Tells of a controller that stopped answering.
+    pub(super) fn miss(&mut self, name: &str, line: &str) {
+        self.silent = true;
+        eprintln!("kinocue: {name}: {line}");
+    }
+
+    /// Whether there were none.
+    pub(super) const fn none(&self) -> bool {
+        !self.refused && !self.silent
+    }
+
+    /// How the program ends: 76 where a controller refused, 69 where one did not answer.
+    pub(super) const fn exit(&self) -> Exit {
+        match (self.refused, self.silent) {
+            (true, _) => Exit::Refused,
+            (false, true) => Exit::Unavailable,
+            (false, false) => Exit::Done,
+        }
+    }
+}
+
+/// What a controller's state is, where it is not the normal one.
+pub(super) fn state(controller: &Controller, answer: &Answer) -> Option<String> {
+    (answer.code != ReplyCode::Running).then(|| refusal(answer.code, answer.error, controller.dialect))
+}
+
+/// Reads a file whole.
+pub(super) fn read_file(path: &std::path::Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|error| {
+        let exit = if error.kind() == io::ErrorKind::NotFound { Exit::NoInput } else { Exit::Io };
+        Failure { exit, error: anyhow::Error::new(error).context(path.display().to_string()) }
+    })
+}
+
+/// Writes a file whole or not at all.
+pub(super) fn write_file(path: &std::path::Path, text: &str) -> Result<(), Failure> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path));
+    written.with_context(|| format!("cannot write {}", path.display())).or_exit(Exit::Io)
+}
