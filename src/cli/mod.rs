@@ -16,6 +16,7 @@ mod home;
 mod info;
 mod load;
 mod play;
+mod preflight;
 mod print;
 mod register;
 mod sim;
@@ -43,6 +44,7 @@ enum Command {
     Info(info::Args),
     Convert(convert::Args),
     Decode(decode::Args),
+    Preflight(preflight::Args),
     Register(register::Args),
     Home(home::Args),
     Completions(completions::Args),
@@ -77,6 +79,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Preflight(args) => preflight::run(&args),
         Command::Register(args) => register::run(&args),
         Command::Home(args) => home::run(&args),
         Command::Completions(args) => completions::run(&args),

@@ -44,6 +44,7 @@ fn check(section: &mut Section<'_, '_, '_>) -> Option<Check> {
     }
     let why = match check.severity() {
         Severity::Info => "is only told, so there is nothing to accept",
+        _ if check.is_present() => "cannot be accepted: it is about the moment, not for good",
         _ => "cannot be accepted: what a controller does not tell cannot be known to be safe",
     };
     entry.fault(section.faults, &format!("{check} {why}"));
@@ -104,6 +105,7 @@ mod tests {
     #[test]
     fn silence_and_mere_news_cannot_be_accepted_and_nothing_twice() {
         assert!(fault("{ check = \"no-answer\", why = \"x\" }").contains("cannot be accepted"));
+        assert!(fault("{ check = \"active-error\", why = \"x\" }").contains("not for good"));
         assert!(fault("{ check = \"version\", why = \"x\" }").contains("only told"));
         let one = "{ check = \"amplitude\", why = \"x\" }";
         assert!(fault(&format!("{one}, {one}")).ends_with("amplitude is accepted twice here"));

@@ -161,13 +161,14 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     /// Reads one register of each controller, then the next: an answer that comes late is then never taken for that of
     /// a later read, nor has one to be waited for.
     fn rounds(&mut self) {
-        let monitors = [Dialect::Smc, Dialect::Mbox].map(monitors);
-        for round in 0..ROUNDS {
+        for (smc, mbox) in monitors(Dialect::Smc).into_iter().zip(monitors(Dialect::Mbox)) {
             if self.talk.now().since(self.begun) >= LAST_ROUND {
                 return;
             }
-            let of =
-                |lane: usize| monitors[usize::from(self.controllers[lane].dialect == Dialect::Mbox)][round];
+            let of = |lane: usize| match self.controllers[lane].dialect {
+                Dialect::Smc => smc,
+                Dialect::Mbox => mbox,
+            };
             let requests = self.live().into_iter().map(|lane| (lane, Request::read(of(lane)))).collect();
             for Outcome { lane, result, .. } in self.ask(requests, ROUND) {
                 self.found[lane].rounds += 1;

@@ -47,6 +47,14 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         );
         notes.add(check, found, "check cable, switch and load of the network");
     }
+    if survey.odds.malformed > 0 {
+        let found = format!("{} datagrams from its address were no messages", survey.odds.malformed);
+        notes.add(
+            Check::BrokenReplies,
+            found,
+            "check cable and switch, and that nothing else has this address",
+        );
+    }
     if let Some((median, most)) = round_trip(&survey.round_trips).filter(|(_, most)| *most > SLOW) {
         let ms = |took: Duration| took.as_secs_f64() * 1e3;
         let found =

@@ -131,6 +131,8 @@ checks! {
         "One or two of 20 reads without an answer within 100 ms: the network loses datagrams.";
     SlowReplies "slow-replies" Answers Warn
         "An answer that took over 20 ms: a show notices a silent controller after 250 ms, and late replies hide it.";
+    BrokenReplies "broken-replies" Answers Warn
+        "Datagrams came from the controller's address that are no messages: a broken cable or switch, or another device.";
 
     Address "address" Identity Fail
         "The controller takes itself for another address or port than the one it was reached at (PA10 to PA14): its \
@@ -256,11 +258,23 @@ checks! {
 }
 
 impl Check {
-    /// Whether a configuration may accept it for good: whatever was found and understood, but not that a controller is
-    /// silent, and nothing that is only told.
+    /// Whether a configuration may accept it for good: a setting that was found and understood, but not that a
+    /// controller is silent or in trouble at present, and nothing that is only told.
     #[must_use]
     pub const fn can_be_accepted(self) -> bool {
-        !matches!(self, Self::NoAnswer | Self::RegisterUnread) && !matches!(self.severity(), Severity::Info)
+        !self.is_unknown() && !self.is_present() && !matches!(self.severity(), Severity::Info)
+    }
+
+    /// Whether it means that something is not known.
+    #[must_use]
+    pub const fn is_unknown(self) -> bool {
+        matches!(self, Self::NoAnswer | Self::RegisterUnread | Self::Route)
+    }
+
+    /// Whether it is about this moment, and no setting.
+    #[must_use]
+    pub const fn is_present(self) -> bool {
+        matches!(self, Self::EmergencyStopActive | Self::ActiveError)
     }
 }
 
@@ -312,8 +326,16 @@ mod tests {
     }
 
     #[test]
-    fn silence_cannot_be_accepted() {
-        assert!(!Check::NoAnswer.can_be_accepted() && !Check::RegisterUnread.can_be_accepted());
+    fn silence_and_present_trouble_cannot_be_accepted() {
+        for check in [
+            Check::NoAnswer,
+            Check::RegisterUnread,
+            Check::Route,
+            Check::EmergencyStopActive,
+            Check::ActiveError,
+        ] {
+            assert!(!check.can_be_accepted(), "{check}");
+        }
         assert!(Check::EstopDisabled.can_be_accepted() && Check::FastForward.can_be_accepted());
         assert!(!Check::Version.can_be_accepted());
     }

@@ -106,7 +106,7 @@ fn judge_offset(subject: &Subject<'_>, notes: &mut Notes) {
     if usize::from(offset) != wanted {
         let found = format!(
             "PA95 = {offset}: takes axes from {} on, but fan_out = {word} means PA95 = {wanted}",
-            offset + 1
+            u32::from(offset) + 1
         );
         notes.add(Check::AxisOffset, found, format!("set PA95 = {wanted}"));
     }

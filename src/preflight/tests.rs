@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use proptest::prelude::*;
+
 use super::testing::Case;
 use super::*;
 use crate::config::FanOut;
@@ -245,6 +247,9 @@ fn signs_of_somebody_else_are_told() {
     case.survey.odds.duplicate = 2;
     assert_eq!(check(&case), Some(Check::TwoAnswer));
     let mut case = Case::smc();
+    case.survey.odds.malformed = 1;
+    assert_eq!(check(&case), Some(Check::BrokenReplies));
+    let mut case = Case::smc();
     case.survey.odds.foreign = 1;
     assert_eq!(check(&case), Some(Check::ForeignReplies));
 }
@@ -333,4 +338,23 @@ fn what_a_controller_does_not_tell_is_accepted_by_nobody() {
     case.survey.values.remove(&Address::Pa(0x90));
     case.controller.accept_findings = vec![Acceptance { check: Check::RegisterUnread, why: "x".to_owned() }];
     assert!(case.findings()[0].fails());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn whatever_the_registers_hold_it_is_put_into_sentences(
+        values in proptest::collection::vec(prop_oneof![0..4_u16, any::<u16>()], 90),
+        mbox in any::<bool>(),
+    ) {
+        let mut case = Case::new(if mbox { Dialect::Mbox } else { Dialect::Smc });
+        for (register, value) in case.survey.values.values_mut().zip(values) {
+            *register = value;
+        }
+        for finding in case.findings() {
+            prop_assert!(!finding.found.is_empty() && !finding.found.contains("  "), "{}", finding.found);
+            prop_assert!(!finding.found.ends_with('.') && !finding.remedy.ends_with('.'), "{finding:?}");
+        }
+    }
 }

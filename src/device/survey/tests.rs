@@ -129,3 +129,47 @@ fn mbox_controllers_are_not_asked_what_they_lack() {
     assert!(!found.values.contains_key(&PACKETS));
     assert_eq!((found.rounds, found.round_trips.len()), (ROUNDS, ROUNDS));
 }
+
+/// A reply as a hostile network would have it: cut, lengthened, with octets changed, twice, late or not at all.
+fn mutated(reply: &[u8], dice: &mut impl FnMut(usize) -> usize) -> Vec<Vec<u8>> {
+    let mut octets = reply.to_vec();
+    match dice(6) {
+        0 => octets.truncate(dice(reply.len())),
+        1 => octets.extend([0xa5; 7]),
+        2 => return vec![],
+        3 => return vec![octets.clone(), octets],
+        _ => {
+            for _ in 0..=dice(4) {
+                let at = dice(octets.len());
+                octets[at] = dice(256).try_into().unwrap();
+            }
+        }
+    }
+    vec![octets]
+}
+
+#[test]
+fn ten_thousand_mutated_replies_neither_panic_nor_hold_a_survey_up() {
+    let mut sent = 0;
+    for seed in 1_u64.. {
+        let rig = hall(64, |_| false);
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        rig.filter(move |_, reply| {
+            let mut dice = |sides: usize| {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                usize::try_from(state % u64::try_from(sides).unwrap()).unwrap()
+            };
+            // Most arrive whole, so that every part of the survey is reached.
+            if dice(4) > 0 { vec![reply] } else { mutated(&reply, &mut dice) }
+        });
+        run(&rig);
+        assert!(rig.elapsed() < LIMIT, "seed {seed}: {:?}", rig.elapsed());
+        sent += rig.received();
+        // A quarter of the replies is mutated.
+        if sent > 44_000 {
+            return;
+        }
+    }
+}
