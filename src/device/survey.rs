@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use super::settings::Values;
-use super::talk::{Link, Watch};
+use super::talk::Link;
 use super::{Address, Answer, Fault, Odds, Outcome, Patience, Request, Talk, reads, table};
 use crate::config::Controller;
 use crate::net::Origin;
@@ -18,6 +18,8 @@ use crate::wire::{DeviceError, Dialect, ReplyCode};
 pub const ROUNDS: usize = 20;
 /// How long each of these waits for its answer.
 pub const ROUND_TIMEOUT: Duration = Duration::from_millis(100);
+/// How long a survey listens for reports at the least.
+pub const LISTEN: Duration = Duration::from_millis(300);
 /// No round begins this long after the survey began.
 const LAST_ROUND: Duration = Duration::from_secs(7);
 
@@ -84,6 +86,8 @@ pub fn survey<L: Link, C: Clock>(
     asking.rounds();
     on("reading again");
     asking.last();
+    on("listening for reports");
+    asking.listen();
     asking.finish()
 }
 
@@ -202,6 +206,10 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
         }
     }
 
+    fn listen(&mut self) {
+        self.talk.wait(self.begun + LISTEN, &mut hearing(&mut self.observer));
+    }
+
     fn finish(self) -> Vec<Survey> {
         let Self { talk, observer, mut found, .. } = self;
         for (lane, survey) in found.iter_mut().enumerate() {
@@ -218,14 +226,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     /// Asks, notes states, and counts what is sent; hears what comes meanwhile.
     fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<Outcome> {
         let Self { talk, observer, .. } = self;
-        let mut watch = |origin: Origin, octets: &[u8], at: MonoTime| {
-            let _ = match origin {
-                Origin::Controller(lane) => observer.hear(lane, octets, at),
-                Origin::Stranger(from) => observer.hear_elsewhere(from, octets, at),
-            };
-        };
-        let watch: &mut Watch<'_> = &mut watch;
-        let outcomes = talk.ask_watching(requests, patience, watch);
+        let outcomes = talk.ask_watching(requests, patience, &mut hearing(observer));
         for Outcome { lane, request, result } in &outcomes {
             self.packets[*lane].count(request, result);
             let state = result.as_ref().ok().map(|answer| (answer.code, answer.error));
@@ -243,6 +244,16 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     fn each_smc(&self, request: Request) -> Vec<(usize, Request)> {
         let smc = |lane: &usize| self.controllers[*lane].dialect == Dialect::Smc;
         self.live().into_iter().filter(smc).map(|lane| (lane, request.clone())).collect()
+    }
+}
+
+/// Takes what is no answer for a report.
+fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
+    |origin, octets, at| {
+        let _ = match origin {
+            Origin::Controller(lane) => observer.hear(lane, octets, at),
+            Origin::Stranger(from) => observer.hear_elsewhere(from, octets, at),
+        };
     }
 }
 

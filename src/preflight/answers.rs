@@ -40,11 +40,12 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     let missed = survey.rounds.saturating_sub(survey.round_trips.len());
     if missed > 0 {
         let check = if missed > LOST { Check::RepliesLost } else { Check::RepliesMissed };
-        let found = format!(
-            "{missed} of {} reads had no answer within {} ms",
-            survey.rounds,
-            ROUND_TIMEOUT.as_millis()
-        );
+        let ms = ROUND_TIMEOUT.as_millis();
+        let late = match survey.odds.late {
+            0 => String::new(),
+            late => format!("; {late} answers came later"),
+        };
+        let found = format!("{missed} of {} reads had no answer within {ms} ms{late}", survey.rounds);
         notes.add(check, found, "check cable, switch and load of the network");
     }
     if survey.odds.malformed > 0 {

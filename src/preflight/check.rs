@@ -252,6 +252,9 @@ checks! {
         "With PA1f = 0 the controller never reports its state, so a drive's alarm between frames goes unnoticed.";
     StatusElsewhere "status-elsewhere" Status Fail
         "With PA1f = 2 reports go to PA25 to PA29; where that is not this machine, nobody here hears them.";
+    StatusUnheard "status-unheard" Status Warn
+        "The settings promise status reports to this machine, but none came while it listened: a firewall may be in the \
+         way, or the firmware has no such reports.";
     StatusSlow "status-slow" Status Fail
         "PA1e is the interval of status reports: 0 sends one only when an alarm begins, and over 100 ms is no beat by \
          which a loss is noticed in time.";

@@ -1,10 +1,17 @@
 //! What a controller says of itself: its present errors, and whether it would tell of the next.
 
+use std::net::SocketAddrV4;
+
 use super::{Check, Notes, Subject, Terms};
+use crate::device::survey::LISTEN;
 use crate::wire::{DeviceError, Dialect, ReplyCode};
 
 /// Reports at least this often are a beat by which a loss is noticed, ms.
 const SLOWEST_BEAT_MS: u16 = 100;
+
+/// Where the addresses of the two hosts begin that reports may go to.
+const HOST: u8 = 0x20;
+const SECOND_HOST: u8 = 0x25;
 
 pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     judge_state(subject, notes);
@@ -70,18 +77,42 @@ fn judge_reports(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
             format!("PA1e = {interval}: {what}"),
             format!("set PA1e = {SLOWEST_BEAT_MS}"),
         );
+    } else if report_to_here(subject, terms)
+        && subject.survey.is_some_and(|survey| survey.reported.reports == 0)
+    {
+        let found = format!(
+            "reports should come every {interval} ms (PA1e), but none came in {} ms",
+            LISTEN.as_millis()
+        );
+        notes.add(
+            Check::StatusUnheard,
+            found,
+            "check this machine's firewall, and whether the firmware sends 0x3101",
+        );
     }
 }
 
 fn judge_second_host(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
-    let (Ok(route), Some(host), Some(port)) = (&subject.route, subject.ip(0x25), subject.pa(0x29)) else {
-        return;
-    };
-    if host != route.local || port != terms.frame_port {
-        let found = format!(
-            "PA1f = 2: reports go to {host}:{port} (PA25 to PA29), not to {}:{}",
-            route.local, terms.frame_port
-        );
+    let (Ok(route), Some(to)) = (&subject.route, host(subject, SECOND_HOST)) else { return };
+    let here = SocketAddrV4::new(route.local, terms.frame_port);
+    if to != here {
+        let found = format!("PA1f = 2: reports go to {to} (PA25 to PA29), not to {here}");
         notes.add(Check::StatusElsewhere, found, "set PA1f = 1");
     }
+}
+
+/// Whether its reports, if there are any, come here.
+fn report_to_here(subject: &Subject<'_>, terms: &Terms) -> bool {
+    let to = match subject.pa(0x1f) {
+        Some(1) => host(subject, HOST),
+        Some(2) => host(subject, SECOND_HOST),
+        _ => None,
+    };
+    let here = subject.route.as_ref().map(|route| SocketAddrV4::new(route.local, terms.frame_port));
+    to.is_some_and(|to| here == Ok(to))
+}
+
+/// An address in four parameters, and its port in the fifth.
+fn host(subject: &Subject<'_>, first: u8) -> Option<SocketAddrV4> {
+    Some(SocketAddrV4::new(subject.ip(first)?, subject.pa(first + 4)?))
 }

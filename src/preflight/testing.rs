@@ -48,6 +48,7 @@ impl Case {
             foreign_packets: (dialect == Dialect::Smc).then_some(0),
             ..Survey::default()
         };
+        survey.reported.reports = u64::from(dialect == Dialect::Smc);
         let of_smc: &[_] = if dialect == Dialect::Smc { &SAFE_SMC } else { &[] };
         let of_axes = (0x80..=0x85).map(|number| (number, 2_880)).filter(|_| dialect == Dialect::Smc);
         for (number, value) in SAFE.into_iter().chain(of_smc.iter().copied()).chain(of_axes) {

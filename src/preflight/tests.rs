@@ -233,6 +233,8 @@ fn slow_and_lost_answers_are_told_by_their_figures() {
     let finding = only(&case).unwrap();
     assert_eq!((finding.check, finding.fails()), (Check::RepliesLost, true));
     assert_eq!(finding.found, "3 of 20 reads had no answer within 100 ms");
+    case.survey.odds.late = 3;
+    assert!(only(&case).unwrap().found.ends_with("within 100 ms; 3 answers came later"));
 }
 
 #[test]
@@ -270,6 +272,17 @@ fn a_present_error_or_emergency_stop_is_told_in_words_and_once() {
     let positions = PerAxis::from_fn(3, |_| Pulses(0));
     case.survey.reported.measured = Some(Heard { value: positions, at: MonoTime::default() });
     assert_eq!(case.told().len(), 1);
+}
+
+#[test]
+fn reports_that_are_promised_and_do_not_come_are_told() {
+    let mut case = Case::smc();
+    case.survey.reported.reports = 0;
+    let finding = only(&case).unwrap();
+    assert_eq!((finding.check, finding.fails()), (Check::StatusUnheard, false));
+    assert_eq!(finding.found, "reports should come every 100 ms (PA1e), but none came in 300 ms");
+    case.terms.frame_port = 8_411;
+    assert_eq!(check(&case), Some(Check::ReplyPort), "where they go elsewhere, that is the fault");
 }
 
 #[test]

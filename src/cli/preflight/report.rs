@@ -108,7 +108,9 @@ impl Report {
         let mut table = Table::new();
         table.load_style(STYLE);
         let titles = Family::ALL.iter().map(|family| family.title());
-        table.set_header(["controller", "address"].into_iter().chain(titles).chain(["p50 ms", "max ms"]));
+        table.set_header(
+            ["controller", "row", "address"].into_iter().chain(titles).chain(["p50 ms", "max ms"]),
+        );
         for controller in &self.controllers {
             table.add_row(controller.row());
         }
@@ -167,7 +169,8 @@ impl ControllerReport {
 
     /// Its line of the table.
     fn row(&self) -> Vec<String> {
-        let mut row = vec![self.name.clone(), self.address.to_string()];
+        let seat_row = self.row.clone().unwrap_or_else(|| "-".to_owned());
+        let mut row = vec![self.name.clone(), seat_row, self.address.to_string()];
         row.extend(Family::ALL.iter().map(|family| self.mark(*family).to_owned()));
         let ms = |us: f64| format!("{:.2}", us / 1e3);
         match &self.round_trip_us {

@@ -3,7 +3,9 @@
 use super::*;
 use crate::config::from_to_args;
 use crate::device::testing::{Rig, millis};
+use crate::motion::Pulses;
 use crate::sim::Setup;
+use crate::wire::{Code, MAX_LEN, PerAxis, Status};
 
 /// Whatever happens, a survey of 64 controllers ends within this.
 const LIMIT: Duration = Duration::from_secs(10);
@@ -109,6 +111,33 @@ fn two_controllers_of_one_address_are_seen_by_their_answers() {
     let found = run(&rig).remove(0);
     assert_eq!(found.changed, [Address::Pa(0x1b)]);
     assert!(found.odds.duplicate > 0);
+}
+
+#[test]
+fn reports_are_heard_from_the_frame_port_and_from_elsewhere() {
+    let status = |station| Status {
+        station,
+        positions: PerAxis::from_fn(3, |_| Pulses(0)),
+        forces: PerAxis::from_fn(3, |_| 0),
+        servo_errors: PerAxis::from_fn(3, |_| 0),
+        error: 21,
+        outputs: 0,
+        inputs: 0,
+    };
+    let own = Code::station([127, 0, 0, 1]);
+    for (origin, station, reports) in [
+        (Origin::Controller(0), own, 1),
+        (Origin::Stranger("127.0.0.1:5000".parse().unwrap()), own, 1),
+        (Origin::Stranger("127.0.0.2:7408".parse().unwrap()), own, 0),
+        (Origin::Controller(0), Code(0x0102), 0),
+    ] {
+        let rig = hall(1, |_| false);
+        rig.inject(origin, status(station).emit(&mut [0; MAX_LEN]).to_vec());
+        let found = run(&rig).remove(0);
+        assert_eq!(found.reported.reports, reports, "{origin:?}");
+        assert_eq!(found.reported.error.map(|heard| heard.value), (reports > 0).then_some(21));
+        assert!(rig.elapsed() >= LISTEN);
+    }
 }
 
 #[test]
