@@ -37,11 +37,15 @@ Examples:
   kinocue preflight --to 192.168.15.201:7408,axes=3
   kinocue preflight --explain estop-and
 
-A site that lives with a finding names it in its configuration, under [show] for all or under a [[controller]] for one:
+A site that lives with a finding names it in its configuration, under [show] or under one [[controller]]:
   accept_findings = [{ check = \"estop-disabled\", why = \"hard-wired contactor K1, tested 12 May\" }]
 
-Exit codes: 0 nothing fails, 1 something does, 69 no controller answers, 75 another program holds the frame port,
-78 the configuration is bad.")]
+Exit codes:
+  0   nothing fails
+  1   something fails
+  69  no controller answers
+  75  another program holds the frame port
+  78  the configuration is bad")]
 pub(super) struct Args {
     /// The controllers [default: all].
     #[arg(value_name = "NAME")]

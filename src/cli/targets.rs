@@ -16,7 +16,8 @@ use crate::wire::ReplyCode;
 /// Which controllers are meant.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
-    /// A controller: HOST:PORT, and behind commas name=A1 and dialect=smc or mbox; repeatable.
+    /// A controller: HOST:PORT, and behind commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
+    /// mbox; repeatable.
     #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
     to: Vec<String>,
     /// The controllers of a configuration: all of them, unless --row or names choose.
