@@ -13,8 +13,8 @@ use serde_json::Value;
 
 /// Settings that pass, but for the address of the host.
 const SAFE: &[&str] = &[
-    "00=10", "04=0", "06=0", "07=2880", "1e=100", "1f=1", "80=2880", "81=2880", "82=2880", "83=2880",
-    "84=2880", "85=2880", "90=1", "91=2", "92=1", "93=20", "94=300",
+    "00=10", "06=0", "07=2880", "1e=100", "1f=1", "80=2880", "81=2880", "82=2880", "83=2880", "84=2880",
+    "85=2880", "90=1", "91=2", "92=1", "93=20", "94=300",
 ];
 
 /// `kinocue sim`, killed where a test ends before it does.
@@ -279,7 +279,7 @@ fn a_cue_gives_the_axes_and_the_rate_the_longest_time() {
 
 #[test]
 fn mbox_controllers_are_judged_by_what_they_have() {
-    let parameters = ["04=0", "06=0", "07=2880", "90=1", "91=2", "92=1", "93=20", "94=300"];
+    let parameters = ["06=0", "07=2880", "90=1", "91=2", "92=1", "93=20", "94=300"];
     let sim = Sim::start(1, 11, &parameters, &["--dialect", "mbox"]);
     let folder = tempfile::tempdir().expect("a folder");
     let path = hall(&folder, &sim.addresses, "", "dialect = \"mbox\"\nestop_inputs = [1]");
