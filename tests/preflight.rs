@@ -153,14 +153,9 @@ fn settings_of_the_factory_are_refused_in_sentences() {
 
 #[test]
 fn each_of_these_settings_is_found_through_the_wire() {
-    for (setting, check) in [
-        ("92=3", "estop-and"),
-        ("91=1", "estop-returns"),
-        ("0d=500", "auto-reset"),
-        ("55=9", "amplitude"),
-        ("23=77", "reply-address"),
-        ("95=3", "axis-offset"),
-    ] {
+    for (setting, check) in
+        [("92=3", "estop-and"), ("0d=500", "auto-reset"), ("23=77", "reply-address"), ("95=3", "axis-offset")]
+    {
         let sim = Sim::safe(3, &[setting]);
         let said = preflight(3, &["--to", &format!("{},axes=3", sim.addresses[0]), "--json"]);
         assert_eq!((said.exit, failed(&said.json(), 0)), (1, vec![check]), "{setting}");

@@ -66,8 +66,8 @@ impl Survey {
     }
 }
 
-/// Asks all controllers of a conversation for the registers `wanted`, in the same order, and measures. Tells `on` what
-/// it is about to do.
+/// Asks all controllers of a conversation for the registers `wanted` of each, and measures; gives what each told, in the
+/// order of `controllers`. Tells `on` what it is about to do.
 ///
 /// # Panics
 /// If `controllers` or `wanted` are fewer than the conversation was opened with.
@@ -140,7 +140,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
         let requests = (0..self.controllers.len()).map(|lane| (lane, IDENTITY)).collect();
         for Outcome { lane, result, .. } in self.ask(requests, FIRST) {
             match result {
-                Ok(answer) => self.take(lane, &IDENTITY, &answer),
+                Ok(answer) => self.found[lane].values.extend(told(&IDENTITY, &answer)),
                 Err(fault) if fault.refused() => self.found[lane].unread.push(fault),
                 Err(fault) => self.found[lane].silent = Some(fault),
             }
@@ -156,7 +156,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
         }
         for Outcome { lane, request, result } in self.ask(requests, REGISTERS) {
             match result {
-                Ok(answer) => self.take(lane, &request, &answer),
+                Ok(answer) => self.found[lane].values.extend(told(&request, &answer)),
                 Err(fault) => self.found[lane].unread.push(fault),
             }
         }
@@ -175,13 +175,14 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
             };
             let requests = self.live().into_iter().map(|lane| (lane, Request::read(of(lane)))).collect();
             for Outcome { lane, result, .. } in self.ask(requests, ROUND) {
-                self.found[lane].rounds += 1;
+                let found = &mut self.found[lane];
                 match result {
-                    Ok(answer) => self.found[lane].round_trips.push(answer.took),
-                    // It answered all the same.
-                    Err(fault) if fault.refused() => self.found[lane].rounds -= 1,
+                    // A refusal is an answer too, but one whose time nobody took.
+                    Err(fault) if fault.refused() => continue,
+                    Ok(answer) => found.round_trips.push(answer.took),
                     Err(_) => {}
                 }
+                found.rounds += 1;
             }
         }
     }
@@ -217,10 +218,6 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
             survey.reported = observer.states()[lane];
         }
         found
-    }
-
-    fn take(&mut self, lane: usize, request: &Request, answer: &Answer) {
-        self.found[lane].values.extend(told(request, answer));
     }
 
     /// Asks, notes states, and counts what is sent; hears what comes meanwhile.
