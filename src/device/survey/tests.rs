@@ -82,6 +82,21 @@ fn lost_replies_do_not_look_like_another_master() {
 }
 
 #[test]
+fn an_early_count_that_comes_late_does_not_look_like_another_master() {
+    let rig = hall(1, |_| false);
+    let mut held = None;
+    rig.filter(move |nth, reply| match nth {
+        1 => {
+            held = Some(reply); // DP34, counted before it was asked for again
+            vec![]
+        }
+        2 => held.take().into_iter().collect(),
+        _ => vec![reply],
+    });
+    assert_eq!(run(&rig)[0].foreign_packets, Some(0));
+}
+
+#[test]
 fn packets_that_nobody_here_sent_are_counted() {
     let rig = hall(1, |_| false);
     let mut packets = 0;
