@@ -43,6 +43,7 @@ pub mod rt;
 pub mod sim;
 
 pub mod device;
+pub mod preflight;
 
 pub mod app;
 pub mod doctor;

@@ -8,7 +8,7 @@ use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::net::{Delivery, Sender};
-use crate::plan::PARK_VELOCITY_MM_S;
+use crate::plan::homing_time;
 use crate::rt::{AckLoop, Sent};
 use crate::time::{Clock, MonoTime};
 use crate::wire::{Code, MAX_LEN, PerAxis, RegisterReply, position_reads, positions};
@@ -18,8 +18,6 @@ const READ_TRIES: usize = 3;
 const READ_WAIT: Duration = Duration::from_millis(200);
 /// How often replies are looked for meanwhile.
 const LOOK: Duration = Duration::from_millis(2);
-/// The longest Time that a controller executes as it is (PA0b, IMAX manual 2.3.1).
-const LONGEST_MS: u32 = 3_000;
 /// What is waited beyond the Time of the slow frame.
 const SETTLE: Duration = Duration::from_millis(20);
 
@@ -178,27 +176,4 @@ fn first_axis(reply: &RegisterReply<'_>) -> Option<usize> {
 
 fn tells_all(controller: &Controller, told: &Told) -> bool {
     told.iter().take(controller.seat.axes.min(6)).all(Option::is_some)
-}
-
-/// The Time that takes a seat over its whole stroke at 50 mm/s, and whether it had to be cut.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a saturating cast is what is wanted"
-)]
-fn homing_time(stroke_mm: f64) -> (u32, bool) {
-    let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
-    (whole.min(LONGEST_MS), whole > LONGEST_MS)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_way_home_takes_the_stroke_at_50_mm_a_second_and_3_s_at_the_most() {
-        assert_eq!(homing_time(100.0), (2_000, false));
-        assert_eq!(homing_time(150.0), (3_000, false));
-        assert_eq!(homing_time(475.0), (3_000, true));
-    }
 }

@@ -12,8 +12,8 @@ pub(super) fn agreed(question: &str, given: bool, flag: &str) -> Result<bool, Fa
         return Ok(true);
     }
     somebody(question, flag)?;
-    eprint!("{question} [yes/no] ");
-    io::stderr().flush().or_exit(Exit::Io)?;
+    let mut asked = io::stderr().lock();
+    write!(asked, "{question} [yes/no] ").and_then(|()| asked.flush()).or_exit(Exit::Io)?;
     let mut answer = String::new();
     io::stdin().read_line(&mut answer).or_exit(Exit::Io)?;
     Ok(matches!(answer.trim().to_lowercase().as_str(), "y" | "yes"))

@@ -17,6 +17,7 @@ mod home;
 mod info;
 mod load;
 mod play;
+mod preflight;
 mod print;
 mod register;
 mod sim;
@@ -44,6 +45,7 @@ enum Command {
     Info(info::Args),
     Convert(convert::Args),
     Decode(decode::Args),
+    Preflight(preflight::Args),
     Register(register::Args),
     Home(home::Args),
     Doctor(doctor::Args),
@@ -79,6 +81,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Decode(args) => decode::run(&args),
+        Command::Preflight(args) => preflight::run(&args),
         Command::Register(args) => register::run(&args),
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),

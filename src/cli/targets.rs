@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, load, print};
-use crate::config::{Controller, Show, from_to_args};
+use crate::config::{Config, Controller, Show, from_to_args};
 use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
 use crate::motion::MAX_AXES;
 use crate::net::NetError;
@@ -16,7 +16,8 @@ use crate::wire::ReplyCode;
 /// Which controllers are meant.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
-    /// A controller: HOST:PORT, and behind commas name=A1 and dialect=smc or mbox; repeatable.
+    /// A controller: HOST:PORT, and behind commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
+    /// mbox; repeatable.
     #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
     to: Vec<String>,
     /// The controllers of a configuration: all of them, unless --row or names choose.
@@ -34,25 +35,30 @@ pub(super) struct TargetArgs {
 #[derive(Debug)]
 pub(super) struct Targets {
     pub(super) controllers: Vec<Controller>,
-    bind: SocketAddrV4,
+    /// How they are played to, and from where.
+    pub(super) show: Show,
 }
 
 impl TargetArgs {
     /// The controllers that the arguments and `names` mean.
     pub(super) fn resolve(&self, names: &[String]) -> Result<Targets, Failure> {
-        let (controllers, bind) = match &self.config {
-            Some(path) => {
-                let config = load::config(path)?;
-                (config.controllers, config.show.bind)
-            }
-            None => {
-                // Without a cue nothing limits the axes but the protocol.
-                let config = from_to_args(&self.to, &[], MAX_AXES).or_exit(Exit::Usage)?;
-                (config.controllers, Show::default().bind)
-            }
+        // Without a cue nothing limits the axes but the protocol.
+        self.resolve_for(names, MAX_AXES)
+    }
+
+    /// The same, for a cue of `cue_axes` axes.
+    pub(super) fn resolve_for(&self, names: &[String], cue_axes: usize) -> Result<Targets, Failure> {
+        let Config { mut show, controllers, .. } = match &self.config {
+            Some(path) => load::config(path)?,
+            None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
-        let controllers = self.choose(controllers, names)?;
-        Ok(Targets { controllers, bind: self.bind.unwrap_or(bind) })
+        show.bind = self.bind.unwrap_or(show.bind);
+        Ok(Targets { controllers: self.choose(controllers, names)?, show })
+    }
+
+    /// Whether a configuration names them.
+    pub(super) const fn are_configured(&self) -> bool {
+        self.config.is_some()
     }
 
     /// Those of the rows and of the names, in the order of the configuration; all where neither chooses.
@@ -82,7 +88,7 @@ impl TargetArgs {
 impl Targets {
     /// Takes the frame port; 75 while another program holds it.
     pub(super) fn open(&self) -> Result<Talk, Failure> {
-        Talk::open(self.bind, &self.controllers).map_err(|error| {
+        Talk::open(self.show.bind, &self.controllers).map_err(|error| {
             let exit = match &error {
                 NetError::Refused { cause, .. } if cause.kind() == io::ErrorKind::AddrInUse => Exit::TryAgain,
                 NetError::Refused { .. } => Exit::System,

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::motion::{MAX_AXES, SeatType};
+use crate::preflight::Check;
 
+mod accept;
 mod fault;
 mod fit;
 mod read;
@@ -57,6 +59,8 @@ pub struct Show {
     pub spin_us: u32,
     /// The folder with the cues of the daemon.
     pub library: PathBuf,
+    /// Findings of preflight that are accepted for good, of whichever controller.
+    pub accept_findings: Vec<Acceptance>,
 }
 
 impl Default for Show {
@@ -69,6 +73,7 @@ impl Default for Show {
             loss_policy: LossPolicy::Continue,
             spin_us: 0,
             library: PathBuf::from("/var/lib/kinocue/cues"),
+            accept_findings: Vec::new(),
         }
     }
 }
@@ -126,6 +131,17 @@ pub struct Controller {
     pub effects: Option<Vec<String>>,
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where only its replies tell.
     pub estop_inputs: u16,
+    /// Findings of preflight that are accepted for good of this controller.
+    pub accept_findings: Vec<Acceptance>,
+}
+
+/// A finding of preflight that the site lives with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Acceptance {
+    /// What is accepted.
+    pub check: Check,
+    /// Why, in the words of whoever answers for it; not empty.
+    pub why: String,
 }
 
 /// Who applies the axis offset (PA95).

@@ -10,6 +10,7 @@ use toml::de::DeTable;
 
 use crate::motion::{MAX_AXES, SeatType};
 
+use super::accept::acceptances;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::section::{Entry, Section, did_you_mean};
 use super::{
@@ -88,6 +89,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
         loss_policy: section.choice("loss_policy", &policy).unwrap_or(default.loss_policy),
         spin_us: section.whole_in("spin_us", 0..=900).unwrap_or(default.spin_us),
         library: section.text("library").map_or(default.library, PathBuf::from),
+        accept_findings: acceptances(&mut section),
     };
     section.finish();
     Some(show)
@@ -246,6 +248,7 @@ fn controller<'t>(
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
     let estop_inputs = inputs_of(&mut section, "estop_inputs");
+    let accept_findings = acceptances(&mut section);
     section.finish();
     let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
     if let Err(reason) = check_window(axis_offset, seat.axes, fan_out) {
@@ -263,6 +266,7 @@ fn controller<'t>(
         accept,
         effects,
         estop_inputs,
+        accept_findings,
     })
 }
 

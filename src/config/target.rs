@@ -171,6 +171,7 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
         accept: Accept::All,
         effects: None,
         estop_inputs: 0,
+        accept_findings: Vec::new(),
     })
 }
 

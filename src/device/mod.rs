@@ -6,6 +6,7 @@
 //!                        table: what is it? --+                   |
 //!        change: may it be written?   settings: a file, compared  +--> Answer, Fault          in words
 //!                                     home: reset, and wait
+//!                                     survey: all that preflight judges
 //! ```
 //!
 //! Everything but [`Talk`] is told the time and touches neither socket nor clock. What a register is stands in one
@@ -19,6 +20,7 @@ pub mod home;
 mod request;
 mod select;
 pub mod settings;
+pub mod survey;
 mod table;
 mod talk;
 #[cfg(test)]

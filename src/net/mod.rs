@@ -8,6 +8,7 @@
 mod error;
 mod open;
 mod recv;
+mod route;
 mod schedule;
 mod send;
 #[cfg(test)]
@@ -23,6 +24,7 @@ use crate::time::MonoTime;
 
 pub use error::NetError;
 pub use recv::{Origin, Receiver};
+pub use route::{Route, route};
 pub use schedule::DrainGrid;
 pub use send::{Delivery, SendFault, Sender};
 

@@ -4,6 +4,7 @@
 //! One structure that the report, the API and the console read alike.
 
 mod event;
+mod hear;
 mod state;
 
 pub use event::{Cause, Event, What};

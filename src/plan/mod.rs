@@ -13,7 +13,7 @@ mod states;
 
 pub use course::{After, Course};
 pub use join::JOIN_MIN;
-pub use park::PARK_VELOCITY_MM_S;
+pub use park::{PARK_VELOCITY_MM_S, homing_time};
 pub use planner::{From, Planner, Request, To};
 
 use rsruckig::prelude::{DataArrayOrVec, Trajectory};

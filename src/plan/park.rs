@@ -8,6 +8,8 @@ use crate::time::ShowTime;
 
 /// The greatest speed of a seat on its way to park, mm/s.
 pub const PARK_VELOCITY_MM_S: f64 = 50.0;
+/// The longest Time that a controller executes as it is in the factory (PA0b, IMAX manual 2.3.1).
+const LONGEST_MS: u32 = 3_000;
 
 /// What of the seat's own acceleration and jerk a move is planned with: all but what rounding to pulses adds, less only
 /// where its seam with what the lane did before would be rough.
@@ -73,6 +75,19 @@ fn stop_first(window: &Window, from: &[AxisState]) -> Result<Plan, String> {
     let stopped: Vec<AxisState> =
         stop.position_at(ends).iter().map(|position| AxisState::at_rest(*position)).collect();
     Ok(stop.then(straight(window, &stopped, 1.0)?))
+}
+
+/// The Time of the one slow frame that brings a seat to park from wherever it stands, ms: its whole stroke at 50 mm/s, at
+/// most 3 s; and whether it had to be cut to that.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a saturating cast is what is wanted"
+)]
+#[must_use]
+pub fn homing_time(stroke_mm: f64) -> (u32, bool) {
+    let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
+    (whole.min(LONGEST_MS), whole > LONGEST_MS)
 }
 
 fn straight(window: &Window, from: &[AxisState], share: f64) -> Result<Plan, String> {
@@ -156,5 +171,12 @@ mod tests {
                 "{off}"
             );
         }
+    }
+
+    #[test]
+    fn the_way_home_takes_the_stroke_at_50_mm_a_second_and_3_s_at_the_most() {
+        assert_eq!(homing_time(100.0), (2_000, false));
+        assert_eq!(homing_time(150.0), (3_000, false));
+        assert_eq!(homing_time(475.0), (3_000, true));
     }
 }

@@ -1,7 +1,5 @@
 //! The ack thread: drains replies by a timer, never woken by one, and keeps the books of every frame.
 
-use std::net::SocketAddrV4;
-
 use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
@@ -11,7 +9,7 @@ use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply, PerAxis, Report, Status};
+use crate::wire::{FrameNo, MotionReply, PerAxis};
 
 /// Everything that was counted.
 #[derive(Debug)]
@@ -95,7 +93,7 @@ impl AckLoop {
             let controller = match origin {
                 Origin::Controller(controller) => controller,
                 Origin::Stranger(from) => {
-                    *strangers += u64::from(!hear_elsewhere(observer, from, octets, at));
+                    *strangers += u64::from(!observer.hear_elsewhere(from, octets, at));
                     return;
                 }
             };
@@ -105,7 +103,7 @@ impl AckLoop {
                     let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
                     books.on_reply(reply, |tracker| take_records(sent, tracker, last_sent));
                 }
-                Err(_) if hear_report(observer, controller, octets, at) || other(controller, octets) => {}
+                Err(_) if observer.hear(controller, octets, at) || other(controller, octets) => {}
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
@@ -133,25 +131,6 @@ impl AckLoop {
     pub fn on_sent(&mut self, sent: Sent) {
         record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
     }
-}
-
-/// Hears a report that a controller sent unasked; says whether it was one.
-fn hear_report(observer: &mut Observer, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-    if let Ok(status) = Status::parse(octets) {
-        return observer.on_status(controller, &status, at);
-    }
-    let report = Report::parse(octets);
-    report.is_ok_and(|report| {
-        observer.on_report(controller, &report, at);
-        true
-    })
-}
-
-/// Hears a report that came from a port that is no controller's frame port; says whether it was one.
-fn hear_elsewhere(observer: &mut Observer, from: SocketAddrV4, octets: &[u8], at: MonoTime) -> bool {
-    let station = Status::parse(octets).ok().map(|status| status.station);
-    let controller = observer.sender_of_report(*from.ip(), station);
-    controller.is_some_and(|controller| hear_report(observer, controller, octets, at))
 }
 
 fn take_records(sent: &mut Consumer<Sent>, tracker: &mut Tracker, last_sent: &mut MonoTime) {

@@ -1,7 +1,5 @@
 //! How the program that started us wants signals treated.
 
-#![allow(unsafe_code, reason = "sigaction is a C function")]
-
 use std::mem::MaybeUninit;
 use std::{io, ptr};
 
@@ -9,6 +7,7 @@ use std::{io, ptr};
 ///
 /// # Errors
 /// Where there is no such signal.
+#[expect(unsafe_code, reason = "no safe wrapper of sigaction exists among our dependencies")]
 pub fn is_ignored(signal: i32) -> io::Result<bool> {
     let mut present = MaybeUninit::<libc::sigaction>::uninit();
     // SAFETY: with no new action the call only writes the present one to `present`, which is of its type.

@@ -158,7 +158,7 @@ impl MotionRequest {
     /// Octets of its layout; what a datagram has beyond them is surplus.
     #[must_use]
     pub fn layout_len(&self) -> usize {
-        len(self.positions.len(), self.vibration.is_some())
+        motion_len(self.positions.len(), self.vibration.is_some())
     }
 }
 
@@ -256,11 +256,13 @@ impl MotionReply {
     /// Octets of its layout; what a datagram has beyond them is surplus.
     #[must_use]
     pub fn layout_len(&self) -> usize {
-        len(self.positions.len(), self.vibration.is_some())
+        motion_len(self.positions.len(), self.vibration.is_some())
     }
 }
 
-const fn len(axes: usize, vibrating: bool) -> usize {
+/// Octets of a motion frame, or of its reply, with so many positions.
+#[must_use]
+pub const fn motion_len(axes: usize, vibrating: bool) -> usize {
     let tail = if vibrating { vibration::LEN * axes } else { field::EXTEND_LEN };
     field::POSITIONS + 4 * axes + field::PORT_LEN + tail
 }
@@ -293,7 +295,7 @@ pub(super) const fn is_motion(family: u8) -> bool {
 /// The most axes that fit into `octets` octets.
 const fn axes_that_fit(octets: usize, vibrating: bool) -> usize {
     let per_axis = if vibrating { 4 + vibration::LEN } else { 4 };
-    let axes = octets.saturating_sub(len(0, vibrating)) / per_axis;
+    let axes = octets.saturating_sub(motion_len(0, vibrating)) / per_axis;
     if axes > MAX_AXES { MAX_AXES } else { axes }
 }
 
@@ -338,7 +340,7 @@ impl Body<'_> {
         } else {
             put_u32(buf, tail, self.extend);
         }
-        &buf[..len(axes, self.vibration.is_some())]
+        &buf[..motion_len(axes, self.vibration.is_some())]
     }
 }
 
@@ -353,7 +355,7 @@ struct ReadBody {
 }
 
 fn read(octets: &[u8], axes: usize, vibrating: bool) -> Result<ReadBody, WireError> {
-    let need = len(axes.max(1), vibrating);
+    let need = motion_len(axes.max(1), vibrating);
     if octets.len() < need {
         return Err(WireError::Length { len: octets.len(), need });
     }

@@ -1,0 +1,172 @@
+//! `kinocue preflight`: every controller asked, judged and shown.
+
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::anyhow;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::load::{self, SourceArgs, parse_rate};
+use super::targets::{TargetArgs, Targets};
+use super::{Exit, Failure, OrExit as _, print};
+use crate::device::survey::{Survey, survey};
+use crate::motion::MAX_AXES;
+use crate::net::{Route, route};
+use crate::preflight::{Check, Subject, Terms, judge, wanted};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+use crate::timeline::Timeline;
+
+mod explain;
+mod report;
+
+use report::Report;
+
+/// Checks every controller before anyone sits down: who answers, how fast, and whether its settings are right and safe.
+///
+/// Reads only; nothing moves and nothing is changed. Controllers are asked side by side: 64 of them take seconds, also
+/// where some are dead. Ends with 0 only where nothing fails.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue preflight --config hall.toml
+  kinocue preflight --config hall.toml --cue cues/voyage.csv --rate 250
+  kinocue preflight A1 A2 --config hall.toml
+  kinocue preflight --config hall.toml --row B --json
+  kinocue preflight --to 192.168.15.201:7408,axes=3
+  kinocue preflight --explain estop-and
+
+A site that lives with a finding names it in its configuration, under [show] or under one [[controller]]:
+  accept_findings = [{ check = \"estop-disabled\", why = \"hard-wired contactor K1, tested 12 May\" }]
+
+Exit codes:
+  0   nothing fails
+  1   something fails
+  69  no controller answers
+  75  another program holds the frame port
+  78  the configuration is bad")]
+pub(super) struct Args {
+    /// The controllers [default: all].
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    #[command(flatten)]
+    targets: TargetArgs,
+    /// The cue that will be played.
+    #[arg(long, value_name = "CUE")]
+    cue: Option<PathBuf>,
+    #[command(flatten)]
+    source: SourceArgs,
+    /// Frames a second [default: those of the configuration; 100 without].
+    #[arg(long, value_name = "HZ", value_parser = parse_rate)]
+    rate: Option<f64>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Say what the checks are, or what one is, and why it matters; asks no controller.
+    #[arg(long, value_name = "CHECK", num_args = 0..=1, exclusive = true)]
+    explain: Option<Option<String>>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    if let Some(which) = &args.explain {
+        return explain(which.as_deref());
+    }
+    let cue =
+        args.cue.as_ref().map(|path| load::cue(path, &args.source.source())).transpose()?.map(Timeline::new);
+    let cue_axes = cue.as_ref().map_or(MAX_AXES, Timeline::axes);
+    let targets = args.targets.resolve_for(&args.names, cue_axes)?;
+    let terms = Terms {
+        frame_port: targets.show.bind.port(),
+        rate_hz: args.rate.unwrap_or(targets.show.rate_hz),
+        cue: cue.map(|cue| (cue.axes(), cue.has_vibration())),
+    };
+    // What --to means where neither it nor a cue gives the axes reaches to the last one there may be.
+    let axes_are_open = !args.targets.are_configured() && args.cue.is_none();
+    let begun = Monotonic.now();
+    let asked = ask(&targets)?;
+    let subjects: Vec<_> = (targets.controllers.iter().zip(&asked))
+        .map(|(controller, asked)| Subject {
+            controller,
+            axes: Some(controller.seat.axes).filter(|_| !axes_are_open || controller.window().end < MAX_AXES),
+            route: asked.route.clone(),
+            survey: asked.survey.as_ref(),
+        })
+        .collect();
+    let findings = judge(&subjects, &terms, &targets.show.accept_findings);
+    let report = Report::new(&subjects, findings, Monotonic.now().since(begun));
+    tell(&report, args.json)
+}
+
+fn explain(which: Option<&str>) -> Result<Exit, Failure> {
+    let text = match which {
+        None => explain::all(),
+        Some(id) => {
+            explain::one(id.parse::<Check>().map_err(|error| anyhow!("{id}: {error}")).or_exit(Exit::Usage)?)
+        }
+    };
+    print::out(&text)?;
+    Ok(Exit::Done)
+}
+
+/// What asking one controller came to.
+struct Asked {
+    route: Result<Route, String>,
+    /// None where there is no way to it.
+    survey: Option<Survey>,
+}
+
+/// Asks those to whom there is a way.
+fn ask(targets: &Targets) -> Result<Vec<Asked>, Failure> {
+    let bind = *targets.show.bind.ip();
+    let way = |address| route(bind, address).map_err(|error| error.to_string());
+    let routes: Vec<_> = targets.controllers.iter().map(|controller| way(controller.address)).collect();
+    let reached = targets.controllers.iter().zip(&routes).filter(|(_, route)| route.is_ok());
+    let reached = Targets {
+        controllers: reached.map(|(controller, _)| controller.clone()).collect(),
+        show: targets.show.clone(),
+    };
+    let mut surveys =
+        if reached.controllers.is_empty() { Vec::new() } else { survey_all(&reached)? }.into_iter();
+    let asked = |route: Result<Route, String>| {
+        let survey = route.is_ok().then(|| surveys.next()).flatten();
+        Asked { route, survey }
+    };
+    Ok(routes.into_iter().map(asked).collect())
+}
+
+/// Asks all, with a progress line on a terminal.
+fn survey_all(targets: &Targets) -> Result<Vec<Survey>, Failure> {
+    let mut talk = targets.open()?;
+    let bar = std::io::stderr().is_terminal().then(|| {
+        let style = ProgressStyle::with_template("{spinner} {elapsed} {msg}").expect("the template is fixed");
+        let bar = ProgressBar::new_spinner().with_style(style);
+        bar.enable_steady_tick(Duration::from_millis(100));
+        bar
+    });
+    let count = targets.controllers.len();
+    let wanted: Vec<_> = targets.controllers.iter().map(|controller| wanted(controller.dialect)).collect();
+    let surveys = survey(&mut talk, &targets.controllers, &wanted, &mut |doing| {
+        if let Some(bar) = &bar {
+            bar.set_message(format!("{count} controllers: {doing}"));
+        }
+    });
+    if let Some(bar) = bar {
+        bar.finish_and_clear();
+    }
+    Ok(surveys)
+}
+
+fn tell(report: &Report, json: bool) -> Result<Exit, Failure> {
+    if json {
+        print::json(report)?;
+    } else {
+        print::out(&report.text())?;
+    }
+    print::tell(&format!("kinocue: {}", report.summary()));
+    Ok(match (report.answered(), report.passed()) {
+        (0, _) => Exit::Unavailable,
+        (_, false) => Exit::CheckFailed,
+        (_, true) => Exit::Done,
+    })
+}

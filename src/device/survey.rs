@@ -1,0 +1,271 @@
+//! Asks many controllers for all that preflight judges, side by side, and notes how they answer: how fast, how often,
+//! with what state, and whether anybody else seems to be at their address or to speak to them.
+//!
+//! Dead controllers cost their three unanswered tries once; the time for all is bounded whatever the network does.
+
+use std::time::Duration;
+
+use super::settings::Values;
+use super::talk::Link;
+use super::{Address, Answer, Fault, Odds, Outcome, Patience, Request, Talk, reads, table};
+use crate::config::Controller;
+use crate::net::Origin;
+use crate::observe::{ControllerState, Observer, Watched};
+use crate::time::{Clock, MonoTime};
+use crate::wire::{DeviceError, Dialect, ReplyCode};
+
+/// Reads whose round trip is measured.
+pub const ROUNDS: usize = 20;
+/// How long each of these waits for its answer.
+pub const ROUND_TIMEOUT: Duration = Duration::from_millis(100);
+/// How long a survey listens for reports at the least.
+pub const LISTEN: Duration = Duration::from_millis(300);
+/// No round begins this long after the survey began.
+const LAST_ROUND: Duration = Duration::from_secs(7);
+
+const ROUND: Patience = Patience { timeout: ROUND_TIMEOUT, tries: 1 };
+const FIRST: Patience = Patience { timeout: Duration::from_millis(300), tries: 3 };
+const REGISTERS: Patience = Patience { timeout: Duration::from_millis(200), tries: 3 };
+const LAST: Patience = Patience { timeout: Duration::from_millis(200), tries: 2 };
+
+/// The controller's own addresses, PA10 to PA1b: read first and last.
+const IDENTITY: Request = Request::Read { first: Address::Pa(0x10), count: 12 };
+/// Datagrams that the controller received; SMC alone.
+const PACKETS: Address = Address::Dp(0x34);
+
+/// What one controller told.
+#[derive(Debug, Clone, Default)]
+pub struct Survey {
+    /// What its registers hold.
+    pub values: Values,
+    /// Why the first question had no answer; none where it had one.
+    pub silent: Option<Fault>,
+    /// Why later questions had none.
+    pub unread: Vec<Fault>,
+    /// Its state, where an answer told of another than the normal one; the last of these.
+    pub state: Option<(ReplyCode, DeviceError)>,
+    /// How long the answers to the measured reads took.
+    pub round_trips: Vec<Duration>,
+    /// Measured reads that were sent.
+    pub rounds: usize,
+    /// What came from its address and was no answer.
+    pub odds: Odds,
+    /// Registers that told two values, though nobody here wrote them.
+    pub changed: Vec<Address>,
+    /// Datagrams that it received beyond those sent from here; none where that is not known.
+    pub foreign_packets: Option<u16>,
+    /// What it reported unasked.
+    pub reported: ControllerState,
+}
+
+impl Survey {
+    /// Whether it answered at all.
+    #[must_use]
+    pub const fn answered(&self) -> bool {
+        self.silent.is_none()
+    }
+}
+
+/// Asks all controllers of a conversation for the registers `wanted` of each, and measures; gives what each told, in the
+/// order of `controllers`. Tells `on` what it is about to do.
+///
+/// # Panics
+/// If `controllers` or `wanted` are fewer than the conversation was opened with.
+pub fn survey<L: Link, C: Clock>(
+    talk: &mut Talk<L, C>,
+    controllers: &[Controller],
+    wanted: &[Vec<Address>],
+    on: &mut dyn FnMut(&str),
+) -> Vec<Survey> {
+    let mut asking = Asking::new(talk, controllers);
+    on("who answers");
+    asking.first();
+    on("reading registers");
+    asking.registers(wanted);
+    on("measuring round trips");
+    asking.rounds();
+    on("reading again");
+    asking.last();
+    on("listening for reports");
+    asking.listen();
+    asking.finish()
+}
+
+/// A survey under way.
+struct Asking<'t, L, C> {
+    talk: &'t mut Talk<L, C>,
+    controllers: &'t [Controller],
+    observer: Observer,
+    begun: MonoTime,
+    found: Vec<Survey>,
+    packets: Vec<Packets>,
+}
+
+/// What a controller should have counted.
+#[derive(Debug, Clone, Copy, Default)]
+struct Packets {
+    /// What it had counted at first.
+    first: Option<u16>,
+    /// Sent from here since then, at most.
+    sent: u32,
+}
+
+impl Packets {
+    fn count(&mut self, request: &Request, result: &Result<Answer, Fault>) {
+        match result {
+            Ok(answer) if self.first.is_none() && *request == Request::read(PACKETS) => {
+                // What answers an earlier try has not counted the later ones.
+                *self = Self { first: answer.words.first().copied(), sent: answer.tries - 1 };
+            }
+            Ok(answer) => self.sent += answer.tries,
+            Err(Fault::Silent { tries, .. }) => self.sent += tries,
+            Err(_) => self.sent += 1,
+        }
+    }
+}
+
+impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
+    fn new(talk: &'t mut Talk<L, C>, controllers: &'t [Controller]) -> Self {
+        Self {
+            begun: talk.now(),
+            talk,
+            observer: Observer::new(controllers.iter().map(Watched::of).collect()),
+            found: vec![Survey::default(); controllers.len()],
+            packets: vec![Packets::default(); controllers.len()],
+            controllers,
+        }
+    }
+
+    fn first(&mut self) {
+        let requests = (0..self.controllers.len()).map(|lane| (lane, IDENTITY)).collect();
+        for Outcome { lane, result, .. } in self.ask(requests, FIRST) {
+            match result {
+                Ok(answer) => self.found[lane].values.extend(told(&IDENTITY, &answer)),
+                Err(fault) if fault.refused() => self.found[lane].unread.push(fault),
+                Err(fault) => self.found[lane].silent = Some(fault),
+            }
+        }
+    }
+
+    fn registers(&mut self, wanted: &[Vec<Address>]) {
+        let mut requests = self.each_smc(Request::read(PACKETS));
+        for lane in self.live() {
+            let missing = wanted[lane].iter().copied();
+            let missing: Vec<_> = missing.filter(|it| !self.found[lane].values.contains_key(it)).collect();
+            requests.extend(reads(&missing).into_iter().map(|read| (lane, read)));
+        }
+        for Outcome { lane, request, result } in self.ask(requests, REGISTERS) {
+            match result {
+                Ok(answer) => self.found[lane].values.extend(told(&request, &answer)),
+                Err(fault) => self.found[lane].unread.push(fault),
+            }
+        }
+    }
+
+    /// Reads one register of each controller, then the next: an answer that comes late is then never taken for that of
+    /// a later read, nor has one to be waited for.
+    fn rounds(&mut self) {
+        for (smc, mbox) in monitors(Dialect::Smc).into_iter().zip(monitors(Dialect::Mbox)) {
+            if self.talk.now().since(self.begun) >= LAST_ROUND {
+                return;
+            }
+            let of = |lane: usize| match self.controllers[lane].dialect {
+                Dialect::Smc => smc,
+                Dialect::Mbox => mbox,
+            };
+            let requests = self.live().into_iter().map(|lane| (lane, Request::read(of(lane)))).collect();
+            for Outcome { lane, result, .. } in self.ask(requests, ROUND) {
+                let found = &mut self.found[lane];
+                match result {
+                    // A refusal is an answer too, but one whose time nobody took.
+                    Err(fault) if fault.refused() => continue,
+                    Ok(answer) => found.round_trips.push(answer.took),
+                    Err(_) => {}
+                }
+                found.rounds += 1;
+            }
+        }
+    }
+
+    fn last(&mut self) {
+        let mut requests: Vec<_> = self.live().into_iter().map(|lane| (lane, IDENTITY)).collect();
+        requests.extend(self.each_smc(Request::read(PACKETS)));
+        for Outcome { lane, request, result } in self.ask(requests, LAST) {
+            let Ok(answer) = result else { continue };
+            if request == IDENTITY {
+                let before = &self.found[lane].values;
+                let differs =
+                    |(address, word): &(Address, u16)| before.get(address).is_some_and(|it| it != word);
+                self.found[lane].changed =
+                    told(&request, &answer).filter(differs).map(|(address, _)| address).collect();
+            } else {
+                let Packets { first, sent } = self.packets[lane];
+                let grown = first.zip(answer.words.first()).map(|(first, now)| now.wrapping_sub(first));
+                let sent = u16::try_from(sent).unwrap_or(u16::MAX);
+                self.found[lane].foreign_packets = grown.map(|grown| grown.saturating_sub(sent));
+            }
+        }
+    }
+
+    fn listen(&mut self) {
+        self.talk.wait(self.begun + LISTEN, &mut hearing(&mut self.observer));
+    }
+
+    fn finish(self) -> Vec<Survey> {
+        let Self { talk, observer, mut found, .. } = self;
+        for (lane, survey) in found.iter_mut().enumerate() {
+            survey.odds = talk.odds(lane);
+            survey.reported = observer.states()[lane];
+        }
+        found
+    }
+
+    /// Asks, notes states, and counts what is sent; hears what comes meanwhile.
+    fn ask(&mut self, requests: Vec<(usize, Request)>, patience: Patience) -> Vec<Outcome> {
+        let Self { talk, observer, .. } = self;
+        let outcomes = talk.ask_watching(requests, patience, &mut hearing(observer));
+        for Outcome { lane, request, result } in &outcomes {
+            self.packets[*lane].count(request, result);
+            let state = result.as_ref().ok().map(|answer| (answer.code, answer.error));
+            if let Some(state) = state.filter(|(code, _)| *code != ReplyCode::Running) {
+                self.found[*lane].state = Some(state);
+            }
+        }
+        outcomes
+    }
+
+    fn live(&self) -> Vec<usize> {
+        (0..self.found.len()).filter(|lane| self.found[*lane].answered()).collect()
+    }
+
+    fn each_smc(&self, request: Request) -> Vec<(usize, Request)> {
+        let smc = |lane: &usize| self.controllers[*lane].dialect == Dialect::Smc;
+        self.live().into_iter().filter(smc).map(|lane| (lane, request.clone())).collect()
+    }
+}
+
+/// Takes what is no answer for a report.
+fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
+    |origin, octets, at| {
+        let _ = match origin {
+            Origin::Controller(lane) => observer.hear(lane, octets, at),
+            Origin::Stranger(from) => observer.hear_elsewhere(from, octets, at),
+        };
+    }
+}
+
+/// The registers of a read, and what they hold.
+fn told(request: &Request, answer: &Answer) -> impl Iterator<Item = (Address, u16)> {
+    let first = request.first();
+    let addresses = (0..).map_while(move |step| first.after(step));
+    addresses.zip(answer.words.clone())
+}
+
+/// The monitor registers that are read to measure; no other question of the survey is like theirs.
+fn monitors(dialect: Dialect) -> Vec<Address> {
+    let addresses = table().of(dialect).map(|register| register.address);
+    addresses.filter(|it| matches!(it, Address::Dp(_)) && *it != PACKETS).take(ROUNDS).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,28 @@
+//! Reports as they come from the sockets.
+
+use std::net::SocketAddrV4;
+
+use super::Observer;
+use crate::time::MonoTime;
+use crate::wire::{Report, Status};
+
+impl Observer {
+    /// Hears a report that a controller sent unasked (0x3101, 0x1001); says whether it was one.
+    pub fn hear(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
+        if let Ok(status) = Status::parse(octets) {
+            return self.on_status(controller, &status, at);
+        }
+        let report = Report::parse(octets);
+        report.is_ok_and(|report| {
+            self.on_report(controller, &report, at);
+            true
+        })
+    }
+
+    /// Hears a report that came from a port that is no controller's frame port; says whether it was one.
+    pub fn hear_elsewhere(&mut self, from: SocketAddrV4, octets: &[u8], at: MonoTime) -> bool {
+        let station = Status::parse(octets).ok().map(|status| status.station);
+        let controller = self.sender_of_report(*from.ip(), station);
+        controller.is_some_and(|controller| self.hear(controller, octets, at))
+    }
+}

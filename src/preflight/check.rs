@@ -1,0 +1,345 @@
+//! Every check there is: its name, how grave it is, and why it matters. One table; the judges, the configuration,
+//! `--explain` and the reports all read it.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Serialize, Serializer};
+
+/// How grave a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing; nothing to be done.
+    Info,
+    /// Should be looked at; does not stop a show.
+    Warn,
+    /// Nobody should sit down before it is put right, or accepted by name.
+    Fail,
+}
+
+impl Severity {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Warn => "warn",
+            Self::Fail => "fail",
+        }
+    }
+}
+
+/// What a check is about; a column of the table of controllers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Family {
+    /// Whether it answers, and how fast.
+    Answers,
+    /// Whether it is the controller it should be.
+    Identity,
+    /// The way to it and back.
+    Network,
+    /// How it takes frames.
+    Motion,
+    /// How fast it may move.
+    Speed,
+    /// Its emergency stop.
+    EmergencyStop,
+    /// What it says of itself, and how often.
+    Status,
+}
+
+impl Family {
+    /// All of them, in the order of the table.
+    pub const ALL: [Self; 7] = [
+        Self::Answers,
+        Self::Identity,
+        Self::Network,
+        Self::Motion,
+        Self::Speed,
+        Self::EmergencyStop,
+        Self::Status,
+    ];
+
+    /// What heads its column.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Answers => "answers",
+            Self::Identity => "identity",
+            Self::Network => "network",
+            Self::Motion => "motion",
+            Self::Speed => "speed",
+            Self::EmergencyStop => "e-stop",
+            Self::Status => "status",
+        }
+    }
+}
+
+/// Makes the checks and the one table of them.
+macro_rules! checks {
+    ($($check:ident $id:literal $family:ident $severity:ident $why:literal;)+) => {
+        /// One thing that preflight looks for.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Check {
+            $(#[doc = $why] $check,)+
+        }
+
+        impl Check {
+            /// All of them, by family.
+            pub const ALL: &[Self] = &[$(Self::$check,)+];
+
+            /// Its name, which never changes.
+            #[must_use]
+            pub const fn id(self) -> &'static str {
+                match self { $(Self::$check => $id,)+ }
+            }
+
+            /// What it is about.
+            #[must_use]
+            pub const fn family(self) -> Family {
+                match self { $(Self::$check => Family::$family,)+ }
+            }
+
+            /// How grave it is.
+            #[must_use]
+            pub const fn severity(self) -> Severity {
+                match self { $(Self::$check => Severity::$severity,)+ }
+            }
+
+            /// Why it matters, in sentences.
+            #[must_use]
+            pub const fn why(self) -> &'static str {
+                match self { $(Self::$check => $why,)+ }
+            }
+        }
+    };
+}
+
+checks! {
+    NoAnswer "no-answer" Answers Fail
+        "A controller that does not answer cannot be checked, and a seat that nobody watches must not be played to. \
+         PA15 = 0 silences a controller that is alive.";
+    RegisterUnread "register-unread" Answers Fail
+        "A setting that could not be read cannot be known to be safe.";
+    RepliesDisabled "replies-disabled" Answers Fail
+        "With PA15 other than 1 no frame is acknowledged, and the loss of a controller goes unnoticed.";
+    RepliesLost "replies-lost" Answers Fail
+        "More than 2 of 20 reads without an answer within 100 ms: so many lost frames make a show degrade.";
+    RepliesMissed "replies-missed" Answers Warn
+        "One or two of 20 reads without an answer within 100 ms: the network loses datagrams.";
+    SlowReplies "slow-replies" Answers Warn
+        "An answer that took over 20 ms: a show notices a silent controller after 250 ms, and late replies hide it.";
+    BrokenReplies "broken-replies" Answers Warn
+        "Datagrams came from the controller's address that are no messages: a broken cable or switch, or another device.";
+
+    Address "address" Identity Fail
+        "The controller takes itself for another address or port than the one it was reached at (PA10 to PA14): its \
+         station code and its reports are then another seat's.";
+    DuplicateAddress "duplicate-address" Identity Fail
+        "Two controllers of the configuration have one address, or one hardware address (PA16 to PA1b): what is meant \
+         for one seat moves another.";
+    TwoAnswer "two-answer" Identity Warn
+        "A request was answered more than once: two controllers may have one address, or the network repeats datagrams.";
+    Contradiction "contradiction" Identity Fail
+        "The same register read twice gave two values though nobody wrote it: two controllers answer for one, or \
+         somebody else is changing its settings.";
+    ForeignReplies "foreign-replies" Identity Warn
+        "Answers came that nobody had asked for: another program speaks to this controller from this machine's \
+         address, or two controllers have one address.";
+    OtherMaster "other-master" Identity Fail
+        "The controller counts more packets (DP34) than it was sent from here: another machine sends to it, and a \
+         controller obeys everybody.";
+    AxisCount "axis-count" Identity Fail
+        "PA02 differs from the axes of the seat type: axes stand still, or motors that are not there raise errors.";
+    AxisCountOpen "axis-count-open" Identity Info
+        "Neither a configuration, nor axes= in --to, nor a cue says how many axes the seat has.";
+    WorkMode "work-mode" Identity Fail
+        "PA00 must be the work mode: 10, or 0 on RS-485 controllers of the IMAX manual. The others are for tests and \
+         effects, and frames do not move the seat as meant.";
+    AxisOffset "axis-offset" Identity Fail
+        "PA95 must be 0 where kinocue sends each controller its own axes (fan_out = slice), and axis_offset where each \
+         takes its window of one frame (shared). Else the seat plays axes that are not its own.";
+    Version "version" Identity Info
+        "The version of the controller's software, DPFF and DPFE.";
+    VersionDiffers "version-differs" Identity Warn
+        "Controllers of one dialect with different software may behave differently, for instance in an emergency stop.";
+    NotAsked "not-asked" Identity Info
+        "MBOX controllers lack some registers; what these would tell is not known.";
+
+    Route "route" Network Fail
+        "The system has no way to the controller's address.";
+    Mtu "mtu" Network Fail
+        "The largest datagram does not fit through the interface in one piece; controllers put nothing together again.";
+    ReplyAddress "reply-address" Network Fail
+        "PA20 to PA23 must be this machine's address as the controller sees it: that is where it answers and reports.";
+    ReplyPort "reply-port" Network Fail
+        "PA24 must be the frame port: SMC controllers take frames from that port alone, and answer to it.";
+    FramePortFree "frame-port-free" Network Info
+        "With port 0 in bind the frame port is another each time, so PA24 cannot be compared with it.";
+
+    IntervalLimit "interval-limit" Motion Fail
+        "A Time longer than PA0b is cut to it, so the move is made in less time: faster than anyone proved.";
+    IntervalUnlimited "interval-unlimited" Motion Warn
+        "PA0b = 0 means no limit by the SMC manual alone; the IMAX manual does not say what it does.";
+    AutoReset "auto-reset" Motion Fail
+        "With PA0d above 0 the controller resets by itself some time after the last frame: the seat moves without a \
+         command, perhaps in a pause with people on it.";
+    FastForward "fast-forward" Motion Warn
+        "With PA06 = 1 the controller hurries as soon as more than two frames wait, so a burst of late frames is a \
+         violent move. With 0 it lags behind instead.";
+    FastForwardUnknown "fast-forward-unknown" Motion Fail
+        "PA06 is neither 0 nor 1: what the controller does with a backlog is not known.";
+    Amplitude "amplitude" Motion Fail
+        "PA55 other than 0 scales every position in the controller: the seat does not go where it is sent, and what it \
+         acknowledges is not where it stands.";
+    OutputsIgnored "outputs-ignored" Motion Warn
+        "With PA9d = 1 the controller ignores the outputs in frames: no effect of a cue comes on, and none goes off.";
+
+    SpeedUnlimited "speed-unlimited" Speed Fail
+        "PA07 is the last limit on speed that the controller itself keeps; 0 is none that can be relied on.";
+    AxisSpeedUnlimited "axis-speed-unlimited" Speed Fail
+        "PA80 to PA85 limit the speed of each axis; 0 is no limit, so that only PA07 is left.";
+    SpeedTooLow "speed-too-low" Speed Fail
+        "The controller's limit is below the seat type's max_velocity_mm_s: it falls behind fast passages, its queue \
+         fills, and it then hurries (PA06) or stops with Err21.";
+    SpeedTooHigh "speed-too-high" Speed Warn
+        "The controller's limit is more than a tenth above the seat type's max_velocity_mm_s: it would not hold back \
+         a move that is too fast for people.";
+
+    EstopDisabled "estop-disabled" EmergencyStop Fail
+        "With bit 0 of PA90 clear, as it leaves the factory, the controller ignores every emergency stop input.";
+    EstopNoInput "estop-no-input" EmergencyStop Fail
+        "PA92 = 0 names no input: the emergency stop is enabled, but nothing can trigger it.";
+    EstopAnd "estop-and" EmergencyStop Fail
+        "PA92 joins its inputs with AND: with two buttons on two inputs, pressing one does nothing. Wire normally \
+         closed buttons in series to one input.";
+    EstopResumes "estop-resumes" EmergencyStop Fail
+        "With PA91 = 0 the seat holds while the button is pressed and moves on by itself once it is let go; no \
+         emergency stop may end without a reset.";
+    EstopReturns "estop-returns" EmergencyStop Fail
+        "With PA91 = 1 the seat moves to zero when the button is pressed, when it should stand still, and moves on by \
+         itself once it is let go.";
+    EstopAction "estop-action" EmergencyStop Fail
+        "PA91 has a value that no manual explains: what the seat does in an emergency stop is not known.";
+    EstopFilter "estop-filter" EmergencyStop Fail
+        "PA93 is how long the input must be active before anything happens; over 50 ms the seat moves on too long.";
+    EstopRelease "estop-release" EmergencyStop Fail
+        "PA94 limits the speed at which the seat leaves an emergency stop; what 0 means is not documented, and may be \
+         no limit.";
+    EstopReleaseFast "estop-release-fast" EmergencyStop Warn
+        "PA94 is not below PA07, so the seat leaves an emergency stop at the full speed of a show.";
+    EstopWire "estop-wire" EmergencyStop Warn
+        "With PA04 = 1 an input is active when low, and an open one is high: a broken wire looks like a button that \
+         nobody presses. PA04 = 0 with a normally closed button stops when the wire breaks.";
+    EstopResetInput "estop-reset-input" EmergencyStop Warn
+        "With bit 3 of PA90 set and inputs in PA98, a press at an input resets the controller, and the seat moves; so \
+         an emergency stop can be ended from there.";
+    EstopResetShared "estop-reset-shared" EmergencyStop Fail
+        "PA98 and PA92 name the same input: the press that stops the seat also resets it.";
+    EstopJog "estop-jog" EmergencyStop Warn
+        "Bit 1 or 2 of PA90 is set: inputs can move the seat by hand, also during a show.";
+    EstopUnwatched "estop-unwatched" EmergencyStop Warn
+        "estop_inputs of the configuration and PA92 name different inputs: what the controller takes for an emergency \
+         stop and what kinocue does are not the same.";
+
+    EmergencyStopActive "emergency-stop-active" Status Fail
+        "An emergency stop is in effect now.";
+    ActiveError "active-error" Status Fail
+        "The controller or one of its drives reports an error now (chapter 6 of both manuals).";
+    StatusOff "status-off" Status Fail
+        "With PA1f = 0 the controller never reports its state, so a drive's alarm between frames goes unnoticed.";
+    StatusElsewhere "status-elsewhere" Status Fail
+        "With PA1f = 2 reports go to PA25 to PA29; where that is not this machine, nobody here hears them.";
+    StatusUnheard "status-unheard" Status Warn
+        "The settings promise status reports to this machine, but none came while it listened: a firewall may be in the \
+         way, or the firmware has no such reports.";
+    StatusSlow "status-slow" Status Fail
+        "PA1e is the interval of status reports: 0 sends one only when an alarm begins, and over 100 ms is no beat by \
+         which a loss is noticed in time.";
+}
+
+impl Check {
+    /// Whether a configuration may accept it for good: a setting that was found and understood, but not that a
+    /// controller is silent or in trouble at present, and nothing that is only told.
+    #[must_use]
+    pub const fn can_be_accepted(self) -> bool {
+        !self.is_unknown() && !self.is_present() && !matches!(self.severity(), Severity::Info)
+    }
+
+    /// Whether it means that something is not known.
+    #[must_use]
+    pub const fn is_unknown(self) -> bool {
+        matches!(self, Self::NoAnswer | Self::RegisterUnread | Self::Route)
+    }
+
+    /// Whether it is about this moment, and no setting.
+    #[must_use]
+    pub const fn is_present(self) -> bool {
+        matches!(self, Self::EmergencyStopActive | Self::ActiveError)
+    }
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+impl Serialize for Check {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.id())
+    }
+}
+
+/// No check has this name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no check has this name; `kinocue preflight --explain` lists them")]
+pub struct UnknownCheck;
+
+impl FromStr for Check {
+    type Err = UnknownCheck;
+
+    fn from_str(id: &str) -> Result<Self, UnknownCheck> {
+        Self::ALL.iter().copied().find(|check| check.id() == id).ok_or(UnknownCheck)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_check_has_a_name_of_its_own_in_kebab_case() {
+        for (index, check) in Check::ALL.iter().enumerate() {
+            assert_eq!(check.id().parse(), Ok(*check));
+            assert!(check.id().bytes().all(|octet| octet.is_ascii_lowercase() || octet == b'-'), "{check}");
+            assert!(Check::ALL[..index].iter().all(|before| before.id() != check.id()), "{check}");
+        }
+        assert_eq!("estop".parse::<Check>(), Err(UnknownCheck));
+    }
+
+    #[test]
+    fn checks_are_explained_in_whole_sentences() {
+        for check in Check::ALL {
+            assert!(check.why().ends_with('.'), "{check}");
+            assert!(!check.why().contains("  "), "{check}");
+        }
+    }
+
+    #[test]
+    fn silence_and_present_trouble_cannot_be_accepted() {
+        for check in [
+            Check::NoAnswer,
+            Check::RegisterUnread,
+            Check::Route,
+            Check::EmergencyStopActive,
+            Check::ActiveError,
+        ] {
+            assert!(!check.can_be_accepted(), "{check}");
+        }
+        assert!(Check::EstopDisabled.can_be_accepted() && Check::FastForward.can_be_accepted());
+        assert!(!Check::Version.can_be_accepted());
+    }
+}

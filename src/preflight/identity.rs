@@ -1,0 +1,168 @@
+//! Whether a controller is the one it should be, alone at its address, and set up for its seat.
+
+use std::collections::BTreeMap;
+
+use super::{Check, Notes, Subject};
+use crate::config::FanOut;
+use crate::device::Address;
+use crate::wire::Dialect;
+
+pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
+    judge_address(subject, notes);
+    judge_company(subject, notes);
+    judge_axes(subject, notes);
+    judge_mode(subject, notes);
+    judge_offset(subject, notes);
+    if let Some(version) = version(subject) {
+        notes.add(Check::Version, format!("software {version}"), "");
+    }
+    if subject.controller.dialect == Dialect::Mbox {
+        let found = "not in the IMAX manual, so not asked: auto reset (PA0d), status reports (PA1e, PA1f), amplitude \
+                     (PA55), speed of single axes (PA80 to PA85), emergency reset (PA98), outputs (PA9d), packets (DP34)";
+        notes.add(Check::NotAsked, found, "");
+    }
+}
+
+fn judge_address(subject: &Subject<'_>, notes: &mut Notes) {
+    let address = subject.controller.address;
+    let (Some(ip), Some(port)) = (subject.ip(0x10), subject.pa(0x14)) else { return };
+    if (ip, port) != (*address.ip(), address.port()) {
+        let found = format!("takes itself for {ip}:{port} (PA10 to PA14), but was reached at {address}");
+        notes.add(Check::Address, found, "set PA10 to PA14 to its address, or correct the configuration");
+    }
+}
+
+/// Signs that somebody else is there.
+fn judge_company(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(survey) = subject.survey else { return };
+    let look = "look for a second controller with this address, and for another program that sends to it";
+    if !survey.changed.is_empty() {
+        let names: Vec<_> = survey.changed.iter().map(Address::to_string).collect();
+        let found = format!("{} told two values within seconds", names.join(", "));
+        notes.add(Check::Contradiction, found, look);
+    }
+    match survey.odds.duplicate {
+        0 => {}
+        1 => notes.add(Check::TwoAnswer, "a request was answered twice", look),
+        count => notes.add(Check::TwoAnswer, format!("{count} answers came twice"), look),
+    }
+    if survey.odds.foreign > 0 {
+        let found = format!("{} answers to what was not asked", survey.odds.foreign);
+        notes.add(Check::ForeignReplies, found, look);
+    }
+    if let Some(count) = survey.foreign_packets.filter(|count| *count > 0) {
+        let found = format!("got {count} more packets (DP34) than were sent from here");
+        notes.add(
+            Check::OtherMaster,
+            found,
+            "end whatever else sends to it: another kinocue, player or tool",
+        );
+    }
+}
+
+fn judge_axes(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(works) = subject.pa(0x02) else { return };
+    let seat = &subject.controller.seat.name;
+    match subject.axes {
+        None => notes.add(
+            Check::AxisCountOpen,
+            format!("PA02 = {works}: works with {works} axes"),
+            "give axes= in --to, or --cue",
+        ),
+        Some(axes) if axes == usize::from(works) => {}
+        Some(axes) => {
+            let found = format!("PA02 = {works}: works with {works} axes, but seat {seat} has {axes}");
+            notes.add(Check::AxisCount, found, format!("set PA02 = {axes}, or give it another seat type"));
+        }
+    }
+}
+
+/// 10 is the work mode (SMC manual 2.3.1); 0 that of RS-485 controllers (IMAX manual 5.2).
+fn judge_mode(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(mode) = subject.pa(0x00) else { return };
+    let dialect = subject.controller.dialect;
+    let what = match (mode, dialect) {
+        (10, _) | (0, Dialect::Mbox) => return,
+        (0, Dialect::Smc) => "the SMC manual's table has no such mode, and its work mode is 10",
+        (1, _) => "manual test",
+        (2 | 12, _) => "test",
+        (11, Dialect::Smc) => "effects",
+        (11, Dialect::Mbox) => "CAN inputs and outputs",
+        _ => "no manual has such a mode",
+    };
+    let remedy = match dialect {
+        Dialect::Smc => "have the integrator set the work mode, PA00 = 10",
+        Dialect::Mbox => "have the integrator set the work mode, PA00 = 0 for RS-485 or 10 for CAN",
+    };
+    notes.add(Check::WorkMode, format!("PA00 = {mode}: {what}"), remedy);
+}
+
+fn judge_offset(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(offset) = subject.pa(0x95) else { return };
+    let (word, wanted) = match subject.controller.fan_out {
+        FanOut::Slice => ("slice", 0),
+        FanOut::Shared => ("shared", subject.controller.axis_offset),
+    };
+    if usize::from(offset) != wanted {
+        let found = format!(
+            "PA95 = {offset}: takes axes from {} on, but fan_out = {word} means PA95 = {wanted}",
+            u32::from(offset) + 1
+        );
+        notes.add(Check::AxisOffset, found, format!("set PA95 = {wanted}"));
+    }
+}
+
+/// Version and minor version. The IMAX manual has something else where SMC controllers have the minor one.
+fn version(subject: &Subject<'_>) -> Option<String> {
+    let (major, minor) = (subject.register(Address::Dp(0xff))?, subject.register(Address::Dp(0xfe)));
+    Some(match (subject.controller.dialect, minor) {
+        (Dialect::Smc, Some(minor)) => format!("{major}.{minor}"),
+        _ => major.to_string(),
+    })
+}
+
+/// What only shows when controllers are held against each other.
+pub(super) fn judge_together(subjects: &[Subject<'_>], all: &mut [Notes]) {
+    for (index, subject) in subjects.iter().enumerate() {
+        let twin = |other: &&Subject<'_>| {
+            other.controller.address == subject.controller.address
+                || mac(subject).is_some_and(|own| mac(other) == Some(own))
+        };
+        let others = subjects[..index].iter().chain(&subjects[index + 1..]);
+        let twins: Vec<&str> = others.filter(twin).map(|other| other.controller.name.as_str()).collect();
+        if !twins.is_empty() {
+            let found = format!("has the address, or hardware address, of {} too", twins.join(", "));
+            all[index].add(Check::DuplicateAddress, found, "give each controller its own (PA10 to PA1b)");
+        }
+    }
+    judge_versions(subjects, all);
+}
+
+/// Those that differ from what most of their dialect have.
+fn judge_versions(subjects: &[Subject<'_>], all: &mut [Notes]) {
+    let of = |subject: &Subject<'_>| {
+        version(subject).map(|version| (subject.controller.dialect == Dialect::Smc, version))
+    };
+    let mut counts: BTreeMap<(bool, String), usize> = BTreeMap::new();
+    for key in subjects.iter().filter_map(of) {
+        *counts.entry(key).or_default() += 1;
+    }
+    for (subject, notes) in subjects.iter().zip(all) {
+        let Some((smc, own)) = of(subject) else { continue };
+        let same_dialect = counts.iter().filter(|((dialect, _), _)| *dialect == smc);
+        let Some(((_, most), _)) = same_dialect.max_by_key(|(_, count)| **count) else { continue };
+        if own != *most {
+            let found = format!("software {own}, while most have {most}");
+            notes.add(Check::VersionDiffers, found, "try it by itself, its emergency stop first");
+        }
+    }
+}
+
+/// The hardware address, where the controller tells one.
+fn mac(subject: &Subject<'_>) -> Option<[u16; 6]> {
+    let mut mac = [0; 6];
+    for (octet, number) in mac.iter_mut().zip(0x16..) {
+        *octet = subject.pa(number)?;
+    }
+    (mac != [0; 6]).then_some(mac)
+}

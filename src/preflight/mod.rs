@@ -1,0 +1,104 @@
+//! What was read of the controllers, held against the configuration, into findings: which seat nobody should sit on yet,
+//! why, and what to do. Control thread; pure but for what it is given.
+//!
+//! ```text
+//!  device::survey --+
+//!  net::route ------+--> Subject --> answers, identity, network, motion, speed, estop, status --> Finding
+//!  configuration ---+                                      check: the one table of what there is to find
+//! ```
+//!
+//! One file for each family of checks. A finding has a name that never changes, so that a configuration can accept it for
+//! good, with its reason.
+
+mod answers;
+mod check;
+mod estop;
+mod identity;
+mod motion;
+mod network;
+mod speed;
+mod status;
+mod subject;
+#[cfg(test)]
+mod testing;
+
+use serde::Serialize;
+
+use crate::config::Acceptance;
+
+pub use answers::round_trip;
+pub use check::{Check, Family, Severity, UnknownCheck};
+pub use subject::{Subject, Terms, wanted};
+
+/// One thing that was found.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What was looked for.
+    pub check: Check,
+    /// What was found, with the register and its value.
+    pub found: String,
+    /// What to do; empty where nothing is to be done.
+    pub remedy: String,
+    /// Why the site lives with it, where it does.
+    pub accepted: Option<String>,
+}
+
+impl Finding {
+    /// How grave it is, its acceptance left aside.
+    #[must_use]
+    pub const fn severity(&self) -> Severity {
+        self.check.severity()
+    }
+
+    /// Whether preflight fails for it.
+    #[must_use]
+    pub fn fails(&self) -> bool {
+        self.severity() == Severity::Fail && self.accepted.is_none()
+    }
+}
+
+/// What is found about one controller, as it is noted.
+#[derive(Debug, Default)]
+struct Notes(Vec<Finding>);
+
+impl Notes {
+    fn add(&mut self, check: Check, found: impl Into<String>, remedy: impl Into<String>) {
+        self.0.push(Finding { check, found: found.into(), remedy: remedy.into(), accepted: None });
+    }
+}
+
+/// Judges all controllers: what was found of each, in the order of `subjects`, the gravest first. `accepted` is what the
+/// hall accepts of any of them.
+#[must_use]
+pub fn judge(subjects: &[Subject<'_>], terms: &Terms, accepted: &[Acceptance]) -> Vec<Vec<Finding>> {
+    let mut all: Vec<Notes> = subjects.iter().map(|subject| one(subject, terms)).collect();
+    identity::judge_together(subjects, &mut all);
+    let accept = |(Notes(mut findings), subject): (Notes, &Subject<'_>)| {
+        for finding in &mut findings {
+            let own = subject.controller.accept_findings.iter();
+            let why = own.chain(accepted).find(|one| one.check == finding.check);
+            finding.accepted = why.filter(|_| finding.check.can_be_accepted()).map(|one| one.why.clone());
+        }
+        findings.sort_by_key(|finding| (std::cmp::Reverse(finding.severity()), finding.check));
+        findings
+    };
+    all.into_iter().zip(subjects).map(accept).collect()
+}
+
+fn one(subject: &Subject<'_>, terms: &Terms) -> Notes {
+    let mut notes = Notes::default();
+    network::judge_way(subject, terms, &mut notes);
+    answers::judge(subject, &mut notes);
+    if subject.answered() {
+        identity::judge(subject, &mut notes);
+        network::judge_replies(subject, terms, &mut notes);
+        motion::judge(subject, terms, &mut notes);
+        speed::judge(subject, &mut notes);
+        estop::judge(subject, &mut notes);
+        status::judge(subject, terms, &mut notes);
+    }
+    notes
+}
+
+#[cfg(test)]
+mod tests;

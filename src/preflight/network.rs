@@ -1,0 +1,44 @@
+//! The way to a controller and back.
+
+use super::{Check, Notes, Subject, Terms};
+
+/// Whether datagrams get there, whole.
+pub(super) fn judge_way(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+    let address = subject.controller.address;
+    match &subject.route {
+        Err(why) => {
+            let found = format!("no way to {address}: {why}");
+            notes.add(Check::Route, found, "check cable and this machine's address and mask, and bind");
+        }
+        Ok(route) => {
+            let need = terms.packet_len(subject.controller);
+            if usize::try_from(route.mtu).is_ok_and(|mtu| mtu < need) {
+                let found =
+                    format!("the interface takes packets of {} octets, but {need} are sent", route.mtu);
+                notes.add(Check::Mtu, found, "set the interface's MTU to 1500");
+            }
+        }
+    }
+}
+
+/// Whether its answers come here.
+pub(super) fn judge_replies(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+    if let (Ok(route), Some(host)) = (&subject.route, subject.ip(0x20))
+        && host != route.local
+    {
+        let found = format!("PA20 to PA23 = {host}, but this machine is {} towards it", route.local);
+        notes.add(Check::ReplyAddress, found, format!("set PA20 to PA23 to {}", route.local));
+    }
+    let Some(port) = subject.pa(0x24) else { return };
+    match terms.frame_port {
+        0 => {
+            let found = format!("PA24 = {port}, but bind has port 0, so the frame port is another each time");
+            notes.add(Check::FramePortFree, found, format!("give bind the port {port}"));
+        }
+        own if own != port => {
+            let found = format!("PA24 = {port}, but the frame port is {own}");
+            notes.add(Check::ReplyPort, found, format!("set PA24 = {own}, or bind port {port}"));
+        }
+        _ => {}
+    }
+}

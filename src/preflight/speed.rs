@@ -1,0 +1,90 @@
+//! How fast a controller lets its axes move, against what the seat may do.
+
+use super::{Check, Notes, Subject};
+
+/// Axes with limits of their own (PA80 to PA85, PAa0 to PAb5).
+const OWN_LIMITS: usize = 6;
+/// A limit this much above the seat's own is told.
+const MARGIN: f64 = 1.1;
+/// Limits are whole turns a minute, so one just below the seat's is as good as equal.
+const SLACK: f64 = 0.999;
+
+/// The lowest limit of an axis.
+struct Limit {
+    axis: usize,
+    rpm: f64,
+    source: String,
+}
+
+pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
+    if subject.pa(0x07) == Some(0) {
+        notes.add(
+            Check::SpeedUnlimited,
+            "PA07 = 0: no limit on speed",
+            format!("set PA07 = {:.0} or less", needed_rpm(subject).ceil()),
+        );
+    }
+    judge_axes_of_their_own(subject, notes);
+    let mut limits: Vec<Limit> =
+        (0..subject.working_axes()).filter_map(|axis| limit(subject, axis)).collect();
+    limits.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+    let seat = &subject.controller.seat;
+    let needed = needed_rpm(subject);
+    let told = |limit: &Limit| {
+        let speed = limit.rpm * seat.lead_mm / 60.0;
+        format!(
+            "axis {} may turn {:.0} rpm ({}), {speed:.1} mm/s at a lead of {} mm; seat {} goes up to {} mm/s",
+            limit.axis + 1,
+            limit.rpm,
+            limit.source,
+            seat.lead_mm,
+            seat.name,
+            seat.max_velocity_mm_s
+        )
+    };
+    if let Some(slowest) = limits.first().filter(|limit| limit.rpm < needed * SLACK) {
+        let remedy = format!("allow {:.0} rpm, or lower max_velocity_mm_s of the seat type", needed.ceil());
+        notes.add(Check::SpeedTooLow, told(slowest), remedy);
+    }
+    if let Some(fastest) = limits.last().filter(|limit| limit.rpm > needed * MARGIN) {
+        let remedy = format!("set PA07 or PA80 to PA85 to {:.0}", needed.ceil());
+        notes.add(Check::SpeedTooHigh, told(fastest), remedy);
+    }
+}
+
+fn judge_axes_of_their_own(subject: &Subject<'_>, notes: &mut Notes) {
+    let axes = 0..subject.working_axes().min(OWN_LIMITS);
+    let open: Vec<_> = axes.filter(|axis| own(subject, 0x80, *axis) == Some(0)).collect();
+    if open.is_empty() {
+        return;
+    }
+    let registers: Vec<_> = open.iter().map(|axis| format!("PA8{axis}")).collect();
+    let found = format!("{} = 0: no limit on the speed of these axes", registers.join(", "));
+    notes.add(Check::AxisSpeedUnlimited, found, format!("set them to {:.0}", needed_rpm(subject).ceil()));
+}
+
+/// Turns a minute that the seat's greatest speed takes.
+fn needed_rpm(subject: &Subject<'_>) -> f64 {
+    let seat = &subject.controller.seat;
+    seat.max_velocity_mm_s * 60.0 / seat.lead_mm
+}
+
+/// The lowest of PA07, PA80.. and PAa0.. times PAb0.. (SMC manual 5.10); those of 0 set none.
+fn limit(subject: &Subject<'_>, axis: usize) -> Option<Limit> {
+    let product =
+        own(subject, 0xa0, axis).zip(own(subject, 0xb0, axis)).map(|(a, b)| u32::from(a) * u32::from(b));
+    let limits = [
+        (subject.pa(0x07).map(u32::from), "PA07".to_owned()),
+        (own(subject, 0x80, axis).map(u32::from), format!("PA8{axis}")),
+        (product, format!("PAa{axis} times PAb{axis}")),
+    ];
+    let set = limits.into_iter().filter_map(|(rpm, source)| Some((rpm.filter(|rpm| *rpm > 0)?, source)));
+    let (rpm, source) = set.min_by_key(|(rpm, _)| *rpm)?;
+    Some(Limit { axis, rpm: f64::from(rpm), source })
+}
+
+/// A register that each of the first six axes has.
+fn own(subject: &Subject<'_>, first: u8, axis: usize) -> Option<u16> {
+    let step = u8::try_from(axis).ok().filter(|_| axis < OWN_LIMITS)?;
+    subject.pa(first + step)
+}

@@ -1,0 +1,116 @@
+//! What is judged, and by what.
+
+use std::net::Ipv4Addr;
+
+use crate::config::{Controller, FanOut};
+use crate::device::survey::Survey;
+use crate::device::{Address, table};
+use crate::engine::Rate;
+use crate::motion::MAX_AXES;
+use crate::net::Route;
+use crate::wire::{Dialect, motion_channel_and_slots, motion_len};
+
+/// Octets of the longest register message that preflight itself exchanges: a read of 32 registers answered.
+const REGISTER_LEN: usize = 80;
+/// Frames with vibration carry at most so many axes (SMC manual 2.2.2.9).
+const MAX_VIBRATING_AXES: usize = 6;
+/// Octets of IP and UDP before each message.
+const HEADERS_LEN: usize = 28;
+
+/// What is known of one controller.
+#[derive(Debug)]
+pub struct Subject<'a> {
+    /// What it should be.
+    pub controller: &'a Controller,
+    /// How many axes its seat has; none where nobody says.
+    pub axes: Option<usize>,
+    /// The way to it, or why there is none.
+    pub route: Result<Route, String>,
+    /// What it told; none where it could not be asked.
+    pub survey: Option<&'a Survey>,
+}
+
+/// What a show will ask of the controllers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Terms {
+    /// The port that controllers answer to; 0 where it is another each time.
+    pub frame_port: u16,
+    /// Frames a second.
+    pub rate_hz: f64,
+    /// The axes of the cue, and whether it vibrates; none where no cue is known.
+    pub cue: Option<(usize, bool)>,
+}
+
+/// The registers that are judged of a controller of `dialect`, as far as its manual has them.
+#[must_use]
+pub fn wanted(dialect: Dialect) -> Vec<Address> {
+    let parameters =
+        [0x00..=0x0d, 0x10..=0x1b, 0x1e..=0x29, 0x55..=0x55, 0x80..=0x85, 0x90..=0x98, 0x9d..=0x9d];
+    let parameters = parameters.into_iter().chain([0xa0..=0xa5, 0xb0..=0xb5]).flatten().map(Address::Pa);
+    let versions = [Address::Dp(0xfe), Address::Dp(0xff)];
+    let known = |it: &Address| table().get(*it).is_some_and(|register| register.dialect.has(dialect));
+    parameters.chain(versions).filter(known).collect()
+}
+
+impl Subject<'_> {
+    /// Whether it answered at all.
+    #[must_use]
+    pub fn answered(&self) -> bool {
+        self.survey.is_some_and(Survey::answered)
+    }
+
+    /// What a parameter holds, where the controller has it and told.
+    #[must_use]
+    pub fn pa(&self, number: u8) -> Option<u16> {
+        self.register(Address::Pa(number))
+    }
+
+    /// What a register holds, where the controller has it and told.
+    #[must_use]
+    pub fn register(&self, address: Address) -> Option<u16> {
+        self.survey?.values.get(&address).copied()
+    }
+
+    /// An IPv4 address in four parameters; none where one is missing or no octet.
+    #[must_use]
+    pub fn ip(&self, first: u8) -> Option<Ipv4Addr> {
+        let octet = |step| self.pa(first + step).and_then(|word| u8::try_from(word).ok());
+        Some(Ipv4Addr::new(octet(0)?, octet(1)?, octet(2)?, octet(3)?))
+    }
+
+    /// Axes that it works with: the seat's, else what PA02 says.
+    #[must_use]
+    pub fn working_axes(&self) -> usize {
+        self.axes.or_else(|| self.pa(0x02).map(usize::from)).unwrap_or(MAX_AXES).min(MAX_AXES)
+    }
+}
+
+impl Terms {
+    /// The largest Time of the show's own frames, ms.
+    #[must_use]
+    pub fn frame_time_ms(&self) -> u32 {
+        // The Times of one second hold every Time there is.
+        let rate = Rate::from_hz(self.rate_hz);
+        (0..1_000).map(|frame| rate.time_ms(frame)).max().unwrap_or(0)
+    }
+
+    /// The largest IP packet that goes to a controller or comes from it, octets.
+    #[must_use]
+    pub fn packet_len(&self, controller: &Controller) -> usize {
+        let cue_axes = self.cue.map_or_else(|| most_axes(controller), |(axes, _)| axes);
+        let (_, slots) = motion_channel_and_slots(controller.frame_axes(cue_axes));
+        let vibrates = self.cue.is_none_or(|(_, vibrates)| vibrates)
+            && controller.dialect == Dialect::Smc
+            && slots <= MAX_VIBRATING_AXES;
+        let frame = motion_len(slots, vibrates);
+        frame.max(REGISTER_LEN) + HEADERS_LEN
+    }
+}
+
+/// The most axes a frame to it may ever carry.
+fn most_axes(controller: &Controller) -> usize {
+    match controller.fan_out {
+        FanOut::Slice => controller.seat.axes,
+        FanOut::Shared => MAX_AXES,
+    }
+}
