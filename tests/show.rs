@@ -140,6 +140,25 @@ fn after_a_long_stall_the_seat_holds_and_then_joins_the_cue_where_the_film_is() 
 }
 
 #[test]
+fn a_stall_upon_a_stall_never_lands_in_the_middle_of_a_join() {
+    let played = Virtual::new(swell(1, 20, 60.0, 0.25))
+        .with(400, Event::Late(Duration::from_millis(60)))
+        .with(402, Event::Late(Duration::from_millis(700)))
+        .play();
+    assert_eq!(played.ended.missed, 76);
+    assert_within(played.worst_from_rest(402, played.frames.len()));
+}
+
+#[test]
+fn a_stop_in_the_last_ticks_of_a_moving_cue_waits_for_what_follows_it() {
+    for at in 590..=602 {
+        let mut show = Virtual::new(swell(1, 6, 60.0, 0.25)).with(at, Event::Stop);
+        show.plays = 2;
+        assert_gentle(&show.play());
+    }
+}
+
+#[test]
 fn many_small_gaps_end_in_a_join_that_never_stops_the_seat() {
     let mut show = Virtual::new(swell(1, 20, 60.0, 0.25));
     for gap in 0..8 {

@@ -22,7 +22,11 @@ impl Engine {
         let gap = self.show.rate.offset(missed);
         let too_long = gap > LAG_HOLD && gap > self.show.rate.period();
         match self.phase {
-            Phase::Stalled => self.playhead += gap,
+            Phase::Stalled if missed > 0 => {
+                // A course that was to begin in the gap would be taken up in its middle.
+                self.drop_switch();
+                self.playhead += gap;
+            }
             Phase::Riding | Phase::Parking if too_long => {
                 // The controllers reached the last pose and stand there.
                 self.homeward |= self.phase == Phase::Parking;
@@ -59,8 +63,8 @@ impl Engine {
                 self.phase = Phase::Closing(CLOSING_FRAMES)
             }
             Phase::Riding | Phase::Stalled if self.homeward && self.stopping() => {}
-            // The old course ends before a way home can begin on it: home from the one that follows.
-            Phase::Riding if self.homeward && self.turns_between(self.playhead, soonest) => {}
+            // The old course ends before another can begin on it: what is to come begins on the one that follows.
+            Phase::Riding if self.turns_between(self.playhead, soonest) => {}
             Phase::Riding | Phase::Stalled if self.homeward => self.ask(Goal::Stop, soonest, soonest),
             Phase::Stalled if asked.is_none() => self.ask(Goal::Rejoin, soonest, soonest),
             Phase::Riding => self.look_ahead_riding(asked, soonest),
@@ -98,8 +102,13 @@ impl Engine {
 
     /// Asks for a course that takes over when show time, as it runs now, is `at`, and calls that instant `start`.
     fn ask(&mut self, goal: Goal, at: ShowTime, start: ShowTime) {
-        // Should the planner be slow, and the cue end before the lanes are on their way home, they go on as was planned.
-        let spare = if goal == Goal::Stop { self.spare.take().or_else(|| self.switch.take()) } else { None };
+        // Should the planner be slow, and the cue end before its answer, the lanes go on as was planned for the end.
+        let spare = if matches!(goal, Goal::Stop | Goal::Rejoin) {
+            let after_the_end = |switch: &mut Switch| matches!(switch.goal, Goal::Home | Goal::Again);
+            self.spare.take().or_else(|| self.switch.take_if(after_the_end))
+        } else {
+            None
+        };
         self.drop_switch();
         self.spare = spare;
         let serial = self.course.serial;

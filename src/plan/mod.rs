@@ -72,6 +72,9 @@ pub enum PlanError {
         /// What the solver said last.
         reason: String,
     },
+    /// Lanes are said to be on a course that was not given out, or was given up.
+    #[error("course {0} is not known")]
+    UnknownCourse(u32),
     /// The solver refused even to stop.
     #[error("no way to stop could be planned: {0}")]
     NoStop(String),

@@ -10,8 +10,8 @@ use super::{After, AxisState, Course, Curve, Plan, PlanError};
 use crate::motion::Window;
 use crate::time::ShowTime;
 
-/// How many of its courses it remembers; the tick thread follows the newest or the one before.
-const REMEMBERED: usize = 4;
+/// How many courses are remembered at the most: the one that is followed, and those that were asked for since.
+const REMEMBERED: usize = 64;
 
 /// How the lanes are as the new course begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +70,7 @@ impl Planner {
     /// A planner for lanes with these windows.
     #[must_use]
     pub fn new(windows: Vec<Window>, rate_hz: f64) -> Self {
-        Self { windows, rate_hz, given: VecDeque::with_capacity(REMEMBERED + 1) }
+        Self { windows, rate_hz, given: VecDeque::new() }
     }
 
     /// Plans what is asked.
@@ -78,7 +78,7 @@ impl Planner {
     /// # Errors
     /// [`PlanError`] where a lane's move cannot be planned; nothing is remembered then.
     pub fn plan(&mut self, request: Request, curve: &Curve<'_>) -> Result<Course, PlanError> {
-        let mut old = self.course_of(request.from);
+        let mut old = self.course_of(request.from)?;
         let mut moves: Vec<Option<Plan>> = Vec::with_capacity(self.windows.len());
         let mut states: Vec<Vec<AxisState>> = Vec::with_capacity(self.windows.len());
         for (lane, window) in self.windows.iter().enumerate() {
@@ -96,7 +96,7 @@ impl Planner {
         let course = Course::new(request.serial, request.start, then, moves);
         self.given.push_back(course.clone());
         if self.given.len() > REMEMBERED {
-            self.given.pop_front();
+            self.given.remove(1); // never the one that is followed
         }
         Ok(course)
     }
@@ -132,9 +132,14 @@ impl Planner {
         }
     }
 
-    fn course_of(&self, from: From) -> Option<Course> {
-        let (From::Course { serial, .. } | From::Stalled { serial, .. }) = from else { return None };
-        self.given.iter().find(|course| course.serial == serial).cloned()
+    /// The course that the lanes are on; those before it are forgotten. Without it nobody knows where they are, and to take
+    /// them for parked would be a leap.
+    fn course_of(&mut self, from: From) -> Result<Option<Course>, PlanError> {
+        let (From::Course { serial, .. } | From::Stalled { serial, .. }) = from else { return Ok(None) };
+        let index = self.given.iter().position(|course| course.serial == serial);
+        let index = index.ok_or(PlanError::UnknownCourse(serial))?;
+        self.given.drain(..index);
+        Ok(self.given.front().cloned())
     }
 }
 
@@ -217,6 +222,21 @@ mod tests {
             again.pose(0, again.start + std::time::Duration::from_millis(1), &window, &heave(again.start));
         assert!((start[0] - 0.5).abs() < 1e-6, "{start:?}");
         assert!((soon[0] - start[0]).abs() < 1e-6, "at rest first");
+    }
+
+    #[test]
+    fn the_course_that_is_followed_is_never_forgotten_and_no_other_is_taken_for_it() {
+        let curve = Curve { pose: &heave, end: ShowTime::from_millis(20_000) };
+        let mut planner = planner(1);
+        planner.plan(request(1, From::Park, To::Cue, 0), &curve).unwrap();
+        let under_way = From::Course { serial: 1, at: ShowTime::from_nanos(5 * SECOND), pace: 1.0 };
+        for serial in 2..200 {
+            let course = planner.plan(request(serial, under_way, To::Park, 5), &curve).unwrap();
+            assert!(course.settled() > course.start, "serial {serial}: it has a way to go");
+        }
+        let unknown = From::Course { serial: 777, at: ShowTime::ZERO, pace: 1.0 };
+        let refusal = planner.plan(request(200, unknown, To::Park, 5), &curve).unwrap_err();
+        assert_eq!(refusal, PlanError::UnknownCourse(777));
     }
 
     #[test]
