@@ -15,9 +15,10 @@ use std::time::Duration;
 
 use common::Virtual;
 use kinocue::motion::Pulses;
+use kinocue::sim::{Controller, Setup};
 use kinocue::wire::{
-    Access, Code, MAX_LEN, Message, MotionReply, PerAxis, RegisterReply, ReplyCode, Status, Vibration,
-    WireError, Words,
+    Access, Code, MAX_LEN, Message, ReadRequest, RegisterReply, ReplyCode, Status, Vibration, WireError,
+    Words, WriteRequest,
 };
 use pcap::Pcap;
 use serde::Deserialize;
@@ -354,30 +355,32 @@ fn damaged_messages_are_refused_at_the_same_octet_for_the_same_reason() {
     assert_agreed(&captured(&datagrams), &datagrams);
 }
 
-/// A show of a second with all its replies, between these ports.
+/// A show of a second with the answers of a virtual controller, between these ports: on the way the emergency stop is
+/// pressed, and at the end registers are read and written.
 fn exchange(host: SocketAddrV4, seat: SocketAddrV4) -> (Pcap, Vec<Vec<u8>>) {
     let played = Virtual::new(common::swell(3, 1, 20.0, 1.0)).play();
-    let (mut pcap, mut datagrams) = (Pcap::new(), Vec::new());
-    for frame in played.lane(0) {
-        let at = Duration::from_nanos(frame.at.as_nanos());
-        pcap.datagram(at, host, seat, &frame.octets);
-        datagrams.push(frame.octets.clone());
-        let request = &frame.request;
-        let reply = MotionReply {
-            timing: request.timing,
-            code: ReplyCode::Running,
-            channel: request.channel,
-            error: 0,
-            frame: request.frame,
-            time_ms: request.time_ms,
-            positions: PerAxis::new(&request.positions),
-            inputs: 5,
-            extend: request.extend,
-            vibration: request.vibration,
-        };
-        let reply = reply.emit(&mut [0; MAX_LEN]).to_vec();
-        pcap.datagram(at + Duration::from_micros(300), seat, host, &reply);
-        datagrams.push(reply);
+    let frames: Vec<_> = played.lane(0).map(|frame| (frame.at, frame.octets.clone())).collect();
+    let (start, end, pressed) = (frames[0].0, frames[frames.len() - 1].0, frames.len() / 2);
+    let all = Code::ALL;
+    let read = ReadRequest { channel: 0, accept: all, reply: all, start: 0x06, num: 6 };
+    let words = [0, 1];
+    let write = WriteRequest { channel: 2, accept: all, reply: all, start: 0, data: Words::from(&words[..]) };
+    let registers = [Message::Read(read), Message::Write(write)];
+    let registers = registers.map(|message| (end, message.emit(&mut [0; MAX_LEN]).to_vec()));
+
+    let parameters = vec![(0x90, 1), (0x92, 1), (0x93, 0)];
+    let setup = Setup { host_port: host.port(), parameters, ..Setup::default() };
+    let mut controller = Controller::new(&setup, seat, start);
+    let (mut pcap, mut datagrams, mut buf) = (Pcap::new(), Vec::new(), [0; MAX_LEN]);
+    for (index, (at, octets)) in frames.into_iter().chain(registers).enumerate() {
+        if index == pressed {
+            controller.set_switches(1, at);
+        }
+        let since = at.since(start);
+        pcap.datagram(since, host, seat, &octets);
+        let reply = controller.on_datagram(host, &octets, at, &mut buf).reply.expect("it answers");
+        pcap.datagram(since + Duration::from_micros(300), seat, host, reply);
+        datagrams.extend([octets, reply.to_vec()]);
     }
     (pcap, datagrams)
 }
@@ -388,7 +391,10 @@ fn a_show_and_its_replies_are_dissected_whole_on_any_port() {
         return;
     }
     let (pcap, datagrams) = exchange(host(), seat());
-    assert!(datagrams.len() > 200);
+    for code in [ReplyCode::Running, ReplyCode::EmergencyStop] {
+        let answered = datagrams.iter().filter(|octets| octets[4..6] == [0x14, code as u8]).count();
+        assert!(answered > 50, "{answered} answers with {code:?}");
+    }
     assert_agreed(&pcap, &datagrams);
     let (pcap, datagrams) = exchange("127.0.0.1:40001".parse().unwrap(), "127.0.0.1:40002".parse().unwrap());
     assert_agreed(&pcap, &datagrams);
