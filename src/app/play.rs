@@ -110,7 +110,7 @@ impl Play {
         let (mail, ends) = mailboxes(self.staged.lanes.len(), show.rate, live);
         let MailEnds { sent, ticks, requests, answers, retired } = ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
-        let mut acks = AckLoop::new(receiver, watched, sent, ticks);
+        let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let prepared = Preparation {
             clock: &Monotonic,
             sender: &sender,

@@ -71,6 +71,9 @@ pub(super) struct Args {
     /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
+    /// Ask for a reply in each Nth frame, 1 to 1000 [default: 1, or the configuration's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
+    ack_every: Option<u32>,
     /// Ask for no replies, and read none.
     #[arg(long)]
     no_acks: bool,
@@ -135,6 +138,9 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     };
     if let Some(hz) = args.rate {
         config.show.rate_hz = hz;
+    }
+    if let Some(every) = args.ack_every {
+        config.show.ack_every = every;
     }
     if let Some(bind) = args.bind {
         config.show.bind = bind;
