@@ -77,6 +77,10 @@ pub(super) struct Args {
     /// Ask for no replies, and read none.
     #[arg(long)]
     no_acks: bool,
+    /// Wake up this long before each tick and spin, 0 to 900 µs: less late for more processor time [default: 0, or the
+    /// configuration's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
+    spin_us: Option<u32>,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -141,6 +145,9 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     }
     if let Some(every) = args.ack_every {
         config.show.ack_every = every;
+    }
+    if let Some(spin) = args.spin_us {
+        config.show.spin_us = spin;
     }
     if let Some(bind) = args.bind {
         config.show.bind = bind;

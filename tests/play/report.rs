@@ -118,6 +118,17 @@ fn a_controller_that_answers_no_frame_is_missed_though_few_ask() {
 }
 
 #[test]
+fn a_play_that_spins_before_each_tick_is_acked_like_any_other() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--spin-us", "900", "--rate", "500", "--json"]);
+    let report = run.report_of(0);
+    assert_sound(&report);
+    let one = &report["controllers"][0];
+    assert_eq!((&report["result"], &one["acked"]), (&"completed".into(), &one["sent"]), "{one}");
+    assert!(sim.end().rest_in_park());
+}
+
+#[test]
 fn without_acks_nothing_is_asked_read_or_judged_and_every_seat_is_homed() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let run = play(&folder.nod(&[0.1]), &sim.to(), &["--no-acks", "--json"]);
