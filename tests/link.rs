@@ -207,7 +207,7 @@ fn records(
 fn play(link: &Link) -> (Books, Ledger, Traffic) {
     let mut dice = Dice(link.seed);
     let traffic = link.traffic(&mut dice);
-    let mut books = Books::new(Tracker::starting_at(&[FrameNo(link.first)]));
+    let mut books = Books::new(Tracker::starting_at(&[FrameNo(link.first)], 1));
     let mut ledger = Ledger::default();
     let mut sends = traffic.sends.iter().copied().peekable();
     let mut replies = traffic.replies.iter().copied().peekable();

@@ -262,7 +262,7 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
         let ack_thread = scope.spawn(move || {
             let clock = Drains { now: Cell::new(origin), answered: Cell::new(0), pace };
             let over = || pace.over.load(Ordering::Acquire);
-            AckLoop::new(receiver, watched, sent, ticks).run(&clock, DrainGrid::new(origin, PERIOD), over)
+            AckLoop::new(receiver, watched, 1, sent, ticks).run(&clock, DrainGrid::new(origin, PERIOD), over)
         });
         let plan_thread = scope.spawn(move || pace.serve(&mut plans));
         mail.wakes(plan_thread.thread().clone());

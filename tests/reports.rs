@@ -44,7 +44,7 @@ fn heard(send: impl FnOnce([UdpSocket; 2], SocketAddrV4)) -> Accounts {
     let watched = addresses.map(|address| Watched { address, dialect: Dialect::Smc, estop_inputs: 0 });
     let (_mail, MailEnds { sent, ticks, .. }) = mailboxes(2, Rate::from_hz(100.0), Arc::new(Live::default()));
     let (_sender, receiver) = ports.split();
-    let mut acks = AckLoop::new(receiver, watched.to_vec(), sent, ticks);
+    let mut acks = AckLoop::new(receiver, watched.to_vec(), 1, sent, ticks);
     send(controllers, ours);
     // Loopback delivers within the call that sends.
     acks.drain(&mut |_, _| false);

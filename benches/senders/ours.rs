@@ -40,7 +40,7 @@ pub(crate) fn run(seconds: u32, to: &[SocketAddrV4]) -> Outcome {
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
     let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
     let MailEnds { sent, ticks, requests, answers, retired } = ends;
-    let acks = AckLoop::new(receiver, watched, sent, ticks);
+    let acks = AckLoop::new(receiver, watched, 1, sent, ticks);
     let (engine, lanes, planner, timeline) = staged.split();
     let plans = PlanLoop { planner, timeline, requests, answers, retired };
     let origin = Monotonic.now() + RUN_UP;

@@ -110,7 +110,7 @@ impl Play {
         let (mail, ends) = mailboxes(self.staged.lanes.len(), show.rate, live);
         let MailEnds { sent, ticks, requests, answers, retired } = ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
-        let mut acks = AckLoop::new(receiver, watched, sent, ticks);
+        let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let prepared = Preparation {
             clock: &Monotonic,
             sender: &sender,
@@ -123,7 +123,8 @@ impl Play {
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };
-        let stage = Stage { silent: self.manner.silent, rate: show.rate, engine, lanes, sender, mail };
+        let spin = Duration::from_micros(u64::from(self.config.show.spin_us));
+        let stage = Stage { silent: self.manner.silent, rate: show.rate, spin, engine, lanes, sender, mail };
         let run = stage.run(acks, plans, stop).map_err(PlayError::Thread)?;
         Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
     }

@@ -9,7 +9,7 @@ use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
 use crate::plan::PlanError;
-use crate::rt::{Accounts, AckLoop, Ended, Mail, PlanLoop, TickLoop};
+use crate::rt::{Accounts, AckLoop, Ended, Mail, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime};
@@ -22,6 +22,8 @@ pub(super) struct Stage {
     /// Whether no replies are to come.
     pub(super) silent: bool,
     pub(super) rate: Rate,
+    /// How long before a deadline the tick thread stops sleeping and spins.
+    pub(super) spin: Duration,
     pub(super) engine: Engine,
     pub(super) lanes: Vec<Lane>,
     pub(super) sender: Sender,
@@ -54,7 +56,7 @@ impl Stage {
     /// # Errors
     /// That of the system where it starts no further thread; no tick has been sent then.
     pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, stop: &AtomicBool) -> io::Result<Run> {
-        let Self { silent, rate, engine, lanes, sender, mut mail } = self;
+        let Self { silent, rate, spin, engine, lanes, sender, mut mail } = self;
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
         let granted = realtime::request();
         thread::scope(|scope| {
@@ -74,7 +76,8 @@ impl Stage {
             let plan_thread = planner.inspect_err(|_| sent_all.store(true, Ordering::Release))?;
             mail.wakes(plan_thread.thread().clone());
             let grid = TickGrid::new(origin, rate);
-            let mut ticks = TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, stop };
+            let clock = Spinning::new(&Monotonic, spin, period);
+            let mut ticks = TickLoop { clock: &clock, grid, engine, lanes, sink: sender, mail, stop };
             let ended = ticks.run();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);

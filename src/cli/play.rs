@@ -71,9 +71,16 @@ pub(super) struct Args {
     /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
+    /// Ask for a reply in each Nth frame, 1 to 1000 [default: 1, or the configuration's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
+    ack_every: Option<u32>,
     /// Ask for no replies, and read none.
     #[arg(long)]
     no_acks: bool,
+    /// Wake up this long before each tick and spin, 0 to 900 µs: less late for more processor time [default: 0, or the
+    /// configuration's].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
+    spin_us: Option<u32>,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -135,6 +142,12 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     };
     if let Some(hz) = args.rate {
         config.show.rate_hz = hz;
+    }
+    if let Some(every) = args.ack_every {
+        config.show.ack_every = every;
+    }
+    if let Some(spin) = args.spin_us {
+        config.show.spin_us = spin;
     }
     if let Some(bind) = args.bind {
         config.show.bind = bind;

@@ -15,6 +15,14 @@ pub struct Manner {
     pub silent: bool,
 }
 
+impl Manner {
+    /// In each of how many frames a reply is asked for; 0 never.
+    #[must_use]
+    pub fn ack_every(&self, config: &Config) -> u32 {
+        if self.silent { 0 } else { config.show.ack_every }
+    }
+}
+
 /// The lanes of every controller, in the configuration's order, for a cue without a [`crate::config::Misfit`].
 #[must_use]
 pub fn lanes(config: &Config, timeline: &Timeline, manner: Manner) -> Vec<Lane> {
@@ -34,7 +42,7 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         code: Code(controller.accept.code(controller.address)),
         vibrates,
         wiring: wiring(config, controller, timeline),
-        ack_every: if manner.silent { 0 } else { config.show.ack_every },
+        ack_every: manner.ack_every(config),
         next_frame: FrameNo::FIRST,
     }
 }

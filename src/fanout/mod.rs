@@ -103,6 +103,12 @@ impl Lane {
         written
     }
 
+    /// The lane with the number of its next frame.
+    #[must_use]
+    pub fn starting_at(self, next_frame: FrameNo) -> Self {
+        Self { next_frame, ..self }
+    }
+
     /// The number of the frame written last; one less than the first where there was none.
     #[must_use]
     pub const fn last_frame(&self) -> FrameNo {
@@ -112,7 +118,7 @@ impl Lane {
     fn stamp(&mut self) -> Stamped {
         let frame = self.next_frame;
         self.next_frame = frame.next();
-        let asked = self.ack_every > 0 && frame.0.wrapping_sub(1).is_multiple_of(self.ack_every);
+        let asked = frame.asks(self.ack_every);
         Stamped { frame, asked }
     }
 }

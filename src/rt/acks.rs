@@ -25,11 +25,11 @@ pub struct Accounts {
 }
 
 impl Accounts {
-    /// Empty accounts of these controllers.
+    /// Empty accounts of these controllers, of which a reply is asked for in each of `ack_every` frames.
     #[must_use]
-    pub fn new(watched: Vec<Watched>) -> Self {
+    pub fn new(watched: Vec<Watched>, ack_every: u32) -> Self {
         Self {
-            books: Books::new(Tracker::new(watched.len())),
+            books: Books::new(Tracker::new(watched.len(), ack_every)),
             lateness: histogram(),
             observer: Observer::new(watched),
             strangers: 0,
@@ -58,15 +58,16 @@ pub struct AckLoop {
 }
 
 impl AckLoop {
-    /// A loop over the replies to what `sent` tells of.
+    /// A loop over the replies to what `sent` tells of; each of `ack_every` frames asks for one.
     #[must_use]
     pub fn new(
         receiver: Receiver,
         watched: Vec<Watched>,
+        ack_every: u32,
         sent: Consumer<Sent>,
         ticks: Consumer<TickReport>,
     ) -> Self {
-        let accounts = Accounts::new(watched);
+        let accounts = Accounts::new(watched, ack_every);
         Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default() }
     }
 

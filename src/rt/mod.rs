@@ -6,10 +6,12 @@
 mod acks;
 mod mail;
 mod planning;
+mod spin;
 
 pub use acks::{Accounts, AckLoop};
 pub use mail::{Answer, Live, Mail, MailEnds, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
+pub use spin::Spinning;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

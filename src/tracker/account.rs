@@ -6,8 +6,8 @@ use crate::wire::{FrameNo, ReplyCode};
 use super::in_flight::{Entry, KEPT, Place, Ring, State};
 use super::{ACK_TIMEOUT, Counts, Fate, Histogram, histogram};
 
-/// Fewer frames than these do not tell whether a controller is lost.
-const LAST_FRAMES: usize = 10;
+/// Fewer frames that asked than these do not tell whether a controller is lost.
+const LAST_ASKED: u32 = 10;
 
 #[derive(Debug)]
 pub(super) struct Account {
@@ -16,20 +16,29 @@ pub(super) struct Account {
     oldest_open: FrameNo,
     /// Time of the newest record.
     recorded_at: MonoTime,
+    /// A reply is asked for in each of so many frames; 0 in none.
+    ack_every: u32,
+    /// Frames so far that wanted a reply, taken by the kernel or not, round after 4,294,967,295.
+    wanted: u32,
     pub(super) counts: Counts,
     pub(super) latency: Histogram,
     pub(super) last_ack: Option<(FrameNo, MonoTime)>,
+    /// The entry of that frame.
+    last_acked: Option<Entry>,
 }
 
 impl Account {
-    pub(super) fn new(first: FrameNo) -> Self {
+    pub(super) fn new(first: FrameNo, ack_every: u32) -> Self {
         Self {
             ring: Ring::new(first),
             oldest_open: first,
             recorded_at: MonoTime::default(),
+            ack_every,
+            wanted: 0,
             counts: Counts::default(),
             latency: histogram(),
             last_ack: None,
+            last_acked: None,
         }
     }
 
@@ -40,17 +49,16 @@ impl Account {
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         let Some(unrecorded) = self.ring.ahead(frame).checked_sub(1) else { return };
         self.recorded_at = at;
-        // Who never asks for a reply did not ask in the frames left out.
-        self.record_unrecorded(unrecorded, asked || self.counts.asked > 0);
+        self.record_unrecorded(unrecorded);
         self.record(if asked { State::InFlight } else { State::Unasked });
     }
 
     pub(super) fn on_send_failed(&mut self, frame: FrameNo) {
-        self.record_unrecorded(self.ring.ahead(frame), self.counts.asked > 0);
+        self.record_unrecorded(self.ring.ahead(frame));
         let Place::Kept(index) = self.ring.find(frame) else { return };
         let entry = self.ring.get_mut(index);
         match entry.state {
-            State::Acked | State::Refused | State::Failed { .. } => return,
+            State::Acked | State::Refused | State::Failed => return,
             State::Unasked => {}
             State::InFlight | State::InFlightUntimed => self.counts.asked -= 1,
             State::Lost => {
@@ -58,7 +66,7 @@ impl Account {
                 self.counts.lost -= 1;
             }
         }
-        entry.state = State::Failed { asked: entry.state.wanted() };
+        entry.state = State::Failed;
         self.counts.sent -= 1;
         self.counts.send_failed += 1;
     }
@@ -66,7 +74,7 @@ impl Account {
     pub(super) fn on_last(&mut self, last: FrameNo, at: MonoTime) {
         if !self.recorded(last) {
             self.recorded_at = at;
-            self.record_unrecorded(self.ring.ahead(last), self.counts.asked > 0);
+            self.record_unrecorded(self.ring.ahead(last));
         }
     }
 
@@ -75,7 +83,7 @@ impl Account {
             Place::Never => Fate::Stray,
             Place::Forgotten => Fate::Stale,
             Place::Kept(index) => match self.ring.get(index).state {
-                State::Unasked | State::Failed { .. } => Fate::Stray,
+                State::Unasked | State::Failed => Fate::Stray,
                 State::Acked | State::Refused => Fate::Duplicate,
                 State::Lost => Fate::Stale,
                 State::InFlight | State::InFlightUntimed => self.settle(index, frame, code, at),
@@ -102,6 +110,7 @@ impl Account {
             }
             if self.last_ack.is_none_or(|(last, _)| frame.since(last) > 0) {
                 self.last_ack = Some((frame, at));
+                self.last_acked = Some(*entry);
             }
         }
         Fate::Answered(code)
@@ -133,29 +142,28 @@ impl Account {
     }
 
     pub(super) fn lost_at_end(&self) -> bool {
-        let wanted = self.ring.newest_first().filter(|entry| entry.state.wanted()).enumerate();
-        let mut last = wanted
-            .take_while(|(count, entry)| {
-                *count < LAST_FRAMES || self.recorded_at.since(entry.at) <= ACK_TIMEOUT
-            })
-            .peekable();
-        last.peek().is_some() && last.all(|(_, entry)| entry.state != State::Acked)
+        // At a low rate of asking the last ten are far older than what the ring remembers.
+        self.last_acked.map_or(self.wanted > 0, |acked| {
+            self.wanted.wrapping_sub(acked.wanted) >= LAST_ASKED
+                && self.recorded_at.since(acked.at) > ACK_TIMEOUT
+        })
     }
 
     /// Takes frames on record that should have been, but of which no record came.
-    fn record_unrecorded(&mut self, count: u32, asked: bool) {
+    fn record_unrecorded(&mut self, count: u32) {
         let forgotten = count.saturating_sub(KEPT);
         if forgotten > 0 {
             // Lost already, as is all before them: the rest will take the place of every frame remembered now.
+            let asked = self.ring.next().asking(forgotten, self.ack_every);
             self.ring.skip(forgotten);
             self.oldest_open = self.ring.next();
             self.counts.sent += u64::from(forgotten);
-            if asked {
-                self.counts.asked += u64::from(forgotten);
-                self.counts.lost += u64::from(forgotten);
-            }
+            self.counts.asked += u64::from(asked);
+            self.counts.lost += u64::from(asked);
+            self.wanted = self.wanted.wrapping_add(asked);
         }
         for _ in forgotten..count {
+            let asked = self.ring.next().asks(self.ack_every);
             self.record(if asked { State::InFlightUntimed } else { State::Unasked });
         }
     }
@@ -163,7 +171,8 @@ impl Account {
     fn record(&mut self, state: State) {
         self.counts.sent += 1;
         self.counts.asked += u64::from(state.open());
-        let forgotten = self.ring.push(Entry { state, at: self.recorded_at });
+        self.wanted = self.wanted.wrapping_add(u32::from(state.open()));
+        let forgotten = self.ring.push(Entry { state, at: self.recorded_at, wanted: self.wanted });
         self.counts.lost += u64::from(forgotten.state.open());
     }
 }

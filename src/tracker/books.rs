@@ -111,7 +111,7 @@ mod tests {
     }
 
     fn books() -> Books {
-        Books::new(Tracker::new(1))
+        Books::new(Tracker::new(1, 1))
     }
 
     #[test]

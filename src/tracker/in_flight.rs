@@ -22,20 +22,12 @@ pub(super) enum State {
     /// Given up.
     Lost,
     /// Not taken by the kernel.
-    Failed {
-        /// Whether it would have asked.
-        asked: bool,
-    },
+    Failed,
 }
 
 impl State {
     pub(super) const fn open(self) -> bool {
         matches!(self, Self::InFlight | Self::InFlightUntimed)
-    }
-
-    /// Whether a reply was wanted of this frame, taken by the kernel or not.
-    pub(super) const fn wanted(self) -> bool {
-        !matches!(self, Self::Unasked | Self::Failed { asked: false })
     }
 }
 
@@ -45,6 +37,8 @@ pub(super) struct Entry {
     pub(super) state: State,
     /// When it was sent.
     pub(super) at: MonoTime,
+    /// How many frames that wanted a reply there had been with it, round after 4,294,967,295.
+    pub(super) wanted: u32,
 }
 
 /// Where a frame number leads.
@@ -70,7 +64,7 @@ pub(super) struct Ring {
 impl Ring {
     /// An empty ring; the first frame will be `first`.
     pub(super) fn new(first: FrameNo) -> Self {
-        let vacant = Entry { state: State::Unasked, at: MonoTime::default() };
+        let vacant = Entry { state: State::Unasked, at: MonoTime::default(), wanted: 0 };
         let newest = FrameNo(first.0.wrapping_sub(1));
         Self { entries: vec![vacant; KEPT as usize].into_boxed_slice(), newest, total: 0 }
     }
@@ -107,12 +101,6 @@ impl Ring {
 
     pub(super) fn get_mut(&mut self, index: usize) -> &mut Entry {
         &mut self.entries[index]
-    }
-
-    /// The frames remembered, from the newest back.
-    pub(super) fn newest_first(&self) -> impl Iterator<Item = Entry> {
-        let kept = u32::try_from(self.total).map_or(KEPT, |total| total.min(KEPT));
-        (0..kept).map(|age| self.entries[slot(FrameNo(self.newest.0.wrapping_sub(age)))])
     }
 
     /// The number of the next frame on record.

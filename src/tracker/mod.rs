@@ -34,16 +34,17 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// Empty books for a number of controllers whose first frames have the number [`FrameNo::FIRST`].
+    /// Empty books for a number of controllers whose first frames have the number [`FrameNo::FIRST`]. A reply is asked
+    /// for in each of `ack_every` frames, as [`FrameNo::asks`] has it; 0 never asks.
     #[must_use]
-    pub fn new(controllers: usize) -> Self {
-        Self::starting_at(&vec![FrameNo::FIRST; controllers])
+    pub fn new(controllers: usize, ack_every: u32) -> Self {
+        Self::starting_at(&vec![FrameNo::FIRST; controllers], ack_every)
     }
 
     /// Empty books for one controller per element, whose next frame has that number.
     #[must_use]
-    pub fn starting_at(first: &[FrameNo]) -> Self {
-        Self { accounts: first.iter().map(|&first| Account::new(first)).collect() }
+    pub fn starting_at(first: &[FrameNo], ack_every: u32) -> Self {
+        Self { accounts: first.iter().map(|&first| Account::new(first, ack_every)).collect() }
     }
 
     /// How many controllers there are.
@@ -55,8 +56,8 @@ impl Tracker {
     /// A frame is about to be handed to the kernel at `at`; `asked` says whether it requests a reply.
     ///
     /// Records come in the order of sending. Numbers left out are frames whose records were dropped: they count as sent,
-    /// at an unknown time not later than `at`, and as asked (unless no frame so far asked for anything). A frame already
-    /// on record is left as it is.
+    /// at an unknown time not later than `at`, and as asked where their numbers are those that ask. A frame already on
+    /// record is left as it is.
     pub fn on_sent(&mut self, controller: usize, frame: FrameNo, asked: bool, at: MonoTime) {
         self.accounts[controller].on_sent(frame, asked, at);
     }
@@ -70,7 +71,7 @@ impl Tracker {
     }
 
     /// `last` was the last frame of the show, sent or not, at `at` at the latest: frames up to it of which no record came
-    /// count as sent and asked, as [`Tracker::on_sent`] has it.
+    /// count as [`Tracker::on_sent`] has it.
     pub fn on_last(&mut self, controller: usize, last: FrameNo, at: MonoTime) {
         self.accounts[controller].on_last(last, at);
     }
@@ -135,7 +136,7 @@ impl Tracker {
     }
 
     /// Whether the controller was lost when the sending ended: it was asked, and acked none of the frames of the last
-    /// second, or of the last ten if those are more. A frame that the kernel did not take was not acked either, and a
+    /// second that asked, or of the last ten that did if those are more. A frame that the kernel did not take was not acked either, and a
     /// refusal is no ack. To be asked after [`Tracker::finish`].
     #[must_use]
     pub fn lost_at_end(&self, controller: usize) -> bool {

@@ -7,7 +7,7 @@ const fn ms(ms: u64) -> MonoTime {
 
 /// A tracker of one controller to which frames 1 to `count` were sent, one each millisecond from 1 ms on, all asking.
 fn sent(count: u32) -> Tracker {
-    let mut tracker = Tracker::new(1);
+    let mut tracker = Tracker::new(1, 1);
     for frame in 1..=count {
         tracker.on_sent(0, FrameNo(frame), true, ms(u64::from(frame)));
     }
@@ -143,7 +143,7 @@ fn frames_without_a_record_count_as_sent_and_asked_at_an_unknown_time() {
 
 #[test]
 fn frames_without_a_record_did_not_ask_where_none_ever_does() {
-    let mut tracker = Tracker::new(1);
+    let mut tracker = Tracker::new(1, 0);
     tracker.on_sent(0, FrameNo(1), false, ms(1));
     tracker.on_sent(0, FrameNo(9_000), false, ms(9));
     tracker.on_send_failed(0, FrameNo(9_002));
@@ -176,7 +176,7 @@ fn a_gap_of_any_length_is_accounted_at_once() {
 
 #[test]
 fn frame_numbers_count_round() {
-    let mut tracker = Tracker::starting_at(&[FrameNo(u32::MAX)]);
+    let mut tracker = Tracker::starting_at(&[FrameNo(u32::MAX)], 1);
     for (frame, at) in [(u32::MAX, 1), (0, 2), (1, 3)] {
         tracker.on_sent(0, FrameNo(frame), true, ms(at));
     }
@@ -195,7 +195,7 @@ fn a_frame_recorded_twice_counts_once() {
 
 #[test]
 fn controllers_do_not_share_their_books() {
-    let mut tracker = Tracker::new(2);
+    let mut tracker = Tracker::new(2, 1);
     tracker.on_sent(1, FrameNo(1), true, ms(1));
     tracker.on_port_closed(0, 3);
     assert_eq!(tracker.on_reply(0, FrameNo(1), Running, ms(2)), Fate::Stray);
@@ -220,7 +220,7 @@ fn a_controller_is_lost_at_the_end_if_it_acked_nothing_of_the_last_second() {
 #[test]
 fn at_a_low_rate_the_last_ten_frames_tell_whether_a_controller_is_lost() {
     let slow = |acked: u32| {
-        let mut tracker = Tracker::new(1);
+        let mut tracker = Tracker::new(1, 1);
         for frame in 1..=20 {
             tracker.on_sent(0, FrameNo(frame), true, ms(500 * u64::from(frame)));
         }
@@ -244,5 +244,57 @@ fn a_controller_out_of_reach_is_lost_and_one_never_asked_is_not() {
         tracker.on_send_failed(0, FrameNo(frame));
     }
     assert!(tracker.lost_at_end(0));
-    assert!(!Tracker::new(1).lost_at_end(0), "nothing was sent");
+    assert!(!Tracker::new(1, 1).lost_at_end(0), "nothing was sent");
+}
+
+/// A tracker of one controller to which frames 1 to `count` were sent, one each millisecond, each `ack_every`-th asking.
+fn sent_asking(ack_every: u32, count: u32) -> Tracker {
+    let mut tracker = Tracker::new(1, ack_every);
+    for frame in 1..=count {
+        tracker.on_sent(0, FrameNo(frame), FrameNo(frame).asks(ack_every), ms(u64::from(frame)));
+    }
+    tracker
+}
+
+#[test]
+fn only_the_frames_that_ask_have_to_be_answered() {
+    let mut tracker = sent_asking(10, 95);
+    assert_eq!(tracker.on_reply(0, FrameNo(11), Running, ms(96)), Fate::Answered(Running));
+    assert_eq!(tracker.on_reply(0, FrameNo(21), Fault, ms(96)), Fate::Answered(Fault));
+    assert_eq!(tracker.on_reply(0, FrameNo(12), Running, ms(96)), Fate::Stray);
+    tracker.finish();
+    let counts = tracker.counts(0);
+    assert_eq!((counts.sent, counts.asked, counts.acked, counts.fault, counts.lost), (95, 10, 1, 1, 8));
+    assert_balanced(&tracker);
+}
+
+#[test]
+fn of_frames_without_a_record_those_asked_whose_numbers_ask() {
+    let mut tracker = sent_asking(10, 1);
+    tracker.on_sent(0, FrameNo(35), false, ms(35));
+    assert_eq!((tracker.counts(0).sent, tracker.counts(0).asked), (35, 4));
+    assert_eq!(tracker.on_reply(0, FrameNo(31), Running, ms(36)), Fate::Answered(Running));
+    assert_eq!(tracker.on_reply(0, FrameNo(32), Running, ms(36)), Fate::Stray);
+    tracker.on_last(0, FrameNo(1_000_001), ms(99));
+    assert_eq!((tracker.counts(0).sent, tracker.counts(0).asked), (1_000_001, 100_001));
+    tracker.finish();
+    assert_balanced(&tracker);
+}
+
+#[test]
+fn where_few_frames_ask_the_last_ten_that_did_tell_whether_a_controller_is_lost() {
+    // Far more frames than are remembered lie between the first of the last ten and the end.
+    let lost = |acked: u32| {
+        let mut tracker = Tracker::new(1, 1_000);
+        for frame in 1..=20_000 {
+            tracker.on_sent(0, FrameNo(frame), FrameNo(frame).asks(1_000), ms(u64::from(frame)));
+            if frame == acked {
+                tracker.on_reply(0, FrameNo(frame), Running, ms(u64::from(frame) + 1));
+            }
+        }
+        tracker.finish();
+        tracker.lost_at_end(0)
+    };
+    assert!(lost(9_001) && lost(0));
+    assert!(!lost(10_001));
 }

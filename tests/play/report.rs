@@ -93,6 +93,42 @@ fn people_read_the_report_on_stderr_and_stdout_stays_empty() {
 }
 
 #[test]
+fn with_few_replies_asked_for_the_books_are_of_the_frames_that_ask() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--ack-every", "10", "--json"]);
+    let report = run.report_of(0);
+    assert_sound(&report);
+    let one = &report["controllers"][0];
+    let sent = one["sent"].as_u64().expect("a count");
+    assert_eq!((&one["asked"], &one["acked"]), (&sent.div_ceil(10).into(), &one["asked"]), "{one}");
+    assert_eq!((&one["lost"], &one["stray"]), (&0.into(), &0.into()), "{one}");
+    let seen = sim.end();
+    assert_eq!((seen.controllers[0]["executed"].as_u64(), seen.rows.len() as u64), (Some(sent), sent));
+    assert!(run.code == Some(0) && seen.rest_in_park());
+}
+
+#[test]
+fn a_controller_that_answers_no_frame_is_missed_though_few_ask() {
+    let (folder, sim) = (Folder::new(), Sim::one(&["--mute"]));
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--ack-every", "10", "--json"]);
+    let report = run.report_of(69);
+    assert_sound(&report);
+    let one = &report["controllers"][0];
+    assert_eq!((&one["acked"], &one["lost"]), (&0.into(), &one["asked"]), "{one}");
+}
+
+#[test]
+fn a_play_that_spins_before_each_tick_is_acked_like_any_other() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let run = play(&folder.nod(&[0.1]), &sim.to(), &["--spin-us", "900", "--rate", "500", "--json"]);
+    let report = run.report_of(0);
+    assert_sound(&report);
+    let one = &report["controllers"][0];
+    assert_eq!((&report["result"], &one["acked"]), (&"completed".into(), &one["sent"]), "{one}");
+    assert!(sim.end().rest_in_park());
+}
+
+#[test]
 fn without_acks_nothing_is_asked_read_or_judged_and_every_seat_is_homed() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let run = play(&folder.nod(&[0.1]), &sim.to(), &["--no-acks", "--json"]);

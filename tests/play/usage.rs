@@ -46,6 +46,10 @@ fn wrong_use_is_64_and_says_what_is_wrong() {
         (&["--to", to, "--effect", "air"], "air"),
         (&["--to", to, "--effect", "air=13"], "12"),
         (&["--to", to, "--bind", "here"], "--bind"),
+        (&["--to", to, "--ack-every", "0"], "1..=1000"),
+        (&["--to", to, "--ack-every", "1001"], "1..=1000"),
+        (&["--to", to, "--ack-every", "2", "--no-acks"], "--no-acks"),
+        (&["--to", to, "--spin-us", "901"], "0..=900"),
     ];
     for (args, said) in cases {
         let run = kinocue(&[&["play", cue], *args].concat());
