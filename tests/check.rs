@@ -168,3 +168,13 @@ fn completions_name_the_commands() {
         assert!(run.code == Some(0) && run.stdout.contains("convert"), "{shell}");
     }
 }
+
+#[test]
+fn one_axis_and_one_frequency_are_told_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "one.csv", "time_s,a1,v1_hz,v1_amp\n0,0,20,0.001\n1,0,20,0.001\n");
+    let run = kinocue(&["check", &cue]);
+    assert!(run.stdout.contains("passed: 1 axis, "), "{}", run.stdout);
+    let run = kinocue(&["info", &cue]);
+    assert!(run.stdout.contains("a1: 20 Hz, up to 0.15 mm"), "{}", run.stdout);
+}

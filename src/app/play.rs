@@ -107,7 +107,7 @@ impl Play {
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let show = self.staged.show.clone();
-        let (mail, ends) = mailboxes(self.staged.lanes.len(), show.rate, live);
+        let (mail, ends) = mailboxes(self.staged.lanes.len(), show.rate, Arc::clone(&live));
         let MailEnds { sent, ticks, requests, answers, retired } = ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
@@ -118,6 +118,7 @@ impl Play {
             controllers: &self.config.controllers,
             lanes: &mut self.staged.lanes,
             stop,
+            live: &live,
         }
         .run(!self.manner.silent);
         let (engine, lanes, planner, timeline) = self.staged.split();

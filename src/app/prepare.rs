@@ -9,7 +9,7 @@ use crate::fanout::Lane;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::net::{Delivery, Sender};
 use crate::plan::homing_time;
-use crate::rt::{AckLoop, Sent};
+use crate::rt::{AckLoop, Live, Phase, Sent};
 use crate::time::{Clock, MonoTime};
 use crate::wire::{Code, MAX_LEN, PerAxis, RegisterReply, position_reads, positions};
 
@@ -39,6 +39,8 @@ pub(super) struct Preparation<'a, C> {
     pub(super) lanes: &'a mut [Lane],
     /// Read throughout: somebody wants the show to stop.
     pub(super) stop: &'a AtomicBool,
+    /// Told of the seats that are brought to park.
+    pub(super) live: &'a Live,
 }
 
 /// The positions that a controller has told so far, its own axes from the first on.
@@ -62,11 +64,13 @@ impl<C: Clock> Preparation<'_, C> {
         for (lane, told) in told.iter().enumerate() {
             if !self.is_parked(lane, told) {
                 let time_ms = self.send_home(lane, &mut prepared);
+                self.live.on_homing(time_ms);
                 arrival =
                     arrival.max(Some(self.clock.now() + Duration::from_millis(u64::from(time_ms)) + SETTLE));
             }
         }
         if let Some(arrival) = arrival {
+            self.live.enter(Phase::Homing);
             self.wait_until(arrival, &mut |_, _| false, &mut || false);
         }
         prepared

@@ -178,9 +178,10 @@ impl Report {
         self.axes.extend(figures::report(&path.display().to_string(), &figures));
         self.seat = figures::seat_names(&seats);
         if self.exits.len() == before {
+            let axes = timeline.axes();
+            let noun = if axes == 1 { "axis" } else { "axes" };
             let words = format!(
-                "{} axes, {}; velocity, acceleration and jerk for seat {} at {} frames a second are shown, not judged",
-                timeline.axes(),
+                "{axes} {noun}, {}; velocity, acceleration and jerk for seat {} at {} frames a second are shown, not judged",
                 timeline.duration(),
                 self.seat,
                 judge.rate_hz

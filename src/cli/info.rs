@@ -173,7 +173,8 @@ impl Info {
             let axes: Vec<_> = alike.iter().map(|v| v.axis.as_str()).collect();
             let VibrationReport { min_hz, max_hz, max_amplitude_mm, .. } = &alike[0];
             let axes = axes.join(", ");
-            ("vibration", format!("{axes}: {min_hz} to {max_hz} Hz, up to {max_amplitude_mm:.2} mm"))
+            let hz = if min_hz == max_hz { min_hz.to_string() } else { format!("{min_hz} to {max_hz}") };
+            ("vibration", format!("{axes}: {hz} Hz, up to {max_amplitude_mm:.2} mm"))
         }));
         facts.extend(self.effects.iter().map(|effect| {
             let first = effect.first_s.map(|s| format!(", first at {}", ShowTime::from_secs_f64(s)));

@@ -1,15 +1,11 @@
 //! `kinocue play`: one cue in the foreground, a progress line, the report at the end.
 
-use std::io::IsTerminal as _;
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, anyhow};
-use indicatif::{ProgressBar, ProgressStyle};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::load::{self, SourceArgs, after_help, parse_rate};
@@ -24,6 +20,10 @@ use crate::sys::signal;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 use crate::wire::Timing;
+
+mod progress;
+
+use progress::{Progress, Said};
 
 const EXAMPLES: [&str; 4] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
@@ -120,12 +120,10 @@ pub(super) fn play(
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
     let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
-    if !play.join().is_zero() {
-        print::tell(&format!("joining the cue takes {:.2} s", play.join().as_secs_f64()));
-    }
     let stop = stop_on_signals().context("signals cannot be handled").or_exit(Exit::System)?;
     let live = Arc::new(Live::default());
-    let progress = Progress::start(Arc::clone(&live), length, for_ever);
+    let said = Said { live: Arc::clone(&live), stop: Arc::clone(&stop), length, join: play.join() };
+    let progress = Progress::start(said, for_ever);
     let played = play.run(&stop, live).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
@@ -209,43 +207,4 @@ fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
         return Err(why).or_exit(Exit::Unavailable);
     }
     Ok(Exit::Done)
-}
-
-/// The progress line on a terminal, drawn by a thread of its own.
-struct Progress(Option<(Arc<AtomicBool>, thread::JoinHandle<()>)>);
-
-impl Progress {
-    fn start(live: Arc<Live>, length: ShowTime, for_ever: bool) -> Self {
-        if !std::io::stderr().is_terminal() {
-            return Self(None);
-        }
-        let done = Arc::new(AtomicBool::new(false));
-        let over = Arc::clone(&done);
-        let drawer = thread::spawn(move || {
-            let total = u64::try_from(length.as_nanos() / 1_000_000).unwrap_or(0);
-            let bar = if for_ever { ProgressBar::no_length() } else { ProgressBar::new(total) };
-            let style = ProgressStyle::with_template("{msg} [{wide_bar}]").expect("the template is fixed");
-            bar.set_style(style.progress_chars("=> "));
-            while !over.load(Ordering::Relaxed) {
-                let show = live.show();
-                bar.set_position(u64::try_from(show.as_nanos() / 1_000_000).unwrap_or(0));
-                bar.set_message(format!(
-                    "{show} / {length}, {} ticks, {} missed",
-                    live.ticks(),
-                    live.missed()
-                ));
-                thread::park_timeout(Duration::from_millis(100));
-            }
-            bar.finish_and_clear();
-        });
-        Self(Some((done, drawer)))
-    }
-
-    fn finish(self) {
-        if let Some((done, drawer)) = self.0 {
-            done.store(true, Ordering::Relaxed);
-            drawer.thread().unpark();
-            let _ = drawer.join(); // a progress line that failed is no reason to fail
-        }
-    }
 }

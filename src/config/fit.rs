@@ -1,12 +1,14 @@
 //! Whether a cue fits the hall: its axes, effects, vibration and stroke against the controllers.
 
+use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
 use crate::cue::CueFaults;
 use crate::motion::SeatType;
+use crate::time::ShowTime;
 use crate::timeline::{Held, Timeline};
-use crate::wire::motion_channel_and_slots;
+use crate::wire::{Vibration, motion_channel_and_slots};
 
 use super::section::did_you_mean;
 use super::{Config, Controller, Dialect, FanOut};
@@ -15,7 +17,7 @@ use super::{Config, Controller, Dialect, FanOut};
 const MAX_VIBRATING_AXES: usize = 6;
 
 /// One thing of a cue that the hall cannot do.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Misfit {
     /// An axis that no controller takes.
@@ -53,6 +55,59 @@ pub enum Misfit {
         /// Axes of its frames.
         axes: usize,
     },
+    /// A swing that no frame can ask for; it would be cut without a word.
+    #[error("v{axis}_amp: {amplitude} is over {limit}, the most that a frame can say; lower the amplitude")]
+    UnsaidAmplitude {
+        /// The axis, from 1.
+        axis: usize,
+        /// What the cue asks for.
+        amplitude: Amplitude,
+        /// What a frame can say.
+        limit: Swing,
+    },
+    /// A swing that leaves the stroke wherever the axis stands.
+    #[error("v{axis}_amp: {amplitude} is over {limit}, half the stroke; lower the amplitude")]
+    AmplitudePastStroke {
+        /// The axis, from 1.
+        axis: usize,
+        /// What the cue asks for.
+        amplitude: Amplitude,
+        /// Half the seat's stroke.
+        limit: Swing,
+    },
+}
+
+/// How far a vibration swings to either side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Swing {
+    /// Millimetres.
+    pub mm: f64,
+    /// Pulses.
+    pub pulses: f64,
+}
+
+impl fmt::Display for Swing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.3} mm, {:.0} pulses", self.mm, self.pulses)
+    }
+}
+
+/// The farthest swing that a cue asks of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Amplitude {
+    /// How far.
+    pub swing: Swing,
+    /// The seat type that it means so much on.
+    pub seat: String,
+    /// The first show time at which it is asked for.
+    pub at: ShowTime,
+}
+
+impl fmt::Display for Amplitude {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { swing, seat, at } = self;
+        write!(f, "the amplitude at {at} ({swing}, on seat {seat})")
+    }
 }
 
 impl Misfit {
@@ -63,6 +118,9 @@ impl Misfit {
             Self::UntakenAxis { axis } => format!("a{axis}"),
             Self::UnknownEffect { name, .. } => format!("fx_{name}"),
             Self::NoVibration { axis, .. } | Self::WideVibration { axis, .. } => format!("v{axis}_hz"),
+            Self::UnsaidAmplitude { axis, .. } | Self::AmplitudePastStroke { axis, .. } => {
+                format!("v{axis}_amp")
+            }
         }
     }
 }
@@ -87,7 +145,23 @@ impl Config {
             Misfit::UnknownEffect { name: name.clone(), hint }
         });
         let shaken = self.controllers.iter().filter_map(|controller| unshakeable(controller, timeline));
-        untaken.chain(unknown).chain(shaken).collect()
+        untaken.chain(unknown).chain(shaken).chain(self.overshaken(timeline)).collect()
+    }
+
+    /// The axes that swing too far, once for each seat type.
+    fn overshaken(&self, timeline: &Timeline) -> Vec<Misfit> {
+        let mut judged: Vec<(usize, &Arc<SeatType>)> = Vec::new();
+        let mut misfits = Vec::new();
+        for controller in self.controllers.iter().filter(|one| unshakeable(one, timeline).is_none()) {
+            for axis in controller.window() {
+                let pair = (axis, &controller.seat);
+                if !judged.contains(&pair) {
+                    misfits.extend(overshake(axis, &controller.seat, timeline));
+                    judged.push(pair);
+                }
+            }
+        }
+        misfits
     }
 
     /// Holds the cue's axes against the stroke of each seat that takes them.
@@ -129,6 +203,26 @@ fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
         }
         Dialect::Smc => None,
     }
+}
+
+/// Why an axis, counted from 0, swings too far on a seat: past the lower of what a frame can say and half the stroke.
+fn overshake(axis: usize, seat: &SeatType, timeline: &Timeline) -> Option<Misfit> {
+    let (at, strongest) = timeline.strongest_vibration(axis)?;
+    let swing = |pulses: f64| Swing { mm: pulses / seat.stroke_pulses() * seat.stroke_mm, pulses };
+    // Whole pulses, as the wire has them.
+    let pulses = (strongest.amplitude * timeline.unit().to_stroke(seat) * seat.stroke_pulses()).round();
+    let half = (seat.stroke_pulses() / 2.0).round();
+    let most = f64::from(Vibration::MAX_AMPLITUDE);
+    if pulses <= half.min(most) {
+        return None;
+    }
+    let amplitude = Amplitude { swing: swing(pulses), seat: seat.name.clone(), at };
+    let axis = axis + 1;
+    Some(if half < most {
+        Misfit::AmplitudePastStroke { axis, amplitude, limit: swing(half) }
+    } else {
+        Misfit::UnsaidAmplitude { axis, amplitude, limit: swing(most) }
+    })
 }
 
 #[cfg(test)]
@@ -178,6 +272,46 @@ mod tests {
         assert!(misfits(&["1,axes=6"], header, row).is_empty());
         assert_eq!(misfits(&["1,axes=7"], header, row).len(), 1);
         assert!(misfits(&["1,axes=10"], header, "0,0,0,0").is_empty());
+    }
+
+    #[test]
+    fn a_swing_that_no_frame_can_say_is_refused_with_its_time_and_the_limit() {
+        let shake = |amplitude: &str| {
+            let text =
+                format!("# units: mm\ntime_s,a1,v1_hz,v1_amp\n0,9,20,1\n1.5,9,20,{amplitude}\n2,9,0,99\n");
+            let timeline =
+                Timeline::new(cue::read(Path::new("t.csv"), text.as_bytes(), &Source::Native).unwrap());
+            let targets = ["127.0.0.1:1".to_owned(), "127.0.0.1:2".to_owned()];
+            from_to_args(&targets, &[], 1).unwrap().misfits(&timeline)
+        };
+        assert!(shake("32.7675").is_empty(), "65,535 pulses, and what has no frequency shakes nothing");
+        let found = shake("32.768");
+        let [misfit] = &found[..] else { panic!("told once for both seats: {found:?}") };
+        assert_eq!(misfit.column(), "v1_amp");
+        assert_eq!(
+            misfit.to_string(),
+            "v1_amp: the amplitude at 00:01.500 (32.768 mm, 65536 pulses, on seat bench3) is over 32.767 mm, 65535 \
+             pulses, the most that a frame can say; lower the amplitude"
+        );
+    }
+
+    #[test]
+    fn a_swing_over_half_the_stroke_of_a_seat_is_refused() {
+        let shake = |percent: f64| {
+            let timeline = cue("a1,a2,v2_hz,v2_amp", &format!("0,0,20,{}", percent / 100.0));
+            let targets = ["127.0.0.1:1,axes=1".to_owned(), "127.0.0.1:2,axes=1,offset=1".to_owned()];
+            let mut config = from_to_args(&targets, &[], 2).unwrap();
+            let coarse = SeatType { pulses_per_rev: 1_000.0, ..SeatType::bench3(1) };
+            config.controllers[1].seat = Arc::new(coarse);
+            config.misfits(&timeline)
+        };
+        assert!(shake(50.0).is_empty());
+        let found = shake(51.0);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(matches!(found[0], Misfit::AmplitudePastStroke { axis: 2, .. }), "{found:?}");
+        let text = found[0].to_string();
+        assert!(text.contains("76.500 mm, 15300 pulses"), "{text}");
+        assert!(text.contains("is over 75.000 mm, 15000 pulses, half the stroke"), "{text}");
     }
 
     #[test]

@@ -20,7 +20,7 @@ mod tests;
 
 pub use crate::wire::{Dialect, Timing};
 pub use fault::{ConfigFault, ConfigFaults};
-pub use fit::{HallStroke, Misfit};
+pub use fit::{Amplitude, HallStroke, Misfit, Swing};
 pub use target::{TargetError, from_to_args};
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).

@@ -158,7 +158,11 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
     let axes = options.axes.unwrap_or(cue_axes - options.offset);
     check_window(options.offset, axes, options.fan_out).map_err(refuse)?;
     let address = resolve(target, host)?;
-    check_peer(address).map_err(|reason| refuse(format!("{address}: {reason}")))?;
+    check_peer(address).map_err(|reason| {
+        // A host that is an address has just been named.
+        let is_named = host == address.to_string();
+        refuse(if is_named { reason.to_owned() } else { format!("{address}: {reason}") })
+    })?;
     Ok(Controller {
         group: options.name.clone(),
         name: options.name,

@@ -178,6 +178,22 @@ impl Engine {
         self.playhead
     }
 
+    /// Whether the lanes are on their way onto the cue.
+    #[must_use]
+    pub fn is_joining(&self) -> bool {
+        match self.phase {
+            Phase::Settling => true,
+            Phase::Riding => self.reached < self.course.settled(),
+            _ => false,
+        }
+    }
+
+    /// Whether the lanes are to park, be it that they still follow the cue, or are there.
+    #[must_use]
+    pub const fn is_homeward(&self) -> bool {
+        self.homeward || matches!(self.phase, Phase::Parking | Phase::Closing(_) | Phase::Done)
+    }
+
     /// How far the show is behind its grid.
     #[must_use]
     pub fn lag(&self) -> Duration {

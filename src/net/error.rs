@@ -44,11 +44,29 @@ impl NetError {
             Some(libc::ENETUNREACH | libc::EHOSTUNREACH) => {
                 "no route leads there: check the cable and this machine's address and mask"
             }
+            Some(libc::EINVAL) => {
+                "the local address that is bound does not lead there: give --bind (or bind under [show]) this \
+                 machine's address in the controllers' network, or 0.0.0.0"
+            }
             Some(libc::EMFILE | libc::ENFILE) => {
                 "too many files are open: raise the limit with LimitNOFILE= or `ulimit -n`"
             }
             _ => "check the network settings of this machine",
         };
         Self::Refused { attempt, address, remedy, cause }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_address_that_leads_nowhere_is_named_as_what_to_change() {
+        let cause = io::Error::from_raw_os_error(libc::EINVAL);
+        let peer = "192.168.15.201:7408".parse().unwrap();
+        let error = NetError::refused("reach the controller", peer, cause).to_string();
+        assert!(error.starts_with("cannot reach the controller 192.168.15.201:7408; "), "{error}");
+        assert!(error.contains("--bind (or bind under [show])"), "{error}");
     }
 }

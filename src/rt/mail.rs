@@ -1,11 +1,11 @@
 //! What crosses between the tick thread and the others: bounded, single-producer, never waited for.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::thread::Thread;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::live::{Live, Phase};
 use crate::engine::Rate;
 use crate::plan::{Course, Request};
 use crate::time::{MonoTime, ShowTime};
@@ -57,34 +57,6 @@ pub enum Answer {
     Course(Box<Course>),
     /// There is none for the request of that serial.
     Refused(u32),
-}
-
-/// What anyone may look at while a play runs.
-#[derive(Debug, Default)]
-pub struct Live {
-    show_ns: AtomicI64,
-    ticks: AtomicU64,
-    missed: AtomicU64,
-}
-
-impl Live {
-    /// Show time after the newest tick.
-    #[must_use]
-    pub fn show(&self) -> ShowTime {
-        ShowTime::from_nanos(self.show_ns.load(Ordering::Relaxed))
-    }
-
-    /// Ticks that sent so far.
-    #[must_use]
-    pub fn ticks(&self) -> u64 {
-        self.ticks.load(Ordering::Relaxed)
-    }
-
-    /// Ticks slept through so far.
-    #[must_use]
-    pub fn missed(&self) -> u64 {
-        self.missed.load(Ordering::Relaxed)
-    }
 }
 
 /// The tick thread's ends.
@@ -153,10 +125,9 @@ impl Mail {
         self.unposted += u64::from(self.sent.push(sent).is_err());
     }
 
-    pub(super) fn report(&mut self, report: TickReport) {
-        self.live.show_ns.store(report.show.as_nanos(), Ordering::Relaxed);
-        self.live.ticks.fetch_add(1, Ordering::Relaxed);
-        self.live.missed.fetch_add(report.missed, Ordering::Relaxed);
+    pub(super) fn report(&mut self, report: TickReport, phase: Phase) {
+        self.live.on_tick(&report);
+        self.live.enter(phase);
         self.unposted += u64::from(self.ticks.push(report).is_err());
     }
 

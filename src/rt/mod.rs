@@ -4,12 +4,14 @@
 //! happened before it or happens on another thread; values cross in bounded single-producer mailboxes.
 
 mod acks;
+mod live;
 mod mail;
 mod planning;
 mod spin;
 
 pub use acks::{Accounts, AckLoop};
-pub use mail::{Answer, Live, Mail, MailEnds, Sent, TickReport, mailboxes};
+pub use live::{Live, Phase};
+pub use mail::{Answer, Mail, MailEnds, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
 pub use spin::Spinning;
 
@@ -110,7 +112,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             }
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
-        self.mail.report(TickReport { late_ns, missed: tick.missed, show: self.engine.playhead() });
+        let report = TickReport { late_ns, missed: tick.missed, show: self.engine.playhead() };
+        self.mail.report(report, Phase::of(&self.engine));
     }
 
     fn hand_on(&mut self) {

@@ -126,8 +126,10 @@ fn lock_memory() -> Result<(), String> {
         Some(_) => MlockAllFlags::CURRENT,
     };
     let cause = match mlockall(pages) {
-        Ok(()) if locked_kib() > 0 => return Ok(()),
-        Ok(()) => String::from("granted, but VmLck in /proc/self/status is 0"),
+        Ok(()) => match not_in_force(fs::read_to_string("/proc/self/status")) {
+            None => return Ok(()),
+            Some(cause) => cause,
+        },
         Err(cause) => cause.to_string(),
     };
     Err(format!(
@@ -141,11 +143,16 @@ fn words(limit: Option<u64>) -> String {
     limit.map_or_else(|| String::from("unlimited"), |limit| limit.to_string())
 }
 
-/// Locked memory of this process, in KiB; 0 where the kernel does not tell.
-fn locked_kib() -> u64 {
-    fs::read_to_string("/proc/self/status").map_or(0, |status| vm_lck(&status))
+/// Why a lock that was granted cannot be taken for one, by what the kernel says of the process.
+fn not_in_force(status: io::Result<String>) -> Option<String> {
+    match status {
+        Ok(status) if vm_lck(&status) > 0 => None,
+        Ok(_) => Some(String::from("granted, but VmLck in /proc/self/status is 0")),
+        Err(cause) => Some(format!("granted, but /proc/self/status could not be read: {cause}")),
+    }
 }
 
+/// Locked memory, in KiB; 0 where the kernel does not tell.
 fn vm_lck(status: &str) -> u64 {
     let line = status.lines().find_map(|line| line.strip_prefix("VmLck:"));
     line.and_then(|value| value.trim().strip_suffix("kB")?.trim().parse().ok()).unwrap_or(0)
@@ -183,6 +190,15 @@ mod tests {
         assert_eq!(vm_lck("Name:\tkinocue\nVmSize:\t  9000 kB\nVmLck:\t    1234 kB\n"), 1_234);
         assert_eq!(vm_lck("Name:\tkinocue\n"), 0);
         assert_eq!(vm_lck("VmLck:\tnonsense\n"), 0);
+    }
+
+    #[test]
+    fn a_status_that_cannot_be_read_is_not_taken_for_one_without_locked_memory() {
+        let told = |status| not_in_force(status).unwrap_or_default();
+        assert_eq!(told(Ok("VmLck:\t 4 kB\n".to_owned())), "");
+        assert!(told(Ok("VmLck:\t 0 kB\n".to_owned())).contains("VmLck"));
+        let unread = told(Err(io::Error::from_raw_os_error(libc::EMFILE)));
+        assert!(unread.contains("could not be read") && !unread.contains("VmLck"), "{unread}");
     }
 
     #[test]

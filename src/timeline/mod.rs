@@ -145,6 +145,16 @@ impl Timeline {
             .is_some_and(|steps| steps.as_slice().iter().any(|step| moves(step.value)))
     }
 
+    /// The farthest swing of an axis, counted from 0, and the first show time from which it holds; none where the axis
+    /// never vibrates.
+    #[must_use]
+    pub fn strongest_vibration(&self, axis: usize) -> Option<(ShowTime, Vibration)> {
+        let steps = self.cue.vibration().get(axis)?.as_slice().iter().filter(|step| moves(step.value));
+        let strongest = steps
+            .reduce(|most, step| if step.value.amplitude > most.value.amplitude { step } else { most })?;
+        Some((strongest.at, strongest.value))
+    }
+
     /// The effects that are on at a show time.
     #[must_use]
     pub fn effects(&self, at: ShowTime, hint: &mut Hint) -> EffectSet {

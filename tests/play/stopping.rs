@@ -33,6 +33,10 @@ fn ctrl_c_and_sigterm_park_the_seats_turn_effects_off_and_report_a_stop() {
                 let report = run.report_of(0);
                 let one = &report["controllers"][0];
                 assert_eq!(report["result"], "stopped");
+                for phase in ["playing", "parking; Ctrl-C again ends at once"] {
+                    let line = format!("kinocue: {phase}\n");
+                    assert_eq!(run.stderr.matches(&line).count(), 1, "{line}: {}", run.stderr);
+                }
                 assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()), "{one}");
                 let seen = sim.end();
                 assert!(seen.rest_in_park(), "{:?}", seen.controllers);

@@ -32,6 +32,7 @@ fn wrong_use_is_64_and_says_what_is_wrong() {
         (&["--to", to, "--config", "hall.toml"], "--config"),
         (&["--to", "127.0.0.1"], "port"),
         (&["--to", "127.0.0.1:0"], "port"),
+        (&["--to", "0.0.0.0:7408"], "--to 0.0.0.0:7408: is no destination"),
         (&["--to", "127.0.0.1:7408,axis=2"], "axis"),
         (&["--to", "127.0.0.1:7408,axes=13"], "12"),
         (&["--to", "127.0.0.1:7408,offset=2"], "offset"),
@@ -82,6 +83,23 @@ fn vibration_that_a_frame_has_no_room_for_is_refused() {
         let run = play(&cue, &[to.to_owned()], &["--json"]);
         assert_eq!((run.code, run.stdout.as_str()), (Some(65), ""), "{run:?}");
         assert!(run.stderr.contains("nod.csv:1:30: v1_hz"), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_vibration_that_swings_too_far_is_refused_by_check_and_play() {
+    let folder = Folder::new();
+    let seat = "[seat.wide]\naxes = 3\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 10000\n\
+                max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n";
+    let hall = format!("{seat}[[controller]]\nname = \"A1\"\naddress = \"127.0.0.1:9\"\nseat = \"wide\"\n");
+    let hall = folder.write("hall.toml", hall);
+    let cue = folder.nod_with(&[0.01; 3], ",v1_hz,v1_amp", |_| ",20,0.6".to_owned());
+    let [hall, cue] = [&hall, &cue].map(|path| path.to_str().expect("text"));
+    for command in ["check", "play"] {
+        let run = kinocue(&[command, cue, "--config", hall, "--json"]);
+        assert_eq!(run.code, Some(65), "{run:?}");
+        let said = if command == "check" { &run.stdout } else { &run.stderr };
+        assert!(said.contains("v1_amp: the amplitude at 00:00.000 (90.000 mm"), "{run:?}");
     }
 }
 

@@ -1,0 +1,123 @@
+//! What anyone may look at while a play runs: atomics that the playing threads store, and nobody waits for.
+
+use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::time::Duration;
+
+use super::TickReport;
+use crate::engine::Engine;
+use crate::time::ShowTime;
+
+/// How far a play is, in the order of a show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Phase {
+    /// The controllers are asked where their seats stand.
+    #[default]
+    Asking,
+    /// Seats are on their slow way to park.
+    Homing,
+    /// Seats are on their way onto the cue.
+    Joining,
+    /// Seats follow the cue.
+    Playing,
+    /// Seats are on their way to park, or there.
+    Parking,
+}
+
+impl Phase {
+    const ALL: [Self; 5] = [Self::Asking, Self::Homing, Self::Joining, Self::Playing, Self::Parking];
+
+    /// Where the engine is after a tick.
+    pub(super) fn of(engine: &Engine) -> Self {
+        match (engine.is_homeward(), engine.is_joining()) {
+            (true, _) => Self::Parking,
+            (false, true) => Self::Joining,
+            (false, false) => Self::Playing,
+        }
+    }
+}
+
+/// What anyone may look at while a play runs.
+#[derive(Debug, Default)]
+pub struct Live {
+    phase: AtomicU8,
+    homing: AtomicU32,
+    homing_ms: AtomicU32,
+    show_ns: AtomicI64,
+    ticks: AtomicU64,
+    missed: AtomicU64,
+}
+
+impl Live {
+    /// How far the play is.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        // Acquire: who sees the phase sees the homing it speaks of.
+        let phase = usize::from(self.phase.load(Ordering::Acquire));
+        Phase::ALL.get(phase).copied().unwrap_or_default()
+    }
+
+    /// Seats that were not at park before tick 0, and how long the slowest of them takes to get there.
+    #[must_use]
+    pub fn homing(&self) -> (u32, Duration) {
+        let ms = self.homing_ms.load(Ordering::Relaxed);
+        (self.homing.load(Ordering::Relaxed), Duration::from_millis(u64::from(ms)))
+    }
+
+    /// Show time after the newest tick.
+    #[must_use]
+    pub fn show(&self) -> ShowTime {
+        ShowTime::from_nanos(self.show_ns.load(Ordering::Relaxed))
+    }
+
+    /// Ticks that sent so far.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.ticks.load(Ordering::Relaxed)
+    }
+
+    /// Ticks slept through so far.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.missed.load(Ordering::Relaxed)
+    }
+
+    /// Notes one more seat that is on its slow way to park, `time_ms` long.
+    pub fn on_homing(&self, time_ms: u32) {
+        self.homing.fetch_add(1, Ordering::Relaxed);
+        self.homing_ms.fetch_max(time_ms, Ordering::Relaxed);
+    }
+
+    /// Notes how far the play is.
+    pub fn enter(&self, phase: Phase) {
+        self.phase.store(phase as u8, Ordering::Release);
+    }
+
+    /// Notes a tick that sent.
+    pub fn on_tick(&self, report: &TickReport) {
+        self.show_ns.store(report.show.as_nanos(), Ordering::Relaxed);
+        self.ticks.fetch_add(1, Ordering::Relaxed);
+        self.missed.fetch_add(report.missed, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_phase_that_is_entered_is_seen() {
+        let live = Live::default();
+        assert_eq!(live.phase(), Phase::Asking);
+        for phase in Phase::ALL {
+            live.enter(phase);
+            assert_eq!(live.phase(), phase);
+        }
+    }
+
+    #[test]
+    fn the_slowest_seat_says_how_long_homing_takes() {
+        let live = Live::default();
+        [2_000, 3_000, 1_000].into_iter().for_each(|ms| live.on_homing(ms));
+        assert_eq!(live.homing(), (3, Duration::from_secs(3)));
+    }
+}
