@@ -2,7 +2,7 @@
 
 use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
 use crate::engine::Rate;
-use crate::motion::{Measure, Reading, Readings, Spacing, Window};
+use crate::motion::{Limits, Measure, Reading, Readings, Slot, Spacing, Window};
 use crate::plan::Curve;
 use crate::time::ShowTime;
 
@@ -58,8 +58,8 @@ impl Headroom {
     }
 }
 
-fn different_slots(windows: &[Window]) -> Vec<(usize, crate::motion::Slot)> {
-    let mut slots: Vec<(usize, crate::motion::Slot)> = Vec::new();
+fn different_slots(windows: &[Window]) -> Vec<(usize, Slot)> {
+    let mut slots: Vec<(usize, Slot)> = Vec::new();
     for (_, slot) in windows.iter().flat_map(Window::moving) {
         let axis = slot.axis.expect("a moving slot has an axis");
         if !slots.contains(&(axis, *slot)) {
@@ -95,7 +95,7 @@ impl Load {
 }
 
 /// Keeps the loads where each reading was taken.
-fn note(loads: &mut [Load], readings: &Readings, limits: crate::motion::Limits) {
+fn note(loads: &mut [Load], readings: &Readings, limits: Limits) {
     let last = loads.len() - 1;
     let index = |reading: &Reading| usize::try_from(reading.at.as_nanos() / SPAN).unwrap_or(0).min(last);
     let Readings { velocity, acceleration, jerk, .. } = readings;
@@ -113,7 +113,7 @@ fn note(loads: &mut [Load], readings: &Readings, limits: crate::motion::Limits) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::{MAX_AXES, Pose, SeatType, Slot};
+    use crate::motion::{MAX_AXES, Pose, SeatType};
 
     /// Ten seconds of rest, then ten at a steady share of the seat's greatest speed, back and forth.
     fn headroom(share: f64) -> Headroom {

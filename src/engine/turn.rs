@@ -20,14 +20,13 @@ impl Engine {
     /// A few missed ticks leave a lag that is slewed away; after too many the lanes hold, then go on from rest.
     pub(super) fn count_missed(&mut self, missed: u64) {
         let gap = self.show.rate.offset(missed);
-        let too_long = gap > LAG_HOLD && gap > self.show.rate.period();
         match self.phase {
             Phase::Stalled if missed > 0 => {
                 // A course that was to begin in the gap would be taken up in its middle.
                 self.drop_switch();
                 self.playhead += gap;
             }
-            Phase::Riding | Phase::Parking if too_long => {
+            Phase::Riding | Phase::Parking if self.is_too_long(gap) => {
                 // The controllers reached the last pose and stand there.
                 self.homeward |= self.phase == Phase::Parking;
                 self.playhead += gap + self.slew.lag();
@@ -39,6 +38,11 @@ impl Engine {
             Phase::Riding => self.slew.fall_behind(gap),
             _ => {}
         }
+    }
+
+    /// Whether a gap or a lag is more than can be slewed away.
+    fn is_too_long(&self, span: Duration) -> bool {
+        span > LAG_HOLD && span > self.show.rate.period()
     }
 
     /// How much show time passes in a frame of that Time.
@@ -84,7 +88,7 @@ impl Engine {
 
     fn look_ahead_riding(&mut self, asked: Option<Goal>, soonest: ShowTime) {
         let lag = self.slew.lag();
-        if lag > LAG_HOLD && lag > self.show.rate.period() {
+        if self.is_too_long(lag) {
             if asked != Some(Goal::Rejoin) {
                 // Many small gaps: the lanes are moving, so they join from the lagging cue onto the true one.
                 self.ask(Goal::Rejoin, soonest, soonest + lag);
