@@ -14,6 +14,7 @@ use std::time::Duration;
 
 use common::spread::{Spread, verdict};
 use common::stage::{ride, stage};
+use kinocue::engine::Step;
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::Clock as _;
 use kinocue::wire::MAX_LEN;
@@ -108,9 +109,10 @@ fn round(links: &[Link]) -> Round {
     for _ in 0..TICKS {
         let joining = engine.playhead() < settled;
         let tick_us = timed(|| {
-            let beat = engine.tick(0).expect("the ride is longer");
-            for (lane, pose) in lanes.iter_mut().zip(engine.poses()) {
-                black_box(lane.encode(&beat, pose, &mut buf));
+            let Step::Send(beat) = engine.tick(0) else { unreachable!("the ride is longer") };
+            for (index, lane) in lanes.iter_mut().enumerate() {
+                let (pose, mix) = engine.frame(index).expect("every lane takes part");
+                black_box(lane.encode(&beat, pose, mix, &mut buf));
             }
         });
         let sends_us = timed(|| send_all(links));

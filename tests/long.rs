@@ -54,10 +54,11 @@ impl Run {
         let show = Show { rate, timing: self.timing, start: ShowTime::ZERO, plays: 0 };
         let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false })
             .expect("there is a join");
+        let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
         let lanes: Vec<Lane> = lanes.into_iter().map(|lane| lane.starting_at(self.first)).collect();
         let live = Arc::new(Live::default());
-        let (mail, MailEnds { sent, ticks, requests, answers, retired }) =
+        let (mail, MailEnds { sent, ticks, requests, answers, retired, orders: _orders }) =
             mailboxes(1, rate, Arc::clone(&live));
         let plans = PlanLoop { planner, timeline, requests, answers, retired };
         let stop = AtomicBool::new(false);
@@ -77,7 +78,8 @@ impl Run {
         };
         let sink = Link { next: self.first, timing: self.timing, sum_ms: 0, bridges: 0 };
         let grid = TickGrid::new(ORIGIN, rate);
-        let mut tick_loop = TickLoop { clock: &clock, grid, engine, lanes, sink, mail, stop: &stop };
+        let mut tick_loop =
+            TickLoop { clock: &clock, grid, engine, lanes, sink, mail, desk: &desk, leave: &stop };
         let ended = tick_loop.run();
         let (bridges, last) = (tick_loop.sink.bridges, tick_loop.lanes[0].last_frame());
         let laps = clock.laps.get();

@@ -248,12 +248,13 @@ struct Outcome {
 fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
     let (staged, watched) = staged(addresses);
     let rate = staged.show.rate;
+    let desk = staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::default());
     let (mut mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
-    let MailEnds { sent, ticks, requests, answers, retired } = ends;
+    let MailEnds { sent, ticks, requests, answers, retired, orders: _orders } = ends;
     let mut plans = PlanLoop { planner, timeline, requests, answers, retired };
     // The kernel stamps replies with the real time; ahead of it, no frame is ever given up in a slow test.
     let origin = Monotonic.now() + Duration::from_secs(3_600);
@@ -268,8 +269,16 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
         mail.wakes(plan_thread.thread().clone());
         let clock = Jumps { pace, live, now: Cell::new(origin), show: Cell::default(), laps: Cell::new(0) };
         let grid = TickGrid::new(origin, rate);
-        let mut tick_loop =
-            TickLoop { clock: &clock, grid, engine, lanes, sink: sender, mail, stop: &pace.stop };
+        let mut tick_loop = TickLoop {
+            clock: &clock,
+            grid,
+            engine,
+            lanes,
+            sink: sender,
+            mail,
+            desk: &desk,
+            leave: &pace.stop,
+        };
         let before = Calls::so_far();
         let ended = tick_loop.run();
         let calls = Calls::so_far().since(before);

@@ -77,7 +77,7 @@ fn the_octets_of_a_small_show_are_those_on_record() {
 
 #[test]
 fn a_stop_before_the_first_frame_sends_none() {
-    let played = Virtual::new(swell(1, 6, 40.0, 0.4)).with(0, Event::Stop).play();
+    let played = Virtual::new(swell(1, 6, 40.0, 0.4)).with(0, Event::Leave).play();
     assert_eq!((played.ended.ending, played.ended.ticks), (Ending::Stopped, 0));
     assert!(played.frames.is_empty());
 }
@@ -152,7 +152,7 @@ fn a_stall_upon_a_stall_never_lands_in_the_middle_of_a_join() {
 #[test]
 fn a_stop_in_the_last_ticks_of_a_moving_cue_waits_for_what_follows_it() {
     for at in 590..=602 {
-        let mut show = Virtual::new(swell(1, 6, 60.0, 0.25)).with(at, Event::Stop);
+        let mut show = Virtual::new(swell(1, 6, 60.0, 0.25)).with(at, Event::Leave);
         show.plays = 2;
         assert_gentle(&show.play());
     }
@@ -172,7 +172,7 @@ fn many_small_gaps_end_in_a_join_that_never_stops_the_seat() {
 #[test]
 fn a_stop_parks_from_the_moving_cue_within_the_limits() {
     for at in [50, 170, 333, 400, 555] {
-        let played = Virtual::new(swell(3, 20, 60.0, 0.25)).with(at, Event::Stop).play();
+        let played = Virtual::new(swell(3, 20, 60.0, 0.25)).with(at, Event::Leave).play();
         assert_eq!(played.ended.ending, Ending::Stopped);
         assert_gentle(&played);
         let last = played.frames.last().unwrap();
@@ -185,7 +185,7 @@ fn a_stop_parks_from_the_moving_cue_within_the_limits() {
 fn a_planner_that_answers_late_is_given_more_time_and_the_seat_never_jumps() {
     let played = Virtual::new(swell(1, 20, 60.0, 0.25))
         .with(395, Event::SlowPlanner(25))
-        .with(400, Event::Stop)
+        .with(400, Event::Leave)
         .play();
     assert_eq!(played.ended.ending, Ending::Stopped);
     assert_gentle(&played);

@@ -39,15 +39,17 @@ pub(crate) fn run(seconds: u32, to: &[SocketAddrV4]) -> Outcome {
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
     let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
-    let MailEnds { sent, ticks, requests, answers, retired } = ends;
+    let MailEnds { sent, ticks, requests, answers, retired, orders: _orders } = ends;
     let acks = AckLoop::new(receiver, watched, 1, sent, ticks);
+    let desk = staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let plans = PlanLoop { planner, timeline, requests, answers, retired };
     let origin = Monotonic.now() + RUN_UP;
     let grid = TickGrid::new(origin, rate);
     let drains = DrainGrid::new(origin, rate.period());
     let never = AtomicBool::new(false);
-    let tick_loop = TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, stop: &never };
+    let tick_loop =
+        TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, desk: &desk, leave: &never };
     outcome(to.len(), run_threads(tick_loop, acks, plans, drains))
 }
 

@@ -11,6 +11,8 @@ use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
 use super::sum_up::sum_up;
+use rtrb::Producer;
+
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::Show;
@@ -18,7 +20,7 @@ use crate::fanout::Manner;
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
 use crate::plan::PlanError;
-use crate::rt::{AckLoop, Live, MailEnds, PlanLoop, mailboxes};
+use crate::rt::{AckLoop, Desk, Live, Mail, MailEnds, Order, PlanLoop, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -60,6 +62,20 @@ pub struct Play {
     config: Config,
     manner: Manner,
     staged: Staged,
+    mail: Mail,
+    ends: MailEnds,
+    control: Control,
+}
+
+/// What a play is led and watched by while it runs.
+#[derive(Debug, Clone)]
+pub struct Control {
+    /// Where levels, effects, seats, trim and the stop are set.
+    pub desk: Arc<Desk>,
+    /// How far the play is.
+    pub live: Arc<Live>,
+    /// Set to have the seats parked and the play end.
+    pub leave: Arc<AtomicBool>,
 }
 
 /// What came of a play.
@@ -83,7 +99,16 @@ impl Play {
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
         let staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
-        Ok(Self { config, manner, staged })
+        let live = Arc::new(Live::default());
+        let (mail, ends) = mailboxes(staged.lanes.len(), staged.show.rate, Arc::clone(&live));
+        let control = Control { desk: Arc::new(staged.desk()), live, leave: Arc::default() };
+        Ok(Self { config, manner, staged, mail, ends, control })
+    }
+
+    /// What it is led and watched by.
+    #[must_use]
+    pub const fn control(&self) -> &Control {
+        &self.control
     }
 
     /// How long the first move onto the cue takes.
@@ -94,39 +119,49 @@ impl Play {
         Duration::from_nanos(span.unsigned_abs())
     }
 
-    /// Plays, on the calling thread, until the end or until `stop` is set.
+    /// Plays, on the calling thread, until the end or until it is told to leave. `lead` gets the end of the mailbox for
+    /// orders before the first tick.
     ///
     /// # Errors
     /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads.
     ///
     /// # Panics
     /// Where one of its threads panicked.
-    pub fn run(mut self, stop: &AtomicBool, live: Arc<Live>) -> Result<Played, PlayError> {
+    pub fn run(mut self, lead: impl FnOnce(Producer<Order>)) -> Result<Played, PlayError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let show = self.staged.show.clone();
-        let (mail, ends) = mailboxes(self.staged.lanes.len(), show.rate, Arc::clone(&live));
-        let MailEnds { sent, ticks, requests, answers, retired } = ends;
+        let MailEnds { sent, ticks, requests, answers, retired, orders } = self.ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
+        let Control { desk, live, leave } = &self.control;
         let prepared = Preparation {
             clock: &Monotonic,
             sender: &sender,
             acks: &mut acks,
             controllers: &self.config.controllers,
             lanes: &mut self.staged.lanes,
-            stop,
-            live: &live,
+            stop: leave,
+            live,
         }
         .run(!self.manner.silent);
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };
         let spin = Duration::from_micros(u64::from(self.config.show.spin_us));
-        let stage = Stage { silent: self.manner.silent, rate: show.rate, spin, engine, lanes, sender, mail };
-        let run = stage.run(acks, plans, stop).map_err(PlayError::Thread)?;
+        let stage = Stage {
+            silent: self.manner.silent,
+            rate: show.rate,
+            spin,
+            engine,
+            lanes,
+            sender,
+            mail: self.mail,
+        };
+        lead(orders);
+        let run = stage.run(acks, plans, desk, leave).map_err(PlayError::Thread)?;
         Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
     }
 }

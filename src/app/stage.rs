@@ -9,7 +9,7 @@ use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
 use crate::plan::PlanError;
-use crate::rt::{Accounts, AckLoop, Ended, Mail, PlanLoop, Spinning, TickLoop};
+use crate::rt::{Accounts, AckLoop, Desk, Ended, Mail, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime};
@@ -55,7 +55,13 @@ impl Stage {
     ///
     /// # Errors
     /// That of the system where it starts no further thread; no tick has been sent then.
-    pub(super) fn run(self, acks: AckLoop, mut plans: PlanLoop, stop: &AtomicBool) -> io::Result<Run> {
+    pub(super) fn run(
+        self,
+        acks: AckLoop,
+        mut plans: PlanLoop,
+        desk: &Desk,
+        leave: &AtomicBool,
+    ) -> io::Result<Run> {
         let Self { silent, rate, spin, engine, lanes, sender, mut mail } = self;
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
         let granted = realtime::request();
@@ -77,7 +83,7 @@ impl Stage {
             mail.wakes(plan_thread.thread().clone());
             let grid = TickGrid::new(origin, rate);
             let clock = Spinning::new(&Monotonic, spin, period);
-            let mut ticks = TickLoop { clock: &clock, grid, engine, lanes, sink: sender, mail, stop };
+            let mut ticks = TickLoop { clock: &clock, grid, engine, lanes, sink: sender, mail, desk, leave };
             let ended = ticks.run();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use crate::config::Config;
-use crate::engine::{Engine, Headroom, Show};
+use crate::engine::{Engine, Headroom, Mix, Show};
 use crate::fanout::{Lane, Manner, lanes};
 use crate::motion::Window;
-use crate::plan::{Course, Curve, From, PlanError, Planner, Request, To};
+use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
+use crate::rt::Desk;
 use crate::timeline::{Hint, Timeline};
 
 /// A show with its lanes and its first course; nothing is open yet, and nothing moves.
@@ -37,10 +38,22 @@ impl Staged {
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };
         let headroom = Headroom::measure(&windows, &curve, show.rate);
+        let scene = Box::new(Scene::parked(&windows));
+        let request = Request { from: From::Rest, to: To::Cue, start: show.start, serial: 1, scene };
         let mut planner = Planner::new(windows, show.rate.hz());
-        let request = Request { from: From::Park, to: To::Cue, start: show.start, serial: 1 };
-        let course = Box::new(planner.plan(request, &curve)?);
+        let course = Box::new(planner.plan(&request, &curve)?);
         Ok(Self { show, timeline: Arc::new(timeline), lanes, planner, course, headroom })
+    }
+
+    /// A desk that is set as the show begins.
+    #[must_use]
+    pub fn desk(&self) -> Desk {
+        let level = |lane: &Lane| lane.window.level();
+        Desk::new(self.lanes.iter().map(|lane| Mix {
+            motion: level(lane),
+            vibration: level(lane),
+            ..Mix::FULL
+        }))
     }
 
     /// The engine for the tick loop, the lanes for the fan-out, and the planner for its thread.

@@ -15,7 +15,6 @@ use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::engine::{Rate, Show};
 use crate::fanout::Manner;
-use crate::rt::Live;
 use crate::sys::signal;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
@@ -120,11 +119,11 @@ pub(super) fn play(
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
     let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
-    let stop = stop_on_signals().context("signals cannot be handled").or_exit(Exit::System)?;
-    let live = Arc::new(Live::default());
-    let said = Said { live: Arc::clone(&live), stop: Arc::clone(&stop), length, join: play.join() };
+    let control = play.control().clone();
+    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    let said = Said { live: control.live, stop: control.leave, length, join: play.join() };
     let progress = Progress::start(said, for_ever);
-    let played = play.run(&stop, live).map_err(|error| refused(error, &cue));
+    let played = play.run(drop).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
 }
@@ -168,19 +167,18 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
 }
 
 /// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once.
-fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
+fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<()> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let code = Exit::Interrupted as i32;
     signal_hook::flag::register_conditional_shutdown(SIGINT, code, Arc::clone(&interrupted))?;
     signal_hook::flag::register(SIGINT, interrupted)?;
-    signal_hook::flag::register(SIGINT, Arc::clone(&stop))?;
-    signal_hook::flag::register(SIGTERM, Arc::clone(&stop))?;
+    signal_hook::flag::register(SIGINT, Arc::clone(leave))?;
+    signal_hook::flag::register(SIGTERM, Arc::clone(leave))?;
     if !signal::is_ignored(SIGHUP)? {
         // The terminal is gone; the seats must not be left in the air for that.
-        signal_hook::flag::register(SIGHUP, Arc::clone(&stop))?;
+        signal_hook::flag::register(SIGHUP, Arc::clone(leave))?;
     }
-    Ok(stop)
+    Ok(())
 }
 
 fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {

@@ -1,5 +1,7 @@
-//! How much faster than the film the cue may run, tenth of a second by tenth: what its motion leaves of the limits.
+//! What the cue's motion leaves of the limits, tenth of a second by tenth: how much faster than the film it may run, and
+//! how quickly a level may change.
 
+use super::fader::{GATHER, RATE};
 use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
 use crate::engine::Rate;
 use crate::motion::{Limits, Measure, Reading, Readings, Slot, Spacing, Window};
@@ -8,25 +10,26 @@ use crate::time::ShowTime;
 
 /// Show time of one entry, nanoseconds.
 const SPAN: i64 = 100_000_000;
-/// Entries looked at from the present on: slowing down from the greatest speed takes a tenth of a second, and the
-/// measure reaches 81 ms to either side.
+/// Entries looked at from the present on: slowing down from the greatest speed takes a tenth of a second, a quarter for a
+/// level, and the measure reaches 81 ms to either side.
 const AHEAD: usize = 4;
-/// One unit of an entry.
-const UNIT: f64 = MAX_SPEED_UP / 255.0;
 /// Over which time the measure sees a change of pace begin or end, seconds: the shorter of its distances, 16 ms and more.
 const MEASURED_OVER_S: f64 = 0.016;
 /// Two hours are measured in a second at this rate, and what the measure sees hardly depends on it.
 const MEASURED_AT: f64 = 100.0;
 
-/// The greatest speed-up by show time; built once, then only read.
+/// What each tenth of a second of the cue asks, at full level; built once, then only read.
 #[derive(Debug, Clone)]
 pub struct Headroom {
-    /// For each tenth of a second, what it leaves, in 255ths of [`MAX_SPEED_UP`].
-    entries: Box<[u8]>,
+    loads: Box<[Load]>,
+    /// The least of all slots' limits, strokes.
+    least: Limits,
+    /// The greatest share of any limit anywhere.
+    greatest: f64,
 }
 
 impl Headroom {
-    /// Measures the cue on every different slot of the windows.
+    /// Measures the cue at full level on every different slot of the windows.
     #[must_use]
     pub fn measure(windows: &[Window], curve: &Curve<'_>, rate: Rate) -> Self {
         let spans = usize::try_from(curve.end.as_nanos().max(0) / SPAN).unwrap_or(0) + 1;
@@ -44,53 +47,104 @@ impl Headroom {
                 note(&mut loads, &measure.push(at, slot.place(pose[*axis])), slot.limits);
             }
         }
-        Self { entries: loads.iter().map(Load::leaves).collect() }
+        let greatest = loads.iter().fold(0.0, |greatest: f64, load| greatest.max(load.greatest()));
+        Self { loads: loads.into(), least: least_limits(&slots), greatest }
     }
 
-    /// The greatest speed-up from `at` on. Never allocates.
+    /// The greatest speed-up from `at` on, with motion at `level`. Never allocates.
     #[must_use]
-    pub fn at(&self, at: ShowTime) -> f64 {
-        let first =
-            usize::try_from(at.as_nanos().max(0) / SPAN).unwrap_or(usize::MAX).min(self.entries.len());
-        let last = (first + AHEAD).min(self.entries.len());
-        let least = self.entries[first.saturating_sub(1)..last].iter().min();
-        least.map_or(0.0, |least| f64::from(*least) * UNIT)
+    pub fn pace(&self, at: ShowTime, level: f64) -> f64 {
+        let leaves = self.ahead(at).iter().map(|load| load.leaves_pace(level));
+        leaves.fold(MAX_SPEED_UP, f64::min)
     }
+
+    /// What of the greatest rates of a level may be used from `at` on, 0 to 1. Never allocates.
+    #[must_use]
+    pub fn fade(&self, at: ShowTime, level: f64) -> f64 {
+        let leaves = self.ahead(at).iter().map(|load| load.leaves_fade(level, self.least));
+        leaves.fold(1.0, f64::min).max(0.0)
+    }
+
+    /// The greatest level at which the cue keeps the limits, and can still change its level; 1 at the most.
+    #[must_use]
+    pub fn greatest_level(&self) -> f64 {
+        (0.98 / self.greatest).min(1.0)
+    }
+
+    fn ahead(&self, at: ShowTime) -> &[Load] {
+        let first = usize::try_from(at.as_nanos().max(0) / SPAN).unwrap_or(usize::MAX).min(self.loads.len());
+        let last = (first + AHEAD).min(self.loads.len());
+        &self.loads[first.saturating_sub(1)..last]
+    }
+}
+
+fn least_limits(slots: &[(usize, Slot)]) -> Limits {
+    let free = Limits { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
+    slots.iter().fold(free, |least, (_, Slot { limits, .. })| Limits {
+        velocity: least.velocity.min(limits.velocity),
+        acceleration: least.acceleration.min(limits.acceleration),
+        jerk: least.jerk.min(limits.jerk),
+    })
 }
 
 fn different_slots(windows: &[Window]) -> Vec<(usize, Slot)> {
     let mut slots: Vec<(usize, Slot)> = Vec::new();
     for (_, slot) in windows.iter().flat_map(Window::moving) {
+        let slot = slot.at_level(1.0);
         let axis = slot.axis.expect("a moving slot has an axis");
-        if !slots.contains(&(axis, *slot)) {
-            slots.push((axis, *slot));
+        if !slots.contains(&(axis, slot)) {
+            slots.push((axis, slot));
         }
     }
     slots
 }
 
-/// The greatest share of each limit in a tenth of a second.
+/// The greatest share of each limit in a tenth of a second, and what changes of pace or level multiply.
 #[derive(Debug, Clone, Copy, Default)]
 struct Load {
-    velocity: f64,
-    acceleration: f64,
-    jerk: f64,
-    /// What changing the pace adds to acceleration and to jerk at the greatest speed.
-    acceleration_added: f64,
-    jerk_added: f64,
+    velocity: f32,
+    acceleration: f32,
+    jerk: f32,
+    /// Velocity over the limits of acceleration, seconds, and of jerk, seconds squared.
+    velocity_by_acceleration: f32,
+    velocity_by_jerk: f32,
+    /// Acceleration over the limit of jerk, seconds.
+    acceleration_by_jerk: f32,
 }
 
 impl Load {
-    /// How much faster time may run: speed grows with the pace, acceleration with its square, jerk with its cube.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255 after the clamp")]
-    fn leaves(&self) -> u8 {
+    fn greatest(&self) -> f64 {
+        f64::from(self.velocity.max(self.acceleration).max(self.jerk))
+    }
+
+    /// How much faster time may run: speed grows with the pace, acceleration with its square, jerk with its cube, and
+    /// changing the pace adds to both.
+    fn leaves_pace(&self, level: f64) -> f64 {
+        let at_level = |share: f32| level * f64::from(share);
+        let added = CHANGE_PER_S * at_level(self.velocity_by_acceleration);
+        let jerk_added = CHANGE_PER_S * at_level(self.velocity_by_jerk) / MEASURED_OVER_S;
         let paces = [
-            1.0 / self.velocity,
-            ((1.0 - self.acceleration_added).max(0.0) / self.acceleration).sqrt(),
-            ((1.0 - self.jerk_added).max(0.0) / self.jerk).cbrt(),
+            1.0 / at_level(self.velocity),
+            ((1.0 - added).max(0.0) / at_level(self.acceleration)).sqrt(),
+            ((1.0 - jerk_added).max(0.0) / at_level(self.jerk)).cbrt(),
         ];
         let pace = paces.into_iter().filter(|pace| pace.is_finite()).fold(1.0 + MAX_SPEED_UP, f64::min);
-        ((pace - 1.0) / UNIT).clamp(0.0, 255.0) as u8
+        (pace - 1.0).max(0.0)
+    }
+
+    /// What of the greatest rates of a level fits: with x = neutral + level (cue - neutral), the product rule says what
+    /// they add, the cue being a stroke away from neutral at the most.
+    fn leaves_fade(&self, level: f64, least: Limits) -> f64 {
+        let left = |share: f32| 1.0 - level * f64::from(share);
+        let adds = [
+            RATE / least.velocity,
+            2.0 * RATE * f64::from(self.velocity_by_acceleration) + GATHER / least.acceleration,
+            3.0 * RATE * f64::from(self.acceleration_by_jerk)
+                + 3.0 * GATHER * f64::from(self.velocity_by_jerk)
+                + GATHER / MEASURED_OVER_S / least.jerk,
+        ];
+        let lefts = [left(self.velocity), left(self.acceleration), left(self.jerk)];
+        lefts.into_iter().zip(adds).map(|(left, adds)| left / adds).fold(1.0, f64::min)
     }
 }
 
@@ -99,15 +153,19 @@ fn note(loads: &mut [Load], readings: &Readings, limits: Limits) {
     let last = loads.len() - 1;
     let index = |reading: &Reading| usize::try_from(reading.at.as_nanos() / SPAN).unwrap_or(0).min(last);
     let Readings { velocity, acceleration, jerk, .. } = readings;
-    let speed = velocity.value.abs();
     let load = &mut loads[index(velocity)];
-    load.velocity = load.velocity.max(speed / limits.velocity);
-    load.acceleration_added = load.acceleration_added.max(speed * CHANGE_PER_S / limits.acceleration);
-    load.jerk_added = load.jerk_added.max(speed * CHANGE_PER_S / MEASURED_OVER_S / limits.jerk);
+    raise(&mut load.velocity, velocity.value, limits.velocity);
+    raise(&mut load.velocity_by_acceleration, velocity.value, limits.acceleration);
+    raise(&mut load.velocity_by_jerk, velocity.value, limits.jerk);
     let load = &mut loads[index(acceleration)];
-    load.acceleration = load.acceleration.max(acceleration.value.abs() / limits.acceleration);
-    let load = &mut loads[index(jerk)];
-    load.jerk = load.jerk.max(jerk.value.abs() / limits.jerk);
+    raise(&mut load.acceleration, acceleration.value, limits.acceleration);
+    raise(&mut load.acceleration_by_jerk, acceleration.value, limits.jerk);
+    raise(&mut loads[index(jerk)].jerk, jerk.value, limits.jerk);
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "single precision is some 1e-7 of it")]
+fn raise(kept: &mut f32, value: f64, over: f64) {
+    *kept = kept.max((value.abs() / over) as f32);
 }
 
 #[cfg(test)]
@@ -132,18 +190,27 @@ mod tests {
     #[test]
     fn a_cue_at_the_limit_leaves_nothing_and_one_at_rest_all() {
         let headroom = headroom(1.0);
-        assert_eq!(headroom.at(ShowTime::from_millis(5_000)), MAX_SPEED_UP);
-        assert_eq!(headroom.at(ShowTime::from_millis(15_000)), 0.0);
+        assert_eq!(headroom.pace(ShowTime::from_millis(5_000), 1.0), MAX_SPEED_UP);
+        assert_eq!(headroom.pace(ShowTime::from_millis(15_000), 1.0), 0.0);
+    }
+
+    #[test]
+    fn a_cue_at_the_limit_holds_its_level_and_at_half_level_both_may_change() {
+        let headroom = headroom(1.0);
+        assert_eq!(headroom.fade(ShowTime::from_millis(15_000), 1.0), 0.0);
+        assert!(headroom.fade(ShowTime::from_millis(15_000), 0.5) > 0.5);
+        assert_eq!(headroom.pace(ShowTime::from_millis(15_000), 0.5), MAX_SPEED_UP);
+        assert!((headroom.greatest_level() - 0.98).abs() < 1e-6);
     }
 
     #[test]
     fn the_limit_is_seen_coming() {
-        assert_eq!(headroom(1.0).at(ShowTime::from_millis(9_750)), 0.0);
+        assert_eq!(headroom(1.0).pace(ShowTime::from_millis(9_750), 1.0), 0.0);
     }
 
     #[test]
     fn a_cue_one_per_cent_below_the_limit_leaves_one_per_cent() {
-        let left = headroom(1.0 / 1.01).at(ShowTime::from_millis(15_000));
+        let left = headroom(1.0 / 1.01).pace(ShowTime::from_millis(15_000), 1.0);
         assert!((left - 0.01).abs() < 2e-4, "{left}");
     }
 }

@@ -1,15 +1,23 @@
 //! The life of a play, tick by tick: where show time stands, which course the lanes follow, and what each frame says.
 //! Tick thread; told the time, never asks; allocates nothing.
 
+mod fader;
 mod grid;
 mod headroom;
+mod mix;
+mod orders;
+mod rest;
+mod rider;
 mod slew;
 mod stamps;
 mod switch;
+mod trail;
 mod turn;
 
 pub use grid::{Rate, Tick, TickGrid};
 pub use headroom::Headroom;
+pub use mix::Mix;
+pub use orders::TRIM_MS;
 pub use slew::MAX_SPEED_UP;
 
 use std::sync::Arc;
@@ -17,13 +25,15 @@ use std::time::Duration;
 
 use crate::cue::Vibration;
 use crate::motion::{MAX_AXES, Pose, Window};
-use crate::plan::Course;
+use crate::plan::{Course, Scene};
 use crate::time::ShowTime;
 use crate::timeline::{EffectSet, Hint, Timeline};
 use crate::wire::Timing;
+use rest::Holds;
+use rider::{HOLD_FRAMES, Part, Rider};
 use slew::Slew;
 use stamps::Stamps;
-use switch::{Retired, Switch};
+use switch::{Retired, Scenes, Switch};
 
 /// What a controller takes for its first absolute frame at the most (PA09, IMAX manual 2.3.1).
 const FIRST_ABSOLUTE_MS: u32 = 100;
@@ -73,13 +83,41 @@ impl Beat {
     }
 }
 
+/// What a tick does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "it is made and used up on one stack, every tick")]
+pub enum Step {
+    /// Frames go out.
+    Send(Beat),
+    /// None does: the lanes rest, and have been told so.
+    Quiet,
+    /// The play has ended.
+    Over,
+}
+
+/// Why lanes rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rest {
+    /// Frames stopped for too long; the film runs on.
+    Late,
+    /// The cue is over, and the way on from there not known yet.
+    Ended,
+    /// Somebody, or the hall's policy, asked for a pause; the film waits.
+    Paused,
+    /// Somebody, or a fault, stopped the show: no frames go out.
+    Stopped,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// Repeats the park pose once, so that no motion hangs on how a controller times its first absolute frame.
     Settling,
+    /// On a course that leads onto the cue.
     Riding,
-    /// Frames stopped for too long: holds the last pose until a course leads on.
-    Stalled,
+    /// Coming to rest.
+    Braking(Rest),
+    /// Holds the last poses until a course leads on.
+    Resting(Rest),
     Parking,
     Closing(u8),
     Done,
@@ -91,23 +129,34 @@ pub struct Engine {
     show: Show,
     timeline: Arc<Timeline>,
     headroom: Headroom,
-    windows: Vec<Window>,
-    poses: Vec<Pose>,
+    /// No level goes beyond it: the cue was proved at no higher one.
+    greatest_level: f64,
+    riders: Vec<Rider>,
     hint: Hint,
     phase: Phase,
     ending: Ending,
     course: Box<Course>,
     switch: Option<Switch>,
-    /// What was to follow the end of the cue, while a stop is asked for.
+    /// What was to follow the end of the cue, while something else is asked for.
     spare: Option<Switch>,
+    scenes: Scenes,
     retired: Retired,
     serial: u32,
     plays_left: Option<u32>,
     /// Whether the lanes are to park, come what may.
     homeward: bool,
+    /// Whether a person asked for the film to go on from a pause.
+    resuming: bool,
+    /// Where in the cue the show is to go on.
+    seeking: Option<ShowTime>,
+    /// Whether the play ends once the lanes rest.
+    ends: bool,
+    /// How much later than the film the motion is to be, milliseconds.
+    trim_ms: i32,
     /// Answers of the planner in a row that came too late.
     late_answers: u32,
     frames: u64,
+    holds: Holds,
     /// The show time of the next tick.
     playhead: ShowTime,
     /// The show time of the pose sent last.
@@ -117,7 +166,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// An engine whose lanes are in their park poses; `course` begins at the show's start.
+    /// An engine whose lanes are in their park poses, at the levels of their windows; `course` begins at the show's start.
     #[must_use]
     pub fn new(
         show: Show,
@@ -127,8 +176,11 @@ impl Engine {
         course: Box<Course>,
     ) -> Self {
         let settles = show.timing == Timing::Absolute && show.rate.period() > millis(FIRST_ABSOLUTE_MS);
+        let levels = windows.iter().map(Window::level);
         Self {
-            poses: windows.iter().map(Window::park).collect(),
+            greatest_level: levels.fold(headroom.greatest_level(), f64::max),
+            scenes: Scenes::like(&Scene::parked(&windows)),
+            riders: windows.into_iter().map(Rider::parked).collect(),
             hint: Hint::default(),
             phase: if settles { Phase::Settling } else { Phase::Riding },
             ending: Ending::Completed,
@@ -138,8 +190,13 @@ impl Engine {
             serial: course.serial,
             plays_left: show.plays.checked_sub(1),
             homeward: false,
+            resuming: false,
+            seeking: None,
+            ends: false,
+            trim_ms: 0,
             late_answers: 0,
             frames: 0,
+            holds: Holds::new(show.rate),
             playhead: show.start,
             reached: show.start,
             slew: Slew::default(),
@@ -147,35 +204,29 @@ impl Engine {
             show,
             timeline,
             headroom,
-            windows,
             course,
         }
     }
 
-    /// Asks for the end: park, three hold frames, done. Asking again changes nothing.
-    ///
-    /// Before the first frame it is the end at once: nothing has been set in motion, and the lanes may still be on a
-    /// slow way to park, or where nobody knows.
-    pub fn stop(&mut self) {
-        if self.frames == 0 {
-            self.phase = Phase::Done;
-            self.ending = Ending::Stopped;
-        } else if !self.homeward && matches!(self.phase, Phase::Settling | Phase::Riding | Phase::Stalled) {
-            self.homeward = true;
-            self.ending = Ending::Stopped;
-        }
+    /// What the frame of this tick says for a lane: its pose, as fractions of each slot's stroke, and what is left of
+    /// vibration and effects. None where the lane gets none.
+    #[must_use]
+    pub fn frame(&self, lane: usize) -> Option<(&Pose, Mix)> {
+        let rider = &self.riders[lane];
+        (rider.part != Part::Away).then(|| (rider.pose(), rider.mix()))
     }
 
-    /// The poses of the frames of this tick, lane by lane, as fractions of each slot's stroke.
+    /// The show time of the next tick: where in the cue the lanes are.
     #[must_use]
-    pub fn poses(&self) -> &[Pose] {
-        &self.poses
-    }
-
-    /// The show time of the next tick.
-    #[must_use]
-    pub fn playhead(&self) -> ShowTime {
+    pub const fn playhead(&self) -> ShowTime {
         self.playhead
+    }
+
+    /// Where the film is: what the playhead will be at once all lag and trim are slewed in, and the trim.
+    #[must_use]
+    pub fn film(&self) -> ShowTime {
+        let ahead = self.slew.owed_s() + f64::from(self.trim_ms) * 1e-3;
+        ShowTime::from_nanos(self.playhead.as_nanos() + ShowTime::from_secs_f64(ahead).as_nanos())
     }
 
     /// Whether the lanes are on their way onto the cue.
@@ -194,10 +245,31 @@ impl Engine {
         self.homeward || matches!(self.phase, Phase::Parking | Phase::Closing(_) | Phase::Done)
     }
 
-    /// How far the show is behind its grid.
+    /// Why the lanes rest, or come to rest; none where they do not.
+    #[must_use]
+    pub const fn rest(&self) -> Option<Rest> {
+        match self.phase {
+            Phase::Braking(rest) | Phase::Resting(rest) => Some(rest),
+            _ => None,
+        }
+    }
+
+    /// Whether the lanes have come to rest.
+    #[must_use]
+    pub const fn is_at_rest(&self) -> bool {
+        matches!(self.phase, Phase::Resting(_) | Phase::Done)
+    }
+
+    /// How far missed ticks have put the show behind its grid.
     #[must_use]
     pub fn lag(&self) -> Duration {
         self.slew.lag()
+    }
+
+    /// The level of a lane's motion as it is now.
+    #[must_use]
+    pub fn level(&self, lane: usize) -> f64 {
+        self.riders[lane].fader.level()
     }
 
     /// How the play ended; none while it lasts.
@@ -206,26 +278,30 @@ impl Engine {
         (self.phase == Phase::Done).then_some(self.ending)
     }
 
-    /// Serves one tick: sets the poses and says what their frames carry. None once the play has ended.
-    pub fn tick(&mut self, missed: u64) -> Option<Beat> {
+    /// Serves one tick: sets the poses and says what their frames carry.
+    pub fn tick(&mut self, missed: u64) -> Step {
         self.count_missed(missed);
         if matches!(self.phase, Phase::Closing(0) | Phase::Done) {
             self.phase = Phase::Done;
-            return None;
+            return Step::Over;
         }
         let time_ms = self.show.rate.time_ms(self.frames);
         self.frames += 1;
         let show = self.playhead;
         self.move_on(millis(time_ms));
+        if let Phase::Resting(rest) = self.phase {
+            self.look_ahead();
+            return self.hold(rest, time_ms);
+        }
         let (timing, time_ms) = self.stamps.next(time_ms);
         let mut beat = Beat::still(timing, time_ms);
-        if matches!(self.phase, Phase::Riding | Phase::Stalled) {
+        if self.phase == Phase::Riding {
             // They act when the frame comes, not when its pose is reached.
             beat.vibration = self.timeline.vibration(show, &mut self.hint);
             beat.effects = self.timeline.effects(show, &mut self.hint);
         }
         self.look_ahead();
-        Some(beat)
+        Step::Send(beat)
     }
 
     /// Advances show time by one frame and sets the poses.
@@ -237,23 +313,31 @@ impl Engine {
             }
             Phase::Closing(left) => return self.close(left),
             Phase::Done => return,
-            Phase::Stalled | Phase::Riding | Phase::Parking => {
+            Phase::Resting(Rest::Late) => self.playhead += time,
+            // The film waits from the very request on.
+            Phase::Braking(_) | Phase::Resting(_) => {}
+            Phase::Riding | Phase::Parking => {
+                self.fade(time);
                 let passed = self.pass(time);
                 self.playhead += passed;
             }
         }
         // Before the poses: one past the change of course is the new course's.
-        self.take_switch();
-        if self.phase == Phase::Stalled {
-            return;
-        }
-        self.reached = self.playhead;
-        let cue = self.timeline.sample(self.reached, &mut self.hint);
-        for (lane, (pose, window)) in self.poses.iter_mut().zip(&self.windows).enumerate() {
-            *pose = self.course.pose(lane, self.reached, window, &cue);
-        }
+        self.take_switch(time);
+        self.end_the_cue();
+        self.pose(time);
+        self.come_to_rest();
         if let Phase::Closing(left) = self.phase {
             self.close(left);
+        }
+    }
+
+    fn pose(&mut self, time: Duration) {
+        self.reached = self.playhead;
+        let cue = self.timeline.sample(self.reached, &mut self.hint);
+        for (lane, rider) in self.riders.iter_mut().enumerate() {
+            let pose = rider.next(lane, time, &mut self.course, self.reached, &cue);
+            rider.send(time, pose);
         }
     }
 
@@ -266,6 +350,6 @@ impl Engine {
     }
 }
 
-fn millis(ms: u32) -> Duration {
-    Duration::from_millis(u64::from(ms))
+const fn millis(ms: u32) -> Duration {
+    Duration::from_millis(ms as u64)
 }

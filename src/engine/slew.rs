@@ -1,29 +1,43 @@
-//! How a lag behind the film is taken back: a little faster than the film, changing speed gently.
+//! How the show is brought back onto the film: a little faster or slower than it, changing speed gently.
 
 use std::time::Duration;
 
-/// The most that show time runs faster than the clock.
+/// The most that show time runs faster or slower than the clock.
 pub const MAX_SPEED_UP: f64 = 0.02;
 /// How quickly that may change, per second: 0.2 % per 10 ms.
 pub(super) const CHANGE_PER_S: f64 = 0.2;
 
-/// The lag of the show behind its grid, and how fast it is being taken back.
+/// How far the show is from where it should be, and how fast that is being taken back.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Slew {
-    lag_s: f64,
+    /// What the show owes the film, seconds; below zero it is ahead.
+    owed_s: f64,
+    /// How much of that is due to missed ticks.
+    missed_s: f64,
     speed_up: f64,
 }
 
 impl Slew {
     /// Show time falls behind by `span`.
     pub(super) fn fall_behind(&mut self, span: Duration) {
-        self.lag_s += span.as_secs_f64();
+        self.owed_s += span.as_secs_f64();
+        self.missed_s += span.as_secs_f64();
     }
 
-    /// How far the show is behind.
+    /// The show is to be `seconds` further on than it was to be so far.
+    pub(super) fn owe(&mut self, seconds: f64) {
+        self.owed_s += seconds;
+    }
+
+    /// What the show owes the film, seconds; below zero it is ahead.
+    pub(super) const fn owed_s(&self) -> f64 {
+        self.owed_s
+    }
+
+    /// How far missed ticks have put the show behind.
     #[must_use]
     pub(super) fn lag(&self) -> Duration {
-        Duration::from_secs_f64(self.lag_s.max(0.0))
+        Duration::from_secs_f64(self.missed_s.max(0.0))
     }
 
     /// Forgets lag and speed: show time was set anew.
@@ -31,10 +45,16 @@ impl Slew {
         *self = Self::default();
     }
 
-    /// Show time was moved on by `span`, and runs no faster than the clock from here on.
-    pub(super) fn skip(&mut self, span: Duration) {
-        self.lag_s = (self.lag_s - span.as_secs_f64()).max(0.0);
+    /// Show time was moved on by `seconds`, and runs no faster than the clock from here on.
+    pub(super) fn skip(&mut self, seconds: f64) {
+        self.owed_s -= seconds;
+        self.missed_s = (self.missed_s - seconds).clamp(0.0, self.owed_s.max(0.0));
         self.speed_up = 0.0;
+    }
+
+    /// Whether show time runs as the clock does, and nothing is owed.
+    pub(super) fn is_done(&self) -> bool {
+        self.owed_s == 0.0 && self.speed_up == 0.0
     }
 
     /// How fast show time runs, as a multiple of the clock.
@@ -44,27 +64,34 @@ impl Slew {
 
     /// How much show time passes in a frame of that Time at the present pace.
     pub(super) fn coast(&mut self, time: Duration) -> Duration {
-        self.lag_s -= self.speed_up * time.as_secs_f64();
+        self.gain(self.speed_up * time.as_secs_f64());
         time.mul_f64(self.pace())
     }
 
-    /// How much show time passes in a frame of that Time, at most `ceiling` (0 to [`MAX_SPEED_UP`]) faster than it.
+    /// How much show time passes in a frame of that Time, at most `ceiling` (0 to [`MAX_SPEED_UP`]) faster or slower than
+    /// it.
     pub(super) fn advance(&mut self, time: Duration, ceiling: f64) -> Duration {
         let dt = time.as_secs_f64();
         let change = CHANGE_PER_S * dt;
-        let wanted = self.closing_speed(dt).min(ceiling).min(MAX_SPEED_UP);
-        self.speed_up = wanted.clamp(self.speed_up - change, self.speed_up + change).max(0.0);
-        self.lag_s -= self.speed_up * dt;
+        let wanted = self.closing_speed(dt).min(ceiling).min(MAX_SPEED_UP) * self.owed_s.signum();
+        self.speed_up = wanted.clamp(self.speed_up - change, self.speed_up + change);
+        self.gain(self.speed_up * dt);
         Duration::from_secs_f64(dt * (1.0 + self.speed_up))
     }
 
-    /// The greatest speed from which the lag is just closed while slowing down gently.
-    fn closing_speed(&self, dt: f64) -> f64 {
-        if self.lag_s <= 0.0 {
-            return 0.0;
+    fn gain(&mut self, seconds: f64) {
+        self.owed_s -= seconds;
+        self.missed_s = (self.missed_s - seconds).clamp(0.0, self.owed_s.max(0.0));
+        if self.owed_s.abs() < 1e-12 {
+            self.owed_s = 0.0;
         }
-        let from_rest = (dt * dt / 4.0 + 2.0 * self.lag_s / CHANGE_PER_S).sqrt() - dt / 2.0;
-        (CHANGE_PER_S * from_rest).min(self.lag_s / dt)
+    }
+
+    /// The greatest speed from which what is owed is just closed while slowing down gently.
+    fn closing_speed(&self, dt: f64) -> f64 {
+        let owed = self.owed_s.abs();
+        let from_rest = (dt * dt / 4.0 + 2.0 * owed / CHANGE_PER_S).sqrt() - dt / 2.0;
+        (CHANGE_PER_S * from_rest).min(owed / dt)
     }
 }
 
@@ -91,6 +118,21 @@ mod tests {
             let lag = lag_ms as f64;
             assert!((gained - lag).abs() < 0.02, "{hz} Hz: {gained} of {lag} ms");
         }
+    }
+
+    #[test]
+    fn a_show_that_is_ahead_waits_for_the_film_as_gently() {
+        let mut slew = Slew::default();
+        slew.owe(-0.5);
+        let period = Duration::from_millis(10);
+        let mut passed = 0.0;
+        for _ in 0..3_000 {
+            let step = slew.advance(period, MAX_SPEED_UP).as_secs_f64();
+            assert!(step >= 0.010 * (1.0 - MAX_SPEED_UP) - 1e-9, "{step}");
+            passed += step;
+        }
+        assert!((passed - 29.5).abs() < 1e-4, "{passed}");
+        assert_eq!(slew.lag(), Duration::ZERO, "no tick was missed");
     }
 
     #[test]

@@ -22,6 +22,11 @@ impl Stamps {
         self.bridge = true;
     }
 
+    /// The next frame holds a pose: it is relative, and a sum starts after it.
+    pub(super) fn hold(&mut self) {
+        (self.bridge, self.sum_ms) = (true, 0);
+    }
+
     /// How the next frame, of `time_ms`, is sent: the timing it uses and the Time it says.
     pub(super) fn next(&mut self, time_ms: u32) -> (Timing, u32) {
         let sum = self.sum_ms.checked_add(time_ms);

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use super::switch::{Goal, Switch};
-use super::{Ending, Engine, Phase};
-use crate::plan::{Course, From, Request, To};
+use super::{Ending, Engine, HOLD_FRAMES, Phase, Rest};
+use crate::plan::{Course, From, Request, Scene, To};
 use crate::time::ShowTime;
 
 /// A lag beyond this, and beyond one period, is not slewed away: the lanes hold, then join.
@@ -13,31 +13,36 @@ const LAG_HOLD: Duration = Duration::from_millis(50);
 const LEAD: Duration = Duration::from_millis(20);
 /// In this time show time surely comes back to the pace of the clock.
 const SLOWING: Duration = Duration::from_millis(150);
-/// Hold frames that close a play.
-const CLOSING_FRAMES: u8 = 3;
 
 impl Engine {
     /// A few missed ticks leave a lag that is slewed away; after too many the lanes hold, then go on from rest.
     pub(super) fn count_missed(&mut self, missed: u64) {
         let gap = self.show.rate.offset(missed);
         match self.phase {
-            Phase::Stalled if missed > 0 => {
+            Phase::Resting(Rest::Late) if missed > 0 => {
                 // A course that was to begin in the gap would be taken up in its middle.
                 self.drop_switch();
                 self.playhead += gap;
             }
+            Phase::Braking(rest) if self.is_too_long(gap) => self.halt(rest),
             Phase::Riding | Phase::Parking if self.is_too_long(gap) => {
-                // The controllers reached the last pose and stand there.
                 self.homeward |= self.phase == Phase::Parking;
-                self.playhead += gap + self.slew.lag();
-                self.slew.reset();
-                self.stamps.break_off();
-                self.drop_switch();
-                self.phase = Phase::Stalled;
+                self.catch_up();
+                self.playhead += gap;
+                self.halt(Rest::Late);
             }
             Phase::Riding => self.slew.fall_behind(gap),
             _ => {}
         }
+    }
+
+    /// The controllers reached the last poses and stand there.
+    fn halt(&mut self, rest: Rest) {
+        self.stamps.break_off();
+        self.drop_switch();
+        self.riders.iter_mut().for_each(super::Rider::halt);
+        self.holds.begin();
+        self.phase = Phase::Resting(rest);
     }
 
     /// Whether a gap or a lag is more than can be slewed away.
@@ -47,13 +52,18 @@ impl Engine {
 
     /// How much show time passes in a frame of that Time.
     pub(super) fn pass(&mut self, time: Duration) -> Duration {
+        if self.slew.is_done() {
+            return time;
+        }
         match (self.phase, &self.switch) {
-            (Phase::Stalled, _) => time,
-            (Phase::Riding, Some(switch)) if switch.pace > 1.0 => self.slew.coast(time),
-            (Phase::Riding, Some(switch)) if switch.at <= self.playhead + SLOWING => {
+            (Phase::Riding, Some(switch)) if switch.pace != 1.0 => self.slew.coast(time),
+            (Phase::Riding, Some(switch)) if switch.is_near(self.playhead + SLOWING) => {
                 self.slew.advance(time, 0.0)
             }
-            (Phase::Riding, _) => self.slew.advance(time, self.headroom.at(self.playhead)),
+            (Phase::Riding, _) => {
+                let level = self.riders.iter().map(|rider| rider.fader.level()).fold(0.0, f64::max);
+                self.slew.advance(time, self.headroom.pace(self.playhead, level))
+            }
             _ => self.slew.advance(time, 0.0),
         }
     }
@@ -64,106 +74,138 @@ impl Engine {
         let soonest = self.playhead + self.lead();
         match self.phase {
             Phase::Parking if self.reached >= self.course.settled() => {
-                self.phase = Phase::Closing(CLOSING_FRAMES)
+                self.phase = Phase::Closing(HOLD_FRAMES);
             }
-            Phase::Riding | Phase::Stalled if self.homeward && self.stopping() => {}
+            Phase::Resting(rest) if asked.is_none() => self.look_ahead_at_rest(rest, soonest),
+            Phase::Riding if self.homeward && asked == Some(Goal::Park) => {}
             // The old course ends before another can begin on it: what is to come begins on the one that follows.
             Phase::Riding if self.turns_between(self.playhead, soonest) => {}
-            Phase::Riding | Phase::Stalled if self.homeward => self.ask(Goal::Stop, soonest, soonest),
-            Phase::Stalled if asked.is_none() => self.ask(Goal::Rejoin, soonest, soonest),
+            // A course is planned for the levels as they stand.
+            Phase::Riding if !self.faders_are_still() => {}
+            Phase::Riding if self.homeward => self.ask(Goal::Park, Some(soonest), soonest),
             Phase::Riding => self.look_ahead_riding(asked, soonest),
             _ => {}
         }
     }
 
-    /// Whether the way home that was asked for is a stop, not the one that follows the end of the cue.
-    fn stopping(&self) -> bool {
-        self.switch.as_ref().is_some_and(|switch| switch.goal == Goal::Stop)
+    fn look_ahead_at_rest(&mut self, rest: Rest, soonest: ShowTime) {
+        let now = self.playhead;
+        match rest {
+            _ if self.homeward => self.ask(Goal::Park, None, now),
+            Rest::Late => self.ask(Goal::Cue, Some(soonest), soonest),
+            Rest::Ended if self.plays_left == Some(0) => self.ask(Goal::Home, None, now),
+            Rest::Ended => self.ask(Goal::Again, None, self.cue_time(ShowTime::ZERO)),
+            Rest::Paused if self.resuming => self.ask(Goal::Cue, None, now),
+            Rest::Paused | Rest::Stopped => {}
+        }
     }
 
     fn turns_between(&self, from: ShowTime, to: ShowTime) -> bool {
-        let mut turns = self.switch.iter().chain(&self.spare);
-        turns.any(|switch| (from..=to).contains(&switch.at))
+        let mut turns = self.switch.iter().chain(&self.spare).filter_map(|switch| switch.at);
+        turns.any(|at| (from..=to).contains(&at))
     }
 
     fn look_ahead_riding(&mut self, asked: Option<Goal>, soonest: ShowTime) {
-        let lag = self.slew.lag();
-        if self.is_too_long(lag) {
-            if asked != Some(Goal::Rejoin) {
-                // Many small gaps: the lanes are moving, so they join from the lagging cue onto the true one.
-                self.ask(Goal::Rejoin, soonest, soonest + lag);
+        let owed = Duration::from_secs_f64(self.slew.owed_s().max(0.0));
+        if let Some(target) = self.seeking {
+            if asked != Some(Goal::Cue) {
+                self.ask(Goal::Cue, Some(soonest), target);
             }
+        } else if self.is_too_long(self.slew.lag()) {
+            if asked != Some(Goal::Cue) {
+                // Many small gaps: the lanes are moving, so they join from the lagging cue onto the true one.
+                self.ask(Goal::Cue, Some(soonest), soonest + owed);
+            }
+        } else if asked.is_none_or(Goal::is_after_the_end) && self.lanes_need_a_course() {
+            self.ask(Goal::Lanes, Some(soonest), soonest);
         } else if asked.is_none() {
             // What follows the end is known all along, so that the planner has all the time there is.
-            let end = self.timeline.duration().max(self.course.settled()).max(soonest);
+            let end = self.end_of_cue().max(soonest);
             if self.plays_left == Some(0) {
-                self.ask(Goal::Home, end, end);
+                self.ask(Goal::Home, Some(end), end);
             } else {
-                self.ask(Goal::Again, end, ShowTime::ZERO);
+                self.ask(Goal::Again, Some(end), self.cue_time(ShowTime::ZERO));
             }
         }
     }
 
+    /// The show time at which the lanes have followed the cue to its end.
+    pub(super) fn end_of_cue(&self) -> ShowTime {
+        self.timeline.duration().max(self.course.settled())
+    }
+
     /// Asks for a course that takes over when show time, as it runs now, is `at`, and calls that instant `start`.
-    fn ask(&mut self, goal: Goal, at: ShowTime, start: ShowTime) {
+    fn ask(&mut self, goal: Goal, at: Option<ShowTime>, start: ShowTime) {
+        // Without a scene the planner still has all of them: it will be asked once it has answered.
+        let Some(mut scene) = self.scenes.take() else { return };
+        self.describe(&mut scene);
         // Should the planner be slow, and the cue end before its answer, the lanes go on as was planned for the end.
-        let spare = if matches!(goal, Goal::Stop | Goal::Rejoin) {
-            let after_the_end = |switch: &mut Switch| matches!(switch.goal, Goal::Home | Goal::Again);
-            self.spare.take().or_else(|| self.switch.take_if(after_the_end))
-        } else {
+        let spare = if goal.is_after_the_end() {
             None
+        } else {
+            let after_the_end = |switch: &mut Switch| switch.goal.is_after_the_end();
+            self.spare.take().or_else(|| self.switch.take_if(after_the_end))
         };
         self.drop_switch();
         self.spare = spare;
-        let serial = self.course.serial;
         // Given the time, the pace is brought back to the clock's; at short notice it is kept.
-        let pace = if at > self.playhead + SLOWING { 1.0 } else { self.slew.pace() };
-        let from = match self.phase {
-            Phase::Stalled => From::Stalled { serial, at: self.reached },
-            _ => From::Course { serial, at, pace },
+        let far = at.is_none_or(|at| at > self.playhead + SLOWING);
+        let pace = if far { 1.0 } else { self.slew.pace() };
+        let from = match (self.phase, at) {
+            (Phase::Riding, Some(at)) => From::Course { serial: self.course.serial, at, pace },
+            _ => From::Rest,
         };
-        let to = if matches!(goal, Goal::Home | Goal::Stop) { To::Park } else { To::Cue };
+        let to = match goal {
+            Goal::Home | Goal::Park => To::Park,
+            Goal::Cue | Goal::Again => To::Cue,
+            Goal::Lanes => To::Same,
+        };
         self.serial = self.serial.wrapping_add(1);
-        let request = Request { from, to, start, serial: self.serial };
-        let gained = if goal == Goal::Rejoin { start.as_nanos() - at.as_nanos() } else { 0 };
-        let skipped = Duration::from_nanos(gained.unsigned_abs());
-        self.switch = Some(Switch { goal, at, pace, skipped, request, unsent: true, course: None });
+        let serial = self.serial;
+        let request = Some(Request { from, to, start, serial, scene });
+        let gained = at.filter(|_| goal == Goal::Cue).map_or(0, |at| start.as_nanos() - at.as_nanos());
+        let skipped_s = ShowTime::from_nanos(gained).as_secs_f64();
+        self.switch = Some(Switch { goal, at, start, pace, skipped_s, serial, request, course: None });
     }
 
     /// The request that the planner has not seen yet.
     pub fn take_request(&mut self) -> Option<Request> {
-        let switch = self.switch.as_mut().filter(|switch| switch.unsent)?;
-        switch.unsent = false;
-        Some(switch.request)
+        self.switch.as_mut()?.request.take()
     }
 
-    /// Hands over a course that the planner made. One that nobody waits for any more, or that came after its time, is
-    /// not taken up.
-    pub fn offer(&mut self, course: Box<Course>) {
+    /// Hands over a course that the planner made, and the scene it made it for. One that nobody waits for any more, or
+    /// that came after its time, is not taken up.
+    pub fn offer(&mut self, course: Box<Course>, scene: Box<Scene>) {
         match &mut self.switch {
-            Some(switch) if switch.request.serial == course.serial && self.playhead <= switch.at => {
-                switch.course = Some(course);
+            Some(switch) if switch.serial == course.serial && switch.is_open(self.playhead) => {
+                switch.course = Some((course, scene));
+                return;
             }
-            Some(switch) if switch.request.serial == course.serial => {
-                self.retired.put(Some(course));
+            Some(switch) if switch.serial == course.serial => {
                 self.late_answers += 1;
                 self.switch = None; // asked again, with more time, at this tick's end
             }
-            _ => self.retired.put(Some(course)),
+            _ => {}
         }
+        self.retired.put(Some(course));
+        self.scenes.put(scene);
     }
 
-    /// Hears that the planner found no course for the request of that serial: the lanes park, or close where they are.
-    pub fn refuse(&mut self, serial: u32) {
-        let Some(switch) = self.switch.as_ref().filter(|switch| switch.request.serial == serial) else {
-            return;
-        };
-        self.ending = Ending::Fault;
-        self.homeward = true;
-        if switch.goal == Goal::Stop {
-            self.phase = Phase::Closing(CLOSING_FRAMES);
+    /// Hears that the planner found no course for the request of that serial. What a person wished for is not done; for
+    /// anything else the lanes park, and where that cannot be planned they come to rest, and the play ends.
+    pub fn refuse(&mut self, serial: u32, scene: Box<Scene>) {
+        self.scenes.put(scene);
+        let Some(switch) = self.switch.take_if(|switch| switch.serial == serial) else { return };
+        let wished = self.resuming || self.seeking.is_some();
+        match switch.goal {
+            Goal::Lanes => self.riders.iter_mut().for_each(|rider| rider.refused = rider.needs_a_course()),
+            Goal::Cue if wished => (self.resuming, self.seeking) = (false, None),
+            Goal::Park | Goal::Home => {
+                (self.ending, self.homeward, self.ends) = (Ending::Fault, false, true);
+                self.come_down(Rest::Stopped);
+            }
+            Goal::Cue | Goal::Again => (self.ending, self.homeward) = (Ending::Fault, true),
         }
-        self.switch = None;
     }
 
     /// A course that is to be freed on another thread.
@@ -171,31 +213,53 @@ impl Engine {
         self.retired.take()
     }
 
-    /// Takes up the new course when its time has come.
-    pub(super) fn take_switch(&mut self) {
-        let due = |switch: &mut Switch| switch.course.is_some() && self.playhead > switch.at;
-        let Some(switch) = self.switch.take_if(due).or_else(|| self.spare.take_if(due)) else { return };
-        let Some(course) = switch.course else { return };
+    /// Takes up the new course when its time has come; `time` is that of this frame.
+    pub(super) fn take_switch(&mut self, time: Duration) {
+        let due =
+            |switch: &mut Switch| switch.course.is_some() && switch.at.is_none_or(|at| self.playhead > at);
+        let Some(mut switch) = self.switch.take_if(due).or_else(|| self.spare.take_if(due)) else { return };
+        let Some((course, scene)) = switch.course.take() else { return };
         self.drop_switch();
-        let over = self.playhead.as_nanos() - switch.at.as_nanos();
-        self.playhead = ShowTime::from_nanos(course.start.as_nanos() + over);
-        self.slew.skip(switch.skipped);
+        let over = switch
+            .at
+            .map_or(time, |at| Duration::from_nanos(self.playhead.as_nanos().abs_diff(at.as_nanos())));
+        self.playhead = switch.start + over;
+        for (rider, scene) in self.riders.iter_mut().zip(&scene.lanes) {
+            rider.take_up(scene);
+        }
+        self.scenes.put(scene);
         self.late_answers = 0;
-        if switch.goal == Goal::Again {
-            self.plays_left = self.plays_left.map(|left| left.saturating_sub(1));
+        match switch.goal {
+            Goal::Lanes => {}
+            Goal::Cue if self.seeking.take().is_some() => self.slew.reset(),
+            Goal::Cue => {
+                self.slew.skip(switch.skipped_s);
+                self.resuming = false;
+            }
+            Goal::Again => {
+                self.slew.skip(0.0);
+                self.plays_left = self.plays_left.map(|left| left.saturating_sub(1));
+            }
+            Goal::Home | Goal::Park => self.slew.skip(0.0),
         }
         self.phase = match switch.goal {
-            Goal::Home | Goal::Stop if course.settled() <= course.start => Phase::Closing(CLOSING_FRAMES),
-            Goal::Home | Goal::Stop => Phase::Parking,
-            Goal::Again | Goal::Rejoin => Phase::Riding,
+            Goal::Home | Goal::Park if course.settled() <= course.start => Phase::Closing(HOLD_FRAMES),
+            Goal::Home | Goal::Park => Phase::Parking,
+            Goal::Again | Goal::Cue | Goal::Lanes => Phase::Riding,
         };
         let old = std::mem::replace(&mut self.course, course);
         self.retired.put(Some(old));
     }
 
-    fn drop_switch(&mut self) {
-        for switch in [self.switch.take(), self.spare.take()] {
-            self.retired.put(switch.and_then(|switch| switch.course));
+    pub(super) fn drop_switch(&mut self) {
+        for switch in [self.switch.take(), self.spare.take()].into_iter().flatten() {
+            if let Some(request) = switch.request {
+                self.scenes.put(request.scene);
+            }
+            if let Some((course, scene)) = switch.course {
+                self.retired.put(Some(course));
+                self.scenes.put(scene);
+            }
         }
     }
 

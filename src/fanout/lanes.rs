@@ -71,8 +71,7 @@ fn shared(config: &Config, controller: &Controller, slots: usize, timeline: &Tim
 }
 
 fn slot(seat: &SeatType, seat_axis: usize, axis: Option<usize>, timeline: &Timeline, level: f64) -> Slot {
-    let neutral = seat.neutral.get(seat_axis).copied().unwrap_or(0.0);
-    Slot::new(seat, seat_axis, axis, timeline.cue().unit().to_stroke(seat)).at_level(level, neutral)
+    Slot::new(seat, seat_axis, axis, timeline.cue().unit().to_stroke(seat)).at_level(level)
 }
 
 fn wiring(config: &Config, controller: &Controller, timeline: &Timeline) -> Wiring {

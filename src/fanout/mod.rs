@@ -6,7 +6,7 @@ mod lanes;
 pub use lanes::{Manner, lanes};
 
 use crate::cue;
-use crate::engine::Beat;
+use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
 use crate::timeline::EffectSet;
 use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration};
@@ -67,6 +67,7 @@ impl Lane {
         &mut self,
         beat: &Beat,
         pose: &Pose,
+        mix: Mix,
         buf: &'b mut [u8; MAX_LEN],
     ) -> (Stamped, &'b [u8]) {
         let stamped = self.stamp();
@@ -76,7 +77,7 @@ impl Lane {
         for (index, slot) in slots.iter().enumerate() {
             positions[index] = slot.pulses(pose[index]);
             if let Some(axis) = slot.axis.filter(|_| self.vibrates) {
-                let cue::Vibration { hz, amplitude } = beat.vibration[axis];
+                let cue::Vibration { hz, amplitude } = mix.vibration(beat.vibration[axis]);
                 vibration[index] = Vibration::from_hz(hz, amplitude * slot.to_stroke * slot.stroke_pulses);
             }
         }
@@ -88,7 +89,7 @@ impl Lane {
             frame: stamped.frame,
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],
-            outputs: self.wiring.outputs(beat.effects),
+            outputs: self.wiring.outputs(mix.effects(beat.effects)),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };
         (stamped, motion.emit(buf))
@@ -98,7 +99,7 @@ impl Lane {
     pub fn encode_homing<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
         let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
         let beat = Beat::still(Timing::Relative, time_ms);
-        let written = self.encode(&beat, &park, buf);
+        let written = self.encode(&beat, &park, Mix::STILL, buf);
         self.vibrates = vibrates;
         written
     }

@@ -29,7 +29,7 @@ fn frames(config: &Config, cue: &Timeline, manner: Manner) -> Vec<MotionRequest>
     let frame = |lane: &mut Lane| {
         let placed = lane.window.place(&pose);
         let mut buf = [0xa5; MAX_LEN];
-        let (_, octets) = lane.encode(&beat, &placed, &mut buf);
+        let (_, octets) = lane.encode(&beat, &placed, Mix { vibration: manner.level, ..Mix::FULL }, &mut buf);
         MotionRequest::parse(octets).unwrap()
     };
     lanes(config, cue, manner).iter_mut().map(frame).collect()
@@ -78,7 +78,7 @@ fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
     let mut beat = Beat::still(Timing::Absolute, 10);
     beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
     let mut buf = [0xa5; MAX_LEN];
-    let (stamped, octets) = lane.encode(&beat, &lane.window.park(), &mut buf);
+    let (stamped, octets) = lane.encode(&beat, &lane.window.park(), Mix::FULL, &mut buf);
     let frame = MotionRequest::parse(octets).unwrap();
     assert_eq!(stamped, Stamped { frame: FrameNo::FIRST, asked: true });
     assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
@@ -92,6 +92,7 @@ fn the_way_home_is_relative_and_plain_and_takes_a_frame_number() {
     let mut buf = [0xa5; MAX_LEN];
     let (first, octets) = lane.encode_homing(3_000, &mut buf);
     assert_eq!((first.frame, &octets[4..6]), (FrameNo(1), &[0x14, 0x01][..]));
-    let (second, octets) = lane.encode(&Beat::still(Timing::Relative, 10), &lane.window.park(), &mut buf);
+    let (second, octets) =
+        lane.encode(&Beat::still(Timing::Relative, 10), &lane.window.park(), Mix::FULL, &mut buf);
     assert_eq!((second.frame, &octets[4..6]), (FrameNo(2), &[0x19, 0x01][..]));
 }

@@ -1,11 +1,13 @@
 //! What moves: axes, poses, seat types and how motion is measured. Pure; no file, no clock, no allocation in
 //! anything that the tick thread calls.
 
+mod brake;
 mod measure;
 mod scan;
 mod seat;
 mod window;
 
+pub use brake::{AxisState, Brake};
 pub use measure::{Measure, Reading, Readings, Spacing};
 pub use scan::{Peak, Peaks, scan};
 pub use seat::{Pulses, SeatType};

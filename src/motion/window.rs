@@ -30,12 +30,14 @@ impl Limits {
 pub struct Slot {
     /// The axis of the cue it carries, counted from 0; none where the slot rests at park throughout.
     pub axis: Option<usize>,
-    /// Cue unit to fraction of this slot's stroke, at the level of the play.
+    /// Cue unit to fraction of this slot's stroke.
     pub to_stroke: f64,
-    /// What the level adds to that, fraction of the stroke: levels scale about the seat's neutral pose.
-    pub shift: f64,
     /// Where it rests, fraction of the stroke.
     pub park: f64,
+    /// What levels scale about, fraction of the stroke.
+    pub neutral: f64,
+    /// How much of the cue's motion about that it makes, 0 to 1.
+    pub level: f64,
     /// Pulses over the whole stroke.
     pub stroke_pulses: f64,
     /// Length of the stroke, mm.
@@ -51,28 +53,28 @@ impl Slot {
         Self {
             axis,
             to_stroke,
-            shift: 0.0,
             park: seat.park.get(seat_axis).copied().unwrap_or(0.0),
+            neutral: seat.neutral.get(seat_axis).copied().unwrap_or(0.0),
+            level: 1.0,
             stroke_pulses: seat.stroke_pulses(),
             stroke_mm: seat.stroke_mm,
             limits: Limits::of(seat),
         }
     }
 
-    /// The same slot with motion scaled to `level`, 0 to 1, about `neutral`, fraction of the stroke.
+    /// The same slot with motion at `level`, 0 to 1.
     #[must_use]
-    pub fn at_level(self, level: f64, neutral: f64) -> Self {
-        Self {
-            to_stroke: self.to_stroke * level,
-            shift: self.shift * level + neutral * (1.0 - level),
-            ..self
-        }
+    pub const fn at_level(self, level: f64) -> Self {
+        Self { level, ..self }
     }
 
     /// Where the cue's `value` puts the axis: fraction of the stroke, held inside it.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {
-        (value * self.to_stroke + self.shift).clamp(0.0, 1.0)
+        let full = value * self.to_stroke;
+        // At full level the cue's own value, to the last bit.
+        let placed = if self.level == 1.0 { full } else { self.neutral + (full - self.neutral) * self.level };
+        placed.clamp(0.0, 1.0)
     }
 
     /// Where the motor stands at `fraction` of the stroke, held inside it: nearest pulse, ties away from zero.
@@ -98,6 +100,23 @@ impl Window {
     pub fn new(slots: Vec<Slot>) -> Self {
         assert!(slots.len() <= MAX_AXES, "a frame has at most {MAX_AXES} slots");
         Self { slots }
+    }
+
+    /// The same window with motion at `level`, 0 to 1.
+    #[must_use]
+    pub fn at_level(&self, level: f64) -> Self {
+        Self { slots: self.slots.iter().map(|slot| slot.at_level(level)).collect() }
+    }
+
+    /// The level of its slots; 1 where it has none.
+    #[must_use]
+    pub fn level(&self) -> f64 {
+        self.slots.first().map_or(1.0, |slot| slot.level)
+    }
+
+    /// Sets the level of every slot. Never allocates.
+    pub fn set_level(&mut self, level: f64) {
+        self.slots.iter_mut().for_each(|slot| slot.level = level);
     }
 
     /// The slots, in frame order.
@@ -141,7 +160,8 @@ mod tests {
 
     #[test]
     fn a_level_scales_about_the_neutral_pose() {
-        let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0).at_level(0.5, 0.4);
+        let seat = SeatType { neutral: [0.4; MAX_AXES], ..SeatType::bench3(1) };
+        let slot = Slot::new(&seat, 0, Some(0), 1.0).at_level(0.5);
         assert!((slot.place(0.4) - 0.4).abs() < 1e-12);
         assert!((slot.place(1.0) - 0.7).abs() < 1e-12);
         assert!((slot.place(0.0) - 0.2).abs() < 1e-12);

@@ -1,17 +1,42 @@
 //! What all lanes do from a show time on: a planned move each, and then the cue or rest.
 
-use super::states::following;
-use super::{AxisState, Curve, Plan};
-use crate::motion::{Pose, Window};
+use super::states::following_by_slot;
+use super::{Curve, Plan};
+use crate::motion::{AxisState, MAX_AXES, Pose, Window};
 use crate::time::ShowTime;
 
-/// What comes after the moves of a course.
+/// What comes after a lane's move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum After {
-    /// The lanes follow the cue.
+    /// The lane follows the cue.
     Cue,
-    /// The lanes rest where their moves ended; one without a move rests in its park pose.
+    /// The lane rests where its move ended; without a move, in its park pose.
     Rest,
+}
+
+/// What one lane does.
+#[derive(Debug, Clone)]
+pub struct Leg {
+    /// The show time at which its move starts.
+    pub start: ShowTime,
+    /// Its move; none where the lane goes on as `then` says at once.
+    pub plan: Option<Plan>,
+    /// What comes after it.
+    pub then: After,
+    /// Whether it is out: it rests in park while the others play.
+    pub out: bool,
+}
+
+impl Leg {
+    /// The show time at which its move has ended.
+    fn settled(&self) -> ShowTime {
+        let seconds = self.plan.as_ref().map_or(0.0, Plan::seconds);
+        ShowTime::from_nanos(self.start.as_nanos() + ShowTime::from_secs_f64(seconds).as_nanos())
+    }
+
+    fn since_start(&self, at: ShowTime) -> f64 {
+        ShowTime::from_nanos(at.as_nanos().saturating_sub(self.start.as_nanos())).as_secs_f64()
+    }
 }
 
 /// A course: made by the planner, followed by the tick thread.
@@ -19,39 +44,49 @@ pub enum After {
 pub struct Course {
     /// Which course this is, so that the planner knows from which one it is asked to go on.
     pub serial: u32,
-    /// The show time at which its moves start.
+    /// The show time at which it takes over.
     pub start: ShowTime,
-    /// What comes after the moves.
-    pub then: After,
-    moves: Vec<Option<Plan>>,
-    seconds: f64,
+    legs: Vec<Leg>,
+    settled: ShowTime,
 }
 
 impl Course {
-    /// A course of these moves, one for each lane; none where the lane goes on as `then` says at once.
+    /// A course of one leg for each lane.
     #[must_use]
-    pub fn new(serial: u32, start: ShowTime, then: After, moves: Vec<Option<Plan>>) -> Self {
-        let seconds = moves.iter().flatten().map(Plan::seconds).fold(0.0, f64::max);
-        Self { serial, start, then, moves, seconds }
+    pub fn new(serial: u32, start: ShowTime, legs: Vec<Leg>) -> Self {
+        let settled = legs.iter().map(Leg::settled).fold(start, ShowTime::max);
+        Self { serial, start, legs, settled }
     }
 
     /// The show time at which the last of its moves has ended.
     #[must_use]
-    pub fn settled(&self) -> ShowTime {
-        ShowTime::from_nanos(self.start.as_nanos() + ShowTime::from_secs_f64(self.seconds).as_nanos())
+    pub const fn settled(&self) -> ShowTime {
+        self.settled
+    }
+
+    /// Whether a lane follows the cue at a show time.
+    #[must_use]
+    pub fn is_on_cue(&self, lane: usize, at: ShowTime) -> bool {
+        self.legs[lane].then == After::Cue && at >= self.legs[lane].settled()
     }
 
     /// Where a lane's slots are at a show time, as fractions of the stroke; `cue` is the cue's pose then. Never
     /// allocates.
     pub fn pose(&mut self, lane: usize, at: ShowTime, window: &Window, cue: &Pose) -> Pose {
-        let seconds = self.since_start(at);
-        let Some(plan) = &mut self.moves[lane] else {
-            return if self.then == After::Cue { window.place(cue) } else { window.park() };
+        let leg = &mut self.legs[lane];
+        let seconds = leg.since_start(at);
+        let Some(plan) = &mut leg.plan else {
+            return if leg.then == After::Cue { window.place(cue) } else { window.park() };
         };
-        if self.then == After::Cue && seconds >= plan.seconds() {
+        if leg.then == After::Cue && seconds >= plan.seconds() {
             return window.place(cue);
         }
-        plan.pose_at(at, self.start, window)
+        plan.pose_at(at, leg.start, window)
+    }
+
+    /// What a lane does.
+    pub(super) fn leg(&self, lane: usize) -> &Leg {
+        &self.legs[lane]
     }
 
     /// How each moving slot of a lane moves at a show time.
@@ -62,17 +97,30 @@ impl Course {
         window: &Window,
         curve: &Curve<'_>,
     ) -> Vec<AxisState> {
-        let seconds = self.since_start(at);
-        match &mut self.moves[lane] {
-            Some(plan) if self.then == After::Rest || seconds < plan.seconds() => plan.states_at(seconds),
-            None if self.then == After::Rest => {
-                window.moving().map(|(_, slot)| AxisState::at_rest(slot.park)).collect()
-            }
-            _ => following(window, curve, at),
-        }
+        let states = self.states_by_slot(lane, at, window, curve);
+        window.moving().map(|(slot, _)| states[slot]).collect()
     }
 
-    fn since_start(&self, at: ShowTime) -> f64 {
-        ShowTime::from_nanos(at.as_nanos().saturating_sub(self.start.as_nanos())).as_secs_f64()
+    /// The same for every slot, in frame order; those that do not move rest in park. Never allocates.
+    #[must_use]
+    pub fn states_by_slot(
+        &mut self,
+        lane: usize,
+        at: ShowTime,
+        window: &Window,
+        curve: &Curve<'_>,
+    ) -> [AxisState; MAX_AXES] {
+        let leg = &mut self.legs[lane];
+        let seconds = leg.since_start(at);
+        match &mut leg.plan {
+            Some(plan) if leg.then == After::Rest || seconds < plan.seconds() => {
+                let mut states = window.park().map(AxisState::at_rest);
+                let moving = window.moving().map(|(slot, _)| slot);
+                moving.zip(plan.states_at(seconds)).for_each(|(slot, state)| states[slot] = state);
+                states
+            }
+            None if leg.then == After::Rest => window.park().map(AxisState::at_rest),
+            _ => following_by_slot(window, curve, at),
+        }
     }
 }

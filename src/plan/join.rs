@@ -152,7 +152,7 @@ mod tests {
         let at = ShowTime::from_secs_f64(plan.seconds());
         let target = following(&window, &cue(), at);
         for (axis, target) in target.iter().enumerate() {
-            let end = plan.states_at(plan.seconds())[axis];
+            let end = plan.states_at(plan.seconds()).nth(axis).unwrap();
             assert!((end.position - target.position).abs() < 1e-6, "axis {axis}: {end:?} {target:?}");
             assert!((end.velocity - target.velocity).abs() < 1e-6, "axis {axis}: {end:?} {target:?}");
         }

@@ -7,18 +7,20 @@ mod course;
 mod join;
 mod park;
 mod planner;
+mod scene;
 mod seam;
 mod solve;
 mod states;
 
-pub use course::{After, Course};
+pub use course::{After, Course, Leg};
 pub use join::JOIN_MIN;
 pub use park::{PARK_VELOCITY_MM_S, homing_time};
 pub use planner::{From, Planner, Request, To};
+pub use scene::{LaneScene, Place, Scene};
 
 use rsruckig::prelude::{DataArrayOrVec, Trajectory};
 
-use crate::motion::{Pose, Window};
+use crate::motion::{AxisState, Pose, Window};
 use crate::time::ShowTime;
 
 /// The cue as the planner sees it.
@@ -28,32 +30,6 @@ pub struct Curve<'a> {
     pub pose: &'a dyn Fn(ShowTime) -> Pose,
     /// Its last row.
     pub end: ShowTime,
-}
-
-/// Where an axis is and how it moves: strokes, strokes per second, strokes per second squared.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct AxisState {
-    /// Fraction of the stroke.
-    pub position: f64,
-    /// Strokes per second.
-    pub velocity: f64,
-    /// Strokes per second squared.
-    pub acceleration: f64,
-}
-
-impl AxisState {
-    /// At rest there.
-    #[must_use]
-    pub const fn at_rest(position: f64) -> Self {
-        Self { position, velocity: 0.0, acceleration: 0.0 }
-    }
-}
-
-impl AxisState {
-    /// The same motion run through `pace` times as fast.
-    fn at_pace(self, pace: f64) -> Self {
-        Self { velocity: self.velocity * pace, acceleration: self.acceleration * pace * pace, ..self }
-    }
 }
 
 /// Why no move could be planned.
@@ -75,6 +51,12 @@ pub enum PlanError {
     /// Lanes are said to be on a course that was not given out, or was given up.
     #[error("course {0} is not known")]
     UnknownCourse(u32),
+    /// A request said nothing of a lane.
+    #[error("nothing is said of lane {0}")]
+    UnknownLane(usize),
+    /// A lane is said to be on a course, but not on which.
+    #[error("lane {0} is on no course that is known")]
+    UnknownPlace(usize),
     /// The solver refused even to stop.
     #[error("no way to stop could be planned: {0}")]
     NoStop(String),
@@ -130,22 +112,17 @@ impl Plan {
         pose
     }
 
-    /// The state of each moving slot `seconds` after the start, clamped likewise.
-    #[must_use]
-    pub fn states_at(&mut self, seconds: f64) -> Vec<AxisState> {
+    /// The state of each moving slot `seconds` after the start, clamped likewise. Never allocates.
+    pub fn states_at(&mut self, seconds: f64) -> impl Iterator<Item = AxisState> {
         let (part, t) = self.part_at(seconds);
         let (p, v, a) = (&mut self.positions, &mut self.velocities, &mut self.accelerations);
         self.parts[part].at_time(t, &mut Some(p), &mut Some(v), &mut Some(a), &mut None, &mut None);
-        let velocities = self.velocities.iter().zip(self.accelerations.iter());
-        self.positions
-            .iter()
-            .zip(velocities)
-            .map(|(position, (velocity, acceleration))| AxisState {
-                position: position.clamp(0.0, 1.0),
-                velocity: *velocity,
-                acceleration: *acceleration,
-            })
-            .collect()
+        let moves = self.velocities.iter().zip(self.accelerations.iter());
+        self.positions.iter().zip(moves).map(|(position, (velocity, acceleration))| AxisState {
+            position: position.clamp(0.0, 1.0),
+            velocity: *velocity,
+            acceleration: *acceleration,
+        })
     }
 
     fn part_at(&self, seconds: f64) -> (usize, f64) {

@@ -3,41 +3,41 @@
 
 use std::time::Duration;
 
-use super::{AxisState, Curve};
-use crate::motion::Window;
+use super::Curve;
+use crate::motion::{AxisState, MAX_AXES, Window};
 use crate::time::ShowTime;
 
 const APART: Duration = Duration::from_millis(20);
 
 /// The state of each moving slot of a window, following the cue at `at`, in strokes.
+pub(super) fn following(window: &Window, cue: &Curve<'_>, at: ShowTime) -> Vec<AxisState> {
+    let states = following_by_slot(window, cue, at);
+    window.moving().map(|(slot, _)| states[slot]).collect()
+}
+
+/// The same for every slot, in frame order. Never allocates.
 ///
 /// Within 20 ms of the cue's end, after which it stands still, the differences look back instead.
-pub(super) fn following(window: &Window, cue: &Curve<'_>, at: ShowTime) -> Vec<AxisState> {
+pub(super) fn following_by_slot(window: &Window, cue: &Curve<'_>, at: ShowTime) -> [AxisState; MAX_AXES] {
     if at <= cue.end && at + APART > cue.end {
         return leaving(window, cue, at);
     }
     let [before, now, after] = [at - APART, at, at + APART].map(|at| window.place(&(cue.pose)(at)));
     let h = APART.as_secs_f64();
-    window
-        .moving()
-        .map(|(slot, _)| AxisState {
-            position: now[slot],
-            velocity: (after[slot] - before[slot]) / (2.0 * h),
-            acceleration: (after[slot] - 2.0 * now[slot] + before[slot]) / (h * h),
-        })
-        .collect()
+    std::array::from_fn(|slot| AxisState {
+        position: now[slot],
+        velocity: (after[slot] - before[slot]) / (2.0 * h),
+        acceleration: (after[slot] - 2.0 * now[slot] + before[slot]) / (h * h),
+    })
 }
 
 /// The same at the cue's very end, from the poses before it alone.
-pub(super) fn leaving(window: &Window, cue: &Curve<'_>, at: ShowTime) -> Vec<AxisState> {
+fn leaving(window: &Window, cue: &Curve<'_>, at: ShowTime) -> [AxisState; MAX_AXES] {
     let [now, before, earlier] = [at, at - APART, at - 2 * APART].map(|at| window.place(&(cue.pose)(at)));
     let h = APART.as_secs_f64();
-    window
-        .moving()
-        .map(|(slot, _)| AxisState {
-            position: now[slot],
-            velocity: (3.0 * now[slot] - 4.0 * before[slot] + earlier[slot]) / (2.0 * h),
-            acceleration: (now[slot] - 2.0 * before[slot] + earlier[slot]) / (h * h),
-        })
-        .collect()
+    std::array::from_fn(|slot| AxisState {
+        position: now[slot],
+        velocity: (3.0 * now[slot] - 4.0 * before[slot] + earlier[slot]) / (2.0 * h),
+        acceleration: (now[slot] - 2.0 * before[slot] + earlier[slot]) / (h * h),
+    })
 }

@@ -6,8 +6,9 @@ use std::thread::Thread;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::live::{Live, Phase};
-use crate::engine::Rate;
-use crate::plan::{Course, Request};
+use crate::engine::{Engine, Rate};
+use crate::motion::Pose;
+use crate::plan::{Course, Request, Scene};
 use crate::time::{MonoTime, ShowTime};
 use crate::wire::FrameNo;
 
@@ -53,10 +54,29 @@ pub struct TickReport {
 /// The planner's answer.
 #[derive(Debug)]
 pub enum Answer {
-    /// The course that was asked for.
-    Course(Box<Course>),
+    /// The course that was asked for, and the scene that came with the request.
+    Course(Box<Course>, Box<Scene>),
     /// There is none for the request of that serial.
-    Refused(u32),
+    Refused(u32, Box<Scene>),
+}
+
+/// What the tick thread is told to do, once; what lasts stands on the [`super::Desk`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Order {
+    /// Come to rest and hold; the film waits.
+    Pause,
+    /// Go on from a pause.
+    Resume,
+    /// Go on elsewhere in the film.
+    Seek(ShowTime),
+    /// Park, and end the play.
+    Park,
+    /// A controller is lost: its lane comes to rest, and after three hold frames nothing goes to it.
+    Leave(u16),
+    /// Nothing goes to that lane from now on.
+    Cut(u16),
+    /// A controller is there again, its seat at rest in that pose.
+    ComeBack(u16, Pose),
 }
 
 /// The tick thread's ends.
@@ -67,6 +87,7 @@ pub struct Mail {
     requests: Producer<Request>,
     answers: Consumer<Answer>,
     retired: Producer<Box<Course>>,
+    orders: Consumer<Order>,
     planner: Option<Thread>,
     live: Arc<Live>,
     unposted: u64,
@@ -85,26 +106,32 @@ pub struct MailEnds {
     pub answers: Producer<Answer>,
     /// To the planner: courses to free.
     pub retired: Consumer<Box<Course>>,
+    /// From whoever leads the show: orders.
+    pub orders: Producer<Order>,
 }
 
 /// Mailboxes for a play of that many lanes.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 2,000 ticks")]
 pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) {
-    let ticks = (HELD_S * rate.hz()).ceil() as usize;
+    let held = (HELD_S * rate.hz()).ceil() as usize;
     // Each frame may be followed by word of its failure.
-    let (sent, sent_end) = RingBuffer::new((2 * lanes * ticks).max(1024));
-    let (reports, reports_end) = RingBuffer::new(ticks.max(64));
+    let (sent, sent_end) = RingBuffer::new((2 * lanes * held).max(1024));
+    let (reports, reports_end) = RingBuffer::new(held.max(64));
     let (requests, requests_end) = RingBuffer::new(PLANS);
     let (answers_end, answers) = RingBuffer::new(PLANS);
     let (retired, retired_end) = RingBuffer::new(PLANS);
-    let mail = Mail { sent, ticks: reports, requests, answers, retired, planner: None, live, unposted: 0 };
+    // One for each lane at once, and some more.
+    let (orders_end, orders) = RingBuffer::new(lanes + PLANS);
+    let (ticks, planner, unposted) = (reports, None, 0);
+    let mail = Mail { sent, ticks, requests, answers, retired, orders, planner, live, unposted };
     let ends = MailEnds {
         sent: sent_end,
         ticks: reports_end,
         requests: requests_end,
         answers: answers_end,
         retired: retired_end,
+        orders: orders_end,
     };
     (mail, ends)
 }
@@ -125,14 +152,22 @@ impl Mail {
         self.unposted += u64::from(self.sent.push(sent).is_err());
     }
 
-    pub(super) fn report(&mut self, report: TickReport, phase: Phase) {
+    pub(super) fn report(&mut self, report: TickReport) {
         self.live.on_tick(&report);
-        self.live.enter(phase);
         self.unposted += u64::from(self.ticks.push(report).is_err());
     }
 
     pub(super) fn answer(&mut self) -> Option<Answer> {
         self.answers.pop().ok()
+    }
+
+    /// Shows how far the play is.
+    pub(super) fn look(&self, engine: &Engine) {
+        self.live.enter(Phase::of(engine));
+    }
+
+    pub(super) fn order(&mut self) -> Option<Order> {
+        self.orders.pop().ok()
     }
 
     pub(super) fn ask(&mut self, request: Request) {

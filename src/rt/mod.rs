@@ -4,20 +4,22 @@
 //! happened before it or happens on another thread; values cross in bounded single-producer mailboxes.
 
 mod acks;
+mod desk;
 mod live;
 mod mail;
 mod planning;
 mod spin;
 
 pub use acks::{Accounts, AckLoop};
+pub use desk::Desk;
 pub use live::{Live, Phase};
-pub use mail::{Answer, Mail, MailEnds, Sent, TickReport, mailboxes};
+pub use mail::{Answer, Mail, MailEnds, Order, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
 pub use spin::Spinning;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::engine::{Beat, Ending, Engine, Tick, TickGrid};
+use crate::engine::{Beat, Ending, Engine, Step, Tick, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
 use crate::time::{Clock, nanos};
@@ -34,6 +36,9 @@ impl FrameSink for Sender {
         Sender::send(self, lane, datagram)
     }
 }
+
+/// Orders obeyed in one tick; more wait for the next.
+const ORDERS_PER_TICK: usize = 8;
 
 /// What the loop did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,8 +67,10 @@ pub struct TickLoop<'a, C, S> {
     pub sink: S,
     /// Its ends of the mailboxes.
     pub mail: Mail,
-    /// Read every tick: somebody wants the show to stop.
-    pub stop: &'a AtomicBool,
+    /// What operators set, and the stop; read every tick.
+    pub desk: &'a Desk,
+    /// Read every tick: somebody wants the seats parked and the play to end.
+    pub leave: &'a AtomicBool,
 }
 
 impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
@@ -74,34 +81,63 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             self.clock.sleep_until(self.grid.next_deadline());
             let tick = self.grid.take(self.clock.now());
             self.take_mail();
-            let Some(beat) = self.engine.tick(tick.missed) else { break };
-            missed += tick.missed;
-            ticks += 1;
-            self.send(tick, &beat);
+            match self.engine.tick(tick.missed) {
+                Step::Send(beat) => {
+                    missed += tick.missed;
+                    ticks += 1;
+                    self.send(tick, &beat);
+                }
+                Step::Quiet => self.mail.look(&self.engine),
+                Step::Over => break,
+            }
             self.hand_on();
         }
         let ending = self.engine.ending().unwrap_or(Ending::Fault);
         Ended { ticks, missed, unposted: self.mail.unposted(), ending }
     }
 
-    /// Bounded: the planner answers one request at a time.
+    /// Bounded: so many orders a tick, and the planner answers one request at a time. The stop waits for none of them.
     fn take_mail(&mut self) {
-        if self.stop.load(Ordering::Relaxed) {
+        for lane in 0..self.lanes.len() {
+            self.engine.mix(lane, self.desk.mix(lane));
+        }
+        self.engine.trim(self.desk.trim_ms());
+        for _ in 0..ORDERS_PER_TICK {
+            let Some(order) = self.mail.order() else { break };
+            self.obey(order);
+        }
+        if self.leave.load(Ordering::Relaxed) {
+            self.engine.leave_now();
+        }
+        if self.desk.take_stop() {
             self.engine.stop();
         }
         while let Some(answer) = self.mail.answer() {
             match answer {
-                Answer::Course(course) => self.engine.offer(course),
-                Answer::Refused(serial) => self.engine.refuse(serial),
+                Answer::Course(course, scene) => self.engine.offer(course, scene),
+                Answer::Refused(serial, scene) => self.engine.refuse(serial, scene),
             }
+        }
+    }
+
+    fn obey(&mut self, order: Order) {
+        match order {
+            Order::Pause => self.engine.pause(),
+            Order::Resume => self.engine.resume(),
+            Order::Seek(film) => self.engine.seek(film),
+            Order::Park => self.engine.park(),
+            Order::Leave(lane) => self.engine.leave(usize::from(lane)),
+            Order::Cut(lane) => self.engine.cut(usize::from(lane)),
+            Order::ComeBack(lane, pose) => self.engine.come_back(usize::from(lane), pose),
         }
     }
 
     fn send(&mut self, tick: Tick, beat: &Beat) {
         let mut buf = [0; MAX_LEN];
         let mut first = None;
-        for (index, (lane, pose)) in self.lanes.iter_mut().zip(self.engine.poses()).enumerate() {
-            let (stamped, datagram) = lane.encode(beat, pose, &mut buf);
+        for (index, lane) in self.lanes.iter_mut().enumerate() {
+            let Some((pose, mix)) = self.engine.frame(index) else { continue };
+            let (stamped, datagram) = lane.encode(beat, pose, mix, &mut buf);
             let at = self.clock.now();
             first.get_or_insert(at);
             let of = u16::try_from(index).expect("fewer controllers than ports");
@@ -113,7 +149,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
         let report = TickReport { late_ns, missed: tick.missed, show: self.engine.playhead() };
-        self.mail.report(report, Phase::of(&self.engine));
+        self.mail.report(report);
+        self.mail.look(&self.engine);
     }
 
     fn hand_on(&mut self) {

@@ -42,11 +42,11 @@ impl PlanLoop {
             let timeline = &self.timeline;
             let pose = |at| timeline.sample(at, &mut Hint::default());
             let curve = Curve { pose: &pose, end: timeline.duration() };
-            let answer = match self.planner.plan(request, &curve) {
-                Ok(course) => Answer::Course(Box::new(course)),
+            let answer = match self.planner.plan(&request, &curve) {
+                Ok(course) => Answer::Course(Box::new(course), request.scene),
                 Err(error) => {
                     refusals.push(error);
-                    Answer::Refused(request.serial)
+                    Answer::Refused(request.serial, request.scene)
                 }
             };
             // One request is under way at a time, so there is room; a course nobody takes is only freed.

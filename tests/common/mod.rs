@@ -13,14 +13,15 @@ use std::time::Duration;
 use kinocue::app::Staged;
 use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
-use kinocue::engine::{Rate, Show, TickGrid};
+use kinocue::engine::{Mix, Rate, Show, TickGrid};
 use kinocue::fanout::Manner;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
-use kinocue::rt::{Ended, FrameSink, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::rt::{Desk, Ended, FrameSink, Live, MailEnds, Order, PlanLoop, TickLoop, mailboxes};
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
+use rtrb::Producer;
 
 /// When tick 0 is due.
 pub const ORIGIN: MonoTime = MonoTime::from_nanos(1_000_000_000);
@@ -31,7 +32,15 @@ pub enum Event {
     /// The tick thread wakes up this much late.
     Late(Duration),
     /// Somebody presses Ctrl-C.
+    Leave,
+    /// Somebody presses stop.
     Stop,
+    /// Somebody gives an order.
+    Order(Order),
+    /// Somebody sets what a lane makes of the cue.
+    Mix(usize, Mix),
+    /// Somebody sets the trim.
+    Trim(i32),
     /// From here on the planner takes this many ticks to answer.
     SlowPlanner(u32),
 }
@@ -94,17 +103,33 @@ impl Virtual {
         let manner = Manner { level: self.level, silent: false };
         let staged = Staged::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
+        let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
-        let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired } = ends;
+        let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired, orders } = ends;
         let plans = PlanLoop { planner, timeline: Arc::clone(&timeline), requests, answers, retired };
-        let stop = AtomicBool::new(false);
-        let clock = Stage::new(plans, &stop, &self.script, self.at_most);
+        let leave = AtomicBool::new(false);
+        let hands = Hands { desk: &desk, leave: &leave, orders: RefCell::new(orders) };
+        let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
         let sink = Link { now: &clock.now, frames: Vec::new() };
-        let mut tick_loop = TickLoop { clock: &clock, grid, engine, lanes, sink, mail, stop: &stop };
+        let mut tick_loop =
+            TickLoop { clock: &clock, grid, engine, lanes, sink, mail, desk: &desk, leave: &leave };
         let ended = tick_loop.run();
         Played { ended, frames: tick_loop.sink.frames, join, timeline, rate }
+    }
+}
+
+/// What operators have in their hands.
+struct Hands<'a> {
+    desk: &'a Desk,
+    leave: &'a AtomicBool,
+    orders: RefCell<Producer<Order>>,
+}
+
+impl Hands<'_> {
+    fn order(&self, order: Order) {
+        self.orders.borrow_mut().push(order).expect("there is room");
     }
 }
 
@@ -115,20 +140,20 @@ struct Stage<'a> {
     plans: RefCell<PlanLoop>,
     planner_delay: Cell<u32>,
     planner_waits: Cell<u32>,
-    stop: &'a AtomicBool,
+    hands: Hands<'a>,
     script: &'a [(u64, Event)],
     at_most: u64,
 }
 
 impl<'a> Stage<'a> {
-    fn new(plans: PlanLoop, stop: &'a AtomicBool, script: &'a [(u64, Event)], at_most: u64) -> Self {
+    fn new(plans: PlanLoop, hands: Hands<'a>, script: &'a [(u64, Event)], at_most: u64) -> Self {
         Self {
             now: Cell::new(ORIGIN),
             wake_ups: Cell::new(0),
             plans: RefCell::new(plans),
             planner_delay: Cell::new(0),
             planner_waits: Cell::new(0),
-            stop,
+            hands,
             script,
             at_most,
         }
@@ -159,7 +184,11 @@ impl Clock for Stage<'_> {
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             match event {
                 Event::Late(span) => self.now.set(self.now.get() + *span),
-                Event::Stop => self.stop.store(true, Ordering::Relaxed),
+                Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
+                Event::Stop => self.hands.desk.stop(),
+                Event::Order(order) => self.hands.order(*order),
+                Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
+                Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
                 Event::SlowPlanner(ticks) => {
                     self.planner_delay.set(*ticks);
                     self.planner_waits.set(*ticks);
@@ -236,44 +265,75 @@ impl Played {
 
     /// What the frames make the first lane do from rest in its park pose.
     pub fn worst(&self) -> Worst {
-        self.worst_until(self.frames.len())
+        self.worst_of(0, 0..self.lane(0).count(), |_| 0.0)
     }
 
     /// What the frames before `end` make the first lane do from rest in its park pose.
     pub fn worst_until(&self, end: usize) -> Worst {
-        self.worst_of(0..end, |_| 0.0)
+        self.worst_of(0, 0..end, |_| 0.0)
     }
 
     /// What the frames from `first` to before `end` make the first lane do, if it was at rest in the pose of the first.
     pub fn worst_from_rest(&self, first: usize, end: usize) -> Worst {
-        self.worst_of(first..end, |mm| mm)
+        self.worst_of(0, first..end, |mm| mm)
+    }
+
+    /// The same of its first axis, if that was at rest `mm` up.
+    pub fn worst_from_rest_at(&self, mm: f64, first: usize, end: usize) -> Worst {
+        self.worst_of_axis(0, 0, first..end, |_| mm)
+    }
+
+    /// What its frames of those numbers make a lane do, if it was at rest in the pose of the first.
+    pub fn worst_of_lane(&self, lane: usize, frames: Range<usize>) -> Worst {
+        self.worst_of(lane, frames, |mm| mm)
     }
 
     /// By the measure of what is sent, over the limits of the bench seat; before the first frame the seat rested where
     /// `before` puts it.
-    fn worst_of(&self, frames: Range<usize>, before: impl Fn(f64) -> f64) -> Worst {
+    fn worst_of(&self, lane: usize, frames: Range<usize>, before: impl Fn(f64) -> f64) -> Worst {
+        let axes = 0..self.frames[0].request.positions.len();
+        let worst = axes.map(|axis| self.worst_of_axis(lane, axis, frames.clone(), &before));
+        worst.fold(Worst::default(), Worst::max)
+    }
+
+    fn worst_of_axis(
+        &self,
+        lane: usize,
+        axis: usize,
+        frames: Range<usize>,
+        before: impl Fn(f64) -> f64,
+    ) -> Worst {
         let seat = SeatType::bench3(1);
         let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / self.rate.hz()).max(0.005);
+        let sent: Vec<&Frame> = self.lane(lane).collect();
         let mut worst = Worst::default();
-        for axis in 0..self.frames[0].request.positions.len() {
-            let sent = self.positions_mm(0, axis);
-            let mut measure = Measure::new(Spacing::at_rate(self.rate.hz()));
-            let mut at = ShowTime::ZERO;
-            for _ in 0..100 {
-                measure.push(at, before(sent[frames.start]));
-                at += self.rate.period();
+        let mm = self.positions_mm(lane, axis);
+        let mut measure = Measure::new(Spacing::at_rate(self.rate.hz()));
+        let mut at = ShowTime::ZERO;
+        for _ in 0..100 {
+            measure.push(at, before(mm[frames.start]));
+            at += self.rate.period();
+        }
+        for (index, frame) in frames.enumerate() {
+            if index > 0 {
+                at += Duration::from_millis(u64::from(self.time_ms(sent[frame], frame)));
             }
-            for frame in frames.clone() {
-                let seen = measure.push(at, sent[frame]);
-                at += Duration::from_millis(u64::from(self.rate.time_ms(frame as u64 + 1)));
-                worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
-                worst.acceleration =
-                    worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
-                worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
-                worst.step = worst.step.max(seen.step.value.abs() / step);
-            }
+            let seen = measure.push(at, mm[frame]);
+            worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
+            worst.acceleration =
+                worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
+            worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
+            worst.step = worst.step.max(seen.step.value.abs() / step);
         }
         worst
+    }
+
+    /// How long a frame gives its seat.
+    fn time_ms(&self, frame: &Frame, index: usize) -> u32 {
+        match frame.request.timing {
+            Timing::Relative => frame.request.time_ms,
+            Timing::Absolute => self.rate.time_ms(index as u64),
+        }
     }
 }
 

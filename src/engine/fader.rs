@@ -1,0 +1,120 @@
+//! How a level changes while a seat follows the cue: gently, and by what the cue leaves of the limits.
+
+/// The quickest change of a level, per second.
+pub(super) const RATE: f64 = 0.25;
+/// How quickly the change itself grows and ends, per second squared: 0.25 s to full speed.
+pub(super) const GATHER: f64 = 1.0;
+/// The least share with which a change ends.
+const LEAST: f64 = 0.05;
+/// Levels nearer than this are the same.
+const SAME: f64 = 1e-6;
+
+/// A level on its way to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fader {
+    level: f64,
+    /// Per second.
+    rate: f64,
+    /// How quickly it comes to stand, per second squared, while it is told to.
+    ends_by: Option<f64>,
+}
+
+impl Fader {
+    pub(super) const fn at(level: f64) -> Self {
+        Self { level, rate: 0.0, ends_by: None }
+    }
+
+    /// Where it is, 0 to 1.
+    pub(super) const fn level(self) -> f64 {
+        self.level
+    }
+
+    /// Whether it stands.
+    pub(super) fn is_still(self) -> bool {
+        self.rate == 0.0
+    }
+
+    /// Whether it stands at `target`.
+    pub(super) fn is_at(self, target: f64) -> bool {
+        self.is_still() && (self.level - target).abs() < SAME
+    }
+
+    /// Comes to stand, in a quarter of a second at the most.
+    pub(super) fn settle(&mut self, dt: f64) {
+        // A slow change was slow because the cue left no more: it ends as slowly.
+        self.ends_by.get_or_insert(GATHER * self.rate.abs() / RATE);
+        let gather = self.ends_by.unwrap_or(GATHER) * dt;
+        let rate = self.rate - self.rate.clamp(-gather, gather);
+        self.level = (self.level + rate * dt).clamp(0.0, 1.0);
+        self.rate = rate;
+        if rate.abs() < SAME {
+            *self = Self::at(self.level);
+        }
+    }
+
+    /// Moves on for `dt` seconds towards `target`, no quicker than that share of the rates, 0 to 1. One that goes the
+    /// other way, or too quickly, slows down first.
+    pub(super) fn advance(&mut self, dt: f64, target: f64, share: f64) {
+        self.ends_by = None;
+        // A share that shrinks must neither stop it abruptly nor leave it running.
+        let shown = if self.is_still() { share } else { share.max(self.rate.abs() / RATE).max(LEAST) };
+        let change = GATHER * shown * dt;
+        let gap = target - self.level;
+        let wanted = gap.signum() * closing_rate(gap.abs(), GATHER * share.max(LEAST), dt).min(RATE * share);
+        self.rate = wanted.clamp(self.rate - change, self.rate + change);
+        self.level = (self.level + self.rate * dt).clamp(0.0, 1.0);
+        if (target - self.level).abs() < SAME && self.rate.abs() < SAME {
+            *self = Self::at(target);
+        }
+    }
+}
+
+/// The greatest rate from which a gap is just closed while slowing down by no more than `gather`, tick by tick.
+fn closing_rate(gap: f64, gather: f64, dt: f64) -> f64 {
+    let ticks_left = (dt * dt / 4.0 + 2.0 * gap / gather).sqrt() - dt / 2.0;
+    (gather * ticks_left).min(gap / dt)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_arrives_without_passing_its_rates_or_its_goal() {
+        for (from, to, dt) in [(1.0, 0.0, 0.01), (0.0, 1.0, 0.001), (0.6, 0.61, 0.02), (0.5, 0.4999, 0.001)] {
+            let mut fader = Fader::at(from);
+            let mut ticks = 0;
+            while !fader.is_at(to) {
+                let before = fader;
+                fader.advance(dt, to, 1.0);
+                assert!(fader.rate.abs() <= RATE + 1e-9, "{fader:?}");
+                let change = (fader.rate - before.rate).abs();
+                assert!(change <= GATHER * dt + 1e-6 || fader.is_at(to), "{before:?} {fader:?}");
+                assert!((fader.level - from) * (fader.level - to) <= 1e-6, "{fader:?} passes {to}");
+                ticks += 1;
+                assert!(f64::from(ticks) * dt < 6.0, "{fader:?} never arrives");
+            }
+            assert_eq!(fader.level(), to);
+        }
+    }
+
+    #[test]
+    fn a_cue_that_leaves_nothing_holds_the_level_where_it_is() {
+        let mut fader = Fader::at(1.0);
+        (0..1000).for_each(|_| fader.advance(0.01, 0.2, 0.0));
+        assert_eq!(fader, Fader::at(1.0));
+    }
+
+    #[test]
+    fn a_goal_that_moves_away_behind_it_is_turned_to_gently() {
+        let mut fader = Fader::at(0.5);
+        (0..100).for_each(|_| fader.advance(0.01, 1.0, 1.0));
+        let mut last = fader;
+        for _ in 0..1000 {
+            fader.advance(0.01, 0.0, 1.0);
+            assert!((fader.rate - last.rate).abs() <= GATHER * 0.01 + 1e-6, "{last:?} {fader:?}");
+            last = fader;
+        }
+        assert!(fader.is_at(0.0), "{fader:?}");
+    }
+}

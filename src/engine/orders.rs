@@ -1,0 +1,126 @@
+//! What the engine is told to do. None of it waits: each is taken up by the tick it is told before.
+
+use super::{Ending, Engine, Mix, Part, Phase, Rest};
+use crate::motion::Pose;
+use crate::time::ShowTime;
+
+/// The furthest trim, milliseconds.
+pub const TRIM_MS: i32 = 500;
+
+impl Engine {
+    /// Parks, three hold frames, and the end. Asking again changes nothing.
+    ///
+    /// Before the first frame it is the end at once: nothing has been set in motion, and the lanes may still be on a
+    /// slow way to park, or where nobody knows.
+    pub fn park(&mut self) {
+        if self.frames == 0 {
+            self.phase = Phase::Done;
+            self.ending = Ending::Stopped;
+        } else if !self.is_homeward() {
+            self.homeward = true;
+            self.ending = Ending::Stopped;
+        }
+    }
+
+    /// Parks and ends, as [`Engine::park`] does; lanes that were stopped stay where they are, and the play ends at once.
+    pub fn leave_now(&mut self) {
+        if self.phase == Phase::Resting(Rest::Stopped) && !self.homeward {
+            self.phase = Phase::Done;
+        } else if self.rest() != Some(Rest::Stopped) {
+            self.park();
+        }
+    }
+
+    /// Brings the lanes to rest at once, without the planner; then three hold frames, and no more.
+    pub fn stop(&mut self) {
+        if matches!(self.phase, Phase::Done | Phase::Braking(Rest::Stopped) | Phase::Resting(Rest::Stopped)) {
+            return;
+        }
+        (self.homeward, self.resuming, self.seeking) = (false, false, None);
+        self.ending = Ending::Stopped;
+        self.come_down(Rest::Stopped);
+    }
+
+    /// Brings the lanes to rest at once, without the planner, and holds them there; the film waits.
+    pub fn pause(&mut self) {
+        match self.phase {
+            Phase::Settling
+            | Phase::Riding
+            | Phase::Braking(Rest::Ended)
+            | Phase::Resting(Rest::Late | Rest::Ended)
+                if !self.homeward =>
+            {
+                self.come_down(Rest::Paused);
+            }
+            Phase::Resting(Rest::Paused) => self.drop_switch(),
+            _ => {}
+        }
+        self.resuming = false;
+    }
+
+    /// Goes on from a pause.
+    pub fn resume(&mut self) {
+        self.resuming = self.rest() == Some(Rest::Paused);
+    }
+
+    /// Goes on elsewhere in the film, from a pause once it is resumed. A time after the end is the end.
+    pub fn seek(&mut self, film: ShowTime) {
+        let target = self.cue_time(film.min(self.timeline.duration()));
+        match self.phase {
+            Phase::Braking(Rest::Paused) | Phase::Resting(Rest::Paused) => {
+                self.drop_switch();
+                self.playhead = target;
+            }
+            Phase::Settling | Phase::Riding | Phase::Resting(Rest::Late) if !self.homeward => {
+                self.seeking = Some(target);
+            }
+            _ => {}
+        }
+    }
+
+    /// Sets how much later than the film the motion is, ±[`TRIM_MS`]; it is slewed in.
+    pub fn trim(&mut self, ms: i32) {
+        let ms = ms.clamp(-TRIM_MS, TRIM_MS);
+        let sooner_s = f64::from(self.trim_ms - ms) * 1e-3;
+        if sooner_s == 0.0 {
+            return;
+        }
+        self.trim_ms = ms;
+        self.slew.owe(sooner_s);
+        if self.rest() == Some(Rest::Paused) && self.switch.is_none() {
+            self.catch_up();
+        }
+    }
+
+    /// Sets what a lane makes of the cue.
+    pub fn mix(&mut self, lane: usize, mix: Mix) {
+        let rider = &mut self.riders[lane];
+        rider.refused &= rider.wanted.on == mix.on;
+        rider.wanted = mix;
+    }
+
+    /// Brings one lane to rest; after three hold frames nothing goes to it.
+    pub fn leave(&mut self, lane: usize) {
+        self.brake(lane);
+        self.riders[lane].leave();
+    }
+
+    /// Nothing goes to that lane from now on.
+    pub fn cut(&mut self, lane: usize) {
+        self.riders[lane].cut();
+    }
+
+    /// A lane is there again, at rest in that pose; it joins the others where they follow the cue.
+    pub fn come_back(&mut self, lane: usize, pose: Pose) {
+        if self.riders[lane].part == Part::Away {
+            self.riders[lane].come_back(pose);
+            // Its controller's sum of Times has been broken off.
+            self.stamps.break_off();
+        }
+    }
+
+    /// Where in the cue the lanes are to be at a time of the film.
+    pub(super) fn cue_time(&self, film: ShowTime) -> ShowTime {
+        ShowTime::from_nanos(film.as_nanos() - i64::from(self.trim_ms) * 1_000_000)
+    }
+}

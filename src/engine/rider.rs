@@ -1,0 +1,228 @@
+//! One lane as it rides: on the course that all follow, on its own way to rest, at rest, or away.
+
+use std::time::Duration;
+
+use super::fader::Fader;
+use super::mix::Mix;
+use super::trail::Trail;
+use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
+use crate::plan::{Course, LaneScene, Place};
+use crate::time::ShowTime;
+
+/// Hold frames that end a lane's motion.
+pub(super) const HOLD_FRAMES: u8 = 3;
+
+/// How quickly the level of vibration changes, per second.
+const VIBRATION_RATE: f64 = 1.0;
+
+/// What a lane does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Part {
+    /// Follows the course.
+    With,
+    /// Comes to rest, for that long by now.
+    Braking(Duration),
+    /// Rests where it is, until a course leads on from there.
+    Still,
+    /// Nothing goes to it.
+    Away,
+}
+
+/// One lane.
+#[derive(Debug, Clone)]
+pub(super) struct Rider {
+    /// Its slots, at its present level.
+    pub(super) window: Window,
+    pub(super) part: Part,
+    /// What the operator wants of it.
+    pub(super) wanted: Mix,
+    /// Whether it is out on the course that is followed.
+    pub(super) out: bool,
+    /// Hold frames after which it is away; none where it stays.
+    pub(super) leaving: Option<u8>,
+    /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
+    pub(super) refused: bool,
+    pub(super) fader: Fader,
+    /// The level of its vibration.
+    vibration: f64,
+    trail: Trail,
+    brake: Brake,
+}
+
+impl Rider {
+    /// A lane at rest in its park pose; motion at its window's level.
+    pub(super) fn parked(window: Window) -> Self {
+        let level = window.level();
+        Self {
+            part: Part::With,
+            wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
+            out: false,
+            leaving: None,
+            refused: false,
+            fader: Fader::at(level),
+            vibration: level,
+            trail: Trail::at_rest(window.park()),
+            brake: Brake::new(&window, &Trail::at_rest(window.park()).states()),
+            window,
+        }
+    }
+
+    /// The pose sent last.
+    pub(super) const fn pose(&self) -> &Pose {
+        self.trail.pose()
+    }
+
+    /// Begins to come to rest from however it moves on its course.
+    ///
+    /// The course knows that best; while the level changes, it is only seen in what was sent.
+    pub(super) fn brake(&mut self, on_course: impl FnOnce(&Window) -> [AxisState; MAX_AXES]) {
+        if self.part != Part::With {
+            return;
+        }
+        let mut states = if self.fader.is_still() { on_course(&self.window) } else { self.trail.states() };
+        for (state, position) in states.iter_mut().zip(self.pose()) {
+            state.position = *position;
+        }
+        self.brake = Brake::new(&self.window, &states);
+        self.part = Part::Braking(Duration::ZERO);
+    }
+
+    /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
+    pub(super) fn leave(&mut self) {
+        if self.part != Part::Away {
+            self.leaving.get_or_insert(HOLD_FRAMES);
+        }
+    }
+
+    /// Nothing goes to it from now on.
+    pub(super) fn cut(&mut self) {
+        (self.part, self.leaving) = (Part::Away, None);
+    }
+
+    /// It is there again, at rest in that pose.
+    pub(super) fn come_back(&mut self, pose: Pose) {
+        self.rest_at(pose);
+        (self.part, self.leaving, self.refused) = (Part::Still, None, false);
+    }
+
+    /// Frames stopped: the controller reached the last pose and stands there.
+    pub(super) fn halt(&mut self) {
+        self.rest_at(*self.pose());
+        if self.part != Part::Away {
+            self.part = Part::Still;
+        }
+    }
+
+    fn rest_at(&mut self, pose: Pose) {
+        self.trail.rest(pose);
+    }
+
+    /// Whether it moves on its own way to rest.
+    pub(super) const fn is_braking(&self) -> bool {
+        matches!(self.part, Part::Braking(_))
+    }
+
+    /// Where it is to be `time` after the frame before; `at` on its course, and `cue` there.
+    pub(super) fn next(
+        &mut self,
+        lane: usize,
+        time: Duration,
+        course: &mut Course,
+        at: ShowTime,
+        cue: &Pose,
+    ) -> Pose {
+        match &mut self.part {
+            Part::With => course.pose(lane, at, &self.window, cue),
+            Part::Braking(since) => {
+                *since += time;
+                let since = since.as_secs_f64();
+                if since >= self.brake.seconds() {
+                    self.part = Part::Still;
+                }
+                self.brake.pose(since)
+            }
+            Part::Still => {
+                if let Some(left) = &mut self.leaving {
+                    *left -= 1;
+                    if *left == 0 {
+                        self.cut();
+                    }
+                }
+                *self.pose()
+            }
+            Part::Away => *self.pose(),
+        }
+    }
+
+    /// What is sent for it, to be reached in `time`.
+    pub(super) fn send(&mut self, time: Duration, pose: Pose) {
+        self.trail.push(time, pose);
+        let step = VIBRATION_RATE * time.as_secs_f64();
+        self.vibration += (self.wanted.vibration - self.vibration).clamp(-step, step);
+    }
+
+    /// How it is as a course is asked for.
+    pub(super) fn scene(&self) -> LaneScene {
+        let place = match self.part {
+            Part::With => Place::OnCourse,
+            Part::Away => Place::Away,
+            Part::Braking(_) | Part::Still if self.leaving.is_some() => Place::Away,
+            Part::Braking(_) | Part::Still => Place::Still(*self.pose()),
+        };
+        LaneScene { place, level: self.fader.level(), out: self.wants_out() }
+    }
+
+    /// Whether it is to be out on the next course.
+    pub(super) const fn wants_out(&self) -> bool {
+        !self.wanted.on
+    }
+
+    /// Whether it is not where it is to be, and only a new course can bring it there.
+    pub(super) fn needs_a_course(&self) -> bool {
+        let apart = match self.part {
+            Part::With => self.out != self.wants_out(),
+            Part::Still => self.leaving.is_none(),
+            Part::Braking(_) | Part::Away => false,
+        };
+        apart && !self.refused
+    }
+
+    /// Takes up the course that was asked for with `scene`.
+    pub(super) fn take_up(&mut self, scene: &LaneScene) {
+        let as_planned = match (self.part, scene.place) {
+            (Part::With, Place::OnCourse) => true,
+            (Part::Still, Place::Still(pose)) => self.leaving.is_none() && pose == *self.pose(),
+            _ => false,
+        };
+        if as_planned {
+            (self.part, self.out) = (Part::With, scene.out);
+        }
+    }
+
+    /// What it makes of the cue's vibration and effects; its motion is in the poses.
+    pub(super) fn mix(&self) -> Mix {
+        if self.part == Part::With && !self.out {
+            Mix { vibration: self.vibration, ..self.wanted }
+        } else {
+            Mix::STILL
+        }
+    }
+
+    /// Moves its level on by `dt` seconds, towards `target`.
+    pub(super) fn fade(&mut self, dt: f64, target: f64, share: f64) {
+        self.fader.advance(dt, target, share);
+        self.window.set_level(self.fader.level());
+    }
+
+    /// Lets its level come to stand where it is.
+    pub(super) fn settle(&mut self, dt: f64) {
+        self.fader.settle(dt);
+        self.window.set_level(self.fader.level());
+    }
+
+    /// Sets its level at once: it rests, and the next course begins there.
+    pub(super) fn set_level(&mut self, level: f64) {
+        self.fader = Fader::at(level);
+        self.window.set_level(level);
+    }
+}

@@ -1,0 +1,127 @@
+//! Where operators set what lasts: levels, effects, seats on or off, trim, and the stop that is read every tick. Last
+//! value wins, so that no flood of changes can hold up the tick thread, or a stop.
+
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+
+use crate::engine::Mix;
+
+/// What operators set. Anyone may write; the tick thread reads all of it every tick.
+#[derive(Debug)]
+pub struct Desk {
+    stop: AtomicBool,
+    trim_ms: AtomicI32,
+    strips: Box<[Strip]>,
+}
+
+/// What is set for one seat.
+#[derive(Debug)]
+struct Strip {
+    motion: AtomicU32,
+    vibration: AtomicU32,
+    effects: AtomicU32,
+    on: AtomicBool,
+}
+
+impl Desk {
+    /// A desk of one strip for each lane.
+    #[must_use]
+    pub fn new(mixes: impl Iterator<Item = Mix>) -> Self {
+        let strip = |_| Strip {
+            motion: AtomicU32::new(0),
+            vibration: AtomicU32::new(0),
+            effects: AtomicU32::new(0),
+            on: AtomicBool::new(true),
+        };
+        let mixes: Vec<Mix> = mixes.collect();
+        let desk = Self {
+            stop: AtomicBool::new(false),
+            trim_ms: AtomicI32::new(0),
+            strips: mixes.iter().map(strip).collect(),
+        };
+        mixes.into_iter().enumerate().for_each(|(lane, mix)| desk.set(lane, mix));
+        desk
+    }
+
+    /// How many lanes it has.
+    #[must_use]
+    pub fn lanes(&self) -> usize {
+        self.strips.len()
+    }
+
+    /// What is set for a lane.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    #[must_use]
+    pub fn mix(&self, lane: usize) -> Mix {
+        let strip = &self.strips[lane];
+        let level = |level: &AtomicU32| f64::from(f32::from_bits(level.load(Ordering::Relaxed)));
+        Mix {
+            motion: level(&strip.motion),
+            vibration: level(&strip.vibration),
+            effects: strip.effects.load(Ordering::Relaxed),
+            on: strip.on.load(Ordering::Relaxed),
+        }
+    }
+
+    /// Sets what a lane makes of the cue; levels are taken into 0 to 1.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    #[expect(clippy::cast_possible_truncation, reason = "a level needs no more than seven digits")]
+    pub fn set(&self, lane: usize, mix: Mix) {
+        let strip = &self.strips[lane];
+        // Not-a-number is no motion.
+        let bits = |level: f64| (level.clamp(0.0, 1.0).max(0.0) as f32).to_bits();
+        strip.motion.store(bits(mix.motion), Ordering::Relaxed);
+        strip.vibration.store(bits(mix.vibration), Ordering::Relaxed);
+        strip.effects.store(mix.effects, Ordering::Relaxed);
+        strip.on.store(mix.on, Ordering::Relaxed);
+    }
+
+    /// How much later than the film the motion is to be, milliseconds.
+    #[must_use]
+    pub fn trim_ms(&self) -> i32 {
+        self.trim_ms.load(Ordering::Relaxed)
+    }
+
+    /// Sets it; the engine takes it into its range.
+    pub fn set_trim_ms(&self, ms: i32) {
+        self.trim_ms.store(ms, Ordering::Relaxed);
+    }
+
+    /// Asks for the lanes to come to rest at once.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Release);
+    }
+
+    /// Takes the request for a stop, if there is one.
+    #[must_use]
+    pub fn take_stop(&self) -> bool {
+        // A plain load in all the ticks in which there is none.
+        self.stop.load(Ordering::Acquire) && self.stop.swap(false, Ordering::AcqRel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_set_is_read_and_levels_stay_within_their_range() {
+        let desk = Desk::new([Mix::FULL; 2].into_iter());
+        assert_eq!((desk.lanes(), desk.mix(1)), (2, Mix::FULL));
+        for (set, read) in [(0.5, 0.5), (7.0, 1.0), (-1.0, 0.0), (f64::NAN, 0.0)] {
+            desk.set(1, Mix { motion: set, vibration: set, effects: 5, on: false });
+            assert_eq!(desk.mix(1), Mix { motion: read, vibration: read, effects: 5, on: false });
+        }
+        assert_eq!(desk.mix(0), Mix::FULL, "the other seat is as it was");
+    }
+
+    #[test]
+    fn a_stop_is_taken_once() {
+        let desk = Desk::new(std::iter::empty());
+        desk.stop();
+        assert_eq!([desk.take_stop(), desk.take_stop()], [true, false]);
+    }
+}

@@ -1,0 +1,312 @@
+//! Shows that are led by hand, in virtual time: pause, stop, seek, levels, trim, seats out and in, controllers lost and
+//! back. Whatever is done, what is sent stays within the limits of the seats.
+
+mod common;
+
+use std::time::Duration;
+
+use common::{Event, Frame, Played, Virtual, Worst, swell};
+use kinocue::engine::{Ending, Mix};
+use kinocue::motion::MAX_AXES;
+use kinocue::rt::Order;
+use kinocue::time::ShowTime;
+use kinocue::timeline::Hint;
+use kinocue::wire;
+
+fn assert_within(worst: Worst) {
+    let Worst { velocity, acceleration, jerk, step } = worst;
+    assert!(velocity <= 1.01 && acceleration <= 1.01 && jerk <= 1.01 && step <= 1.01, "{worst:?}");
+}
+
+/// Twenty seconds, 60 mm to either side of the middle; a quarter of a turn a second is 94 mm/s.
+fn ride() -> Virtual {
+    Virtual::new(swell(3, 20, 60.0, 0.25))
+}
+
+/// The same with vibration and an effect that are on throughout.
+fn ride_with_effects() -> Virtual {
+    let motion = swell(1, 20, 60.0, 0.25);
+    let mut rows = motion.lines();
+    let head = rows.next().expect("there is a header");
+    let rows: Vec<String> = rows.map(|row| format!("{row},20,0.01,1")).collect();
+    Virtual::new(format!("{head},v1_hz,v1_amp,fx_air\n{}\n", rows.join("\n")))
+}
+
+fn pulses(frame: &Frame) -> i32 {
+    frame.request.positions[0].0
+}
+
+/// Where the cue puts the first axis, in pulses.
+fn cue_at(played: &Played, ms: i64) -> i32 {
+    let pose = played.timeline.sample(ShowTime::from_millis(ms), &mut Hint::default());
+    #[expect(clippy::cast_possible_truncation, reason = "300,000 at the most")]
+    let pulses = (pose[0] * 300_000.0).round() as i32;
+    pulses
+}
+
+/// How many frames from `from` on move the seat.
+fn moving(played: &Played, from: usize) -> usize {
+    let frames: Vec<i32> = played.lane(0).map(pulses).collect();
+    frames[from - 1..].windows(2).take_while(|pair| pair[0] != pair[1]).count()
+}
+
+#[test]
+fn a_stop_slows_every_seat_from_the_next_frame_on_then_holds_three_frames_and_sends_no_more() {
+    for hz in [50_u32, 100, 333, 1000] {
+        for part in 0..20 {
+            let at = hz * 4 + hz * part / 4;
+            let (press, leave) = (u64::from(at), u64::from(at) + 2_000);
+            let show = ride().at_rate(f64::from(hz));
+            let played = show.with(press, Event::Stop).with(leave, Event::Leave).play();
+            assert_eq!(played.ended.ending, Ending::Stopped);
+            assert_within(played.worst());
+            let count = usize::try_from(at).unwrap();
+            let in_200_ms = usize::try_from(hz / 5).unwrap();
+            let slowing = moving(&played, count);
+            assert!(slowing <= in_200_ms, "{hz} Hz, {at}: {slowing} frames");
+            let frames = played.lane(0).count();
+            assert!(frames <= count + in_200_ms + 4, "{hz} Hz, {at}: {frames} frames");
+            let rest = played.lane(0).skip(frames - 3);
+            assert!(rest.map(pulses).all(|last| last == pulses(&played.frames[frames - 1])));
+        }
+    }
+}
+
+#[test]
+fn the_first_frame_after_a_stop_is_slower_than_the_one_before() {
+    let played = ride().with(500, Event::Stop).with(900, Event::Leave).play();
+    let smooth = ride().play();
+    let step =
+        |played: &Played, frame: usize| pulses(&played.frames[frame]) - pulses(&played.frames[frame - 1]);
+    assert!(step(&played, 500).abs() < step(&smooth, 500).abs(), "frame 500 is the first after the request");
+}
+
+#[test]
+fn a_pause_holds_the_seats_with_ten_frames_a_second_and_resume_joins_the_film_where_it_waited() {
+    let smooth = ride().play();
+    let played = ride().with(600, Event::Order(Order::Pause)).with(1_000, Event::Order(Order::Resume)).play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+    assert_within(played.worst());
+    let slowing = moving(&played, 600);
+    assert!((5..=20).contains(&slowing), "{slowing} frames");
+    let held: Vec<&Frame> = played
+        .lane(0)
+        .skip(600 + slowing)
+        .take_while(|f| f.request.time_ms != 10 || pulses(f) == pulses(&played.frames[600 + slowing]))
+        .collect();
+    assert!((36..=42).contains(&held.len()), "{} hold frames in 4 s less what the slowing took", held.len());
+    assert!(held[1..held.len() - 1].iter().all(|frame| frame.request.time_ms == 100));
+    // From the end on both shows send the same.
+    let tail = |played: &Played| played.lane(0).rev_pulses(700);
+    assert_eq!(tail(&played), tail(&smooth));
+}
+
+trait RevPulses {
+    fn rev_pulses(self, count: usize) -> Vec<i32>;
+}
+
+impl<'a, I: Iterator<Item = &'a Frame>> RevPulses for I {
+    fn rev_pulses(self, count: usize) -> Vec<i32> {
+        let all: Vec<i32> = self.map(pulses).collect();
+        all[all.len() - count..].to_vec()
+    }
+}
+
+#[test]
+fn a_seek_joins_the_cue_elsewhere_from_the_moving_seat() {
+    for (at, to_s) in [(500, 12), (1_200, 3), (900, 9), (510, 19), (100, 10)] {
+        let target = ShowTime::from_millis(to_s * 1_000);
+        let played = ride().with(at, Event::Order(Order::Seek(target))).play();
+        assert_eq!(played.ended.ending, Ending::Completed);
+        assert_within(played.worst());
+        // The film goes on there 20 ms after the request: some seconds later the seat is where the cue is.
+        let later = usize::try_from(at).unwrap() + 403;
+        if to_s < 15 {
+            let (now, cue) = (pulses(&played.frames[later]), cue_at(&played, to_s * 1_000 + 4_010));
+            assert_eq!(now, cue, "{at}, {to_s} s");
+        }
+    }
+}
+
+#[test]
+fn a_seek_in_a_pause_moves_nothing_until_resume() {
+    let target = ShowTime::from_millis(15_000);
+    let played = ride()
+        .with(600, Event::Order(Order::Pause))
+        .with(700, Event::Order(Order::Seek(target)))
+        .with(800, Event::Order(Order::Resume))
+        .play();
+    assert_within(played.worst());
+    let frames = played.lane(0).count();
+    assert!(frames < 600 + 30 + 20 + 510 + 400, "{frames}: five seconds of film were left");
+}
+
+#[test]
+fn a_park_out_of_a_pause_and_a_stop_out_of_a_park_are_gentle() {
+    for stop_at in [700, 702, 710, 750, 800] {
+        let played = ride()
+            .with(600, Event::Order(Order::Pause))
+            .with(690, Event::Order(Order::Park))
+            .with(stop_at, Event::Stop)
+            .with(stop_at + 100, Event::Order(Order::Park))
+            .play();
+        assert_within(played.worst());
+        assert_eq!(pulses(played.frames.last().unwrap()), 0, "parked in the end");
+    }
+}
+
+#[test]
+fn a_stop_a_pause_and_a_park_take_effects_and_vibration_away_at_once() {
+    for event in [Event::Stop, Event::Order(Order::Pause)] {
+        let played = ride_with_effects().with(600, event).with(800, Event::Leave).play();
+        assert_eq!(played.frames[599].request.outputs, 1);
+        assert_eq!(played.frames[600].request.outputs, 0);
+        let vibrates = |frame: &Frame| {
+            frame.request.vibration.as_ref().is_some_and(|axes| axes[0] != wire::Vibration::NONE)
+        };
+        assert!(vibrates(&played.frames[599]) && !vibrates(&played.frames[600]));
+    }
+}
+
+#[test]
+fn a_level_fades_within_the_limits_and_arrives() {
+    let neutral = 0;
+    let mix = Mix { motion: 0.4, ..Mix::FULL };
+    let played = ride().with(500, Event::Mix(0, mix)).with(1_300, Event::Mix(0, Mix::FULL)).play();
+    assert_within(played.worst());
+    let at = |frame: usize| (pulses(&played.frames[frame]), cue_at(&played, 10 * (frame as i64 + 1)));
+    let (now, cue) = at(1_250);
+    assert!((f64::from(now - neutral) - 0.4 * f64::from(cue)).abs() < 2.0, "{now} of {cue}");
+    let (now, cue) = at(1_900);
+    assert!((now - cue).abs() < 2, "{now} of {cue}");
+}
+
+#[test]
+fn a_level_that_changes_all_the_time_keeps_the_limits_also_where_the_show_is_stopped_or_sought() {
+    let mut show = Virtual::new(swell(3, 20, 70.0, 0.45));
+    for (step, at) in (300..1_900).step_by(37).enumerate() {
+        let motion = [0.2, 1.0, 0.5, 0.9, 0.0][step % 5];
+        show = show.with(at, Event::Mix(0, Mix { motion, ..Mix::FULL }));
+    }
+    assert_within(show.play().worst());
+    for at in [700, 713, 1_111, 1_500] {
+        let seek = Event::Order(Order::Seek(ShowTime::from_millis(4_000)));
+        for event in [Event::Stop, Event::Leave, Event::Order(Order::Pause), seek] {
+            let show = Virtual { script: show.script.clone(), ..Virtual::new(show.cue.clone()) };
+            let played = show.with(at, event).with(at + 500, Event::Leave).play();
+            assert_within(played.worst());
+        }
+    }
+}
+
+#[test]
+fn a_trim_is_slewed_in_and_ends_where_it_should() {
+    for (ms, frame) in [(80, 1_500), (-80, 1_500), (200, 1_900)] {
+        let played = ride().with(300, Event::Trim(ms)).play();
+        assert_within(played.worst());
+        let now = pulses(&played.frames[frame]);
+        let cue = cue_at(&played, 10 * (frame as i64 + 1) - i64::from(ms));
+        assert!((now - cue).abs() < 30, "{ms} ms: {now} of {cue}");
+        let fastest = played.positions_mm(0, 0).windows(2).map(|p| (p[1] - p[0]).abs()).fold(0.0, f64::max);
+        assert!(fastest <= 0.94248 * 1.021, "{fastest} mm a frame");
+    }
+}
+
+/// Two seats that play the same.
+fn two_seats() -> Virtual {
+    let to = ["127.0.0.1:7408", "127.0.0.1:7409"].map(str::to_owned);
+    Virtual { to: to.to_vec(), ..ride() }
+}
+
+fn octets(played: &Played, lane: usize) -> Vec<Vec<u8>> {
+    played.lane(lane).map(|frame| frame.octets.clone()).collect()
+}
+
+#[test]
+fn a_seat_that_is_switched_off_parks_softly_and_on_joins_again_while_the_other_gets_the_very_same_frames() {
+    let smooth = two_seats().play();
+    let off = Mix { on: false, ..Mix::FULL };
+    let played = two_seats().with(400, Event::Mix(1, off)).with(1_200, Event::Mix(1, Mix::FULL)).play();
+    assert_within(played.worst());
+    assert_within(played.worst_of_lane(1, 0..played.lane(1).count()));
+    assert_eq!(octets(&played, 0), octets(&smooth, 0));
+    let second: Vec<i32> = played.lane(1).map(pulses).collect();
+    assert_eq!(second[1_100], 0, "parked");
+    assert_eq!(second[1_600], pulses(&smooth.lane(1).nth(1_600).unwrap().clone()), "with the cue again");
+    let mm = played.positions_mm(1, 0);
+    let fastest = mm[440..1_100].windows(2).map(|pair| (pair[1] - pair[0]).abs() / 0.010).fold(0.0, f64::max);
+    assert!(fastest <= 50.1, "{fastest} mm/s on the way to park");
+}
+
+#[test]
+fn a_seat_that_is_off_stays_parked_through_pauses_seeks_loops_and_the_end() {
+    let off = Mix { on: false, ..Mix::FULL };
+    let mut show = two_seats()
+        .with(200, Event::Mix(1, off))
+        .with(900, Event::Order(Order::Pause))
+        .with(1_000, Event::Order(Order::Resume))
+        .with(1_300, Event::Order(Order::Seek(ShowTime::from_millis(16_000))));
+    show.plays = 2;
+    let played = show.play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+    assert_within(played.worst());
+    let second: Vec<i32> = played.lane(1).map(pulses).collect();
+    assert!(second[800..].iter().all(|pulses| *pulses == 0));
+}
+
+#[test]
+fn a_lost_controller_is_brought_to_rest_told_so_three_times_and_gets_nothing_until_it_is_back() {
+    let smooth = two_seats().play();
+    let played = two_seats().with(500, Event::Order(Order::Leave(1))).play();
+    assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
+    let count = played.lane(1).count();
+    assert!((503..=530).contains(&count), "{count} frames");
+    assert_within(played.worst_of_lane(1, 0..count));
+    let last: Vec<i32> = played.lane(1).rev_pulses(4);
+    assert!(last.iter().all(|pulses| *pulses == last[0]), "{last:?}");
+    let numbers: Vec<u32> = played.lane(1).map(|frame| frame.request.frame.0).collect();
+    assert!(numbers.iter().zip(1..).all(|(number, expected)| *number == expected));
+}
+
+#[test]
+fn a_controller_that_is_back_joins_from_where_it_was_read() {
+    let mut pose = [0.0; MAX_AXES];
+    pose[..3].copy_from_slice(&[0.2, 0.9, 0.5]);
+    let played = two_seats()
+        .with(500, Event::Order(Order::Leave(1)))
+        .with(1_000, Event::Order(Order::ComeBack(1, pose)))
+        .play();
+    assert_within(played.worst());
+    let gap = played.lane(1).position(|frame| pulses(frame) == 60_000).unwrap();
+    let count = played.lane(1).count();
+    assert_within(played.worst_of_lane(1, gap..count));
+    let (first, second) = (played.lane(0).rev_pulses(600), played.lane(1).rev_pulses(600));
+    assert_eq!(first, second, "with the other again");
+}
+
+#[test]
+fn a_controller_in_emergency_stop_gets_no_frame_from_the_next_tick_on() {
+    let played = two_seats().with(500, Event::Order(Order::Cut(1))).play();
+    assert_eq!(played.lane(1).count(), 500);
+    assert_eq!(played.ended.ending, Ending::Completed, "what the hall does is decided elsewhere");
+}
+
+#[test]
+fn a_planner_that_sleeps_through_the_end_of_a_moving_cue_leaves_the_seat_at_rest_not_at_a_wall() {
+    for end in 5..9 {
+        let cue = swell(1, end, 60.0, 0.21);
+        let played =
+            Virtual::new(cue).with(10, Event::SlowPlanner(1_200)).with(300, Event::SlowPlanner(1_200)).play();
+        assert_within(played.worst());
+        assert_eq!(pulses(played.frames.last().unwrap()), 0);
+    }
+}
+
+#[test]
+fn a_stall_in_the_middle_of_a_stop_leaves_the_seat_where_the_stall_left_it() {
+    let late = Event::Late(Duration::from_millis(300));
+    let played = ride().with(500, Event::Stop).with(505, late).with(700, Event::Leave).play();
+    let frames: Vec<i32> = played.lane(0).map(pulses).collect();
+    assert_eq!(frames.len(), 505 + 3, "three hold frames after the stall: {}", frames.len());
+    assert!(frames[504..].iter().all(|pulses| *pulses == frames[504]));
+}
