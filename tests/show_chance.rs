@@ -10,7 +10,7 @@ use common::{Event, Played, Virtual, Worst};
 use kinocue::engine::{Ending, Mix};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::Order;
-use kinocue::time::ShowTime;
+use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::Timing;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -60,7 +60,6 @@ fn event() -> impl Strategy<Value = Event> {
 
 /// What operators, and those who watch the controllers, may do at any instant.
 fn lead() -> impl Strategy<Value = Event> {
-    let pose = |place: f64| [place; MAX_AXES];
     prop_oneof![
         1 => Just(Event::Stop),
         2 => Just(Event::Order(Order::Pause)),
@@ -70,33 +69,34 @@ fn lead() -> impl Strategy<Value = Event> {
         3 => (-600..600_i32).prop_map(Event::Trim),
         4 => (0.0..1.0_f64).prop_map(|motion| Event::Mix(0, Mix { motion, ..Mix::FULL })),
         1 => any::<bool>().prop_map(|on| Event::Mix(0, Mix { on, ..Mix::FULL })),
-        1 => Just(Event::Order(Order::Leave(0))),
-        1 => Just(Event::Order(Order::Cut(0))),
-        2 => (0.0..1.0_f64).prop_map(move |place| Event::Order(Order::ComeBack(0, pose(place)))),
     ]
 }
 
-/// What the seat was made to do between the gaps: after each the controller stands at the last pose, or, where it is back,
-/// where it was read, mm.
-fn worst(played: &Played, back: &[f64]) -> Worst {
+/// What the seat was made to do between the gaps: after each the controller stands at the last pose or, where it was back
+/// meanwhile, where it was read.
+fn worst(played: &Played) -> Worst {
     let mm = played.positions_mm(0, 0);
     let period = played.rate.period();
     let tick = |frame: &common::Frame| {
         (frame.at.since(common::ORIGIN) + Duration::from_nanos(50)).div_duration_f64(period).floor()
     };
-    let is_gap = |pair: &[common::Frame]| {
-        let missed = tick(&pair[1]) - tick(&pair[0]) - 1.0;
+    let is_gap = |first: usize| {
+        let missed = tick(&played.frames[first]) - tick(&played.frames[first - 1]) - 1.0;
         period.mul_f64(missed.max(0.0)) > period.max(Duration::from_millis(50))
     };
+    let read_before = |first: usize| {
+        let since = first.checked_sub(1).map_or(MonoTime::default(), |last| played.frames[last].at);
+        let between = |at: MonoTime| at > since && at <= played.frames[first].at;
+        played.happened.iter().find_map(|(at, event)| match event {
+            Event::Order(Order::ComeBack(_, pose)) if between(*at) => Some(150.0 * pose[0]),
+            _ => None,
+        })
+    };
     let mut worst = Worst::default();
-    let (mut start, mut rest) = (0, 0.0);
-    for (at, _) in played.frames.windows(2).enumerate().filter(|(_, pair)| is_gap(pair)) {
-        worst = worst.max(played.worst_from_rest_at(rest, start, at + 1));
-        let (last, next) = (mm[at], mm[at + 1]);
-        // Nearest of those it may stand at; it has hardly begun to move.
-        let near = |a: &f64, b: &f64| (a - next).abs().total_cmp(&(b - next).abs());
-        rest = back.iter().copied().chain([last]).min_by(near).unwrap_or(last);
-        start = at + 1;
+    let (mut start, mut rest) = (0, read_before(0).unwrap_or(0.0));
+    for first in (1..mm.len()).filter(|&first| is_gap(first)) {
+        worst = worst.max(played.worst_from_rest_at(rest, start, first));
+        (start, rest) = (first, read_before(first).unwrap_or(mm[first - 1]));
     }
     worst.max(played.worst_from_rest_at(rest, start, mm.len()))
 }
@@ -143,7 +143,7 @@ proptest! {
             prop_assert_eq!(played.ended.ending, Ending::Stopped, "stopped before anything was sent");
             return Ok(());
         }
-        prop_assert!(is_within(worst(&played, &[])), "{:?}", worst(&played, &[]));
+        prop_assert!(is_within(worst(&played)), "{:?}", worst(&played));
         prop_assert!(played.ended.ending != Ending::Fault);
         let last = played.frames.last().expect("there are frames");
         prop_assert_eq!((last.request.positions[0].0, last.request.outputs), (0, 0), "it ends parked");
@@ -157,33 +157,33 @@ proptest! {
         waves in waves(),
         rate in rate(),
         events in prop::collection::vec((0.0..1.2_f64, prop_oneof![3 => lead(), 1 => event()]), 0..12),
+        loss in prop::option::of((0.0..0.9_f64, any::<bool>(), 0.0..1.0_f64)),
     ) {
         let has = |what: fn(&Event) -> bool| events.iter().any(|(_, event)| what(event));
-        let given_up = has(|event| matches!(event, Event::Order(Order::Leave(_) | Order::Cut(_))))
-            || has(|event| matches!(event, Event::Stop)) && has(|event| matches!(event, Event::Leave));
-        let read = |(_, event): &(f64, Event)| match event {
-            Event::Order(Order::ComeBack(_, pose)) => Some(150.0 * pose[0]),
-            _ => None,
-        };
-        let back: Vec<f64> = events.iter().filter_map(read).chain([75.0]).collect();
+        let is_left = has(|event| matches!(event, Event::Leave));
+        let is_stopped = has(|event| matches!(event, Event::Stop));
         let mut show = show(&waves, rate, events);
-        // Whatever state that left it in: back, and parked.
-        let end = [1.3, 1.31, 1.8, 1.9].map(|share| wake_up(&waves, rate, share));
+        if let Some((share, at_once, place)) = loss {
+            let order = if at_once { Order::Cut(0) } else { Order::Leave(0) };
+            show = show.with(wake_up(&waves, rate, share), Event::Order(order));
+            let back = Order::ComeBack(0, [place; MAX_AXES]);
+            show = show.with(wake_up(&waves, rate, share + 0.35), Event::Order(back));
+        }
+        // Whatever state that left it in, a person resumes and parks.
         show = show
-            .with(end[0], Event::Order(Order::ComeBack(0, [0.5; MAX_AXES])))
-            .with(end[1], Event::Order(Order::Park))
-            .with(end[2], Event::Order(Order::Resume))
-            .with(end[3], Event::Order(Order::Park));
+            .with(wake_up(&waves, rate, 1.31), Event::Order(Order::Park))
+            .with(wake_up(&waves, rate, 1.8), Event::Order(Order::Resume))
+            .with(wake_up(&waves, rate, 1.9), Event::Order(Order::Park));
         let played = show.play();
         if played.frames.is_empty() {
             return Ok(());
         }
-        prop_assert!(is_within(worst(&played, &back)), "{:?}", worst(&played, &back));
+        prop_assert!(is_within(worst(&played)), "{:?}", worst(&played));
         prop_assert!(played.ended.ending != Ending::Fault);
         let last = played.frames.last().expect("there are frames");
         prop_assert_eq!(last.request.outputs, 0);
-        // A controller that was given up, or stopped before the play was left, stands where it was.
-        if !given_up {
+        // Given up until after the end, or stopped and then left, it stands where it was.
+        if loss.is_none() && !(is_left && is_stopped) {
             prop_assert_eq!(last.request.positions[0].0, 0, "it ends parked");
         }
         prop_assert!(played.frames.iter().zip(1..).all(|(frame, number)| frame.request.frame.0 == number));

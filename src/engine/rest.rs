@@ -134,9 +134,8 @@ impl Engine {
 
     /// Whether levels may change: no other course is to begin soon.
     fn may_fade(&self) -> bool {
-        let waits = self.homeward || self.seeking.is_some() || self.lanes_need_a_course();
         let asked = self.switch.as_ref().is_some_and(|switch| !switch.goal.is_after_the_end());
-        !waits && !asked && self.playhead + FADE_CLEAR < self.end_of_cue()
+        !self.is_wanted_elsewhere() && !asked && self.playhead + FADE_CLEAR < self.end_of_cue()
     }
 
     pub(super) fn faders_are_still(&self) -> bool {

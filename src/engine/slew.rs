@@ -8,13 +8,24 @@ pub const MAX_SPEED_UP: f64 = 0.02;
 pub(super) const CHANGE_PER_S: f64 = 0.2;
 
 /// How far the show is from where it should be, and how fast that is being taken back.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Slew {
     /// What the show owes the film, seconds; below zero it is ahead.
     owed_s: f64,
     /// How much of that is due to missed ticks.
     missed_s: f64,
     speed_up: f64,
+    /// For how long show time has run as the clock does, seconds.
+    calm_s: f64,
+}
+
+/// Further back than this the measure does not see, seconds.
+const SEEN_S: f64 = 0.081;
+
+impl Default for Slew {
+    fn default() -> Self {
+        Self { owed_s: 0.0, missed_s: 0.0, speed_up: 0.0, calm_s: SEEN_S }
+    }
 }
 
 impl Slew {
@@ -57,6 +68,11 @@ impl Slew {
         self.owed_s == 0.0 && self.speed_up == 0.0
     }
 
+    /// Whether no change of pace is left in what the measure sees.
+    pub(super) fn is_calm(&self) -> bool {
+        self.calm_s >= SEEN_S
+    }
+
     /// How fast show time runs, as a multiple of the clock.
     pub(super) fn pace(&self) -> f64 {
         1.0 + self.speed_up
@@ -75,6 +91,7 @@ impl Slew {
         let change = CHANGE_PER_S * dt;
         let wanted = self.closing_speed(dt).min(ceiling).min(MAX_SPEED_UP) * self.owed_s.signum();
         self.speed_up = wanted.clamp(self.speed_up - change, self.speed_up + change);
+        self.calm_s = if self.speed_up == 0.0 { self.calm_s + dt } else { 0.0 };
         self.gain(self.speed_up * dt);
         Duration::from_secs_f64(dt * (1.0 + self.speed_up))
     }

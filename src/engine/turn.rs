@@ -52,7 +52,7 @@ impl Engine {
 
     /// How much show time passes in a frame of that Time.
     pub(super) fn pass(&mut self, time: Duration) -> Duration {
-        if self.slew.is_done() {
+        if self.slew.is_done() && self.slew.is_calm() {
             return time;
         }
         match (self.phase, &self.switch) {
@@ -60,6 +60,7 @@ impl Engine {
             (Phase::Riding, Some(switch)) if switch.is_near(self.playhead + SLOWING) => {
                 self.slew.advance(time, 0.0)
             }
+            (Phase::Riding, _) if self.is_wanted_elsewhere() => self.slew.advance(time, 0.0),
             (Phase::Riding, _) => {
                 let level = self.riders.iter().map(|rider| rider.fader.level()).fold(0.0, f64::max);
                 self.slew.advance(time, self.headroom.pace(self.playhead, level))
@@ -80,12 +81,18 @@ impl Engine {
             Phase::Riding if self.homeward && asked == Some(Goal::Park) => {}
             // The old course ends before another can begin on it: what is to come begins on the one that follows.
             Phase::Riding if self.turns_between(self.playhead, soonest) => {}
-            // A course is planned for the levels as they stand.
+            // A course is planned for levels that stand, and for show time that runs as the clock does.
             Phase::Riding if !self.faders_are_still() => {}
+            Phase::Riding if self.is_wanted_elsewhere() && !self.slew.is_calm() => {}
             Phase::Riding if self.homeward => self.ask(Goal::Park, Some(soonest), soonest),
             Phase::Riding => self.look_ahead_riding(asked, soonest),
             _ => {}
         }
+    }
+
+    /// Whether somebody waits for lanes to leave their course.
+    pub(super) fn is_wanted_elsewhere(&self) -> bool {
+        self.homeward || self.seeking.is_some() || self.lanes_need_a_course()
     }
 
     fn look_ahead_at_rest(&mut self, rest: Rest, soonest: ShowTime) {

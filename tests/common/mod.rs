@@ -116,7 +116,8 @@ impl Virtual {
         let mut tick_loop =
             TickLoop { clock: &clock, grid, engine, lanes, sink, mail, desk: &desk, leave: &leave };
         let ended = tick_loop.run();
-        Played { ended, frames: tick_loop.sink.frames, join, timeline, rate }
+        let frames = tick_loop.sink.frames;
+        Played { ended, frames, happened: clock.happened.take(), join, timeline, rate }
     }
 }
 
@@ -141,6 +142,7 @@ struct Stage<'a> {
     planner_delay: Cell<u32>,
     planner_waits: Cell<u32>,
     hands: Hands<'a>,
+    happened: RefCell<Vec<(MonoTime, Event)>>,
     script: &'a [(u64, Event)],
     at_most: u64,
 }
@@ -154,6 +156,7 @@ impl<'a> Stage<'a> {
             planner_delay: Cell::new(0),
             planner_waits: Cell::new(0),
             hands,
+            happened: RefCell::default(),
             script,
             at_most,
         }
@@ -182,6 +185,7 @@ impl Clock for Stage<'_> {
         self.now.set(deadline.max(self.now.get()));
         self.serve_planner();
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
+            self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
                 Event::Late(span) => self.now.set(self.now.get() + *span),
                 Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
@@ -224,6 +228,8 @@ pub struct Frame {
 pub struct Played {
     pub ended: Ended,
     pub frames: Vec<Frame>,
+    /// The events of the script, and when each came.
+    pub happened: Vec<(MonoTime, Event)>,
     /// How long the first join takes.
     pub join: ShowTime,
     pub timeline: Arc<Timeline>,
