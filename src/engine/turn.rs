@@ -60,7 +60,9 @@ impl Engine {
             (Phase::Riding, Some(switch)) if switch.is_near(self.playhead + SLOWING) => {
                 self.slew.advance(time, 0.0)
             }
-            (Phase::Riding, _) if self.is_wanted_elsewhere() => self.slew.advance(time, 0.0),
+            (Phase::Riding, _) if self.is_wanted_elsewhere() || self.reached < self.course.parked() => {
+                self.slew.advance(time, 0.0)
+            }
             (Phase::Riding, _) => {
                 let level = self.riders.iter().map(|rider| rider.fader.level()).fold(0.0, f64::max);
                 self.slew.advance(time, self.headroom.pace(self.playhead, level))
