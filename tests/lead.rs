@@ -8,7 +8,8 @@ use std::time::Duration;
 use common::{Event, Frame, Played, Virtual, Worst, swell};
 use kinocue::engine::{Ending, Mix};
 use kinocue::motion::MAX_AXES;
-use kinocue::rt::Order;
+use kinocue::rt::{Alarm, News};
+use kinocue::state::{self, Refusal, Request, Why};
 use kinocue::time::ShowTime;
 use kinocue::timeline::Hint;
 use kinocue::wire;
@@ -30,6 +31,13 @@ fn ride_with_effects() -> Virtual {
     let head = rows.next().expect("there is a header");
     let rows: Vec<String> = rows.map(|row| format!("{row},20,0.01,1")).collect();
     Virtual::new(format!("{head},v1_hz,v1_amp,fx_air\n{}\n", rows.join("\n")))
+}
+
+fn refusal(news: &News) -> Option<Refusal> {
+    match news {
+        News::Refused(refusal) => Some(*refusal),
+        News::Entered { .. } => None,
+    }
 }
 
 fn pulses(frame: &Frame) -> i32 {
@@ -84,7 +92,7 @@ fn the_first_frame_after_a_stop_is_slower_than_the_one_before() {
 #[test]
 fn a_pause_holds_the_seats_with_ten_frames_a_second_and_resume_joins_the_film_where_it_waited() {
     let smooth = ride().play();
-    let played = ride().with(600, Event::Order(Order::Pause)).with(1_000, Event::Order(Order::Resume)).play();
+    let played = ride().with(600, Event::Ask(Request::Pause)).with(1_000, Event::Ask(Request::Resume)).play();
     assert_eq!(played.ended.ending, Ending::Completed);
     assert_within(played.worst());
     let slowing = moving(&played, 600);
@@ -116,7 +124,7 @@ impl<'a, I: Iterator<Item = &'a Frame>> RevPulses for I {
 fn a_seek_joins_the_cue_elsewhere_from_the_moving_seat() {
     for (at, to_s) in [(500, 12), (1_200, 3), (900, 9), (510, 19), (100, 10)] {
         let target = ShowTime::from_millis(to_s * 1_000);
-        let played = ride().with(at, Event::Order(Order::Seek(target))).play();
+        let played = ride().with(at, Event::Seek(target)).play();
         assert_eq!(played.ended.ending, Ending::Completed);
         assert_within(played.worst());
         // The film goes on there 20 ms after the request: some seconds later the seat is where the cue is.
@@ -132,9 +140,9 @@ fn a_seek_joins_the_cue_elsewhere_from_the_moving_seat() {
 fn a_seek_in_a_pause_moves_nothing_until_resume() {
     let target = ShowTime::from_millis(15_000);
     let played = ride()
-        .with(600, Event::Order(Order::Pause))
-        .with(700, Event::Order(Order::Seek(target)))
-        .with(800, Event::Order(Order::Resume))
+        .with(600, Event::Ask(Request::Pause))
+        .with(700, Event::Seek(target))
+        .with(800, Event::Ask(Request::Resume))
         .play();
     assert_within(played.worst());
     let frames = played.lane(0).count();
@@ -145,11 +153,21 @@ fn a_seek_in_a_pause_moves_nothing_until_resume() {
 fn a_park_out_of_a_pause_and_a_stop_out_of_a_park_are_gentle() {
     for stop_at in [700, 702, 710, 750, 800] {
         let played = ride()
-            .with(600, Event::Order(Order::Pause))
-            .with(690, Event::Order(Order::Park))
+            .with(600, Event::Ask(Request::Pause))
+            .with(690, Event::Ask(Request::Park))
             .with(stop_at, Event::Stop)
-            .with(stop_at + 100, Event::Order(Order::Park))
+            .with(stop_at + 90, Event::Ask(Request::Park))
+            .with(stop_at + 100, Event::Ask(Request::Clear))
+            .with(stop_at + 110, Event::Ask(Request::Park))
+            .with(stop_at + 120, Event::Alarm(Alarm::Event(state::Event::PositionsRead)))
+            .with(stop_at + 130, Event::Ask(Request::Park))
             .play();
+        let refused: Vec<Why> = played.news.iter().filter_map(refusal).map(|refusal| refusal.why).collect();
+        assert_eq!(
+            refused,
+            [Why::Latched, Why::PositionsNotRead],
+            "a stop is latched, and nothing is taken on trust"
+        );
         assert_within(played.worst());
         assert_eq!(pulses(played.frames.last().unwrap()), 0, "parked in the end");
     }
@@ -157,7 +175,7 @@ fn a_park_out_of_a_pause_and_a_stop_out_of_a_park_are_gentle() {
 
 #[test]
 fn a_stop_a_pause_and_a_park_take_effects_and_vibration_away_at_once() {
-    for event in [Event::Stop, Event::Order(Order::Pause)] {
+    for event in [Event::Stop, Event::Ask(Request::Pause)] {
         let played = ride_with_effects().with(600, event).with(800, Event::Leave).play();
         assert_eq!(played.frames[599].request.outputs, 1);
         assert_eq!(played.frames[600].request.outputs, 0);
@@ -190,8 +208,8 @@ fn a_level_that_changes_all_the_time_keeps_the_limits_also_where_the_show_is_sto
     }
     assert_within(show.play().worst());
     for at in [700, 713, 1_111, 1_500] {
-        let seek = Event::Order(Order::Seek(ShowTime::from_millis(4_000)));
-        for event in [Event::Stop, Event::Leave, Event::Order(Order::Pause), seek] {
+        let seek = Event::Seek(ShowTime::from_millis(4_000));
+        for event in [Event::Stop, Event::Leave, Event::Ask(Request::Pause), seek] {
             let show = Virtual { script: show.script.clone(), ..Virtual::new(show.cue.clone()) };
             let played = show.with(at, event).with(at + 500, Event::Leave).play();
             assert_within(played.worst());
@@ -243,9 +261,9 @@ fn a_seat_that_is_off_stays_parked_through_pauses_seeks_loops_and_the_end() {
     let off = Mix { on: false, ..Mix::FULL };
     let mut show = two_seats()
         .with(200, Event::Mix(1, off))
-        .with(900, Event::Order(Order::Pause))
-        .with(1_000, Event::Order(Order::Resume))
-        .with(1_300, Event::Order(Order::Seek(ShowTime::from_millis(16_000))));
+        .with(900, Event::Ask(Request::Pause))
+        .with(1_000, Event::Ask(Request::Resume))
+        .with(1_300, Event::Seek(ShowTime::from_millis(16_000)));
     show.plays = 2;
     let played = show.play();
     assert_eq!(played.ended.ending, Ending::Completed);
@@ -257,7 +275,7 @@ fn a_seat_that_is_off_stays_parked_through_pauses_seeks_loops_and_the_end() {
 #[test]
 fn a_lost_controller_is_brought_to_rest_told_so_three_times_and_gets_nothing_until_it_is_back() {
     let smooth = two_seats().play();
-    let played = two_seats().with(500, Event::Order(Order::Leave(1))).play();
+    let played = two_seats().with(500, Event::Alarm(Alarm::Leave(1))).play();
     assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
     let count = played.lane(1).count();
     assert!((503..=530).contains(&count), "{count} frames");
@@ -273,8 +291,8 @@ fn a_controller_that_is_back_joins_from_where_it_was_read() {
     let mut pose = [0.0; MAX_AXES];
     pose[..3].copy_from_slice(&[0.2, 0.9, 0.5]);
     let played = two_seats()
-        .with(500, Event::Order(Order::Leave(1)))
-        .with(1_000, Event::Order(Order::ComeBack(1, pose)))
+        .with(500, Event::Alarm(Alarm::Leave(1)))
+        .with(1_000, Event::Alarm(Alarm::Found(1, pose)))
         .play();
     assert_within(played.worst());
     let gap = played.lane(1).position(|frame| pulses(frame) == 60_000).unwrap();
@@ -286,7 +304,7 @@ fn a_controller_that_is_back_joins_from_where_it_was_read() {
 
 #[test]
 fn a_controller_in_emergency_stop_gets_no_frame_from_the_next_tick_on() {
-    let played = two_seats().with(500, Event::Order(Order::Cut(1))).play();
+    let played = two_seats().with(500, Event::Alarm(Alarm::Cut(1))).play();
     assert_eq!(played.lane(1).count(), 500);
     assert_eq!(played.ended.ending, Ending::Completed, "what the hall does is decided elsewhere");
 }

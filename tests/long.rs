@@ -12,7 +12,9 @@ use kinocue::cue::{self, Source};
 use kinocue::engine::{Ending, Rate, Show, TickGrid};
 use kinocue::fanout::{Lane, Manner};
 use kinocue::net::Delivery;
-use kinocue::rt::{Ended, FrameSink, Live, MailEnds, PlanLoop, Sent, TickLoop, TickReport, mailboxes};
+use kinocue::rt::{
+    Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Sent, TickLoop, TickReport, mailboxes,
+};
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
 use kinocue::tracker::Tracker;
@@ -58,7 +60,7 @@ impl Run {
         let (engine, lanes, planner, timeline) = staged.split();
         let lanes: Vec<Lane> = lanes.into_iter().map(|lane| lane.starting_at(self.first)).collect();
         let live = Arc::new(Live::default());
-        let (mail, MailEnds { sent, ticks, requests, answers, retired, orders: _orders }) =
+        let (mail, MailEnds { sent, ticks, requests, answers, retired, .. }) =
             mailboxes(1, rate, Arc::clone(&live));
         let plans = PlanLoop { planner, timeline, requests, answers, retired };
         let stop = AtomicBool::new(false);
@@ -77,9 +79,10 @@ impl Run {
             stop: &stop,
         };
         let sink = Link { next: self.first, timing: self.timing, sum_ms: 0, bridges: 0 };
+        let conductor = Conductor::of_a_play(ORIGIN, false);
         let grid = TickGrid::new(ORIGIN, rate);
         let mut tick_loop =
-            TickLoop { clock: &clock, grid, engine, lanes, sink, mail, desk: &desk, leave: &stop };
+            TickLoop { clock: &clock, grid, engine, conductor, lanes, sink, mail, desk: &desk, leave: &stop };
         let ended = tick_loop.run();
         let (bridges, last) = (tick_loop.sink.bridges, tick_loop.lanes[0].last_frame());
         let laps = clock.laps.get();

@@ -18,7 +18,7 @@ use kinocue::engine::{Ending, Rate, Show, TickGrid};
 use kinocue::fanout::{Lane, Manner};
 use kinocue::net::{DrainGrid, Ports};
 use kinocue::observe::Watched;
-use kinocue::rt::{Accounts, AckLoop, Ended, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::rt::{Accounts, AckLoop, Conductor, Ended, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
@@ -254,7 +254,7 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
     let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::default());
     let (mut mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
-    let MailEnds { sent, ticks, requests, answers, retired, orders: _orders } = ends;
+    let MailEnds { sent, ticks, requests, answers, retired, .. } = ends;
     let mut plans = PlanLoop { planner, timeline, requests, answers, retired };
     // The kernel stamps replies with the real time; ahead of it, no frame is ever given up in a slow test.
     let origin = Monotonic.now() + Duration::from_secs(3_600);
@@ -268,11 +268,13 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
         let plan_thread = scope.spawn(move || pace.serve(&mut plans));
         mail.wakes(plan_thread.thread().clone());
         let clock = Jumps { pace, live, now: Cell::new(origin), show: Cell::default(), laps: Cell::new(0) };
+        let conductor = Conductor::of_a_play(origin, false);
         let grid = TickGrid::new(origin, rate);
         let mut tick_loop = TickLoop {
             clock: &clock,
             grid,
             engine,
+            conductor,
             lanes,
             sink: sender,
             mail,

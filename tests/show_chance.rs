@@ -9,7 +9,8 @@ use std::time::Duration;
 use common::{Event, Played, Virtual, Worst};
 use kinocue::engine::{Ending, Mix};
 use kinocue::motion::MAX_AXES;
-use kinocue::rt::Order;
+use kinocue::rt::Alarm;
+use kinocue::state::{self, Request};
 use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::Timing;
 use proptest::prelude::*;
@@ -62,10 +63,10 @@ fn event() -> impl Strategy<Value = Event> {
 fn lead() -> impl Strategy<Value = Event> {
     prop_oneof![
         1 => Just(Event::Stop),
-        2 => Just(Event::Order(Order::Pause)),
-        3 => Just(Event::Order(Order::Resume)),
-        1 => Just(Event::Order(Order::Park)),
-        3 => (0..14_000_i64).prop_map(|ms| Event::Order(Order::Seek(ShowTime::from_millis(ms)))),
+        2 => Just(Event::Ask(Request::Pause)),
+        3 => Just(Event::Ask(Request::Resume)),
+        1 => Just(Event::Ask(Request::Park)),
+        3 => (0..14_000_i64).prop_map(|ms| Event::Seek(ShowTime::from_millis(ms))),
         3 => (-600..600_i32).prop_map(Event::Trim),
         4 => (0.0..1.0_f64).prop_map(|motion| Event::Mix(0, Mix { motion, ..Mix::FULL })),
         1 => any::<bool>().prop_map(|on| Event::Mix(0, Mix { on, ..Mix::FULL })),
@@ -88,7 +89,7 @@ fn worst(played: &Played) -> Worst {
         let since = first.checked_sub(1).map_or(MonoTime::default(), |last| played.frames[last].at);
         let between = |at: MonoTime| at > since && at <= played.frames[first].at;
         played.happened.iter().find_map(|(at, event)| match event {
-            Event::Order(Order::ComeBack(_, pose)) if between(*at) => Some(150.0 * pose[0]),
+            Event::Alarm(Alarm::Found(_, pose)) if between(*at) => Some(150.0 * pose[0]),
             _ => None,
         })
     };
@@ -164,16 +165,20 @@ proptest! {
         let is_stopped = has(|event| matches!(event, Event::Stop));
         let mut show = show(&waves, rate, events);
         if let Some((share, at_once, place)) = loss {
-            let order = if at_once { Order::Cut(0) } else { Order::Leave(0) };
-            show = show.with(wake_up(&waves, rate, share), Event::Order(order));
-            let back = Order::ComeBack(0, [place; MAX_AXES]);
-            show = show.with(wake_up(&waves, rate, share + 0.35), Event::Order(back));
+            let order = if at_once { Alarm::Cut(0) } else { Alarm::Leave(0) };
+            show = show.with(wake_up(&waves, rate, share), Event::Alarm(order));
+            let back = Alarm::Found(0, [place; MAX_AXES]);
+            show = show.with(wake_up(&waves, rate, share + 0.35), Event::Alarm(back));
         }
-        // Whatever state that left it in, a person resumes and parks.
+        // Whatever state that left it in, a person clears it, and parks.
+        let read = Event::Alarm(Alarm::Event(state::Event::PositionsRead));
         show = show
-            .with(wake_up(&waves, rate, 1.31), Event::Order(Order::Park))
-            .with(wake_up(&waves, rate, 1.8), Event::Order(Order::Resume))
-            .with(wake_up(&waves, rate, 1.9), Event::Order(Order::Park));
+            .with(wake_up(&waves, rate, 1.31), Event::Ask(Request::Park))
+            .with(wake_up(&waves, rate, 1.4), Event::Ask(Request::Clear))
+            .with(wake_up(&waves, rate, 1.45), read)
+            .with(wake_up(&waves, rate, 1.5), Event::Ask(Request::Park))
+            .with(wake_up(&waves, rate, 1.8), Event::Ask(Request::Resume))
+            .with(wake_up(&waves, rate, 1.9), Event::Ask(Request::Park));
         let played = show.play();
         if played.frames.is_empty() {
             return Ok(());

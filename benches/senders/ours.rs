@@ -10,7 +10,7 @@ use std::time::Duration;
 use kinocue::engine::TickGrid;
 use kinocue::fanout::Lane;
 use kinocue::net::{DrainGrid, Ports, Sender};
-use kinocue::rt::{Accounts, AckLoop, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::rt::{Accounts, AckLoop, Conductor, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
 use kinocue::sys::clock::{Monotonic, thread_cpu_time};
 use kinocue::sys::realtime::{RealTime, normal_priority, request};
 use kinocue::time::Clock as _;
@@ -39,17 +39,27 @@ pub(crate) fn run(seconds: u32, to: &[SocketAddrV4]) -> Outcome {
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
     let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
-    let MailEnds { sent, ticks, requests, answers, retired, orders: _orders } = ends;
+    let MailEnds { sent, ticks, requests, answers, retired, .. } = ends;
     let acks = AckLoop::new(receiver, watched, 1, sent, ticks);
     let desk = staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let plans = PlanLoop { planner, timeline, requests, answers, retired };
     let origin = Monotonic.now() + RUN_UP;
+    let conductor = Conductor::of_a_play(origin, false);
     let grid = TickGrid::new(origin, rate);
     let drains = DrainGrid::new(origin, rate.period());
     let never = AtomicBool::new(false);
-    let tick_loop =
-        TickLoop { clock: &Monotonic, grid, engine, lanes, sink: sender, mail, desk: &desk, leave: &never };
+    let tick_loop = TickLoop {
+        clock: &Monotonic,
+        grid,
+        engine,
+        conductor,
+        lanes,
+        sink: sender,
+        mail,
+        desk: &desk,
+        leave: &never,
+    };
     outcome(to.len(), run_threads(tick_loop, acks, plans, drains))
 }
 

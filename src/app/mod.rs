@@ -7,6 +7,6 @@ mod stage;
 mod staged;
 mod sum_up;
 
-pub use play::{Control, Play, PlayError, Played};
+pub use play::{Control, Play, PlayError, Played, Reins};
 pub use report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
 pub use staged::Staged;

@@ -11,7 +11,7 @@ use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
 use super::sum_up::sum_up;
-use rtrb::Producer;
+use rtrb::{Consumer, Producer};
 
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
@@ -20,7 +20,7 @@ use crate::fanout::Manner;
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
 use crate::plan::PlanError;
-use crate::rt::{AckLoop, Desk, Live, Mail, MailEnds, Order, PlanLoop, mailboxes};
+use crate::rt::{AckLoop, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -78,6 +78,15 @@ pub struct Control {
     pub leave: Arc<AtomicBool>,
 }
 
+/// What a play is led with.
+#[derive(Debug)]
+pub struct Reins {
+    /// What is asked of the hall.
+    pub commands: Producer<Command>,
+    /// What the hall does.
+    pub news: Consumer<News>,
+}
+
 /// What came of a play.
 #[derive(Debug)]
 pub struct Played {
@@ -119,24 +128,24 @@ impl Play {
         Duration::from_nanos(span.unsigned_abs())
     }
 
-    /// Plays, on the calling thread, until the end or until it is told to leave. `lead` gets the end of the mailbox for
-    /// orders before the first tick.
+    /// Plays, on the calling thread, until the end or until it is told to leave. Before the first tick `lead` gets what it
+    /// is led with, and says whether it will do so; unattended, a play ends with a stop or a fault.
     ///
     /// # Errors
     /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads.
     ///
     /// # Panics
     /// Where one of its threads panicked.
-    pub fn run(mut self, lead: impl FnOnce(Producer<Order>)) -> Result<Played, PlayError> {
+    pub fn run(mut self, lead: impl FnOnce(Reins) -> bool) -> Result<Played, PlayError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let show = self.staged.show.clone();
-        let MailEnds { sent, ticks, requests, answers, retired, orders } = self.ends;
+        let MailEnds { sent, ticks, requests, answers, retired, commands, alarms: _alarms, news } = self.ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
-        let Control { desk, live, leave } = &self.control;
+        let Control { live, leave, .. } = &self.control;
         let prepared = Preparation {
             clock: &Monotonic,
             sender: &sender,
@@ -160,8 +169,8 @@ impl Play {
             sender,
             mail: self.mail,
         };
-        lead(orders);
-        let run = stage.run(acks, plans, desk, leave).map_err(PlayError::Thread)?;
+        let attended = lead(Reins { commands, news });
+        let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
         Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
     }
 }

@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, Builder};
 use std::time::Duration;
 
+use super::play::Control;
 use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
 use crate::plan::PlanError;
-use crate::rt::{Accounts, AckLoop, Desk, Ended, Mail, PlanLoop, Spinning, TickLoop};
+use crate::rt::{Accounts, AckLoop, Conductor, Ended, Mail, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime};
@@ -59,8 +60,8 @@ impl Stage {
         self,
         acks: AckLoop,
         mut plans: PlanLoop,
-        desk: &Desk,
-        leave: &AtomicBool,
+        attended: bool,
+        control: &Control,
     ) -> io::Result<Run> {
         let Self { silent, rate, spin, engine, lanes, sender, mut mail } = self;
         let (sent_all, done) = (AtomicBool::new(false), AtomicBool::new(false));
@@ -83,7 +84,10 @@ impl Stage {
             mail.wakes(plan_thread.thread().clone());
             let grid = TickGrid::new(origin, rate);
             let clock = Spinning::new(&Monotonic, spin, period);
-            let mut ticks = TickLoop { clock: &clock, grid, engine, lanes, sink: sender, mail, desk, leave };
+            let conductor = Conductor::of_a_play(origin, attended);
+            let (desk, leave) = (&*control.desk, &*control.leave);
+            let mut ticks =
+                TickLoop { clock: &clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave };
             let ended = ticks.run();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);

@@ -123,7 +123,7 @@ pub(super) fn play(
     leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let said = Said { live: control.live, stop: control.leave, length, join: play.join() };
     let progress = Progress::start(said, for_ever);
-    let played = play.run(drop).map_err(|error| refused(error, &cue));
+    let played = play.run(|_| false).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
 }

@@ -149,8 +149,8 @@ pub struct Engine {
     resuming: bool,
     /// Where in the cue the show is to go on.
     seeking: Option<ShowTime>,
-    /// Whether the play ends once the lanes rest.
-    ends: bool,
+    /// Whether a move that the show needs could not be planned.
+    planless: bool,
     /// How much later than the film the motion is to be, milliseconds.
     trim_ms: i32,
     /// Answers of the planner in a row that came too late.
@@ -192,7 +192,7 @@ impl Engine {
             homeward: false,
             resuming: false,
             seeking: None,
-            ends: false,
+            planless: false,
             trim_ms: 0,
             late_answers: 0,
             frames: 0,
@@ -254,10 +254,25 @@ impl Engine {
         }
     }
 
-    /// Whether the lanes have come to rest.
+    /// Whether the lanes were stopped, rest, and have been told so.
     #[must_use]
-    pub const fn is_at_rest(&self) -> bool {
-        matches!(self.phase, Phase::Resting(_) | Phase::Done)
+    pub const fn is_told_to_rest(&self) -> bool {
+        match self.phase {
+            Phase::Resting(Rest::Stopped) => self.holds.are_over(),
+            Phase::Done => true,
+            _ => false,
+        }
+    }
+
+    /// Whether all lanes follow the cue that take part, and nobody waits for them elsewhere.
+    #[must_use]
+    pub fn is_on_cue(&self) -> bool {
+        self.phase == Phase::Riding && !self.is_joining() && self.seeking.is_none()
+    }
+
+    /// Whether a move that the show needs could not be planned since this was asked last.
+    pub fn take_planless(&mut self) -> bool {
+        std::mem::take(&mut self.planless)
     }
 
     /// How far missed ticks have put the show behind its grid.

@@ -22,18 +22,14 @@ impl Engine {
         }
     }
 
-    /// Parks and ends, as [`Engine::park`] does; lanes that were stopped stay where they are, and the play ends at once.
-    pub fn leave_now(&mut self) {
-        if self.phase == Phase::Resting(Rest::Stopped) && !self.homeward {
-            self.phase = Phase::Done;
-        } else if self.rest() != Some(Rest::Stopped) {
-            self.park();
-        }
+    /// Ends the play where the lanes are.
+    pub fn end(&mut self) {
+        self.phase = Phase::Done;
     }
 
     /// Brings the lanes to rest at once, without the planner; then three hold frames, and no more.
     pub fn stop(&mut self) {
-        if matches!(self.phase, Phase::Done | Phase::Braking(Rest::Stopped) | Phase::Resting(Rest::Stopped)) {
+        if self.phase == Phase::Done || self.rest() == Some(Rest::Stopped) {
             return;
         }
         (self.homeward, self.resuming, self.seeking) = (false, false, None);
@@ -60,7 +56,7 @@ impl Engine {
 
     /// Goes on from a pause.
     pub fn resume(&mut self) {
-        self.resuming = self.rest() == Some(Rest::Paused);
+        self.resuming |= self.rest() == Some(Rest::Paused);
     }
 
     /// Goes on elsewhere in the film, from a pause once it is resumed. A time after the end is the end.
@@ -110,12 +106,16 @@ impl Engine {
         self.riders[lane].cut();
     }
 
-    /// A lane is there again, at rest in that pose; it joins the others where they follow the cue.
-    pub fn come_back(&mut self, lane: usize, pose: Pose) {
-        if self.riders[lane].part == Part::Away {
-            self.riders[lane].come_back(pose);
+    /// A lane's controller was read: it is at rest in that pose. One that was away is there again, and joins the others where
+    /// they follow the cue; one that rests goes on from there.
+    pub fn found(&mut self, lane: usize, pose: Pose) {
+        let rider = &mut self.riders[lane];
+        if rider.part == Part::Away {
+            rider.come_back(pose);
             // Its controller's sum of Times has been broken off.
             self.stamps.break_off();
+        } else if self.phase == Phase::Resting(Rest::Stopped) && self.switch.is_none() {
+            rider.come_back(pose);
         }
     }
 

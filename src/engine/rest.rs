@@ -31,6 +31,11 @@ impl Holds {
         (self.ticks, self.time_ms) = (0, 0);
     }
 
+    /// Whether a stop has been told often enough.
+    pub(super) const fn are_over(&self) -> bool {
+        self.ticks >= HOLD_FRAMES as u32
+    }
+
     /// The Time of the frame of this tick, `time_ms` after the one before; none where none is sent.
     fn next(&mut self, rest: Rest, time_ms: u32) -> Option<u32> {
         self.time_ms += time_ms;
@@ -92,7 +97,7 @@ impl Engine {
             && !self.riders.iter().any(Rider::is_braking)
         {
             self.holds.begin();
-            self.phase = if self.ends { Phase::Closing(HOLD_FRAMES) } else { Phase::Resting(rest) };
+            self.phase = Phase::Resting(rest);
         }
     }
 

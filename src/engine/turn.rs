@@ -200,20 +200,17 @@ impl Engine {
         self.scenes.put(scene);
     }
 
-    /// Hears that the planner found no course for the request of that serial. What a person wished for is not done; for
-    /// anything else the lanes park, and where that cannot be planned they come to rest, and the play ends.
+    /// Hears that the planner found no course for the request of that serial. A seek is not done then, and a lane stays out;
+    /// without any other move the show cannot go on.
     pub fn refuse(&mut self, serial: u32, scene: Box<Scene>) {
         self.scenes.put(scene);
         let Some(switch) = self.switch.take_if(|switch| switch.serial == serial) else { return };
-        let wished = self.resuming || self.seeking.is_some();
         match switch.goal {
             Goal::Lanes => self.riders.iter_mut().for_each(|rider| rider.refused = rider.needs_a_course()),
-            Goal::Cue if wished => (self.resuming, self.seeking) = (false, None),
-            Goal::Park | Goal::Home => {
-                (self.ending, self.homeward, self.ends) = (Ending::Fault, false, true);
-                self.come_down(Rest::Stopped);
+            Goal::Cue if self.seeking.take().is_some() => {}
+            Goal::Cue | Goal::Again | Goal::Park | Goal::Home => {
+                (self.ending, self.planless, self.resuming) = (Ending::Fault, true, false);
             }
-            Goal::Cue | Goal::Again => (self.ending, self.homeward) = (Ending::Fault, true),
         }
     }
 

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 use super::TickReport;
-use crate::engine::Engine;
+use crate::state::{Ride, State};
 use crate::time::ShowTime;
 
 /// How far a play is, in the order of a show.
@@ -19,19 +19,50 @@ pub enum Phase {
     Joining,
     /// Seats follow the cue.
     Playing,
+    /// Frames were late; seats hold, and join again.
+    Freewheeling,
+    /// Seats hold; the film waits.
+    Paused,
+    /// Seats come to rest.
+    Stopping,
+    /// Seats rest, and stay so until somebody clears it.
+    Stopped,
+    /// Something is wrong; seats rest, and stay so until somebody clears it.
+    Fault,
+    /// Seats rest anywhere; they may park.
+    Recovering,
     /// Seats are on their way to park, or there.
     Parking,
 }
 
 impl Phase {
-    const ALL: [Self; 5] = [Self::Asking, Self::Homing, Self::Joining, Self::Playing, Self::Parking];
+    const ALL: [Self; 11] = [
+        Self::Asking,
+        Self::Homing,
+        Self::Joining,
+        Self::Playing,
+        Self::Freewheeling,
+        Self::Paused,
+        Self::Stopping,
+        Self::Stopped,
+        Self::Fault,
+        Self::Recovering,
+        Self::Parking,
+    ];
 
-    /// Where the engine is after a tick.
-    pub(super) fn of(engine: &Engine) -> Self {
-        match (engine.is_homeward(), engine.is_joining()) {
-            (true, _) => Self::Parking,
-            (false, true) => Self::Joining,
-            (false, false) => Self::Playing,
+    const fn of(state: State) -> Self {
+        match state {
+            State::Boot => Self::Asking,
+            State::Homing => Self::Homing,
+            State::Armed | State::Playing(Ride::Joining) => Self::Joining,
+            State::Playing(Ride::Following) => Self::Playing,
+            State::Playing(Ride::Freewheeling) => Self::Freewheeling,
+            State::Paused => Self::Paused,
+            State::Stopping => Self::Stopping,
+            State::Stopped => Self::Stopped,
+            State::Fault => Self::Fault,
+            State::Recovering => Self::Recovering,
+            State::Parking | State::Parked => Self::Parking,
         }
     }
 }
@@ -90,6 +121,11 @@ impl Live {
     /// Notes how far the play is.
     pub fn enter(&self, phase: Phase) {
         self.phase.store(phase as u8, Ordering::Release);
+    }
+
+    /// Notes where the hall stands.
+    pub(super) fn on_state(&self, state: State) {
+        self.enter(Phase::of(state));
     }
 
     /// Notes a tick that sent.

@@ -5,10 +5,11 @@ use std::thread::Thread;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::live::{Live, Phase};
-use crate::engine::{Engine, Rate};
+use super::live::Live;
+use crate::engine::Rate;
 use crate::motion::Pose;
-use crate::plan::{Course, Request, Scene};
+use crate::plan::{Course, Request as PlanRequest, Scene};
+use crate::state::{Cause, Event, Refusal, Request, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::wire::FrameNo;
 
@@ -16,6 +17,10 @@ use crate::wire::FrameNo;
 const HELD_S: f64 = 2.0;
 /// Places in the mailboxes to and from the planner.
 const PLANS: usize = 8;
+/// Commands that wait at the most: a person gives no more, and of a flood the rest is refused where it is given.
+const COMMANDS: usize = 64;
+/// News that waits at the most.
+const NEWS: usize = 256;
 
 /// What the tick thread says about one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,23 +65,42 @@ pub enum Answer {
     Refused(u32, Box<Scene>),
 }
 
-/// What the tick thread is told to do, once; what lasts stands on the [`super::Desk`].
+/// What a person asks for, once; what lasts stands on the [`super::Desk`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Order {
-    /// Come to rest and hold; the film waits.
-    Pause,
-    /// Go on from a pause.
-    Resume,
-    /// Go on elsewhere in the film.
+pub enum Command {
+    /// Anything but to seek.
+    Request(Request),
+    /// Go on at that time of the film.
     Seek(ShowTime),
-    /// Park, and end the play.
-    Park,
+}
+
+/// What the ack thread sees of the controllers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Alarm {
+    /// Something that concerns the hall.
+    Event(Event),
     /// A controller is lost: its lane comes to rest, and after three hold frames nothing goes to it.
     Leave(u16),
     /// Nothing goes to that lane from now on.
     Cut(u16),
-    /// A controller is there again, its seat at rest in that pose.
-    ComeBack(u16, Pose),
+    /// A controller was read: its seat is at rest in that pose, fractions of each slot's stroke.
+    Found(u16, Pose),
+}
+
+/// What the tick thread makes known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum News {
+    /// The hall is in another state, or in the same for another cause.
+    Entered {
+        /// Which.
+        state: State,
+        /// Why.
+        cause: Cause,
+        /// Since when.
+        at: MonoTime,
+    },
+    /// A command was not taken.
+    Refused(Refusal),
 }
 
 /// The tick thread's ends.
@@ -84,10 +108,12 @@ pub enum Order {
 pub struct Mail {
     sent: Producer<Sent>,
     ticks: Producer<TickReport>,
-    requests: Producer<Request>,
+    requests: Producer<PlanRequest>,
     answers: Consumer<Answer>,
     retired: Producer<Box<Course>>,
-    orders: Consumer<Order>,
+    commands: Consumer<Command>,
+    alarms: Consumer<Alarm>,
+    news: Producer<News>,
     planner: Option<Thread>,
     live: Arc<Live>,
     unposted: u64,
@@ -101,13 +127,17 @@ pub struct MailEnds {
     /// To the ack thread: ticks.
     pub ticks: Consumer<TickReport>,
     /// To the planner: requests.
-    pub requests: Consumer<Request>,
+    pub requests: Consumer<PlanRequest>,
     /// From the planner: answers.
     pub answers: Producer<Answer>,
     /// To the planner: courses to free.
     pub retired: Consumer<Box<Course>>,
-    /// From whoever leads the show: orders.
-    pub orders: Producer<Order>,
+    /// From whoever leads the show: commands.
+    pub commands: Producer<Command>,
+    /// From the ack thread: what it sees of the controllers.
+    pub alarms: Producer<Alarm>,
+    /// To whoever leads the show: what the hall does.
+    pub news: Consumer<News>,
 }
 
 /// Mailboxes for a play of that many lanes.
@@ -121,17 +151,32 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     let (requests, requests_end) = RingBuffer::new(PLANS);
     let (answers_end, answers) = RingBuffer::new(PLANS);
     let (retired, retired_end) = RingBuffer::new(PLANS);
-    // One for each lane at once, and some more.
-    let (orders_end, orders) = RingBuffer::new(lanes + PLANS);
-    let (ticks, planner, unposted) = (reports, None, 0);
-    let mail = Mail { sent, ticks, requests, answers, retired, orders, planner, live, unposted };
+    let (commands_end, commands) = RingBuffer::new(COMMANDS);
+    // Some for each lane at once, and some more.
+    let (alarms_end, alarms) = RingBuffer::new(4 * lanes + COMMANDS);
+    let (news, news_end) = RingBuffer::new(NEWS);
+    let mail = Mail {
+        sent,
+        ticks: reports,
+        requests,
+        answers,
+        retired,
+        commands,
+        alarms,
+        news,
+        planner: None,
+        live,
+        unposted: 0,
+    };
     let ends = MailEnds {
         sent: sent_end,
         ticks: reports_end,
         requests: requests_end,
         answers: answers_end,
         retired: retired_end,
-        orders: orders_end,
+        commands: commands_end,
+        alarms: alarms_end,
+        news: news_end,
     };
     (mail, ends)
 }
@@ -162,15 +207,24 @@ impl Mail {
     }
 
     /// Shows how far the play is.
-    pub(super) fn look(&self, engine: &Engine) {
-        self.live.enter(Phase::of(engine));
+    pub(super) fn look(&self, state: State) {
+        self.live.on_state(state);
     }
 
-    pub(super) fn order(&mut self) -> Option<Order> {
-        self.orders.pop().ok()
+    pub(super) fn command(&mut self) -> Option<Command> {
+        self.commands.pop().ok()
     }
 
-    pub(super) fn ask(&mut self, request: Request) {
+    pub(super) fn alarm(&mut self) -> Option<Alarm> {
+        self.alarms.pop().ok()
+    }
+
+    /// Where nobody reads it, news is lost; where the hall stands is in [`Live`] as well.
+    pub(super) fn tell(&mut self, news: News) {
+        let _ = self.news.push(news);
+    }
+
+    pub(super) fn ask(&mut self, request: PlanRequest) {
         self.unposted += u64::from(self.requests.push(request).is_err());
         self.wake();
     }

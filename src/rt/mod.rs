@@ -4,6 +4,7 @@
 //! happened before it or happens on another thread; values cross in bounded single-producer mailboxes.
 
 mod acks;
+mod conductor;
 mod desk;
 mod live;
 mod mail;
@@ -11,9 +12,10 @@ mod planning;
 mod spin;
 
 pub use acks::{Accounts, AckLoop};
+pub use conductor::Conductor;
 pub use desk::Desk;
 pub use live::{Live, Phase};
-pub use mail::{Answer, Mail, MailEnds, Order, Sent, TickReport, mailboxes};
+pub use mail::{Alarm, Answer, Command, Mail, MailEnds, News, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
 pub use spin::Spinning;
 
@@ -22,7 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::engine::{Beat, Ending, Engine, Step, Tick, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
-use crate::time::{Clock, nanos};
+use crate::time::{Clock, MonoTime, nanos};
 use crate::wire::MAX_LEN;
 
 /// Where the frames of a tick go.
@@ -37,8 +39,10 @@ impl FrameSink for Sender {
     }
 }
 
-/// Orders obeyed in one tick; more wait for the next.
-const ORDERS_PER_TICK: usize = 8;
+/// Commands taken in one tick; more wait for the next.
+const COMMANDS_PER_TICK: usize = 8;
+/// Alarms taken in one tick; more wait for the next.
+const ALARMS_PER_TICK: usize = 64;
 
 /// What the loop did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +65,8 @@ pub struct TickLoop<'a, C, S> {
     pub grid: TickGrid,
     /// What the lanes do.
     pub engine: Engine,
+    /// What the hall is in, and what it is asked.
+    pub conductor: Conductor,
     /// The lanes, in the order of the sink's.
     pub lanes: Vec<Lane>,
     /// Where frames go.
@@ -79,56 +85,59 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let (mut ticks, mut missed) = (0, 0);
         loop {
             self.clock.sleep_until(self.grid.next_deadline());
-            let tick = self.grid.take(self.clock.now());
-            self.take_mail();
-            match self.engine.tick(tick.missed) {
-                Step::Send(beat) => {
+            let now = self.clock.now();
+            let tick = self.grid.take(now);
+            self.take_mail(now);
+            let step = self.engine.tick(tick.missed);
+            match step {
+                // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
+                Step::Send(beat) if self.conductor.machine().may_send_motion() => {
                     missed += tick.missed;
                     ticks += 1;
                     self.send(tick, &beat);
                 }
-                Step::Quiet => self.mail.look(&self.engine),
-                Step::Over => break,
+                Step::Send(_) | Step::Quiet | Step::Over => {}
             }
+            self.conductor.watch(&mut self.engine, now);
             self.hand_on();
+            if step == Step::Over {
+                break;
+            }
         }
-        let ending = self.engine.ending().unwrap_or(Ending::Fault);
+        let ending = self.conductor.ending(&self.engine);
         Ended { ticks, missed, unposted: self.mail.unposted(), ending }
     }
 
-    /// Bounded: so many orders a tick, and the planner answers one request at a time. The stop waits for none of them.
-    fn take_mail(&mut self) {
-        for lane in 0..self.lanes.len() {
-            self.engine.mix(lane, self.desk.mix(lane));
+    /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
+    /// them.
+    fn take_mail(&mut self, now: MonoTime) {
+        let Self { conductor, engine, mail, desk, .. } = self;
+        if desk.take_stop() {
+            conductor.stop(engine, now);
         }
-        self.engine.trim(self.desk.trim_ms());
-        for _ in 0..ORDERS_PER_TICK {
-            let Some(order) = self.mail.order() else { break };
-            self.obey(order);
+        conductor.tick(engine, now);
+        for lane in 0..desk.lanes() {
+            engine.mix(lane, desk.mix(lane));
         }
-        if self.leave.load(Ordering::Relaxed) {
-            self.engine.leave_now();
+        engine.trim(desk.trim_ms());
+        for _ in 0..ALARMS_PER_TICK {
+            let Some(alarm) = mail.alarm() else { break };
+            conductor.alarm(alarm, engine, now);
         }
-        if self.desk.take_stop() {
-            self.engine.stop();
-        }
-        while let Some(answer) = self.mail.answer() {
-            match answer {
-                Answer::Course(course, scene) => self.engine.offer(course, scene),
-                Answer::Refused(serial, scene) => self.engine.refuse(serial, scene),
+        for _ in 0..COMMANDS_PER_TICK {
+            let Some(command) = mail.command() else { break };
+            if let Err(refusal) = conductor.command(command, engine, now) {
+                mail.tell(News::Refused(refusal));
             }
         }
-    }
-
-    fn obey(&mut self, order: Order) {
-        match order {
-            Order::Pause => self.engine.pause(),
-            Order::Resume => self.engine.resume(),
-            Order::Seek(film) => self.engine.seek(film),
-            Order::Park => self.engine.park(),
-            Order::Leave(lane) => self.engine.leave(usize::from(lane)),
-            Order::Cut(lane) => self.engine.cut(usize::from(lane)),
-            Order::ComeBack(lane, pose) => self.engine.come_back(usize::from(lane), pose),
+        if self.leave.load(Ordering::Relaxed) {
+            conductor.leave(engine, now);
+        }
+        while let Some(answer) = mail.answer() {
+            match answer {
+                Answer::Course(course, scene) => engine.offer(course, scene),
+                Answer::Refused(serial, scene) => engine.refuse(serial, scene),
+            }
         }
     }
 
@@ -148,12 +157,15 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             }
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
-        let report = TickReport { late_ns, missed: tick.missed, show: self.engine.playhead() };
+        let report = TickReport { late_ns, missed: tick.missed, show: self.engine.film() };
         self.mail.report(report);
-        self.mail.look(&self.engine);
     }
 
     fn hand_on(&mut self) {
+        self.mail.look(self.conductor.machine().state());
+        if let Some(news) = self.conductor.news() {
+            self.mail.tell(news);
+        }
         if let Some(request) = self.engine.take_request() {
             self.mail.ask(request);
         }

@@ -17,7 +17,10 @@ use kinocue::engine::{Mix, Rate, Show, TickGrid};
 use kinocue::fanout::Manner;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
-use kinocue::rt::{Desk, Ended, FrameSink, Live, MailEnds, Order, PlanLoop, TickLoop, mailboxes};
+use kinocue::rt::{
+    Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, TickLoop, mailboxes,
+};
+use kinocue::state::Request;
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
@@ -35,8 +38,12 @@ pub enum Event {
     Leave,
     /// Somebody presses stop.
     Stop,
-    /// Somebody gives an order.
-    Order(Order),
+    /// Somebody asks for something.
+    Ask(Request),
+    /// Somebody seeks.
+    Seek(ShowTime),
+    /// Something is seen of a controller.
+    Alarm(Alarm),
     /// Somebody sets what a lane makes of the cue.
     Mix(usize, Mix),
     /// Somebody sets the trim.
@@ -106,18 +113,36 @@ impl Virtual {
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
-        let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired, orders } = ends;
+        let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired, commands, alarms, news } =
+            ends;
         let plans = PlanLoop { planner, timeline: Arc::clone(&timeline), requests, answers, retired };
         let leave = AtomicBool::new(false);
-        let hands = Hands { desk: &desk, leave: &leave, orders: RefCell::new(orders) };
+        let hands = Hands {
+            desk: &desk,
+            leave: &leave,
+            commands: RefCell::new(commands),
+            alarms: RefCell::new(alarms),
+        };
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
+        let conductor = Conductor::of_a_play(clock.now(), true);
         let sink = Link { now: &clock.now, frames: Vec::new() };
-        let mut tick_loop =
-            TickLoop { clock: &clock, grid, engine, lanes, sink, mail, desk: &desk, leave: &leave };
+        let mut tick_loop = TickLoop {
+            clock: &clock,
+            grid,
+            engine,
+            conductor,
+            lanes,
+            sink,
+            mail,
+            desk: &desk,
+            leave: &leave,
+        };
         let ended = tick_loop.run();
         let frames = tick_loop.sink.frames;
-        Played { ended, frames, happened: clock.happened.take(), join, timeline, rate }
+        let mut news = news;
+        let news = std::iter::from_fn(|| news.pop().ok()).collect();
+        Played { ended, frames, happened: clock.happened.take(), news, join, timeline, rate }
     }
 }
 
@@ -125,12 +150,13 @@ impl Virtual {
 struct Hands<'a> {
     desk: &'a Desk,
     leave: &'a AtomicBool,
-    orders: RefCell<Producer<Order>>,
+    commands: RefCell<Producer<Command>>,
+    alarms: RefCell<Producer<Alarm>>,
 }
 
 impl Hands<'_> {
-    fn order(&self, order: Order) {
-        self.orders.borrow_mut().push(order).expect("there is room");
+    fn command(&self, command: Command) {
+        self.commands.borrow_mut().push(command).expect("there is room");
     }
 }
 
@@ -190,7 +216,11 @@ impl Clock for Stage<'_> {
                 Event::Late(span) => self.now.set(self.now.get() + *span),
                 Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
                 Event::Stop => self.hands.desk.stop(),
-                Event::Order(order) => self.hands.order(*order),
+                Event::Ask(request) => self.hands.command(Command::Request(*request)),
+                Event::Seek(film) => self.hands.command(Command::Seek(*film)),
+                Event::Alarm(alarm) => {
+                    self.hands.alarms.borrow_mut().push(*alarm).expect("there is room");
+                }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
                 Event::SlowPlanner(ticks) => {
@@ -230,6 +260,8 @@ pub struct Played {
     pub frames: Vec<Frame>,
     /// The events of the script, and when each came.
     pub happened: Vec<(MonoTime, Event)>,
+    /// What the hall made known.
+    pub news: Vec<News>,
     /// How long the first join takes.
     pub join: ShowTime,
     pub timeline: Arc<Timeline>,

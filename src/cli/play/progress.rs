@@ -38,6 +38,12 @@ impl Said {
             }
             Phase::Joining => format!("joining the cue ({:.2} s)", self.join.as_secs_f64()),
             Phase::Playing => "playing".to_owned(),
+            Phase::Freewheeling => "frames were late; the seats hold, and join again".to_owned(),
+            Phase::Paused => "paused".to_owned(),
+            Phase::Stopping => "stopping".to_owned(),
+            Phase::Stopped => "stopped".to_owned(),
+            Phase::Fault => "fault; the seats were stopped".to_owned(),
+            Phase::Recovering => "cleared".to_owned(),
             Phase::Parking if self.stop.load(Ordering::Relaxed) => {
                 "parking; Ctrl-C again ends at once".to_owned()
             }
