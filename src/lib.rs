@@ -35,6 +35,8 @@ pub mod plan;
 
 pub mod engine;
 
+pub mod state;
+
 pub mod config;
 
 pub mod fanout;

@@ -1,0 +1,200 @@
+//! Requests by persons.
+
+use super::{Cause, Goal, Machine, Refusal, Request, Ride, State, Why};
+use crate::time::MonoTime;
+
+impl Machine {
+    /// Takes a request. One that would change nothing is taken; [`Request::Stop`] always is.
+    ///
+    /// [`Request::Seek`] is taken while the hall is armed, playing or paused; only while it plays does it change the state.
+    ///
+    /// # Errors
+    /// [`Refusal`] where the state does not allow it; nothing has changed then.
+    pub fn request(&mut self, request: Request, now: MonoTime) -> Result<(), Refusal> {
+        let taken = match request {
+            Request::Home => self.home(now),
+            Request::Arm => self.arm(now),
+            Request::Disarm => self.disarm(now),
+            Request::Go => self.go(now),
+            Request::Pause => self.pause(now),
+            Request::Resume => self.resume(now),
+            Request::Seek => self.seek(now),
+            Request::Stop => {
+                self.stop(now);
+                Ok(())
+            }
+            Request::Park => self.park(now),
+            Request::Clear => self.clear(now),
+        };
+        taken.map_err(|why| Refusal { state: self.state, asked: request, why })
+    }
+
+    fn home(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Homing => Ok(()),
+            State::Parked | State::Recovering if !self.facts.identified => Err(Why::NotIdentified),
+            State::Parked | State::Recovering => {
+                self.begin_homing(Goal::Parked, Request::Home, now);
+                Ok(())
+            }
+            state => Err(in_the_way(state)),
+        }
+    }
+
+    fn begin_homing(&mut self, goal: Goal, asked: Request, now: MonoTime) {
+        self.goal = goal;
+        self.facts.homed = false;
+        self.enter(State::Homing, Cause::Asked(asked), now);
+    }
+
+    fn arm(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Homing if self.goal == Goal::Armed => return Ok(()),
+            State::Parked | State::Armed => {}
+            state => return Err(in_the_way(state)),
+        }
+        if let Some(why) = self.facts.readiness.against_arming() {
+            return Err(why);
+        }
+        if self.facts.homed {
+            self.enter(State::Armed, Cause::Asked(Request::Arm), now);
+        } else {
+            self.begin_homing(Goal::Armed, Request::Arm, now);
+        }
+        Ok(())
+    }
+
+    fn disarm(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Armed => self.enter(State::Parked, Cause::Asked(Request::Disarm), now),
+            State::Homing => self.goal = Goal::Parked,
+            State::Parked => {}
+            state => return Err(in_the_way(state)),
+        }
+        Ok(())
+    }
+
+    fn go(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Armed => {
+                self.enter(State::Playing(Ride::Joining), Cause::Asked(Request::Go), now);
+                Ok(())
+            }
+            State::Playing(_) => Err(Why::PlaysAlready),
+            State::Paused => Err(Why::PausedNow),
+            State::Parked => Err(Why::NotArmed),
+            state => Err(in_the_way(state)),
+        }
+    }
+
+    fn pause(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Playing(_) => self.enter(State::Paused, Cause::Asked(Request::Pause), now),
+            State::Paused => {}
+            state => return Err(nothing_plays(state)),
+        }
+        Ok(())
+    }
+
+    fn resume(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Paused => {
+                self.enter(State::Playing(Ride::Joining), Cause::Asked(Request::Resume), now);
+            }
+            State::Playing(_) => {}
+            state => return Err(nothing_plays(state)),
+        }
+        Ok(())
+    }
+
+    fn seek(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Playing(_) => {
+                self.enter(State::Playing(Ride::Joining), Cause::Asked(Request::Seek), now);
+            }
+            State::Armed | State::Paused => {}
+            state => return Err(nothing_plays(state)),
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self, now: MonoTime) {
+        let cause = match self.state {
+            State::Homing => Cause::StoppedHoming,
+            _ => Cause::Asked(Request::Stop),
+        };
+        let cause = *self.stop.get_or_insert(cause);
+        match self.state {
+            State::Stopped | State::Stopping => {}
+            state if state.may_send_motion() => self.enter(State::Stopping, cause, now),
+            _ => self.enter(State::Stopped, cause, now),
+        }
+    }
+
+    fn park(&mut self, now: MonoTime) -> Result<(), Why> {
+        let cause = Cause::Asked(Request::Park);
+        match self.state {
+            State::Playing(_) | State::Paused => self.enter(State::Parking, cause, now),
+            State::Armed => self.enter(State::Parked, cause, now),
+            State::Parked | State::Parking => {}
+            State::Recovering => {
+                self.known_position()?;
+                self.enter(State::Parking, cause, now);
+            }
+            state => return Err(in_the_way(state)),
+        }
+        Ok(())
+    }
+
+    /// A ramp begins where the seats stand: that has to be known.
+    const fn known_position(&self) -> Result<(), Why> {
+        if !self.facts.identified {
+            Err(Why::NotIdentified)
+        } else if !self.facts.homed {
+            Err(Why::PositionUnknown)
+        } else if !self.facts.measured {
+            Err(Why::PositionsNotRead)
+        } else {
+            Ok(())
+        }
+    }
+
+    fn clear(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.state {
+            State::Stopped | State::Fault if self.facts.pressed => Err(Why::StillPressed),
+            State::Stopped | State::Fault if self.facts.errors => Err(Why::StillWrong),
+            State::Stopped | State::Fault => {
+                self.stop = None;
+                self.fault = None;
+                self.facts.measured = false;
+                self.enter(State::Recovering, Cause::Cleared, now);
+                Ok(())
+            }
+            State::Stopping => Err(Why::StoppingNow),
+            _ => Err(Why::NothingToClear),
+        }
+    }
+}
+
+/// What the state itself has against most requests.
+const fn in_the_way(state: State) -> Why {
+    match state {
+        State::Boot => Why::NotIdentified,
+        State::Recovering => Why::SeatsAnywhere,
+        State::Parked => Why::NothingPlays,
+        State::Homing => Why::HomingNow,
+        State::Armed => Why::ArmedNow,
+        State::Playing(_) | State::Paused => Why::Riding,
+        State::Stopping => Why::StoppingNow,
+        State::Stopped | State::Fault => Why::Latched,
+        State::Parking => Why::ParkingNow,
+    }
+}
+
+/// The same for requests about a cue that plays.
+const fn nothing_plays(state: State) -> Why {
+    match state {
+        State::Armed => Why::NothingPlays,
+        state => in_the_way(state),
+    }
+}

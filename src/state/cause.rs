@@ -1,0 +1,122 @@
+//! Why a hall is in the state it is in.
+
+use super::{Readiness, Request};
+
+/// Why a hall is in the state it is in. Its words are [`Cause::words`]; which controller or group they speak of is
+/// [`Cause::whose`], for whoever knows the names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Cause {
+    /// The program started.
+    Started,
+    /// The program ended without parking the last time.
+    Crashed,
+    /// A seat is not at its park pose.
+    AwayFromPark,
+    /// All seats are at their park poses.
+    FoundParked,
+    /// A person asked for it.
+    Asked(Request),
+    /// A person asked for a stop while the controllers homed, which no frame can end.
+    StoppedHoming,
+    /// The seats are home.
+    Homed,
+    /// The seats are at their park poses again.
+    ArrivedAtPark,
+    /// Nobody started for ten minutes after arming.
+    ArmLapsed,
+    /// What was armed is no longer what is loaded and proved.
+    NotReady(Readiness),
+    /// This controller has rebooted or was reset.
+    Rebooted(u16),
+    /// A gap is over; the seats join.
+    GapOver,
+    /// The seats are on the cue.
+    Joined,
+    /// A frame came more than 50 ms late.
+    Late,
+    /// The cue is over.
+    CueEnded,
+    /// A pause took more than five minutes.
+    PausedTooLong,
+    /// This group of seats is out, and the configuration says what the hall does then.
+    GroupOut(u16),
+    /// An emergency stop at this controller.
+    EmergencyStop(u16),
+    /// Something is wrong.
+    Trouble(Trouble),
+    /// A person cleared it.
+    Cleared,
+}
+
+/// Something that no play goes on with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Trouble {
+    /// A controller has an error, or refuses frames (x = 3, 5).
+    Controller {
+        /// Which, counted from 0.
+        controller: u16,
+        /// Its error number; 0 where it gave none.
+        error: u16,
+    },
+    /// A drive has an alarm.
+    Drive {
+        /// Its controller, counted from 0.
+        controller: u16,
+        /// Its error number.
+        error: u16,
+    },
+    /// The last gate held motion back three times in a second.
+    Gate,
+    /// A move could not be planned.
+    Planner,
+    /// A controller did not get home.
+    Homing(u16),
+    /// Homing took too long.
+    HomingTime,
+    /// Parking took too long.
+    ParkingTime,
+    /// Another master sends frames to this controller.
+    OtherMaster(u16),
+}
+
+/// What a cause speaks of, counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Whose {
+    /// A controller.
+    Controller(u16),
+    /// A group of seats.
+    Group(u16),
+}
+
+impl Cause {
+    /// Which controller or group it speaks of; none where it is the whole hall.
+    #[must_use]
+    pub const fn whose(self) -> Option<Whose> {
+        match self {
+            Self::Rebooted(controller) | Self::EmergencyStop(controller) => {
+                Some(Whose::Controller(controller))
+            }
+            Self::GroupOut(group) => Some(Whose::Group(group)),
+            Self::Trouble(trouble) => trouble.whose(),
+            _ => None,
+        }
+    }
+}
+
+impl Trouble {
+    const fn whose(self) -> Option<Whose> {
+        match self {
+            Self::Controller { controller, .. }
+            | Self::Drive { controller, .. }
+            | Self::Homing(controller)
+            | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
+            Self::Gate | Self::Planner | Self::HomingTime | Self::ParkingTime => None,
+        }
+    }
+
+    /// Whether it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
+    #[must_use]
+    pub const fn lasts(self) -> bool {
+        matches!(self, Self::Controller { .. } | Self::Drive { .. })
+    }
+}

@@ -1,0 +1,196 @@
+//! What the state machine is told and what it says: plain values, all of them `Copy`.
+
+use super::cause::{Cause, Trouble};
+
+/// Where a hall stands (DESIGN: boot, parked, homing, armed, playing and so on).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum State {
+    /// Nothing is known of the controllers; nothing moves.
+    Boot,
+    /// The seats may be anywhere; nothing moves until a person parks or homes them.
+    Recovering,
+    /// The seats are at their park poses, at rest.
+    Parked,
+    /// The controllers home by themselves; no motion frame is sent.
+    Homing,
+    /// Ready to go, for ten minutes.
+    Armed,
+    /// The seats move with the cue.
+    Playing(Ride),
+    /// The seats hold; hold frames are sent.
+    Paused,
+    /// The seats decelerate, to [`State::Stopped`] or to [`State::Fault`].
+    Stopping,
+    /// Stopped by a person, or by an emergency stop; latched until a person clears it.
+    Stopped,
+    /// The seats move to their park poses.
+    Parking,
+    /// Something is wrong; latched until a person clears it.
+    Fault,
+}
+
+/// How seats move with the cue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Ride {
+    /// On their way onto the moving cue.
+    Joining,
+    /// On the cue.
+    Following,
+    /// They hold after a gap, and will join again by themselves.
+    Freewheeling,
+}
+
+impl State {
+    /// Every state there is, in the order of a show.
+    pub const ALL: [Self; 13] = [
+        Self::Boot,
+        Self::Recovering,
+        Self::Parked,
+        Self::Homing,
+        Self::Armed,
+        Self::Playing(Ride::Joining),
+        Self::Playing(Ride::Following),
+        Self::Playing(Ride::Freewheeling),
+        Self::Paused,
+        Self::Parking,
+        Self::Stopping,
+        Self::Stopped,
+        Self::Fault,
+    ];
+
+    /// Whether motion frames may leave.
+    #[must_use]
+    pub const fn may_send_motion(self) -> bool {
+        matches!(self, Self::Playing(_) | Self::Paused | Self::Stopping | Self::Parking)
+    }
+
+    /// Whether only a person gets the hall out of it.
+    #[must_use]
+    pub const fn is_latched(self) -> bool {
+        matches!(self, Self::Stopped | Self::Fault)
+    }
+}
+
+/// What a person can ask for. Who it is, and whether they may, is settled before it comes here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Request {
+    /// Let the controllers find their zero. The seats move over their whole stroke by themselves: whoever asks has made
+    /// sure that nobody sits on them.
+    Home,
+    /// Make ready to go. Where the position is unknown the seats are homed first, as [`Request::Home`] does it and under
+    /// the same condition.
+    Arm,
+    /// No longer ready to go.
+    Disarm,
+    /// Start the cue.
+    Go,
+    /// Decelerate and hold.
+    Pause,
+    /// Go on after a pause.
+    Resume,
+    /// Go on somewhere else in the cue.
+    Seek,
+    /// Decelerate and stay so until cleared. Always taken.
+    Stop,
+    /// Move to the park poses.
+    Park,
+    /// Leave stopped or fault.
+    Clear,
+}
+
+impl Request {
+    /// Every request there is.
+    pub const ALL: [Self; 10] = [
+        Self::Home,
+        Self::Arm,
+        Self::Disarm,
+        Self::Go,
+        Self::Pause,
+        Self::Resume,
+        Self::Seek,
+        Self::Stop,
+        Self::Park,
+        Self::Clear,
+    ];
+}
+
+/// Whether a cue can be armed, as far as files, limits and preflight tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Readiness {
+    /// No cue is loaded.
+    NoCue,
+    /// The cue is not proved to stay within the limits of these seats at this level and speed.
+    NotProved,
+    /// Preflight has not passed.
+    NotPreflighted,
+    /// All of it is there.
+    Ready,
+}
+
+/// What the configuration asks of the hall when a group is out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Demand {
+    /// All hold.
+    Pause,
+    /// All park.
+    Park,
+}
+
+/// What the engine and the observers tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// Every controller that takes part has said what it is and where its seat stands.
+    Identified(Finding),
+    /// The positions of all seats were read (again).
+    PositionsRead,
+    /// A controller has rebooted or was reset: its position is unknown until it is homed. Counted from 0.
+    Rebooted(u16),
+    /// What is loaded and proved has changed.
+    Readiness(Readiness),
+    /// All seats are home.
+    Homed,
+    /// A join begins after a gap.
+    JoinBegun,
+    /// All seats are on the cue.
+    Joined,
+    /// A frame came more than 50 ms late; the seats hold.
+    Late,
+    /// The cue is over, with all its repeats.
+    CueEnded,
+    /// The seats have decelerated, and the hold frames are out.
+    AtRest,
+    /// The seats are at their park poses.
+    Parked,
+    /// The configuration's policy, and the group of seats that it is for, counted from 0.
+    Policy(Demand, u16),
+    /// An emergency stop is in effect at this controller, counted from 0.
+    EmergencyStop(u16),
+    /// No controller reports an emergency stop any more.
+    AllReleased,
+    /// Something is wrong.
+    Trouble(Trouble),
+    /// No controller and no drive reports an error any more.
+    ErrorsGone,
+}
+
+/// What was found when the controllers were first asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Finding {
+    /// All of them know their zero (DPF0 reads 2).
+    pub homed: bool,
+    /// All seats are at their park poses.
+    pub at_park: bool,
+    /// The mark that a start leaves and an orderly end takes away was there.
+    pub crashed: bool,
+}
+
+impl Finding {
+    /// The state that a start leads to, and why.
+    pub(super) const fn leads_to(self) -> (State, Cause) {
+        match self {
+            Self { crashed: true, .. } => (State::Recovering, Cause::Crashed),
+            Self { at_park: false, .. } => (State::Recovering, Cause::AwayFromPark),
+            Self { .. } => (State::Parked, Cause::FoundParked),
+        }
+    }
+}

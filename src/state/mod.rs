@@ -1,0 +1,219 @@
+//! The state machine of a hall: requests by persons and events from the engine and the observers in, one state with its
+//! cause and the next action out. Tick thread; pure: told the time, `Copy` values alone, no allocation.
+//!
+//! Motion frames leave only while [`Machine::may_send_motion`]. Nothing but a person's request leads up: to motion, from
+//! a pause back to it, or out of what is latched. Where several things happen at once, stopped goes before fault, fault
+//! before stopping, stopping before parking, parking before paused, paused before playing.
+//!
+//! A stop asked for while nothing moves is [`State::Stopped`] at once; while the seats move they decelerate first. A
+//! reported emergency stop is [`State::Stopped`] at once from everywhere: the controllers hold the seats then. A fault
+//! while the seats move decelerates them as a stop does, because silence would halt them at the end of a straight line;
+//! it is latched from the first moment, and only [`State::Stopped`] goes before it.
+
+mod ask;
+mod cause;
+mod kinds;
+mod refusal;
+mod tell;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use std::time::Duration;
+
+pub use cause::{Cause, Trouble, Whose};
+pub use kinds::{Demand, Event, Finding, Readiness, Request, Ride, State};
+pub use refusal::{Refusal, Why};
+
+use crate::time::MonoTime;
+
+/// How long a hall stays armed.
+pub const ARMED_FOR: Duration = Duration::from_mins(10);
+/// How long a pause lasts before the seats park.
+pub const PAUSED_FOR: Duration = Duration::from_mins(5);
+/// How long homing may take. Whoever homes gives up after a minute; this is for when no word of that comes.
+pub const HOMING_FOR: Duration = Duration::from_secs(65);
+/// How long the seats may decelerate before frames end without word that they are at rest.
+pub const STOPPING_FOR: Duration = Duration::from_secs(5);
+/// How long parking may take: a stroke of 5 m at 50 mm/s, and then some.
+pub const PARKING_FOR: Duration = Duration::from_mins(2);
+
+/// The state of one hall.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    state: State,
+    cause: Cause,
+    since: MonoTime,
+    facts: Facts,
+    /// What homing leads to.
+    goal: Goal,
+    /// Why the hall stops, or is stopped.
+    stop: Option<Cause>,
+    /// What is wrong; kept until cleared.
+    fault: Option<Trouble>,
+}
+
+/// What is known beside the state.
+#[derive(Debug, Clone, Copy)]
+struct Facts {
+    /// Every controller has said what it is.
+    identified: bool,
+    /// Every controller knows its position.
+    homed: bool,
+    /// The positions were read since the hall was cleared.
+    measured: bool,
+    /// An emergency stop is in effect.
+    pressed: bool,
+    /// A controller or a drive has an error.
+    errors: bool,
+    readiness: Readiness,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Goal {
+    Parked,
+    Armed,
+}
+
+impl Machine {
+    /// A hall of which nothing is known, at the start of the program.
+    #[must_use]
+    pub const fn new(now: MonoTime) -> Self {
+        Self {
+            state: State::Boot,
+            cause: Cause::Started,
+            since: now,
+            facts: Facts {
+                identified: false,
+                homed: false,
+                measured: false,
+                pressed: false,
+                errors: false,
+                readiness: Readiness::NoCue,
+            },
+            goal: Goal::Parked,
+            stop: None,
+            fault: None,
+        }
+    }
+
+    /// Where the hall stands.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// Why it stands there.
+    #[must_use]
+    pub const fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    /// Since when.
+    #[must_use]
+    pub const fn since(&self) -> MonoTime {
+        self.since
+    }
+
+    /// Whether motion frames may leave.
+    #[must_use]
+    pub const fn may_send_motion(&self) -> bool {
+        self.state.may_send_motion()
+    }
+
+    /// What is wrong, whatever the state: beside a stop, or while the seats still decelerate.
+    #[must_use]
+    pub const fn fault(&self) -> Option<Trouble> {
+        self.fault
+    }
+
+    /// Whether a cue can be armed, as far as files, limits and preflight tell.
+    #[must_use]
+    pub const fn readiness(&self) -> Readiness {
+        self.facts.readiness
+    }
+
+    /// Whether every controller has said what it is.
+    #[must_use]
+    pub const fn is_identified(&self) -> bool {
+        self.facts.identified
+    }
+
+    /// Whether every controller knows its position.
+    #[must_use]
+    pub const fn is_homed(&self) -> bool {
+        self.facts.homed
+    }
+
+    /// Whether the positions were read since the program started or the hall was cleared.
+    #[must_use]
+    pub const fn is_measured(&self) -> bool {
+        self.facts.measured
+    }
+
+    /// Whether an emergency stop is in effect.
+    #[must_use]
+    pub const fn is_pressed(&self) -> bool {
+        self.facts.pressed
+    }
+
+    /// Whether a controller or a drive still has an error.
+    #[must_use]
+    pub const fn has_errors(&self) -> bool {
+        self.facts.errors
+    }
+
+    /// When the state ends by itself; none where it does not. For a hall that is armed or paused, worth showing.
+    #[must_use]
+    pub fn lapses(&self) -> Option<MonoTime> {
+        let span = match self.state {
+            State::Armed => ARMED_FOR,
+            State::Paused => PAUSED_FOR,
+            State::Homing => HOMING_FOR,
+            State::Stopping => STOPPING_FOR,
+            State::Parking => PARKING_FOR,
+            _ => return None,
+        };
+        Some(self.since + span)
+    }
+
+    /// Ends a state whose time is over. To be told every tick; a clock that goes back ends nothing.
+    pub fn tick(&mut self, now: MonoTime) {
+        if self.lapses().is_none_or(|end| now < end) {
+            return;
+        }
+        match self.state {
+            State::Armed => self.enter(State::Parked, Cause::ArmLapsed, now),
+            State::Paused => self.enter(State::Parking, Cause::PausedTooLong, now),
+            State::Homing => self.trouble(Trouble::HomingTime, now),
+            State::Parking => self.trouble(Trouble::ParkingTime, now),
+            State::Stopping => self.end_stopping(now),
+            _ => {}
+        }
+    }
+
+    const fn enter(&mut self, state: State, cause: Cause, now: MonoTime) {
+        self.state = state;
+        self.cause = cause;
+        self.since = now;
+    }
+
+    /// Latches that something is wrong.
+    fn trouble(&mut self, trouble: Trouble, now: MonoTime) {
+        self.facts.errors |= trouble.lasts();
+        let first = *self.fault.get_or_insert(trouble);
+        match self.state {
+            State::Stopped | State::Stopping | State::Fault => {}
+            state if state.may_send_motion() => self.enter(State::Stopping, Cause::Trouble(first), now),
+            _ => self.enter(State::Fault, Cause::Trouble(first), now),
+        }
+    }
+
+    /// The seats are at rest. Where both a stop and a fault are latched, stopped goes first and the fault stays known.
+    const fn end_stopping(&mut self, now: MonoTime) {
+        match self.stop {
+            Some(cause) => self.enter(State::Stopped, cause, now),
+            None => self.enter(State::Fault, self.cause, now),
+        }
+    }
+}

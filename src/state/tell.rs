@@ -1,0 +1,111 @@
+//! Events from the engine and the observers.
+
+use super::{Cause, Demand, Event, Finding, Goal, Machine, Readiness, Ride, State};
+use crate::time::MonoTime;
+
+impl Machine {
+    /// Takes an event. One that does not fit the state, because it comes late, changes nothing but what is known.
+    pub fn event(&mut self, event: Event, now: MonoTime) {
+        match event {
+            Event::Identified(finding) => self.identified(finding, now),
+            Event::PositionsRead => self.facts.measured = true,
+            Event::Rebooted(controller) => self.rebooted(controller, now),
+            Event::Readiness(readiness) => self.ready(readiness, now),
+            Event::Homed => self.homed(now),
+            Event::JoinBegun if self.state == State::Playing(Ride::Freewheeling) => {
+                self.enter(State::Playing(Ride::Joining), Cause::GapOver, now);
+            }
+            Event::Joined if self.rides() && self.state != State::Playing(Ride::Following) => {
+                self.enter(State::Playing(Ride::Following), Cause::Joined, now);
+            }
+            Event::Late if self.rides() && self.state != State::Playing(Ride::Freewheeling) => {
+                self.enter(State::Playing(Ride::Freewheeling), Cause::Late, now);
+            }
+            Event::CueEnded if self.rides() => self.enter(State::Parking, Cause::CueEnded, now),
+            Event::AtRest if self.state == State::Stopping => self.end_stopping(now),
+            Event::Parked if self.state == State::Parking => {
+                self.enter(State::Parked, Cause::ArrivedAtPark, now);
+            }
+            Event::Policy(demand, group) => self.policy(demand, group, now),
+            Event::EmergencyStop(controller) => self.emergency_stop(controller, now),
+            Event::AllReleased => self.facts.pressed = false,
+            Event::Trouble(trouble) => self.trouble(trouble, now),
+            Event::ErrorsGone => self.facts.errors = false,
+            Event::JoinBegun
+            | Event::Joined
+            | Event::Late
+            | Event::CueEnded
+            | Event::AtRest
+            | Event::Parked => {}
+        }
+    }
+
+    const fn rides(&self) -> bool {
+        matches!(self.state, State::Playing(_))
+    }
+
+    fn identified(&mut self, finding: Finding, now: MonoTime) {
+        // While the seats move or are armed, only a reboot or homing says anything new of their zero.
+        if !matches!(self.state, State::Boot | State::Recovering | State::Stopped | State::Fault) {
+            return;
+        }
+        self.facts.identified = true;
+        self.facts.homed = finding.homed;
+        self.facts.measured = true;
+        if self.state == State::Boot {
+            let (state, cause) = finding.leads_to();
+            self.enter(state, cause, now);
+        }
+    }
+
+    fn rebooted(&mut self, controller: u16, now: MonoTime) {
+        self.facts.homed = false;
+        if self.state == State::Armed {
+            self.enter(State::Parked, Cause::Rebooted(controller), now);
+        }
+    }
+
+    fn ready(&mut self, readiness: Readiness, now: MonoTime) {
+        self.facts.readiness = readiness;
+        if readiness == Readiness::Ready {
+            return;
+        }
+        match self.state {
+            State::Armed => self.enter(State::Parked, Cause::NotReady(readiness), now),
+            State::Homing => self.goal = Goal::Parked,
+            _ => {}
+        }
+    }
+
+    fn homed(&mut self, now: MonoTime) {
+        if self.state != State::Homing {
+            return;
+        }
+        self.facts.homed = true;
+        self.facts.measured = true;
+        let state = match self.goal {
+            Goal::Parked => State::Parked,
+            Goal::Armed => State::Armed,
+        };
+        self.enter(state, Cause::Homed, now);
+    }
+
+    fn policy(&mut self, demand: Demand, group: u16, now: MonoTime) {
+        match (demand, self.state) {
+            (Demand::Pause, State::Playing(_)) => self.enter(State::Paused, Cause::GroupOut(group), now),
+            (Demand::Park, State::Playing(_) | State::Paused) => {
+                self.enter(State::Parking, Cause::GroupOut(group), now);
+            }
+            _ => {}
+        }
+    }
+
+    /// An emergency stop goes before a person's stop as a cause; the first controller that told of it is the one named.
+    fn emergency_stop(&mut self, controller: u16, now: MonoTime) {
+        self.facts.pressed = true;
+        if !matches!(self.stop, Some(Cause::EmergencyStop(_))) {
+            self.stop = Some(Cause::EmergencyStop(controller));
+            self.enter(State::Stopped, Cause::EmergencyStop(controller), now);
+        }
+    }
+}

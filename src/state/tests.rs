@@ -1,0 +1,361 @@
+mod chance;
+mod table;
+
+use super::*;
+
+const fn s(seconds: u64) -> MonoTime {
+    MonoTime::from_nanos(seconds * 1_000_000_000)
+}
+
+const PARKED: Finding = Finding { homed: true, at_park: true, crashed: false };
+const DRIVE: Trouble = Trouble::Drive { controller: 3, error: 10 };
+
+/// What leads from the start of the program to a state.
+fn way_to(state: State) -> (Vec<Step>, State) {
+    use Request::{Arm, Clear, Go, Home, Park, Pause, Stop};
+    let found = [Step::Tell(Event::Identified(PARKED)), Step::Tell(Event::Readiness(Readiness::Ready))];
+    let then = |steps: &[Step]| found.iter().chain(steps).copied().collect::<Vec<_>>();
+    let go = [Step::Ask(Arm), Step::Ask(Go)];
+    let going = |steps: &[Step]| then(&[&go, steps].concat());
+    let way = match state {
+        State::Boot => vec![],
+        State::Recovering => then(&[Step::Ask(Stop), Step::Ask(Clear), Step::Tell(Event::PositionsRead)]),
+        State::Parked => then(&[]),
+        State::Homing => then(&[Step::Ask(Home)]),
+        State::Armed => then(&[Step::Ask(Arm)]),
+        State::Playing(Ride::Joining) => going(&[]),
+        State::Playing(Ride::Following) => going(&[Step::Tell(Event::Joined)]),
+        State::Playing(Ride::Freewheeling) => going(&[Step::Tell(Event::Late)]),
+        State::Paused => going(&[Step::Ask(Pause)]),
+        State::Parking => going(&[Step::Ask(Park)]),
+        State::Stopping => going(&[Step::Ask(Stop)]),
+        State::Stopped => then(&[Step::Ask(Stop)]),
+        State::Fault => then(&[Step::Tell(Event::Trouble(Trouble::Gate))]),
+    };
+    (way, state)
+}
+
+/// A request or an event.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Step {
+    Ask(Request),
+    Tell(Event),
+}
+
+fn take(hall: &mut Machine, step: Step, now: MonoTime) -> Result<(), Refusal> {
+    match step {
+        Step::Ask(request) => hall.request(request, now),
+        Step::Tell(event) => {
+            hall.event(event, now);
+            Ok(())
+        }
+    }
+}
+
+/// A hall in a state, since second 0.
+#[track_caller]
+fn hall(state: State) -> Machine {
+    let mut hall = Machine::new(s(0));
+    for step in way_to(state).0 {
+        take(&mut hall, step, s(0)).unwrap();
+    }
+    assert_eq!(hall.state(), state);
+    hall
+}
+
+/// The hall in `from` after a request that it has to take.
+#[track_caller]
+fn asked(from: State, request: Request) -> Machine {
+    let mut hall = hall(from);
+    hall.request(request, s(1)).unwrap();
+    hall
+}
+
+/// The hall in `from` after an event.
+#[track_caller]
+fn told(from: State, event: Event) -> Machine {
+    let mut hall = hall(from);
+    hall.event(event, s(1));
+    hall
+}
+
+#[track_caller]
+fn why(from: State, request: Request) -> Why {
+    let mut hall = hall(from);
+    let refusal = hall.request(request, s(1)).unwrap_err();
+    assert_eq!((hall.state(), hall.since()), (from, s(0)), "a refused request changes nothing");
+    assert_eq!((refusal.state, refusal.asked), (from, request));
+    refusal.why
+}
+
+fn riding() -> [State; 3] {
+    [Ride::Joining, Ride::Following, Ride::Freewheeling].map(State::Playing)
+}
+
+#[test]
+fn a_start_leads_to_parked_only_where_the_seats_are_found_so_after_an_orderly_end() {
+    let found = |finding| {
+        Some(told(State::Boot, Event::Identified(finding))).map(|hall| (hall.state(), hall.cause()))
+    };
+    assert_eq!(found(PARKED), Some((State::Parked, Cause::FoundParked)));
+    assert_eq!(found(Finding { at_park: false, ..PARKED }), Some((State::Recovering, Cause::AwayFromPark)));
+    assert_eq!(found(Finding { crashed: true, ..PARKED }), Some((State::Recovering, Cause::Crashed)));
+}
+
+#[test]
+fn a_show_goes_from_arm_to_go_to_the_cue_to_its_end_to_park() {
+    let mut hall = hall(State::Parked);
+    hall.request(Request::Arm, s(1)).unwrap();
+    assert_eq!((hall.state(), hall.cause()), (State::Armed, Cause::Asked(Request::Arm)));
+    hall.request(Request::Go, s(2)).unwrap();
+    assert_eq!((hall.state(), hall.since()), (State::Playing(Ride::Joining), s(2)));
+    hall.event(Event::Joined, s(4));
+    assert_eq!((hall.state(), hall.cause()), (State::Playing(Ride::Following), Cause::Joined));
+    hall.event(Event::CueEnded, s(90));
+    assert_eq!((hall.state(), hall.cause()), (State::Parking, Cause::CueEnded));
+    hall.event(Event::Parked, s(93));
+    assert_eq!((hall.state(), hall.cause()), (State::Parked, Cause::ArrivedAtPark));
+}
+
+#[test]
+fn a_second_go_is_refused() {
+    assert_eq!(riding().map(|state| why(state, Request::Go)), [Why::PlaysAlready; 3]);
+    assert_eq!(why(State::Paused, Request::Go), Why::PausedNow);
+    assert_eq!(why(State::Parked, Request::Go), Why::NotArmed);
+}
+
+#[test]
+fn a_cue_is_armed_only_when_all_is_ready() {
+    for (readiness, expected) in [
+        (Readiness::NoCue, Why::NoCue),
+        (Readiness::NotProved, Why::NotProved),
+        (Readiness::NotPreflighted, Why::NotPreflighted),
+    ] {
+        let mut hall = told(State::Parked, Event::Readiness(readiness));
+        assert_eq!(hall.request(Request::Arm, s(2)).unwrap_err().why, expected);
+        assert_eq!(told(State::Armed, Event::Readiness(readiness)).state(), State::Parked);
+    }
+}
+
+#[test]
+fn arming_homes_first_where_a_position_is_unknown_and_not_otherwise() {
+    let mut hall = told(State::Parked, Event::Rebooted(2));
+    hall.request(Request::Arm, s(2)).unwrap();
+    assert_eq!(hall.state(), State::Homing);
+    hall.event(Event::Homed, s(20));
+    assert_eq!((hall.state(), hall.cause()), (State::Armed, Cause::Homed));
+    assert_eq!(asked(State::Parked, Request::Arm).state(), State::Armed);
+}
+
+#[test]
+fn homing_by_itself_ends_in_parked_and_so_does_arming_that_is_taken_back() {
+    assert_eq!(told(State::Homing, Event::Homed).state(), State::Parked);
+    let mut hall = told(State::Parked, Event::Rebooted(2));
+    hall.request(Request::Arm, s(2)).unwrap();
+    hall.request(Request::Disarm, s(3)).unwrap();
+    hall.event(Event::Homed, s(20));
+    assert_eq!(hall.state(), State::Parked);
+}
+
+#[test]
+fn a_reboot_disarms() {
+    let hall = told(State::Armed, Event::Rebooted(7));
+    assert_eq!((hall.state(), hall.cause().whose()), (State::Parked, Some(Whose::Controller(7))));
+    assert!(!hall.is_homed());
+    assert_eq!(hall.next(), "keep clear of the seats and arm; they home first");
+}
+
+#[test]
+fn arming_lapses_after_ten_minutes_and_arming_again_begins_them_anew() {
+    let mut hall = hall(State::Armed);
+    hall.tick(s(599));
+    assert_eq!(hall.state(), State::Armed);
+    hall.request(Request::Arm, s(599)).unwrap();
+    hall.tick(s(1_198));
+    assert_eq!(hall.state(), State::Armed);
+    hall.tick(s(1_199));
+    assert_eq!((hall.state(), hall.cause()), (State::Parked, Cause::ArmLapsed));
+}
+
+#[test]
+fn a_pause_of_five_minutes_parks() {
+    let mut hall = hall(State::Paused);
+    hall.request(Request::Seek, s(100)).unwrap();
+    hall.tick(s(299));
+    assert_eq!(hall.state(), State::Paused);
+    hall.tick(s(300));
+    assert_eq!((hall.state(), hall.cause()), (State::Parking, Cause::PausedTooLong));
+}
+
+#[test]
+fn a_clock_that_goes_back_ends_nothing() {
+    for state in State::ALL {
+        let mut hall = Machine { since: s(1_000), ..hall(state) };
+        hall.tick(s(0));
+        assert_eq!(hall.state(), state);
+    }
+}
+
+#[test]
+fn resume_and_seek_join() {
+    assert_eq!(asked(State::Paused, Request::Resume).state(), State::Playing(Ride::Joining));
+    for state in riding() {
+        assert_eq!(asked(state, Request::Seek).state(), State::Playing(Ride::Joining));
+        assert_eq!(asked(state, Request::Resume).state(), state, "it plays");
+    }
+}
+
+#[test]
+fn a_late_frame_holds_and_joins_again_by_itself() {
+    let mut hall = told(State::Playing(Ride::Following), Event::Late);
+    assert_eq!((hall.state(), hall.cause()), (State::Playing(Ride::Freewheeling), Cause::Late));
+    hall.event(Event::JoinBegun, s(2));
+    assert_eq!((hall.state(), hall.cause()), (State::Playing(Ride::Joining), Cause::GapOver));
+    hall.event(Event::Joined, s(4));
+    assert_eq!(hall.state(), State::Playing(Ride::Following));
+    for state in [State::Paused, State::Parking, State::Stopping, State::Armed] {
+        assert_eq!(told(state, Event::Late).state(), state);
+    }
+}
+
+#[test]
+fn a_stop_decelerates_what_moves_and_is_stopped_at_once_where_nothing_does() {
+    for state in State::ALL {
+        let stopped = asked(state, Request::Stop);
+        let expected = if state.may_send_motion() { State::Stopping } else { State::Stopped };
+        assert_eq!(stopped.state(), expected, "from {state}");
+    }
+    let mut hall = asked(State::Playing(Ride::Following), Request::Stop);
+    hall.event(Event::AtRest, s(2));
+    assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Request::Stop)));
+}
+
+#[test]
+fn seats_that_never_tell_of_rest_are_sent_no_more_after_five_seconds() {
+    let mut hall = hall(State::Stopping);
+    hall.tick(s(4));
+    assert!(hall.may_send_motion());
+    hall.tick(s(5));
+    assert_eq!(hall.state(), State::Stopped);
+}
+
+#[test]
+fn a_stop_while_homing_says_that_no_frame_can_end_homing() {
+    let hall = asked(State::Homing, Request::Stop);
+    assert_eq!(hall.cause(), Cause::StoppedHoming);
+    assert!(hall.cause().words().contains("hard-wired"));
+    assert!(!hall.is_homed());
+}
+
+#[test]
+fn an_emergency_stop_is_stopped_at_once_from_every_state() {
+    for state in State::ALL {
+        let hall = told(state, Event::EmergencyStop(4));
+        assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::EmergencyStop(4)), "from {state}");
+        assert!(!hall.may_send_motion());
+    }
+}
+
+#[test]
+fn only_a_person_clears_and_only_when_every_emergency_stop_is_released() {
+    let mut hall = told(State::Playing(Ride::Following), Event::EmergencyStop(4));
+    assert_eq!(hall.next(), "release the emergency stop, then clear");
+    assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::StillPressed);
+    hall.event(Event::AllReleased, s(3));
+    hall.tick(s(30_000));
+    assert_eq!(hall.state(), State::Stopped);
+    hall.request(Request::Clear, s(30_000)).unwrap();
+    assert_eq!((hall.state(), hall.cause()), (State::Recovering, Cause::Cleared));
+}
+
+#[test]
+fn after_clearing_the_positions_are_read_anew_before_the_seats_park() {
+    let mut hall = asked(State::Stopped, Request::Clear);
+    assert_eq!(hall.request(Request::Park, s(2)).unwrap_err().why, Why::PositionsNotRead);
+    assert_eq!(hall.next(), "wait until the positions are read, then park");
+    hall.event(Event::PositionsRead, s(3));
+    hall.request(Request::Park, s(4)).unwrap();
+    assert_eq!(hall.state(), State::Parking);
+}
+
+#[test]
+fn a_seat_of_unknown_position_is_homed_and_not_parked() {
+    let mut hall = told(State::Recovering, Event::Rebooted(1));
+    assert_eq!(hall.request(Request::Park, s(2)).unwrap_err().why, Why::PositionUnknown);
+    assert_eq!(hall.next(), "home");
+    hall.request(Request::Home, s(2)).unwrap();
+    hall.event(Event::Homed, s(9));
+    assert_eq!(hall.state(), State::Parked);
+}
+
+#[test]
+fn a_fault_while_the_seats_move_decelerates_them_first() {
+    for state in State::ALL.into_iter().filter(|state| state.may_send_motion() && *state != State::Stopping) {
+        let mut hall = told(state, Event::Trouble(DRIVE));
+        assert_eq!((hall.state(), hall.fault()), (State::Stopping, Some(DRIVE)), "from {state}");
+        hall.event(Event::AtRest, s(2));
+        assert_eq!((hall.state(), hall.cause()), (State::Fault, Cause::Trouble(DRIVE)));
+    }
+    for state in [State::Boot, State::Recovering, State::Parked, State::Homing, State::Armed] {
+        assert_eq!(told(state, Event::Trouble(Trouble::Planner)).state(), State::Fault, "from {state}");
+    }
+}
+
+#[test]
+fn stopped_goes_before_fault_and_keeps_it_known() {
+    let mut hall = told(State::Playing(Ride::Following), Event::Trouble(DRIVE));
+    hall.request(Request::Stop, s(2)).unwrap();
+    hall.event(Event::AtRest, s(2));
+    assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Request::Stop)));
+    assert_eq!(hall.fault(), Some(DRIVE));
+    assert_eq!(hall.request(Request::Clear, s(3)).unwrap_err().why, Why::StillWrong);
+    hall.event(Event::ErrorsGone, s(4));
+    hall.request(Request::Clear, s(5)).unwrap();
+    assert_eq!(hall.fault(), None);
+    assert_eq!(asked(State::Fault, Request::Stop).state(), State::Stopped);
+}
+
+#[test]
+fn the_first_thing_that_went_wrong_is_the_one_named() {
+    let mut hall = told(State::Parked, Event::Trouble(DRIVE));
+    hall.event(Event::Trouble(Trouble::Gate), s(2));
+    assert_eq!((hall.cause(), hall.since()), (Cause::Trouble(DRIVE), s(1)));
+}
+
+#[test]
+fn homing_and_parking_that_take_too_long_are_faults() {
+    let mut homing = hall(State::Homing);
+    homing.tick(s(65));
+    assert_eq!((homing.state(), homing.cause()), (State::Fault, Cause::Trouble(Trouble::HomingTime)));
+    let mut parking = hall(State::Parking);
+    parking.tick(s(120));
+    assert_eq!((parking.state(), parking.fault()), (State::Stopping, Some(Trouble::ParkingTime)));
+}
+
+#[test]
+fn the_policy_of_the_hall_only_leads_down() {
+    for state in riding() {
+        assert_eq!(told(state, Event::Policy(Demand::Pause, 0)).state(), State::Paused);
+        assert_eq!(told(state, Event::Policy(Demand::Park, 0)).state(), State::Parking);
+    }
+    assert_eq!(told(State::Paused, Event::Policy(Demand::Park, 5)).cause(), Cause::GroupOut(5));
+    for state in State::ALL.into_iter().filter(|state| !matches!(state, State::Playing(_) | State::Paused)) {
+        for demand in [Demand::Pause, Demand::Park] {
+            assert_eq!(told(state, Event::Policy(demand, 0)).state(), state);
+        }
+    }
+}
+
+#[test]
+fn parking_an_armed_hall_only_disarms_it() {
+    assert_eq!(asked(State::Armed, Request::Park).state(), State::Parked);
+}
+
+#[test]
+fn a_refusal_says_what_was_asked_in_which_state_why_not_and_what_to_do() {
+    let mut hall = hall(State::Stopped);
+    assert_eq!(
+        hall.request(Request::Arm, s(1)).unwrap_err().to_string(),
+        "cannot arm while stopped: it stays so until it is cleared; clear first"
+    );
+}

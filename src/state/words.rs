@@ -1,0 +1,254 @@
+//! Every word about states, causes, next actions and refusals, once: report, console and API take theirs from here.
+
+use std::fmt;
+
+use super::{Cause, Machine, Readiness, Request, Ride, State, Trouble, Why};
+
+impl State {
+    /// The state in one word, as every surface shows it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Boot => "boot",
+            Self::Recovering => "recovering",
+            Self::Parked => "parked",
+            Self::Homing => "homing",
+            Self::Armed => "armed",
+            Self::Playing(Ride::Joining) => "joining",
+            Self::Playing(Ride::Following) => "playing",
+            Self::Playing(Ride::Freewheeling) => "freewheeling",
+            Self::Paused => "paused",
+            Self::Stopping => "stopping",
+            Self::Stopped => "stopped",
+            Self::Parking => "parking",
+            Self::Fault => "fault",
+        }
+    }
+
+    /// What a person does next, where it hangs on the state alone.
+    const fn next(self) -> &'static str {
+        match self {
+            Self::Boot => "wait until every controller has answered",
+            Self::Recovering => "park, or home",
+            Self::Parked => "load a cue, then arm",
+            Self::Homing => "wait, and keep clear of the seats",
+            Self::Armed => "go, or disarm",
+            Self::Playing(Ride::Freewheeling) => "nothing; the seats join again by themselves",
+            Self::Playing(_) => "nothing; pause, park or stop as needed",
+            Self::Paused => "resume, or park",
+            Self::Stopping | Self::Parking => "wait until the seats are at rest",
+            Self::Stopped | Self::Fault => "clear, then park or home",
+        }
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+impl fmt::Display for Request {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Home => "home",
+            Self::Arm => "arm",
+            Self::Disarm => "disarm",
+            Self::Go => "go",
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Seek => "seek",
+            Self::Stop => "stop",
+            Self::Park => "park",
+            Self::Clear => "clear",
+        })
+    }
+}
+
+impl Machine {
+    /// What a person does next, in words.
+    #[must_use]
+    pub const fn next(&self) -> &'static str {
+        match (self.state(), self.cause()) {
+            (State::Stopped, _) if self.is_pressed() => "release the emergency stop, then clear",
+            (State::Stopped, Cause::StoppedHoming) => "wait until the seats stand still, then clear and home",
+            (State::Stopped | State::Fault, _) if self.has_errors() => {
+                "put the error right at the controller, then clear"
+            }
+            (State::Fault, Cause::Trouble(trouble)) => trouble.next(),
+            (State::Recovering, _) if !self.is_identified() => State::Boot.next(),
+            (State::Recovering, _) if !self.is_homed() => "home",
+            (State::Recovering, _) if !self.is_measured() => "wait until the positions are read, then park",
+            (State::Parked, _) => match self.readiness() {
+                Readiness::Ready if self.is_homed() => "arm",
+                Readiness::Ready => "keep clear of the seats and arm; they home first",
+                readiness => readiness.next(),
+            },
+            (state, _) => state.next(),
+        }
+    }
+}
+
+impl Trouble {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Controller { .. } => "a controller has an error",
+            Self::Drive { .. } => "a drive has an alarm",
+            Self::Gate => "the limits held motion back three times in a second",
+            Self::Planner => "a move could not be planned",
+            Self::Homing(_) => "a seat did not get home",
+            Self::HomingTime => "homing took too long",
+            Self::ParkingTime => "parking took too long",
+            Self::OtherMaster(_) => "another master sends frames to a controller",
+        }
+    }
+
+    const fn next(self) -> &'static str {
+        match self {
+            Self::Gate => "check the cue against the seats, then clear",
+            Self::Homing(_) | Self::HomingTime => "look at the seat, then clear and home again",
+            Self::OtherMaster(_) => "stop the other master, then clear",
+            Self::Controller { .. } | Self::Drive { .. } | Self::Planner | Self::ParkingTime => {
+                State::Fault.next()
+            }
+        }
+    }
+}
+
+impl Readiness {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::NoCue => "no cue is loaded",
+            Self::NotProved => "the cue is not proved for these seats",
+            Self::NotPreflighted => "preflight has not passed",
+            Self::Ready => "the cue is ready",
+        }
+    }
+
+    const fn next(self) -> &'static str {
+        match self {
+            Self::NoCue => "load a cue, then arm",
+            Self::NotProved => "check the cue against the seats, then arm",
+            Self::NotPreflighted => "run preflight, then arm",
+            Self::Ready => "arm",
+        }
+    }
+
+    pub(super) const fn against_arming(self) -> Option<Why> {
+        match self {
+            Self::NoCue => Some(Why::NoCue),
+            Self::NotProved => Some(Why::NotProved),
+            Self::NotPreflighted => Some(Why::NotPreflighted),
+            Self::Ready => None,
+        }
+    }
+}
+
+impl Cause {
+    /// The cause in words, without the name of whom it speaks of.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Started => "the program has started",
+            Self::Crashed => "the program ended without parking the last time",
+            Self::AwayFromPark => "a seat is not at its park pose",
+            Self::FoundParked => "all seats were found at their park poses",
+            Self::Asked(request) => asked(request),
+            Self::StoppedHoming => {
+                "stopped by the operator; the controllers finish their homing by themselves, which only the hard-wired \
+                 emergency stop can end"
+            }
+            Self::Homed => "the seats are home",
+            Self::ArrivedAtPark => "the seats have parked",
+            Self::ArmLapsed => "nobody started within ten minutes of arming",
+            Self::NotReady(readiness) => readiness.words(),
+            Self::Rebooted(_) => "a controller has rebooted; its position is unknown",
+            Self::GapOver => "the seats join after a gap",
+            Self::Joined => "the seats are on the cue",
+            Self::Late => "a frame came more than 50 ms late",
+            Self::CueEnded => "the cue is over",
+            Self::PausedTooLong => "the pause took more than five minutes",
+            Self::GroupOut(_) => "a group of seats is out",
+            Self::EmergencyStop(_) => "emergency stop",
+            Self::Trouble(trouble) => trouble.words(),
+            Self::Cleared => "cleared by the operator",
+        }
+    }
+}
+
+const fn asked(request: Request) -> &'static str {
+    match request {
+        Request::Home => "homed by the operator",
+        Request::Arm => "armed by the operator",
+        Request::Disarm => "disarmed by the operator",
+        Request::Go => "started by the operator",
+        Request::Pause => "paused by the operator",
+        Request::Resume => "resumed by the operator",
+        Request::Seek => "sent elsewhere in the cue by the operator",
+        Request::Stop => "stopped by the operator",
+        Request::Park => "parked by the operator",
+        Request::Clear => "cleared by the operator",
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.words())
+    }
+}
+
+impl Why {
+    /// What stands against the request.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::NotIdentified => "not every controller has said what it is",
+            Self::PositionsNotRead => "where the seats stand has not been read since they stopped",
+            Self::PositionUnknown => "a controller does not know its position",
+            Self::NoCue => Readiness::NoCue.words(),
+            Self::NotProved => Readiness::NotProved.words(),
+            Self::NotPreflighted => Readiness::NotPreflighted.words(),
+            Self::NotArmed => "the hall is not armed",
+            Self::PlaysAlready => "the cue plays already",
+            Self::PausedNow => "the cue is paused",
+            Self::Riding => "the cue is under way",
+            Self::NothingPlays => "nothing plays",
+            Self::HomingNow => "the seats are homing",
+            Self::ParkingNow => "the seats are on their way to park",
+            Self::StoppingNow => "the seats are coming to rest",
+            Self::Latched => "it stays so until it is cleared",
+            Self::SeatsAnywhere => "the seats may be anywhere",
+            Self::ArmedNow => "the hall is armed",
+            Self::StillPressed => "an emergency stop is still in effect",
+            Self::StillWrong => "a controller or a drive still has an error",
+            Self::NothingToClear => "there is nothing to clear",
+        }
+    }
+
+    /// What would have to be done first.
+    #[must_use]
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Self::NotIdentified => "wait until they answer, or take the missing one out of the configuration",
+            Self::PositionsNotRead => "wait until the controllers have answered",
+            Self::PositionUnknown => "home first, with nobody on the seats",
+            Self::NoCue => "load one",
+            Self::NotProved => "check it against the seats",
+            Self::NotPreflighted => "run it",
+            Self::NotArmed => "arm first",
+            Self::PlaysAlready => "use seek to go elsewhere in it",
+            Self::PausedNow => "resume, or park first",
+            Self::Riding => "park first",
+            Self::NothingPlays => "arm and go",
+            Self::HomingNow => "wait until they are home",
+            Self::ParkingNow => "wait until they are there",
+            Self::StoppingNow => "wait, then clear",
+            Self::Latched => "clear first",
+            Self::SeatsAnywhere => "park or home first",
+            Self::ArmedNow => "disarm first",
+            Self::StillPressed => "release it at its place",
+            Self::StillWrong => "put it right there",
+            Self::NothingToClear => "go on",
+        }
+    }
+}
