@@ -50,6 +50,7 @@ pub mod preflight;
 pub mod app;
 pub mod doctor;
 
+pub mod health;
 pub mod net;
 pub mod observe;
 pub mod tracker;

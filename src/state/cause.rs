@@ -27,7 +27,7 @@ pub enum Cause {
     /// What was armed is no longer what is loaded and proved.
     NotReady(Readiness),
     /// This controller has rebooted or was reset.
-    Rebooted(u16),
+    Rebooted(usize),
     /// A gap is over; the seats join.
     GapOver,
     /// The seats are on the cue.
@@ -39,9 +39,9 @@ pub enum Cause {
     /// A pause took more than five minutes.
     PausedTooLong,
     /// This group of seats is out, and the configuration says what the hall does then.
-    GroupOut(u16),
+    GroupOut(usize),
     /// An emergency stop at this controller.
-    EmergencyStop(u16),
+    EmergencyStop(usize),
     /// Something is wrong.
     Trouble(Trouble),
     /// A person cleared it.
@@ -54,14 +54,14 @@ pub enum Trouble {
     /// A controller has an error, or refuses frames (x = 3, 5).
     Controller {
         /// Which, counted from 0.
-        controller: u16,
+        controller: usize,
         /// Its error number; 0 where it gave none.
         error: u16,
     },
     /// A drive has an alarm.
     Drive {
         /// Its controller, counted from 0.
-        controller: u16,
+        controller: usize,
         /// Its error number.
         error: u16,
     },
@@ -70,22 +70,22 @@ pub enum Trouble {
     /// A move could not be planned.
     Planner,
     /// A controller did not get home.
-    Homing(u16),
+    Homing(usize),
     /// Homing took too long.
     HomingTime,
     /// Parking took too long.
     ParkingTime,
     /// Another master sends frames to this controller.
-    OtherMaster(u16),
+    OtherMaster(usize),
 }
 
 /// What a cause speaks of, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Whose {
     /// A controller.
-    Controller(u16),
+    Controller(usize),
     /// A group of seats.
-    Group(u16),
+    Group(usize),
 }
 
 impl Cause {

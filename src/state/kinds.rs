@@ -144,7 +144,7 @@ pub enum Event {
     /// The positions of all seats were read (again).
     PositionsRead,
     /// A controller has rebooted or was reset: its position is unknown until it is homed. Counted from 0.
-    Rebooted(u16),
+    Rebooted(usize),
     /// What is loaded and proved has changed.
     Readiness(Readiness),
     /// All seats are home.
@@ -162,9 +162,9 @@ pub enum Event {
     /// The seats are at their park poses.
     Parked,
     /// The configuration's policy, and the group of seats that it is for, counted from 0.
-    Policy(Demand, u16),
+    Policy(Demand, usize),
     /// An emergency stop is in effect at this controller, counted from 0.
-    EmergencyStop(u16),
+    EmergencyStop(usize),
     /// No controller reports an emergency stop any more.
     AllReleased,
     /// Something is wrong.

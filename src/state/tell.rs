@@ -58,7 +58,7 @@ impl Machine {
         }
     }
 
-    fn rebooted(&mut self, controller: u16, now: MonoTime) {
+    fn rebooted(&mut self, controller: usize, now: MonoTime) {
         self.facts.homed = false;
         if self.state == State::Armed {
             self.enter(State::Parked, Cause::Rebooted(controller), now);
@@ -90,7 +90,7 @@ impl Machine {
         self.enter(state, Cause::Homed, now);
     }
 
-    fn policy(&mut self, demand: Demand, group: u16, now: MonoTime) {
+    fn policy(&mut self, demand: Demand, group: usize, now: MonoTime) {
         match (demand, self.state) {
             (Demand::Pause, State::Playing(_)) => self.enter(State::Paused, Cause::GroupOut(group), now),
             (Demand::Park, State::Playing(_) | State::Paused) => {
@@ -101,7 +101,7 @@ impl Machine {
     }
 
     /// An emergency stop goes before a person's stop as a cause; the first controller that told of it is the one named.
-    fn emergency_stop(&mut self, controller: u16, now: MonoTime) {
+    fn emergency_stop(&mut self, controller: usize, now: MonoTime) {
         self.facts.pressed = true;
         if !matches!(self.stop, Some(Cause::EmergencyStop(_))) {
             self.stop = Some(Cause::EmergencyStop(controller));

@@ -36,10 +36,10 @@ fn event() -> impl Strategy<Value = Event> {
         4 => select(vec![AllReleased, ErrorsGone, Event::Readiness(Readiness::Ready)]),
         2 => any::<[bool; 3]>().prop_map(|[homed, at_park, crashed]| Identified(Finding { homed, at_park, crashed })),
         1 => Just(Identified(PARKED)),
-        1 => (0..3_u16).prop_map(Rebooted),
+        1 => (0..3_usize).prop_map(Rebooted),
         1 => select(readiness.to_vec()).prop_map(Event::Readiness),
-        1 => (select(vec![Demand::Pause, Demand::Park]), 0..3_u16).prop_map(|(demand, group)| Policy(demand, group)),
-        1 => (0..3_u16).prop_map(EmergencyStop),
+        1 => (select(vec![Demand::Pause, Demand::Park]), 0..3_usize).prop_map(|(demand, group)| Policy(demand, group)),
+        1 => (0..3_usize).prop_map(EmergencyStop),
         1 => trouble().prop_map(Event::Trouble),
     ]
 }

@@ -1,0 +1,134 @@
+//! From what is known of the members to the standing of their group, and to what the hall has to hear of it.
+
+use super::{Change, Demand, Health, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well};
+use crate::time::MonoTime;
+
+/// What the members of one group amount to: of each kind the first that there is.
+#[derive(Debug, Clone, Copy, Default)]
+struct Findings {
+    tripped: Option<Why>,
+    ailed: Option<Why>,
+    outcast: Option<Why>,
+    silent: Option<Why>,
+    poor: Option<Why>,
+    unseen: bool,
+}
+
+impl Health {
+    pub(super) fn judge(&mut self, group: usize, now: MonoTime, on: &mut dyn FnMut(Notice)) {
+        let findings = self.findings(group, now);
+        let place = &mut self.places[group];
+        if findings.poor.is_some() {
+            place.poor = now;
+        }
+        let before = *place;
+        let (standing, why) = before.after(findings, self.watched, now);
+        if standing == before.standing {
+            return;
+        }
+        (place.standing, place.why) = (standing, why);
+        self.settle(group, before.standing, standing);
+        on(Notice::Group(Change { group, at: now, from: before.standing, to: standing, why }));
+        if let (Standing::Excluded, Some(controller)) = (standing, why.controller()) {
+            on(Notice::Hall(state::Event::Rebooted(controller)));
+        }
+        let falls_out = before.standing.may_move() && !standing.may_move();
+        if let Some(demand) = self.demand(standing, why).filter(|_| falls_out) {
+            on(Notice::Hall(state::Event::Policy(demand, group)));
+        }
+    }
+
+    fn findings(&self, group: usize, now: MonoTime) -> Findings {
+        let mut found = Findings::default();
+        for controller in self.groups.members(group) {
+            let member = &self.members[controller];
+            let when = |is: bool, why: Why| is.then_some(why);
+            found.tripped = found.tripped.or(when(member.tripped, Why::EmergencyStop(controller)));
+            found.ailed = found.ailed.or(member.ailed);
+            found.outcast = found.outcast.or(member.outcast);
+            found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
+            found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
+            found.unseen |= !member.is_seen(now);
+        }
+        found
+    }
+
+    /// Makes the members of a group that stood so fit for a new standing.
+    fn settle(&mut self, group: usize, from: Standing, to: Standing) {
+        let well = matches!(to, Standing::Ok | Standing::Degraded | Standing::Unwatched);
+        for controller in self.groups.members(group).filter(|_| !well) {
+            let member = &mut self.members[controller];
+            member.forget();
+            // One that was homed while it was out is known, though it was not read since.
+            if from != Standing::Excluded {
+                member.distrust();
+            }
+        }
+    }
+
+    /// What the hall does when a group falls out. A drive with an alarm may hold its seat no more: then all park.
+    const fn demand(&self, standing: Standing, why: Why) -> Option<Demand> {
+        match (standing, why, self.policy) {
+            (Standing::Stopped, ..) => None,
+            (_, Why::Drive { .. }, _) | (.., LossPolicy::Park) => Some(Demand::Park),
+            (.., LossPolicy::Pause) => Some(Demand::Pause),
+            (.., LossPolicy::Continue) => None,
+        }
+    }
+
+    /// Tells the hall of a new emergency stop, and when the last one is released.
+    pub(super) fn tell_of_stops(&mut self, on: &mut dyn FnMut(Notice)) {
+        let mut pressed = false;
+        for (controller, member) in self.members.iter_mut().enumerate() {
+            pressed |= member.pressed;
+            if member.take_press() && !self.stop_told {
+                self.stop_told = true;
+                on(Notice::Hall(state::Event::EmergencyStop(controller)));
+            }
+        }
+        if self.stop_told && !pressed {
+            self.stop_told = false;
+            on(Notice::Hall(state::Event::AllReleased));
+        }
+        let ailing = self.members.iter().any(super::Member::ails);
+        if self.errors_told && !ailing {
+            on(Notice::Hall(state::Event::ErrorsGone));
+        }
+        self.errors_told = ailing;
+    }
+
+    pub(super) fn tell_of_reads(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {
+        for (controller, member) in self.members.iter_mut().enumerate() {
+            let standing = self.places[self.groups.group_of(controller)].standing;
+            let wanted = standing.is_looked_at() || (self.watched && member.wants_baseline());
+            if wanted && member.take_read(now) {
+                on(Notice::Read(controller));
+            }
+        }
+    }
+}
+
+impl Place {
+    fn after(self, found: Findings, watched: bool, now: MonoTime) -> (Standing, Why) {
+        let same = (self.standing, self.why);
+        if let Some(why) = found.tripped {
+            return (Standing::Stopped, why);
+        }
+        if let Some(why) = found.ailed {
+            return (Standing::Error, why);
+        }
+        match (self.standing, found) {
+            // Both last until somebody looks anew.
+            (Standing::Stopped | Standing::Error, _) => same,
+            (_, Findings { outcast: Some(why), .. }) => (Standing::Excluded, why),
+            (Standing::Excluded, _) => (Standing::Lost, Why::NotSeenYet),
+            (Standing::Lost, Findings { unseen: false, .. }) => (Standing::Rejoining, Why::SeenAgain),
+            (Standing::Lost | Standing::Unwatched, _) => same,
+            (_, Findings { silent: Some(why), .. }) if watched => (Standing::Lost, why),
+            (Standing::Rejoining, _) => same,
+            (_, Findings { poor: Some(why), .. }) => (Standing::Degraded, why),
+            (Standing::Degraded, _) if now.since(self.poor) < WELL_AFTER => same,
+            (Standing::Ok | Standing::Degraded, _) => well(watched),
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! What is known of one controller.
+
+use std::time::Duration;
+
+use super::Why;
+use super::proof::{Baseline, Sighting, Traffic, Verdict};
+use super::window::Window;
+use crate::motion::MAX_AXES;
+use crate::time::MonoTime;
+use crate::wire::FrameNo;
+
+/// A controller is lost when it was not heard for this long, and for ten frames that asked.
+const SILENCE: Duration = Duration::from_millis(250);
+const UNHEARD: u32 = 10;
+/// How long a sighting speaks for a controller whose group waits for the others.
+const SEEN_FOR: Duration = Duration::from_secs(1);
+/// Frames further apart belong to two streams, and what was unanswered of the first says nothing of the second.
+const APART: Duration = Duration::from_secs(2);
+/// From one read to the next: 5 Hz.
+const READ_EVERY: Duration = Duration::from_millis(200);
+
+#[derive(Debug, Clone)]
+pub(super) struct Member {
+    controller: usize,
+    window: Window,
+    interval: Duration,
+    /// Since when an ack is waited for, and how many frames have asked since.
+    waiting: Option<MonoTime>,
+    unheard: u32,
+    heard: MonoTime,
+    asked: MonoTime,
+    traffic: Traffic,
+    baseline: Option<Baseline>,
+    /// Its position is known from homing or preflight, so that the next sighting needs no proof.
+    trusted: bool,
+    /// When it was last seen as it was.
+    seen: Option<MonoTime>,
+    /// A read was sent that nothing came of yet.
+    reading: bool,
+    next_read: Option<MonoTime>,
+    /// It has to be homed, and why.
+    pub(super) outcast: Option<Why>,
+    /// An emergency stop is in effect.
+    pub(super) pressed: bool,
+    /// One was, since it was cleared.
+    pub(super) tripped: bool,
+    /// It began, and nobody was told yet.
+    press_untold: bool,
+    error: u16,
+    drives: [u16; MAX_AXES],
+    refusing: bool,
+    /// What went wrong first since it was cleared.
+    pub(super) ailed: Option<Why>,
+}
+
+impl Member {
+    pub(super) fn new(controller: usize, interval: Duration) -> Self {
+        Self {
+            controller,
+            window: Window::new(interval),
+            interval,
+            waiting: None,
+            unheard: 0,
+            heard: MonoTime::default(),
+            asked: MonoTime::default(),
+            traffic: Traffic::default(),
+            baseline: None,
+            trusted: true,
+            seen: None,
+            reading: false,
+            next_read: None,
+            outcast: None,
+            pressed: false,
+            tripped: false,
+            press_untold: false,
+            error: 0,
+            drives: [0; MAX_AXES],
+            refusing: false,
+            ailed: None,
+        }
+    }
+
+    pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
+        self.traffic.sent += 1;
+        if !asked {
+            return;
+        }
+        if at.since(self.asked) > APART.max(2 * self.interval) {
+            self.rest();
+        }
+        self.asked = at;
+        self.window.on_asked(frame, at);
+        self.unheard = self.unheard.saturating_add(1);
+        // After a time without frames, silence begins with the first of them.
+        let flows = at.since(self.heard) <= 2 * self.interval;
+        self.waiting.get_or_insert(if flows { self.heard } else { at });
+    }
+
+    pub(super) fn on_ack(&mut self, frame: FrameNo, at: MonoTime) {
+        let Some(alive) = self.window.on_ack(frame, at) else { return };
+        self.traffic.acked += 1;
+        if alive {
+            self.refusing = false;
+            self.on_life(at);
+        }
+    }
+
+    pub(super) fn on_life(&mut self, at: MonoTime) {
+        self.heard = self.heard.max(at);
+        self.waiting = None;
+        self.unheard = 0;
+    }
+
+    pub(super) fn on_read_sent(&mut self, datagrams: u32) {
+        self.traffic.sent += u64::from(datagrams);
+        self.reading = true;
+    }
+
+    /// A sighting that nobody asked for since the controller was lost is none.
+    pub(super) fn on_sighting(&mut self, sighting: &Sighting, at: MonoTime) {
+        if !std::mem::take(&mut self.reading) {
+            return;
+        }
+        self.on_error(sighting.error);
+        self.refusing &= sighting.error != 0;
+        if let Some(why) = self.against(sighting) {
+            self.outcast.get_or_insert(why);
+        } else {
+            self.baseline = Some(Baseline::of(sighting, self.traffic));
+            self.trusted = false;
+            self.seen = (sighting.error == 0).then_some(at);
+        }
+    }
+
+    fn against(&self, sighting: &Sighting) -> Option<Why> {
+        let controller = self.controller;
+        if !sighting.homed {
+            return Some(Why::NotHome(controller));
+        }
+        let verdict = match &self.baseline {
+            Some(baseline) => baseline.judge(sighting, self.traffic),
+            None if self.trusted => Verdict::Same,
+            None => Verdict::Unproved,
+        };
+        match verdict {
+            Verdict::Same => None,
+            Verdict::Other => Some(Why::Other(controller)),
+            Verdict::Rebooted => Some(Why::Rebooted(controller)),
+            Verdict::Unproved => Some(Why::Unproved(controller)),
+        }
+    }
+
+    pub(super) fn on_error(&mut self, error: u16) {
+        self.error = error;
+        if error != 0 {
+            self.ailed.get_or_insert(Why::Error { controller: self.controller, error });
+        }
+    }
+
+    pub(super) fn on_drive(&mut self, axis: usize, error: u16) {
+        let Some(known) = axis.checked_sub(1).and_then(|index| self.drives.get_mut(index)) else { return };
+        *known = error;
+        if error != 0 {
+            self.ailed.get_or_insert(Why::Drive { controller: self.controller, axis, error });
+        }
+    }
+
+    pub(super) fn on_refused(&mut self) {
+        self.refusing = true;
+        self.ailed.get_or_insert(Why::Refuses(self.controller));
+    }
+
+    pub(super) const fn on_emergency_stop(&mut self, pressed: bool) {
+        self.press_untold |= pressed && !self.pressed;
+        self.tripped |= pressed;
+        self.pressed = pressed;
+    }
+
+    /// Whether an emergency stop began since this was last asked.
+    pub(super) const fn take_press(&mut self) -> bool {
+        std::mem::replace(&mut self.press_untold, false)
+    }
+
+    /// It was homed: its position is known, and what it counts from here on is the new measure.
+    pub(super) const fn on_homed(&mut self) {
+        self.outcast = None;
+        self.baseline = None;
+        self.trusted = true;
+        self.seen = None;
+    }
+
+    /// Whether something is still wrong with it.
+    pub(super) fn ails(&self) -> bool {
+        self.error != 0 || self.refusing || self.drives.iter().any(|error| *error != 0)
+    }
+
+    /// What was latched is over, unless it goes on.
+    pub(super) fn clear(&mut self) {
+        // Whether it would still refuse frames, only the next frame can tell.
+        self.refusing = false;
+        self.tripped = self.pressed;
+        if !self.ails() {
+            self.ailed = None;
+        }
+    }
+
+    pub(super) fn tick(&mut self, now: MonoTime) {
+        self.window.tick(now);
+    }
+
+    pub(super) const fn is_poor(&self) -> bool {
+        self.window.is_poor()
+    }
+
+    pub(super) fn is_silent(&self, now: MonoTime) -> bool {
+        let limit = SILENCE.max(UNHEARD * self.interval);
+        self.unheard >= UNHEARD && self.waiting.is_some_and(|since| now.since(since) >= limit)
+    }
+
+    pub(super) fn is_seen(&self, now: MonoTime) -> bool {
+        self.seen.is_some_and(|at| now.since(at) <= SEEN_FOR)
+    }
+
+    /// Where it was never read, nothing can prove any more that it has not rebooted.
+    pub(super) const fn distrust(&mut self) {
+        self.trusted &= self.baseline.is_some();
+    }
+
+    /// Whatever was on its way, or was seen, does not count from here on.
+    pub(super) fn forget(&mut self) {
+        self.seen = None;
+        self.reading = false;
+        self.next_read = None;
+        self.rest();
+    }
+
+    /// Nothing is expected of it until the next frame that asks.
+    fn rest(&mut self) {
+        self.window.clear();
+        self.waiting = None;
+        self.unheard = 0;
+    }
+
+    /// Whether its packet counter has to be read, though all is well.
+    pub(super) fn wants_baseline(&self) -> bool {
+        self.baseline.map_or(self.trusted, |baseline| baseline.is_stale(self.traffic))
+    }
+
+    /// Whether it is time for a read; if so, the next one is due a while later.
+    pub(super) fn take_read(&mut self, now: MonoTime) -> bool {
+        let due = self.next_read.is_none_or(|next| now >= next);
+        if due {
+            self.next_read = Some(now + READ_EVERY);
+        }
+        due
+    }
+}

@@ -1,0 +1,176 @@
+//! How each motion group stands: told of frames, acks, reports and reads, it says who is degraded, lost, back, stopped,
+//! wrong or out, what the hall does about it, and whose registers are to be read. Ack thread; pure: told the time; its
+//! memory is made at the start.
+//!
+//! Life is an ack, the first one to a frame that asked and newer than any acked before, or a status report. Repeated,
+//! older and stray acks are none, nor is any ack once the group is lost: it comes back by registers that were asked for
+//! since, and by them alone.
+
+mod groups;
+mod judge;
+mod member;
+mod proof;
+mod standing;
+#[cfg(test)]
+mod tests;
+mod window;
+mod words;
+
+use std::time::Duration;
+
+pub use groups::Groups;
+pub use proof::{Identity, Sighting};
+pub use standing::{Change, Notice, Standing, Why};
+pub use words::ACKS_OFF;
+
+use crate::config::LossPolicy;
+use crate::observe;
+use crate::state::{self, Demand};
+use crate::time::MonoTime;
+use crate::wire::FrameNo;
+use member::Member;
+
+/// Acks have to come well for so long before a degraded group is well again.
+const WELL_AFTER: Duration = Duration::from_secs(1);
+
+/// The standing of all groups. Every method that takes a controller or a group panics if there is none of that number.
+#[derive(Debug, Clone)]
+pub struct Health {
+    groups: Groups,
+    members: Vec<Member>,
+    places: Vec<Place>,
+    policy: LossPolicy,
+    watched: bool,
+    /// The hall was told of an emergency stop, and not yet that it is over.
+    stop_told: bool,
+    /// The same for errors.
+    errors_told: bool,
+}
+
+/// Where one group stands.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    standing: Standing,
+    why: Why,
+    /// When acks were last missing.
+    poor: MonoTime,
+}
+
+impl Health {
+    /// Groups that all stand well, as after preflight. Each `ack_every`-th frame asks, one frame in each `period`; with
+    /// `ack_every` 0 they are unwatched.
+    #[must_use]
+    pub fn new(groups: Groups, policy: LossPolicy, ack_every: u32, period: Duration) -> Self {
+        let watched = ack_every > 0;
+        let interval = period * ack_every.max(1);
+        let members = (0..groups.controllers()).map(|controller| Member::new(controller, interval)).collect();
+        let (standing, why) = well(watched);
+        let place = Place { standing, why, poor: MonoTime::default() };
+        let places = vec![place; groups.len()];
+        Self { groups, members, places, policy, watched, stop_told: false, errors_told: false }
+    }
+
+    /// The groups.
+    #[must_use]
+    pub const fn groups(&self) -> &Groups {
+        &self.groups
+    }
+
+    /// How a group stands.
+    #[must_use]
+    pub fn standing(&self, group: usize) -> Standing {
+        self.places[group].standing
+    }
+
+    /// Why it stands so.
+    #[must_use]
+    pub fn why(&self, group: usize) -> Why {
+        self.places[group].why
+    }
+
+    /// A frame was handed to the kernel, taken or not; `asked` says whether it requests an ack. A frame left out is none
+    /// that could be acked. While the hall holds at a low rate, each frame should ask: a group is lost after ten that did.
+    pub fn on_sent(&mut self, controller: usize, frame: FrameNo, asked: bool, at: MonoTime) {
+        self.members[controller].on_sent(frame, asked, at);
+    }
+
+    /// An ack, x = 2, that the kernel received at `at`. To be told after the sending of its frame was.
+    pub fn on_ack(&mut self, controller: usize, frame: FrameNo, at: MonoTime) {
+        self.members[controller].on_ack(frame, at);
+    }
+
+    /// A refusal, x = 3 or 5, of an SMC controller.
+    pub fn on_refused(&mut self, controller: usize) {
+        self.members[controller].on_refused();
+    }
+
+    /// A status report of the controller itself.
+    pub fn on_status(&mut self, controller: usize, at: MonoTime) {
+        self.members[controller].on_life(at);
+    }
+
+    /// What the observer has noticed.
+    pub fn on_event(&mut self, event: &observe::Event) {
+        let member = &mut self.members[event.controller];
+        match event.what {
+            observe::What::EmergencyStop { .. } => member.on_emergency_stop(true),
+            observe::What::EmergencyStopOver => member.on_emergency_stop(false),
+            observe::What::Error(error) => member.on_error(error),
+            observe::What::ServoError { axis, error } => member.on_drive(axis, error),
+            observe::What::Report { .. } => {}
+        }
+    }
+
+    /// So many datagrams went out to read what a [`Sighting`] takes.
+    pub fn on_read_sent(&mut self, controller: usize, datagrams: u32) {
+        self.members[controller].on_read_sent(datagrams);
+    }
+
+    /// What was read; of no account where no read was sent since the group was lost.
+    pub fn on_sighting(&mut self, controller: usize, sighting: &Sighting, at: MonoTime) {
+        self.members[controller].on_sighting(sighting, at);
+    }
+
+    /// A controller is home; a person homes one only while the hall is paused or parked. Where that was all its group was
+    /// out for, the group is looked at next.
+    pub fn on_homed(&mut self, controller: usize) {
+        self.members[controller].on_homed();
+    }
+
+    /// All lanes of a group are on the cue, or at park: a group that rejoined is well.
+    pub fn on_joined(&mut self, group: usize) {
+        let place = &mut self.places[group];
+        if place.standing == Standing::Rejoining {
+            (place.standing, place.why) = well(self.watched);
+        }
+    }
+
+    /// A person has cleared the group, or the hall is about to be armed: what was latched and is over is forgotten, and
+    /// the group takes part again once it was seen as it was.
+    pub fn look_anew(&mut self, group: usize) {
+        for controller in self.groups.members(group) {
+            self.members[controller].clear();
+            self.members[controller].forget();
+        }
+        self.places[group].standing = Standing::Lost;
+        self.places[group].why = Why::NotSeenYet;
+    }
+
+    /// Judges all groups at `now`, an instant up to which all was told, and tells `on` what is new: for each group at most
+    /// one change and one demand, for each controller at most one read and one word of it.
+    pub fn tick(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {
+        for member in &mut self.members {
+            member.tick(now);
+        }
+        self.tell_of_stops(on);
+        for group in 0..self.places.len() {
+            self.judge(group, now, on);
+        }
+        self.tell_of_reads(now, on);
+    }
+}
+
+/// How a group stands with which all is well.
+const fn well(watched: bool) -> (Standing, Why) {
+    if watched { (Standing::Ok, Why::Acked) } else { (Standing::Unwatched, Why::AcksOff) }
+}

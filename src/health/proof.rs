@@ -1,0 +1,154 @@
+//! Whether a controller that is back is the one it was, and has not rebooted: its identity, and its count of datagrams.
+//!
+//! DP34 counts the datagrams that a controller received, round after 65,535. Since it was last read, it must have grown
+//! by at least the frames that were acked and at most by all that was sent; whether reads count is left open. A
+//! controller that rebooted began at 0 and hardly ever meets that.
+
+/// What was read of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sighting {
+    /// What it is; no more than compared.
+    pub identity: Identity,
+    /// Its error number; 0 for none.
+    pub error: u16,
+    /// DP34, the datagrams it received; none where it has no such register.
+    pub packets: Option<u16>,
+    /// Whether DPF0 says that it knows its zero.
+    pub homed: bool,
+}
+
+/// What a controller is, as far as registers tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Identity {
+    /// DPFF.
+    pub version: u16,
+    /// DPFE.
+    pub minor_version: u16,
+    /// PA00.
+    pub work_mode: u16,
+    /// PA02.
+    pub axes: u16,
+}
+
+/// Datagrams that may have been under way when the counter was read, either way.
+const UNDER_WAY: u64 = 64;
+/// With more datagrams than these in doubt the counter proves nothing.
+const PROVES: u64 = 1 << 15;
+/// With more than these in doubt it is time to read the counter again.
+const REFRESH: u64 = 1 << 13;
+
+/// Datagrams to one controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Traffic {
+    /// Handed to the kernel: frames and reads.
+    pub(super) sent: u64,
+    /// Frames that were acked, so that it has surely received them.
+    pub(super) acked: u64,
+}
+
+/// What was known when the counter was last read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Baseline {
+    identity: Identity,
+    packets: Option<u16>,
+    traffic: Traffic,
+}
+
+/// What a sighting says beside the baseline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verdict {
+    Same,
+    Other,
+    Rebooted,
+    Unproved,
+}
+
+impl Baseline {
+    pub(super) const fn of(sighting: &Sighting, traffic: Traffic) -> Self {
+        Self { identity: sighting.identity, packets: sighting.packets, traffic }
+    }
+
+    pub(super) fn judge(&self, sighting: &Sighting, traffic: Traffic) -> Verdict {
+        if sighting.identity != self.identity {
+            return Verdict::Other;
+        }
+        let (Some(then), Some(now)) = (self.packets, sighting.packets) else { return Verdict::Unproved };
+        let doubt = self.doubt(traffic) + 2 * UNDER_WAY;
+        if doubt > PROVES {
+            return Verdict::Unproved;
+        }
+        let acked = traffic.acked - self.traffic.acked;
+        let grown = u64::from(now).wrapping_sub(u64::from(then)).wrapping_sub(acked);
+        if grown.wrapping_add(UNDER_WAY) % (1 << 16) <= doubt { Verdict::Same } else { Verdict::Rebooted }
+    }
+
+    /// Whether the counter should be read again while all is well.
+    pub(super) const fn is_stale(&self, traffic: Traffic) -> bool {
+        self.packets.is_some() && self.doubt(traffic) > REFRESH
+    }
+
+    /// Datagrams that it may have received or not.
+    const fn doubt(&self, traffic: Traffic) -> u64 {
+        (traffic.sent - self.traffic.sent).saturating_sub(traffic.acked - self.traffic.acked)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const fn sighting(packets: u16) -> Sighting {
+        let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
+        Sighting { identity, error: 0, packets: Some(packets), homed: true }
+    }
+
+    fn after(packets: u16, sent: u64, acked: u64, now: u16) -> Verdict {
+        let before = Traffic { sent: 1_000, acked: 900 };
+        let baseline = Baseline::of(&sighting(packets), before);
+        baseline.judge(&sighting(now), Traffic { sent: 1_000 + sent, acked: 900 + acked })
+    }
+
+    #[test]
+    fn a_counter_that_began_anew_is_a_reboot() {
+        assert_eq!(after(40_000, 500, 470, 12), Verdict::Rebooted);
+        assert_eq!(after(40_000, 500, 470, 40_480), Verdict::Same);
+        assert_eq!(after(40_000, 500, 470, 41_000), Verdict::Rebooted, "more than was sent");
+    }
+
+    #[test]
+    fn a_counter_without_news_of_so_much_that_was_sent_proves_nothing() {
+        assert_eq!(after(0, 40_000, 100, 5_000), Verdict::Unproved);
+        let blind = Sighting { packets: None, ..sighting(0) };
+        assert_eq!(
+            Baseline::of(&blind, Traffic::default()).judge(&blind, Traffic::default()),
+            Verdict::Unproved
+        );
+    }
+
+    #[test]
+    fn another_work_mode_is_another_controller() {
+        let mut other = sighting(7);
+        other.identity.work_mode = 1;
+        assert_eq!(
+            Baseline::of(&sighting(7), Traffic::default()).judge(&other, Traffic::default()),
+            Verdict::Other
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        #[test]
+        fn a_counter_that_goes_on_is_believed_after_any_number_of_rounds(
+            packets: u16, acked in 0..10_000_000_u64, unanswered in 0..30_000_u64, received in 0.0..1.0_f64,
+        ) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a share")]
+            let received = (received * unanswered as f64) as u64;
+            let now = (u64::from(packets) + acked + received) % (1 << 16);
+            let verdict = after(packets, acked + unanswered, acked, u16::try_from(now).unwrap());
+            prop_assert_eq!(verdict, Verdict::Same);
+        }
+    }
+}

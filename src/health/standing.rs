@@ -1,0 +1,129 @@
+//! How a group of controllers stands, why, and what follows from it.
+
+use crate::state;
+use crate::time::MonoTime;
+
+/// How a motion group stands. One member's trouble is the whole group's: the seat is rigid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Standing {
+    /// All is well.
+    Ok,
+    /// Acks are missing; motion goes on.
+    Degraded,
+    /// Not heard for too long: three hold frames, then no motion.
+    Lost,
+    /// Found again as it was: it takes part from the next join on.
+    Rejoining,
+    /// An emergency stop; no frame at all. Latched.
+    Stopped,
+    /// A controller or a drive has an error; no motion. Latched.
+    Error,
+    /// Its position is unknown, or nobody can tell: no motion until it is homed.
+    Excluded,
+    /// Acks are off: nobody notices when it is lost.
+    Unwatched,
+}
+
+impl Standing {
+    /// Whether motion frames may go to it.
+    #[must_use]
+    pub const fn may_move(self) -> bool {
+        matches!(self, Self::Ok | Self::Degraded | Self::Rejoining | Self::Unwatched)
+    }
+
+    /// Whether its registers are to be read, to see when it is back or put right.
+    pub(super) const fn is_looked_at(self) -> bool {
+        matches!(self, Self::Lost | Self::Stopped | Self::Error)
+    }
+}
+
+/// Why a group stands as it does. Controllers are counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Why {
+    /// Acks come as they should.
+    Acked,
+    /// No acks are asked for.
+    AcksOff,
+    /// Acks of this controller are missing or late.
+    AcksMissing(usize),
+    /// No ack and no report came from this controller for too long.
+    Silent(usize),
+    /// Nobody has looked at it since it was cleared or homed.
+    NotSeenYet,
+    /// It was seen as it was before.
+    SeenAgain,
+    /// An emergency stop at this controller.
+    EmergencyStop(usize),
+    /// This controller has an error.
+    Error {
+        /// Which.
+        controller: usize,
+        /// The number.
+        error: u16,
+    },
+    /// A drive of this controller has an alarm.
+    Drive {
+        /// Which.
+        controller: usize,
+        /// Its axis, from 1.
+        axis: usize,
+        /// The number.
+        error: u16,
+    },
+    /// This controller refuses frames (x = 3, 5) and gives no error number.
+    Refuses(usize),
+    /// This controller has rebooted: its packet counter began anew.
+    Rebooted(usize),
+    /// This controller was reset: it is not home any more.
+    NotHome(usize),
+    /// Another controller, or another mode, is where this one was.
+    Other(usize),
+    /// Whether this controller has rebooted cannot be told.
+    Unproved(usize),
+}
+
+impl Why {
+    /// The controller it is about; none where that is the whole group.
+    #[must_use]
+    pub const fn controller(self) -> Option<usize> {
+        match self {
+            Self::AcksMissing(controller)
+            | Self::Silent(controller)
+            | Self::EmergencyStop(controller)
+            | Self::Error { controller, .. }
+            | Self::Drive { controller, .. }
+            | Self::Refuses(controller)
+            | Self::Rebooted(controller)
+            | Self::NotHome(controller)
+            | Self::Other(controller)
+            | Self::Unproved(controller) => Some(controller),
+            Self::Acked | Self::AcksOff | Self::NotSeenYet | Self::SeenAgain => None,
+        }
+    }
+}
+
+/// A group that stands otherwise than before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// Which, counted from 0.
+    pub group: usize,
+    /// When that was noticed.
+    pub at: MonoTime,
+    /// How it stood.
+    pub from: Standing,
+    /// How it stands.
+    pub to: Standing,
+    /// Why.
+    pub why: Why,
+}
+
+/// What comes of a look at all groups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Notice {
+    /// For the lanes, the report and the console: a group stands otherwise.
+    Group(Change),
+    /// For the state machine of the hall.
+    Hall(state::Event),
+    /// Identity, mode, error, packet counter and DPF0 of this controller are to be read.
+    Read(usize),
+}

@@ -1,0 +1,542 @@
+mod chance;
+
+use super::*;
+use crate::observe::What;
+use crate::state::Event;
+
+const TICK: Duration = Duration::from_millis(10);
+const IDENTITY: Identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
+
+/// Controllers that can be taken off the network, at 100 Hz, and what the health of their groups told.
+struct Hall {
+    health: Health,
+    now: MonoTime,
+    frame: u32,
+    /// How many datagrams each controller has received.
+    packets: Vec<u16>,
+    /// How late acks come; none where they do not.
+    ack_after: Vec<Option<Duration>>,
+    ack_every: u32,
+    notices: Vec<(MonoTime, Notice)>,
+    answers_reads: bool,
+}
+
+impl Hall {
+    /// Three groups: two controllers under one seat, and two seats of one controller each.
+    fn new(policy: LossPolicy) -> Self {
+        Self::asking(policy, 1, TICK)
+    }
+
+    fn asking(policy: LossPolicy, ack_every: u32, period: Duration) -> Self {
+        let groups = Groups::named(["A1", "A1", "A2", "A3"]);
+        let now = MonoTime::default() + Duration::from_secs(100);
+        let packets = vec![65_500, 9, 300, 7];
+        let mut hall = Self {
+            health: Health::new(groups, policy, ack_every, period),
+            now,
+            frame: 0,
+            packets,
+            ack_after: vec![Some(Duration::from_millis(1)); 4],
+            ack_every,
+            notices: Vec::new(),
+            answers_reads: true,
+        };
+        if ack_every > 0 {
+            hall.look();
+            assert_eq!(hall.reads(), [0, 1, 2, 3], "the counters are read once");
+            hall.notices.clear();
+        }
+        hall
+    }
+
+    fn look(&mut self) {
+        let now = self.now;
+        let mut new = Vec::new();
+        self.health.tick(now, &mut |notice| new.push(notice));
+        for notice in &new {
+            if let (Notice::Read(controller), true) = (*notice, self.answers_reads) {
+                self.read(controller);
+            }
+        }
+        self.notices.extend(new.into_iter().map(|notice| (now, notice)));
+    }
+
+    /// Sends the read, which comes through and is answered where acks do and are.
+    fn read(&mut self, controller: usize) {
+        self.health.on_read_sent(controller, 1);
+        if self.ack_after[controller].is_some() {
+            self.packets[controller] = self.packets[controller].wrapping_add(1);
+            let sighting = self.sighting(controller);
+            self.health.on_sighting(controller, &sighting, self.now);
+        }
+    }
+
+    fn sighting(&self, controller: usize) -> Sighting {
+        Sighting { identity: IDENTITY, error: 0, packets: Some(self.packets[controller]), homed: true }
+    }
+
+    fn tick(&mut self) {
+        self.tick_after(TICK);
+    }
+
+    fn tick_after(&mut self, period: Duration) {
+        self.now = self.now + period;
+        self.frame += 1;
+        let frame = FrameNo(self.frame);
+        for controller in 0..4 {
+            if !self.health.standing(self.health.groups().group_of(controller)).may_move() {
+                continue;
+            }
+            let asks = frame.asks(self.ack_every);
+            self.health.on_sent(controller, frame, asks, self.now);
+            let Some(after) = self.ack_after[controller] else { continue };
+            self.packets[controller] = self.packets[controller].wrapping_add(1);
+            if asks {
+                self.health.on_ack(controller, frame, self.now + after);
+            }
+        }
+        self.look();
+    }
+
+    fn run(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.tick();
+        }
+    }
+
+    fn silence(&mut self, controllers: &[usize]) {
+        controllers.iter().for_each(|&controller| self.ack_after[controller] = None);
+    }
+
+    fn standings(&self) -> [Standing; 3] {
+        [0, 1, 2].map(|group| self.health.standing(group))
+    }
+
+    fn reads(&self) -> Vec<usize> {
+        let read = |(_, notice): &(MonoTime, Notice)| match notice {
+            Notice::Read(controller) => Some(*controller),
+            _ => None,
+        };
+        self.notices.iter().filter_map(read).collect()
+    }
+
+    fn changes(&self) -> Vec<(Standing, Why)> {
+        let change = |(_, notice): &(MonoTime, Notice)| match notice {
+            Notice::Group(change) => Some((change.to, change.why)),
+            _ => None,
+        };
+        self.notices.iter().filter_map(change).collect()
+    }
+
+    fn told_hall(&self) -> Vec<Event> {
+        let event = |(_, notice): &(MonoTime, Notice)| match notice {
+            Notice::Hall(event) => Some(*event),
+            _ => None,
+        };
+        self.notices.iter().filter_map(event).collect()
+    }
+
+    fn observed(&mut self, controller: usize, what: What) {
+        self.health.on_event(&observe::Event { controller, at: self.now, what });
+    }
+
+    /// Takes controller 2 off the network until its group is lost.
+    fn with_lost() -> Self {
+        let mut hall = Self::new(LossPolicy::Continue);
+        hall.run(100);
+        hall.silence(&[2]);
+        hall.run(30);
+        assert_eq!(hall.standings(), [Standing::Ok, Standing::Lost, Standing::Ok]);
+        hall.notices.clear();
+        hall
+    }
+
+    /// Puts it back.
+    fn back(&mut self) {
+        self.ack_after[2] = Some(Duration::from_millis(1));
+    }
+}
+
+const ESTOP: What = What::EmergencyStop { cause: observe::Cause::Reply };
+
+#[test]
+fn a_hall_that_acks_stands_well_and_says_nothing() {
+    let mut hall = Hall::new(LossPolicy::Park);
+    hall.run(1_000);
+    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.notices, []);
+}
+
+#[test]
+fn five_missing_acks_in_a_row_degrade_and_a_good_second_makes_well() {
+    let mut hall = Hall::new(LossPolicy::Park);
+    hall.run(100);
+    hall.silence(&[2]);
+    hall.run(4);
+    hall.back();
+    hall.run(20);
+    assert_eq!(hall.standings(), [Standing::Ok; 3], "four in a row, and four in a hundred");
+    hall.silence(&[2]);
+    hall.run(5);
+    hall.back();
+    hall.run(11);
+    assert_eq!(hall.changes(), [(Standing::Degraded, Why::AcksMissing(2))]);
+    hall.run(98);
+    assert_eq!(hall.health.standing(1), Standing::Degraded);
+    hall.run(10);
+    assert_eq!(hall.changes()[1..], [(Standing::Ok, Why::Acked)]);
+    assert_eq!(hall.told_hall(), []);
+}
+
+#[test]
+fn more_than_one_ack_in_ten_missing_in_a_second_degrades() {
+    let standing = |one_in: u32| {
+        let mut hall = Hall::new(LossPolicy::Continue);
+        for tick in 0..300 {
+            hall.ack_after[3] = (tick % one_in != 0).then_some(Duration::from_millis(1));
+            hall.tick();
+        }
+        hall.health.standing(2)
+    };
+    assert_eq!((standing(11), standing(9)), (Standing::Ok, Standing::Degraded));
+}
+
+#[test]
+fn acks_that_come_after_more_than_100_ms_are_missing_and_still_a_sign_of_life() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.ack_after[3] = Some(Duration::from_millis(99));
+    hall.run(300);
+    assert_eq!(hall.health.standing(2), Standing::Ok);
+    hall.ack_after[3] = Some(Duration::from_millis(600));
+    hall.run(300);
+    assert_eq!(hall.health.standing(2), Standing::Degraded);
+}
+
+#[test]
+fn a_controller_is_lost_after_250_ms_of_silence_give_or_take_a_period() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    let last_ack = hall.now + Duration::from_millis(1);
+    hall.silence(&[3]);
+    hall.run(40);
+    let lost = hall.notices.iter().find_map(|(at, notice)| match notice {
+        Notice::Group(Change { to: Standing::Lost, why: Why::Silent(3), .. }) => Some(at.since(last_ack)),
+        _ => None,
+    });
+    let lost = lost.unwrap();
+    assert!(lost.abs_diff(Duration::from_millis(250)) <= TICK, "{lost:?}");
+}
+
+#[test]
+fn at_a_low_rate_a_controller_is_lost_after_ten_frames_that_asked() {
+    for (ack_every, period_ms, lost_after_ms) in [(1, 50, 500), (10, 10, 1_000), (4, 1, 250), (1, 1, 250)] {
+        let period = Duration::from_millis(period_ms);
+        let mut hall = Hall::asking(LossPolicy::Continue, ack_every, period);
+        let every = u64::from(ack_every);
+        (0..100 * every).for_each(|_| hall.tick_after(period));
+        hall.silence(&[2]);
+        let began = hall.now;
+        while hall.health.standing(1) != Standing::Lost {
+            hall.tick_after(period);
+            assert!(hall.now.since(began) < Duration::from_secs(5));
+        }
+        let (lost, slack) = (hall.now.since(began), u32::try_from(every).unwrap() * period + TICK);
+        let expected = Duration::from_millis(lost_after_ms);
+        assert!(lost.abs_diff(expected) <= slack, "{lost:?}, not {expected:?}");
+    }
+}
+
+#[test]
+fn hold_frames_at_ten_a_second_lose_nobody_by_their_slowness() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    (0..100).for_each(|_| hall.tick_after(Duration::from_millis(100)));
+    assert_eq!(hall.changes(), []);
+    hall.silence(&[2]);
+    (0..12).for_each(|_| hall.tick_after(Duration::from_millis(100)));
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn a_process_that_slept_loses_nobody_who_answers_when_it_wakes() {
+    let mut hall = Hall::new(LossPolicy::Park);
+    for gap_ms in [300, 1_500, 60_000] {
+        hall.run(100);
+        hall.tick_after(Duration::from_millis(gap_ms));
+    }
+    hall.run(100);
+    assert_eq!(hall.changes(), []);
+}
+
+#[test]
+fn a_status_report_is_a_sign_of_life() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.silence(&[3]);
+    for _ in 0..100 {
+        hall.tick();
+        hall.health.on_status(3, hall.now);
+    }
+    assert_eq!(hall.health.standing(2), Standing::Degraded);
+}
+
+#[test]
+fn one_controller_lost_is_its_whole_seat_lost_and_nobody_elses() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.silence(&[1]);
+    hall.run(40);
+    assert_eq!(hall.standings(), [Standing::Lost, Standing::Ok, Standing::Ok]);
+    assert_eq!(hall.health.why(0), Why::Silent(1));
+    let reads = hall.reads();
+    assert!(reads.contains(&0) && reads.contains(&1) && !reads.contains(&2), "{reads:?}");
+    hall.run(500);
+    assert_eq!(
+        hall.health.standing(0),
+        Standing::Lost,
+        "the other controller of the seat is seen all the while"
+    );
+}
+
+#[test]
+fn the_hall_does_what_its_configuration_says() {
+    for (policy, expected) in [
+        (LossPolicy::Continue, vec![]),
+        (LossPolicy::Pause, vec![Event::Policy(Demand::Pause, 1)]),
+        (LossPolicy::Park, vec![Event::Policy(Demand::Park, 1)]),
+    ] {
+        let mut hall = Hall::new(policy);
+        hall.run(100);
+        hall.silence(&[2]);
+        hall.run(200);
+        assert_eq!(hall.told_hall(), expected, "once");
+    }
+}
+
+#[test]
+fn lost_controllers_are_read_five_times_a_second() {
+    let mut hall = Hall::with_lost();
+    hall.run(1_000);
+    let reads = hall.reads();
+    assert!(reads.iter().all(|controller| *controller == 2));
+    assert!((49..=51).contains(&reads.len()), "{} in ten seconds", reads.len());
+}
+
+#[test]
+fn a_lost_controller_that_comes_back_as_it_was_rejoins() {
+    let mut hall = Hall::with_lost();
+    hall.back();
+    hall.run(21);
+    assert_eq!(hall.changes(), [(Standing::Rejoining, Why::SeenAgain)]);
+    hall.run(200);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining, "until it has joined");
+    hall.health.on_joined(1);
+    assert_eq!(hall.health.standing(1), Standing::Ok);
+    hall.silence(&[2]);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn a_controller_that_is_lost_again_while_it_rejoins_is_lost() {
+    let mut hall = Hall::with_lost();
+    hall.back();
+    hall.run(21);
+    hall.silence(&[2]);
+    hall.run(40);
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn a_controller_that_rebooted_is_out_until_it_was_homed_and_seen() {
+    let mut hall = Hall::with_lost();
+    hall.packets[2] = 40;
+    hall.back();
+    hall.run(21);
+    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Rebooted(2))]);
+    assert_eq!(hall.told_hall(), [Event::Rebooted(2)]);
+    hall.run(300);
+    assert_eq!(hall.health.standing(1), Standing::Excluded);
+    hall.health.look_anew(1);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Excluded, "clearing does not home");
+    hall.health.on_homed(2);
+    hall.run(2);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}
+
+#[test]
+fn a_controller_that_is_not_home_or_is_another_is_out() {
+    let changed: [(fn(&mut Sighting), Why); 3] = [
+        (|sighting| sighting.homed = false, Why::NotHome(2)),
+        (|sighting| sighting.identity.work_mode = 5, Why::Other(2)),
+        (|sighting| sighting.packets = None, Why::Unproved(2)),
+    ];
+    for (change, why) in changed {
+        let mut hall = Hall::with_lost();
+        let mut sighting = hall.sighting(2);
+        change(&mut sighting);
+        hall.health.on_read_sent(2, 1);
+        hall.health.on_sighting(2, &sighting, hall.now);
+        hall.look();
+        assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, why));
+    }
+}
+
+#[test]
+fn a_controller_that_was_never_read_before_it_was_lost_cannot_prove_that_it_did_not_reboot() {
+    let mut health =
+        Hall { health: Health::new(Groups::named(["A"; 4]), LossPolicy::Park, 1, TICK), ..Hall::with_lost() };
+    health.answers_reads = false;
+    health.run(100);
+    assert_eq!(health.health.standing(0), Standing::Lost);
+    health.answers_reads = true;
+    health.ack_after = vec![Some(TICK); 4];
+    health.run(30);
+    assert_eq!(health.health.standing(0), Standing::Excluded);
+    assert!(matches!(health.health.why(0), Why::Unproved(_)));
+}
+
+#[test]
+fn acks_and_reports_do_not_bring_a_lost_controller_back_nor_does_a_sighting_that_nobody_asked_for() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.answers_reads = false;
+    hall.silence(&[2]);
+    hall.run(40);
+    assert_eq!(hall.changes().pop(), Some((Standing::Lost, Why::Silent(2))));
+    hall.notices.clear();
+    for frame in 1..=hall.frame + 50 {
+        hall.health.on_ack(2, FrameNo(frame), hall.now);
+        hall.health.on_status(2, hall.now);
+    }
+    let sighting = hall.sighting(2);
+    hall.now = hall.now + TICK;
+    hall.health.on_sighting(2, &sighting, hall.now);
+    hall.look();
+    assert_eq!(hall.changes(), []);
+}
+
+#[test]
+fn an_emergency_stop_stops_its_group_at_once_and_the_hall_is_told_once() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(1, ESTOP);
+    hall.observed(2, ESTOP);
+    hall.look();
+    assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok]);
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(1)]);
+    hall.observed(1, What::EmergencyStopOver);
+    hall.look();
+    assert_eq!(hall.told_hall().len(), 1, "one is still pressed");
+    hall.observed(2, What::EmergencyStopOver);
+    hall.look();
+    assert_eq!(hall.told_hall()[1..], [Event::AllReleased]);
+    assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok], "latched");
+}
+
+#[test]
+fn an_emergency_stop_that_came_and_went_between_two_looks_is_told() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.observed(3, ESTOP);
+    hall.observed(3, What::EmergencyStopOver);
+    hall.look();
+    assert_eq!(hall.health.standing(2), Standing::Stopped);
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(3), Event::AllReleased]);
+}
+
+#[test]
+fn a_cleared_group_takes_part_only_after_it_was_seen_and_not_while_it_is_pressed() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(3, ESTOP);
+    hall.look();
+    hall.health.look_anew(2);
+    hall.run(1);
+    assert_eq!(hall.health.standing(2), Standing::Stopped, "pressed");
+    hall.observed(3, What::EmergencyStopOver);
+    hall.look();
+    hall.health.look_anew(2);
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Lost, Why::NotSeenYet));
+    hall.run(2);
+    assert_eq!(hall.health.standing(2), Standing::Rejoining);
+}
+
+#[test]
+fn a_power_cut_under_an_emergency_stop_is_a_reboot() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(2, ESTOP);
+    hall.look();
+    hall.packets[2] = 3;
+    hall.observed(2, What::EmergencyStopOver);
+    hall.run(30);
+    hall.health.look_anew(1);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Excluded);
+}
+
+#[test]
+fn an_error_stops_its_group_and_the_others_go_by_the_configuration() {
+    let mut hall = Hall::new(LossPolicy::Pause);
+    hall.run(100);
+    hall.observed(0, What::Error(21));
+    hall.look();
+    assert_eq!(hall.health.standing(0), Standing::Error);
+    assert_eq!(hall.health.why(0), Why::Error { controller: 0, error: 21 });
+    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Pause, 0)]);
+    hall.observed(0, What::Error(0));
+    hall.look();
+    assert_eq!((hall.health.standing(0), hall.told_hall()[1]), (Standing::Error, Event::ErrorsGone));
+    hall.health.look_anew(0);
+    hall.run(2);
+    assert_eq!(hall.health.standing(0), Standing::Rejoining);
+}
+
+#[test]
+fn a_drive_with_an_alarm_parks_whatever_the_configuration_says() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.observed(3, What::ServoError { axis: 2, error: 16 });
+    hall.look();
+    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Park, 2)]);
+    assert_eq!(hall.health.why(2).to_string(), "drive of axis 2: error 16");
+}
+
+#[test]
+fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(10);
+    hall.answers_reads = false;
+    hall.health.on_refused(2);
+    hall.look();
+    assert_eq!(hall.changes(), [(Standing::Error, Why::Refuses(2))]);
+    assert_eq!(hall.told_hall(), []);
+    hall.answers_reads = true;
+    hall.run(30);
+    assert_eq!((hall.health.standing(1), hall.told_hall()), (Standing::Error, vec![Event::ErrorsGone]));
+}
+
+#[test]
+fn with_acks_off_nobody_is_watched_but_emergency_stops_still_stop() {
+    let mut hall = Hall::asking(LossPolicy::Park, 0, TICK);
+    hall.silence(&[0, 1, 2, 3]);
+    hall.run(1_000);
+    assert_eq!((hall.standings(), hall.notices.len()), ([Standing::Unwatched; 3], 0));
+    hall.observed(3, ESTOP);
+    hall.look();
+    assert_eq!(hall.health.standing(2), Standing::Stopped);
+    assert!(ACKS_OFF.starts_with("acks are off"));
+}
+
+#[test]
+fn a_counter_is_read_again_before_too_many_frames_that_did_not_ask_make_it_prove_nothing() {
+    let period = Duration::from_millis(1);
+    let mut hall = Hall::asking(LossPolicy::Continue, 10, period);
+    (0..30_000).for_each(|_| hall.tick_after(period));
+    let reads = hall.reads().into_iter().filter(|controller| *controller == 2).count();
+    assert!((2..=4).contains(&reads), "{reads} in 30 s");
+    hall.silence(&[2]);
+    (0..400).for_each(|_| hall.tick_after(period));
+    hall.back();
+    (0..300).for_each(|_| hall.tick_after(period));
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}
