@@ -47,6 +47,7 @@ pub mod preflight;
 
 pub mod app;
 pub mod doctor;
+pub mod latency;
 
 pub mod net;
 pub mod observe;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use super::prepare::Preparation;
+use super::prepare::{Preparation, Prepared};
 use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
@@ -14,7 +14,7 @@ use super::sum_up::sum_up;
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::Show;
-use crate::fanout::Manner;
+use crate::fanout::{Lane, Manner};
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
 use crate::plan::PlanError;
@@ -47,6 +47,9 @@ pub enum PlayError {
     /// The frame port cannot be had.
     #[error(transparent)]
     Net(NetError),
+    /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
+    #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
+    Unsure(Vec<String>),
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
@@ -60,6 +63,8 @@ pub struct Play {
     config: Config,
     manner: Manner,
     staged: Staged,
+    /// Whether nothing may move.
+    holds: bool,
 }
 
 /// What came of a play.
@@ -83,7 +88,20 @@ impl Play {
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
         let staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
-        Ok(Self { config, manner, staged })
+        Ok(Self { config, manner, staged, holds: false })
+    }
+
+    /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin
+    /// unless every seat tells that it stands there, to a pulse.
+    ///
+    /// # Errors
+    /// [`PlayError::Plan`] where no course leads along the cue.
+    pub fn holding(config: Config, timeline: Timeline, show: Show, silent: bool) -> Result<Self, PlayError> {
+        // At level 0 the cue has no part in the pose.
+        let manner = Manner { level: 0.0, silent };
+        let mut staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        staged.lanes.iter_mut().for_each(Lane::hold);
+        Ok(Self { config, manner, staged, holds: true })
     }
 
     /// How long the first move onto the cue takes.
@@ -97,7 +115,8 @@ impl Play {
     /// Plays, on the calling thread, until the end or until `stop` is set.
     ///
     /// # Errors
-    /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads.
+    /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads,
+    /// [`PlayError::Unsure`] where a seat to be held may not stand where it should.
     ///
     /// # Panics
     /// Where one of its threads panicked.
@@ -111,7 +130,7 @@ impl Play {
         let MailEnds { sent, ticks, requests, answers, retired } = ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
-        let prepared = Preparation {
+        let mut preparation = Preparation {
             clock: &Monotonic,
             sender: &sender,
             acks: &mut acks,
@@ -119,8 +138,19 @@ impl Play {
             lanes: &mut self.staged.lanes,
             stop,
             live: &live,
+        };
+        let prepared = if self.holds {
+            let unsure = preparation.unsure();
+            if !unsure.is_empty() {
+                return Err(PlayError::Unsure(unsure));
+            }
+            Prepared::nothing(self.config.controllers.len())
+        } else {
+            preparation.run(!self.manner.silent)
+        };
+        if self.holds {
+            acks.tell(Arc::clone(&live));
         }
-        .run(!self.manner.silent);
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };

@@ -168,7 +168,7 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
 }
 
 /// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once.
-fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
+pub(super) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let interrupted = Arc::new(AtomicBool::new(false));
     let code = Exit::Interrupted as i32;
@@ -192,6 +192,11 @@ fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
     } else {
         print::tell(&format!("\n{}", played.report.text()));
     }
+    judge(played)
+}
+
+/// How the program ends after a play.
+pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
     let refused: Vec<&str> =
         played.report.controllers.iter().filter(|one| one.refused > 0).map(|one| one.name.as_str()).collect();
     if played.report.result == "fault" {

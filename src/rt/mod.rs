@@ -10,7 +10,7 @@ mod planning;
 mod spin;
 
 pub use acks::{Accounts, AckLoop};
-pub use live::{Live, Phase};
+pub use live::{Live, Phase, Times};
 pub use mail::{Answer, Mail, MailEnds, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
 pub use spin::Spinning;
