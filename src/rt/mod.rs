@@ -13,7 +13,7 @@ pub use acks::{Accounts, AckLoop};
 pub use live::{Live, Phase, Times};
 pub use mail::{Answer, Mail, MailEnds, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
-pub use spin::Spinning;
+pub use spin::{Spinning, Spun};
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
