@@ -11,6 +11,7 @@ mod common {
     pub(crate) mod stage;
 }
 mod senders {
+    pub(super) mod again;
     pub(super) mod bare;
     pub(super) mod children;
     pub(super) mod ours;
@@ -21,8 +22,11 @@ mod senders {
 
 use std::net::SocketAddrV4;
 
-use senders::children::{Peer, sender};
-use senders::outcome::{Kind, Outcome};
+use kinocue::sys::clock::Monotonic;
+use senders::again::sender;
+use senders::children::Peer;
+use senders::outcome::Outcome;
+use senders::table::Kind;
 use senders::{bare, ours, peer, table};
 
 /// How many controllers there are in turn, unless told otherwise.
@@ -33,7 +37,9 @@ fn main() {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match words[..] {
         ["peer", count] => peer::run(number(count)),
-        ["ours", seconds, ref to @ ..] => finish(&ours::run(number(seconds), &addresses(to))),
+        ["ours", seconds, ref to @ ..] => {
+            finish(&ours::run(&Monotonic, number(seconds), &addresses(to), false))
+        }
         ["bare", seconds, ref to @ ..] => finish(&bare::run(number(seconds), &addresses(to))),
         _ => compare(&words),
     }
@@ -65,7 +71,7 @@ fn compare(words: &[&str]) {
 /// Both senders, one after the other, every other round in the other order; ours first in the result.
 fn pair(round: usize, seconds: u32, peer: &Peer) -> [Outcome; 2] {
     let run = |kind: Kind| {
-        let outcome = sender(kind, seconds, &peer.addresses);
+        let outcome = sender(&[kind.name(), &seconds.to_string()], &peer.addresses);
         table::line(round, peer.addresses.len(), kind, &outcome);
         outcome
     };

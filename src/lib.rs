@@ -49,6 +49,7 @@ pub mod preflight;
 
 pub mod app;
 pub mod doctor;
+pub mod latency;
 
 pub mod health;
 pub mod net;

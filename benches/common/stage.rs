@@ -17,13 +17,14 @@ use kinocue::wire::Timing;
 /// Axes of the ride and of every controller.
 const AXES: u8 = 6;
 
-/// A ride 1,000 times a second to six axes at each of the addresses, and what has to be known of who is there.
-pub(crate) fn stage(timeline: Timeline, to: &[SocketAddrV4]) -> (Staged, Vec<Watched>) {
+/// A ride 1,000 times a second to six axes at each of the addresses, and what has to be known of who is there; `silent` asks
+/// for no replies.
+pub(crate) fn stage(timeline: Timeline, to: &[SocketAddrV4], silent: bool) -> (Staged, Vec<Watched>) {
     let tos: Vec<String> = to.iter().map(|address| format!("{address},axes={AXES}")).collect();
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
     let show =
         Show { rate: Rate::from_hz(1000.0), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
-    let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false });
+    let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent });
     let watched = config.controllers.iter().map(Watched::of).collect();
     (staged.expect("the ride is gentle"), watched)
 }

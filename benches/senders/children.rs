@@ -1,10 +1,10 @@
-//! This program again, as the controllers or as a sender.
+//! This program again, as the controllers.
 
 use std::io::{BufRead as _, BufReader};
 use std::net::SocketAddrV4;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
-use super::outcome::{Kind, Outcome};
+use super::again::again;
 
 /// A process of controllers.
 pub(crate) struct Peer {
@@ -35,20 +35,4 @@ impl Drop for Peer {
         drop(self.child.stdin.take());
         let _ = self.child.wait();
     }
-}
-
-/// Runs a sender to its end.
-pub(crate) fn sender(kind: Kind, seconds: u32, to: &[SocketAddrV4]) -> Outcome {
-    let output = again()
-        .args([kind.name(), &seconds.to_string()])
-        .args(to.iter().map(ToString::to_string))
-        .stderr(Stdio::inherit())
-        .output()
-        .expect("this program can be started again");
-    assert!(output.status.success(), "the {} sender failed: {}", kind.name(), output.status);
-    serde_json::from_slice(&output.stdout).expect("a sender ends with its outcome")
-}
-
-fn again() -> Command {
-    Command::new(std::env::current_exe().expect("the system tells this program's path"))
 }

@@ -13,7 +13,7 @@ use kinocue::net::{DrainGrid, Ports, Sender};
 use kinocue::rt::{Accounts, AckLoop, Conductor, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
 use kinocue::sys::clock::{Monotonic, thread_cpu_time};
 use kinocue::sys::realtime::{RealTime, normal_priority, request};
-use kinocue::time::Clock as _;
+use kinocue::time::Clock;
 use kinocue::tracker::histogram;
 
 use super::outcome::{Outcome, Quantiles, each};
@@ -32,40 +32,31 @@ struct Run {
     granted: RealTime,
 }
 
-/// Plays a ride of that many seconds.
-pub(crate) fn run(seconds: u32, to: &[SocketAddrV4]) -> Outcome {
-    let (staged, watched) = stage(ride(seconds, 0.0), to);
+/// Plays a ride of that many seconds on that clock; `silent` asks for no replies.
+pub(crate) fn run(clock: &impl Clock, seconds: u32, to: &[SocketAddrV4], silent: bool) -> Outcome {
+    let (staged, watched) = stage(ride(seconds, 0.0), to, silent);
     let rate = staged.show.rate;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
     let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
     let MailEnds { sent, ticks, requests, answers, retired, .. } = ends;
-    let acks = AckLoop::new(receiver, watched, 1, sent, ticks);
+    let acks = AckLoop::new(receiver, watched, u32::from(!silent), sent, ticks);
     let desk = staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let plans = PlanLoop { planner, timeline, requests, answers, retired };
     let origin = Monotonic.now() + RUN_UP;
     let conductor = Conductor::of_a_play(origin, false);
     let grid = TickGrid::new(origin, rate);
-    let drains = DrainGrid::new(origin, rate.period());
+    let drains = if silent { DrainGrid::rare } else { DrainGrid::new }(origin, rate.period());
     let never = AtomicBool::new(false);
-    let tick_loop = TickLoop {
-        clock: &Monotonic,
-        grid,
-        engine,
-        conductor,
-        lanes,
-        sink: sender,
-        mail,
-        desk: &desk,
-        leave: &never,
-    };
+    let tick_loop =
+        TickLoop { clock, grid, engine, conductor, lanes, sink: sender, mail, desk: &desk, leave: &never };
     outcome(to.len(), run_threads(tick_loop, acks, plans, drains))
 }
 
 /// The calling thread becomes the tick thread, once the others have been started.
-fn run_threads(
-    mut tick_loop: TickLoop<'_, Monotonic, Sender>,
+fn run_threads<C: Clock>(
+    mut tick_loop: TickLoop<'_, C, Sender>,
     acks: AckLoop,
     mut plans: PlanLoop,
     drains: DrainGrid,

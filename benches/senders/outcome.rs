@@ -5,24 +5,6 @@ use std::time::Duration;
 use kinocue::tracker::Histogram;
 use serde::{Deserialize, Serialize};
 
-/// Which sender.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// kinocue's engine, lanes, sockets and tick loop.
-    Ours,
-    /// The same loop without kinocue.
-    Bare,
-}
-
-impl Kind {
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Ours => "ours",
-            Self::Bare => "bare",
-        }
-    }
-}
-
 /// The figures of one sender in one round.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Outcome {

@@ -1,6 +1,6 @@
 //! What is printed: a line for each sender of each round, then ours against bare.
 
-use super::outcome::{Kind, Outcome, Quantiles};
+use super::outcome::{Outcome, Quantiles};
 use crate::common::spread::{Spread, verdict};
 
 /// Ours over bare, at most: for the 99th percentiles, and for the sending thread's processor time a datagram.
@@ -8,6 +8,24 @@ const P99_GOAL: f64 = 1.5;
 const SEND_GOAL: f64 = 1.3;
 /// The number of controllers for which the latter is a goal.
 const SEND_GOAL_AT: usize = 64;
+
+/// Which sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// kinocue's engine, lanes, sockets and tick loop.
+    Ours,
+    /// The same loop without kinocue.
+    Bare,
+}
+
+impl Kind {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Ours => "ours",
+            Self::Bare => "bare",
+        }
+    }
+}
 
 /// Opens the table of rounds.
 pub(crate) fn heading(rounds: usize, seconds: u32) {

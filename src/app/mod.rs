@@ -8,5 +8,7 @@ mod staged;
 mod sum_up;
 
 pub use play::{Control, Play, PlayError, Played, Reins};
-pub use report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
+pub use report::{
+    ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, SpinReport, StateReport,
+};
 pub use staged::Staged;

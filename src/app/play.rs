@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use super::prepare::Preparation;
+use super::prepare::{Preparation, Prepared};
 use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
@@ -16,7 +16,7 @@ use rtrb::{Consumer, Producer};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::Show;
-use crate::fanout::Manner;
+use crate::fanout::{Lane, Manner};
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
 use crate::plan::PlanError;
@@ -49,6 +49,9 @@ pub enum PlayError {
     /// The frame port cannot be had.
     #[error(transparent)]
     Net(NetError),
+    /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
+    #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
+    Unsure(Vec<String>),
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
@@ -65,6 +68,8 @@ pub struct Play {
     mail: Mail,
     ends: MailEnds,
     control: Control,
+    /// Whether nothing may move.
+    holds: bool,
 }
 
 /// What a play is led and watched by while it runs.
@@ -108,10 +113,27 @@ impl Play {
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
         let staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        Ok(Self::of(config, staged, manner))
+    }
+
+    /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin
+    /// unless every seat tells that it stands there, to a pulse.
+    ///
+    /// # Errors
+    /// [`PlayError::Plan`] where no course leads along the cue.
+    pub fn holding(config: Config, timeline: Timeline, show: Show, silent: bool) -> Result<Self, PlayError> {
+        // At level 0 the cue has no part in the pose.
+        let manner = Manner { level: 0.0, silent };
+        let mut staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        staged.lanes.iter_mut().for_each(Lane::hold);
+        Ok(Self { holds: true, ..Self::of(config, staged, manner) })
+    }
+
+    fn of(config: Config, staged: Staged, manner: Manner) -> Self {
         let live = Arc::new(Live::default());
         let (mail, ends) = mailboxes(staged.lanes.len(), staged.show.rate, Arc::clone(&live));
         let control = Control { desk: Arc::new(staged.desk()), live, leave: Arc::default() };
-        Ok(Self { config, manner, staged, mail, ends, control })
+        Self { config, manner, staged, mail, ends, control, holds: false }
     }
 
     /// What it is led and watched by.
@@ -132,7 +154,8 @@ impl Play {
     /// is led with, and says whether it will do so; unattended, a play ends with a stop or a fault.
     ///
     /// # Errors
-    /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads.
+    /// [`PlayError::Net`] where the frame port cannot be had, [`PlayError::Thread`] where there are too many threads,
+    /// [`PlayError::Unsure`] where a seat to be held may not stand where it should.
     ///
     /// # Panics
     /// Where one of its threads panicked.
@@ -146,7 +169,7 @@ impl Play {
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
-        let prepared = Preparation {
+        let mut preparation = Preparation {
             clock: &Monotonic,
             sender: &sender,
             acks: &mut acks,
@@ -154,8 +177,19 @@ impl Play {
             lanes: &mut self.staged.lanes,
             stop: leave,
             live,
+        };
+        let prepared = if self.holds {
+            let unsure = preparation.unsure();
+            if !unsure.is_empty() {
+                return Err(PlayError::Unsure(unsure));
+            }
+            Prepared::nothing(self.config.controllers.len())
+        } else {
+            preparation.run(!self.manner.silent)
+        };
+        if self.holds {
+            acks.tell(Arc::clone(live));
         }
-        .run(!self.manner.silent);
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };

@@ -30,6 +30,13 @@ pub(super) struct Prepared {
     pub(super) hurried: Vec<usize>,
 }
 
+impl Prepared {
+    /// Nothing done for so many controllers.
+    pub(super) fn nothing(controllers: usize) -> Self {
+        Self { homing: vec![0; controllers], hurried: Vec::new() }
+    }
+}
+
 /// Everything that preparing needs.
 pub(super) struct Preparation<'a, C> {
     pub(super) clock: &'a C,
@@ -49,14 +56,8 @@ type Told = [Option<Pulses>; MAX_AXES];
 impl<C: Clock> Preparation<'_, C> {
     /// Brings every seat to its park pose, as far as it can be known.
     pub(super) fn run(&mut self, ask: bool) -> Prepared {
-        let told = if ask { self.read_positions() } else { vec![Told::default(); self.lanes.len()] };
-        for (lane, told) in told.iter().enumerate().filter(|(_, told)| told[0].is_some()) {
-            let known = told.iter().take_while(|place| place.is_some()).count();
-            let positions = PerAxis::from_fn(known, |axis| told[axis].unwrap_or_default());
-            self.acks.on_positions(lane, positions, self.clock.now());
-        }
-        let count = self.lanes.len();
-        let mut prepared = Prepared { homing: vec![0; count], hurried: Vec::new() };
+        let told = if ask { self.ask() } else { vec![Told::default(); self.lanes.len()] };
+        let mut prepared = Prepared::nothing(self.lanes.len());
         if self.stopped() {
             return prepared;
         }
@@ -74,6 +75,24 @@ impl<C: Clock> Preparation<'_, C> {
             self.wait_until(arrival, &mut |_, _| false, &mut || false);
         }
         prepared
+    }
+
+    /// Moves nothing; the names of the controllers whose seat does not tell that it stands at its park pose.
+    pub(super) fn unsure(&mut self) -> Vec<String> {
+        let told = self.ask();
+        let unsure = told.iter().enumerate().filter(|(lane, told)| !self.is_parked(*lane, told));
+        unsure.map(|(lane, _)| self.controllers[lane].name.clone()).collect()
+    }
+
+    /// Reads where the seats stand, for the report as well.
+    fn ask(&mut self) -> Vec<Told> {
+        let told = self.read_positions();
+        for (lane, told) in told.iter().enumerate().filter(|(_, told)| told[0].is_some()) {
+            let known = told.iter().take_while(|place| place.is_some()).count();
+            let positions = PerAxis::from_fn(known, |axis| told[axis].unwrap_or_default());
+            self.acks.on_positions(lane, positions, self.clock.now());
+        }
+        told
     }
 
     fn read_positions(&mut self) -> Vec<Told> {

@@ -1,12 +1,14 @@
 //! The report of a play: the same figures as an object for programs and as a table for people.
 
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use comfy_table::{CellAlignment, Table, presets};
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
 use crate::observe::ControllerState;
+use crate::rt::Spun;
 use crate::sys::realtime::RealTime;
 use crate::time::MonoTime;
 
@@ -120,7 +122,7 @@ impl LatencyReport {
 }
 
 /// What the system granted, as read back from it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RealTimeReport {
     /// Scheduling policy of the tick thread: `fifo`, `other` …
     pub policy: String,
@@ -128,15 +130,42 @@ pub struct RealTimeReport {
     pub priority: u8,
     /// Whether memory is locked.
     pub memory_locked: bool,
+    /// How long the tick thread spun before each deadline.
+    pub spin_us: SpinReport,
 }
 
-impl From<&RealTime> for RealTimeReport {
-    fn from(granted: &RealTime) -> Self {
+/// How long a play spun before each deadline, µs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpinReport {
+    /// What was asked for.
+    pub asked: f64,
+    /// What was in effect, so that spin and work together stay under 90 % of the period: the mean of all ticks.
+    pub in_effect: f64,
+}
+
+impl RealTimeReport {
+    /// What the system granted, and how long was spun.
+    #[must_use]
+    pub fn of(granted: &RealTime, spun: Spun) -> Self {
+        let us = |span: Duration| (span.as_secs_f64() * 1e7).round() / 10.0;
         Self {
             policy: granted.policy.to_string(),
             priority: granted.priority,
             memory_locked: granted.memory_locked,
+            spin_us: SpinReport { asked: us(spun.asked), in_effect: us(spun.granted) },
         }
+    }
+
+    fn text(&self) -> String {
+        let Self { policy, priority, memory_locked, spin_us } = self;
+        let locked = if *memory_locked { "locked" } else { "not locked" };
+        let SpinReport { asked, in_effect } = spin_us;
+        let spin = if *asked > 0.0 {
+            format!("spin {in_effect} of {asked} µs asked")
+        } else {
+            "no spin".to_owned()
+        };
+        format!("policy {policy}, priority {priority}, memory {locked}, {spin}")
     }
 }
 
@@ -181,7 +210,6 @@ impl Report {
     pub fn text(&self) -> String {
         let mut text = String::new();
         let late = &self.lateness_us;
-        let locked = if self.realtime.memory_locked { "locked" } else { "not locked" };
         let lines = [
             ("result", format!("{} ({})", self.result, self.cue)),
             ("ticks", format!("{} at {} Hz, {} missed", self.ticks, self.rate_hz, self.missed_ticks)),
@@ -195,13 +223,7 @@ impl Report {
                     shown(late.max)
                 ),
             ),
-            (
-                "real time",
-                format!(
-                    "policy {}, priority {}, memory {locked}",
-                    self.realtime.policy, self.realtime.priority
-                ),
-            ),
+            ("real time", self.realtime.text()),
             ("strangers", format!("{} datagrams", self.strangers)),
         ];
         for (name, value) in lines {

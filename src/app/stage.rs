@@ -10,7 +10,7 @@ use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
 use crate::plan::PlanError;
-use crate::rt::{Accounts, AckLoop, Conductor, Ended, Mail, PlanLoop, Spinning, TickLoop};
+use crate::rt::{Accounts, AckLoop, Conductor, Ended, Mail, PlanLoop, Spinning, Spun, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime};
@@ -36,6 +36,7 @@ pub(super) struct Run {
     pub(super) ended: Ended,
     pub(super) accounts: Accounts,
     pub(super) granted: RealTime,
+    pub(super) spun: Spun,
     pub(super) refusals: Vec<PlanError>,
     /// The instant of tick 0.
     pub(super) origin: MonoTime,
@@ -96,7 +97,7 @@ impl Stage {
             let mut accounts = ack_thread.join().expect("the ack thread does not panic");
             let closed_at = Monotonic.now();
             accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-            Ok(Run { ended, accounts, granted, refusals, origin, closed_at })
+            Ok(Run { ended, accounts, granted, spun: clock.spun(), refusals, origin, closed_at })
         })
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn sum_up(
         missed_ticks: run.ended.missed,
         rate_hz: show.rate.hz(),
         lateness_us: LatencyReport::of(&run.accounts.lateness),
-        realtime: RealTimeReport::from(&run.granted),
+        realtime: RealTimeReport::of(&run.granted, run.spun),
         strangers: run.accounts.strangers,
         controllers: (0..controllers.len())
             .map(|index| entry(index, &controllers[index], prepared, run))

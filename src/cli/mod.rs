@@ -15,6 +15,7 @@ mod exit;
 mod figures;
 mod home;
 mod info;
+mod latency;
 mod load;
 mod play;
 mod preflight;
@@ -49,6 +50,7 @@ enum Command {
     Register(register::Args),
     Home(home::Args),
     Doctor(doctor::Args),
+    Latency(latency::Args),
     Completions(completions::Args),
 }
 
@@ -85,6 +87,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Register(args) => register::run(&args),
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Latency(args) => latency::run(&args),
         Command::Completions(args) => completions::run(&args),
     }
 }

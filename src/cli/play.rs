@@ -167,7 +167,7 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
 }
 
 /// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once.
-fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<()> {
+pub(super) fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<()> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let code = Exit::Interrupted as i32;
     signal_hook::flag::register_conditional_shutdown(SIGINT, code, Arc::clone(&interrupted))?;
@@ -190,6 +190,11 @@ fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
     } else {
         print::tell(&format!("\n{}", played.report.text()));
     }
+    judge(played)
+}
+
+/// How the program ends after a play.
+pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
     let refused: Vec<&str> =
         played.report.controllers.iter().filter(|one| one.refused > 0).map(|one| one.name.as_str()).collect();
     if played.report.result == "fault" {

@@ -7,6 +7,7 @@
 //!        change: may it be written?   settings: a file, compared  +--> Answer, Fault          in words
 //!                                     home: reset, and wait
 //!                                     survey: all that preflight judges
+//!                                     stand: whether a seat may be held where it is
 //! ```
 //!
 //! Everything but [`Talk`] is told the time and touches neither socket nor clock. What a register is stands in one
@@ -20,6 +21,7 @@ pub mod home;
 mod request;
 mod select;
 pub mod settings;
+pub mod stand;
 pub mod survey;
 mod table;
 mod talk;

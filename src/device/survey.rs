@@ -255,7 +255,7 @@ fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
 }
 
 /// The registers of a read, and what they hold.
-fn told(request: &Request, answer: &Answer) -> impl Iterator<Item = (Address, u16)> {
+pub(super) fn told(request: &Request, answer: &Answer) -> impl Iterator<Item = (Address, u16)> {
     let first = request.first();
     let addresses = (0..).map_while(move |step| first.after(step));
     addresses.zip(answer.words.clone())

@@ -104,6 +104,13 @@ impl Lane {
         written
     }
 
+    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration and effects off.
+    pub fn hold(&mut self) {
+        self.window.hold();
+        self.vibrates = false;
+        self.wiring = Wiring::default();
+    }
+
     /// The lane with the number of its next frame.
     #[must_use]
     pub fn starting_at(self, next_frame: FrameNo) -> Self {

@@ -44,6 +44,8 @@ pub struct Slot {
     pub stroke_mm: f64,
     /// What the axis may do.
     pub limits: Limits,
+    /// Between which fractions of the stroke it may be sent, the lower first: the whole stroke, unless it is held.
+    reach: (f64, f64),
 }
 
 impl Slot {
@@ -59,6 +61,7 @@ impl Slot {
             stroke_pulses: seat.stroke_pulses(),
             stroke_mm: seat.stroke_mm,
             limits: Limits::of(seat),
+            reach: (0.0, 1.0),
         }
     }
 
@@ -77,11 +80,12 @@ impl Slot {
         placed.clamp(0.0, 1.0)
     }
 
-    /// Where the motor stands at `fraction` of the stroke, held inside it: nearest pulse, ties away from zero.
+    /// Where the motor is sent for `fraction` of the stroke, held inside it, or where the slot is held: nearest pulse,
+    /// ties away from zero.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32, checked with the seat type")]
     pub fn pulses(&self, fraction: f64) -> Pulses {
-        Pulses((fraction.clamp(0.0, 1.0) * self.stroke_pulses).round() as i32)
+        Pulses((fraction.clamp(self.reach.0, self.reach.1) * self.stroke_pulses).round() as i32)
     }
 }
 
@@ -130,6 +134,14 @@ impl Window {
         self.slots.iter().enumerate().filter(|(_, slot)| slot.axis.is_some())
     }
 
+    /// Holds every slot at its park pose: whatever it is asked for from now on, it is sent there and nowhere else.
+    pub fn hold(&mut self) {
+        for slot in &mut self.slots {
+            let park = slot.park.clamp(0.0, 1.0);
+            slot.reach = (park, park);
+        }
+    }
+
     /// The cue's pose as fractions of each slot's stroke, held inside it; slots without an axis rest at park.
     #[must_use]
     pub fn place(&self, cue: &Pose) -> Pose {
@@ -165,6 +177,17 @@ mod tests {
         assert!((slot.place(0.4) - 0.4).abs() < 1e-12);
         assert!((slot.place(1.0) - 0.7).abs() < 1e-12);
         assert!((slot.place(0.0) - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_window_that_is_held_sends_its_park_pose_whatever_it_is_asked_for() {
+        let seat = SeatType { park: [0.25; MAX_AXES], ..SeatType::bench3(1) };
+        let mut window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
+        assert_eq!(window.slots()[0].pulses(0.5), Pulses(150_000));
+        window.hold();
+        for asked in [f64::NEG_INFINITY, 0.0, 0.5, 1.0, 7.0] {
+            assert_eq!(window.slots()[0].pulses(asked), Pulses(75_000), "{asked}");
+        }
     }
 
     #[test]

@@ -1,15 +1,21 @@
 //! The ack thread: drains replies by a timer, never woken by one, and keeps the books of every frame.
 
+use std::sync::Arc;
+use std::time::Duration;
+
 use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
-use super::{Sent, TickReport};
+use super::{Live, Sent, TickReport};
 use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Reply, Tracker, histogram};
 use crate::wire::{FrameNo, MotionReply, PerAxis};
+
+/// How often the times so far are told to whoever looks.
+const TELL: Duration = Duration::from_millis(100);
 
 /// Everything that was counted.
 #[derive(Debug)]
@@ -55,6 +61,8 @@ pub struct AckLoop {
     ticks: Consumer<TickReport>,
     /// The newest instant at which a frame was sent.
     last_sent: MonoTime,
+    /// Whom to tell the times so far.
+    live: Option<Arc<Live>>,
 }
 
 impl AckLoop {
@@ -68,27 +76,45 @@ impl AckLoop {
         ticks: Consumer<TickReport>,
     ) -> Self {
         let accounts = Accounts::new(watched, ack_every);
-        Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default() }
+        Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default(), live: None }
+    }
+
+    /// Tells `live` the times so far, again and again while it runs.
+    pub fn tell(&mut self, live: Arc<Live>) {
+        self.live = Some(live);
     }
 
     /// Drains until `done` says that no more frames come and the last of them has had its second; the accounts are still
     /// open then.
     pub fn run(mut self, clock: &impl Clock, drains: DrainGrid, done: impl Fn() -> bool) -> Accounts {
+        let mut tell_at = clock.now() + TELL;
         loop {
             let over = done();
             self.drain(&mut |_, _| false);
+            if clock.now() >= tell_at {
+                self.tell_times();
+                tell_at = clock.now() + TELL;
+            }
             if over && clock.now().since(self.last_sent) > ACK_TIMEOUT {
                 break;
             }
             clock.sleep_until(drains.next_after(clock.now()));
         }
+        self.tell_times();
         self.into_accounts()
+    }
+
+    fn tell_times(&self) {
+        if let Some(live) = &self.live {
+            let Accounts { books, lateness, .. } = &self.accounts;
+            live.on_times(lateness, books.tracker().latency_of_all());
+        }
     }
 
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, .. } = self;
         let Accounts { books, lateness, observer, strangers } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {

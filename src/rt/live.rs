@@ -1,11 +1,14 @@
-//! What anyone may look at while a play runs: atomics that the playing threads store, and nobody waits for.
+//! What anyone may look at while a play runs: atomics that the playing threads store, and nobody waits for. Only the times
+//! are behind a lock, which the ack thread and whoever looks share, never the tick thread.
 
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::TickReport;
 use crate::state::{Ride, State};
 use crate::time::ShowTime;
+use crate::tracker::{Histogram, histogram};
 
 /// How far a play is, in the order of a show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -67,9 +70,25 @@ impl Phase {
     }
 }
 
+/// The times that a play has counted so far, ns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Times {
+    /// Lateness of the ticks that sent.
+    pub lateness: Histogram,
+    /// Latency of the acks of all controllers.
+    pub acks: Histogram,
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self { lateness: histogram(), acks: histogram() }
+    }
+}
+
 /// What anyone may look at while a play runs.
 #[derive(Debug, Default)]
 pub struct Live {
+    times: Mutex<Times>,
     phase: AtomicU8,
     homing: AtomicU32,
     homing_ms: AtomicU32,
@@ -110,6 +129,28 @@ impl Live {
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed.load(Ordering::Relaxed)
+    }
+
+    /// A copy of the times as the ack thread last told them; empty where nobody asked it to.
+    #[must_use]
+    pub fn times(&self) -> Times {
+        self.lock().clone()
+    }
+
+    /// Notes the times so far.
+    ///
+    /// # Panics
+    /// Where they are not made as [`histogram()`] makes them.
+    pub fn on_times(&self, lateness: &Histogram, acks: &Histogram) {
+        let mut times = self.lock();
+        let alike = "they have the same bounds";
+        times.lateness.set_to(lateness).expect(alike);
+        times.acks.set_to(acks).expect(alike);
+    }
+
+    /// Held for the time of a copy.
+    fn lock(&self) -> MutexGuard<'_, Times> {
+        self.times.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes one more seat that is on its slow way to park, `time_ms` long.

@@ -14,10 +14,10 @@ mod spin;
 pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
-pub use live::{Live, Phase};
+pub use live::{Live, Phase, Times};
 pub use mail::{Alarm, Answer, Command, Mail, MailEnds, News, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
-pub use spin::Spinning;
+pub use spin::{Spinning, Spun};
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

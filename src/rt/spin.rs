@@ -18,6 +18,15 @@ fn spin_after(work: Duration, asked: Duration, period: Duration) -> Duration {
     asked.min((period * LIMIT_PERCENT / 100).saturating_sub(work))
 }
 
+/// How long a play spun before its deadlines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Spun {
+    /// What was asked for.
+    pub asked: Duration,
+    /// What was left of that, the work of the ticks and the limit of 90 % taken off: the mean of all ticks but the first.
+    pub granted: Duration,
+}
+
 /// A clock for the tick loop: sleeps until shortly before each deadline, then spins.
 ///
 /// What lies between the end of one sleep and the beginning of the next is taken for the work of a tick. The spin is cut
@@ -29,6 +38,8 @@ pub struct Spinning<'a, C> {
     period: Duration,
     /// When the sleep before ended.
     woke: Cell<Option<MonoTime>>,
+    /// What was granted in all so far, and how often.
+    granted: Cell<(Duration, u32)>,
 }
 
 impl<'a, C: Clock> Spinning<'a, C> {
@@ -36,7 +47,23 @@ impl<'a, C: Clock> Spinning<'a, C> {
     /// never spins.
     #[must_use]
     pub fn new(clock: &'a C, asked: Duration, period: Duration) -> Self {
-        Self { clock, asked, period, woke: Cell::new(None) }
+        Self { clock, asked, period, woke: Cell::new(None), granted: Cell::default() }
+    }
+
+    /// How long it has spun so far.
+    #[must_use]
+    pub fn spun(&self) -> Spun {
+        let (sum, times) = self.granted.get();
+        Spun { asked: self.asked, granted: sum.checked_div(times).unwrap_or_default() }
+    }
+
+    /// What the next deadline may be spun for.
+    fn grant(&self) -> Duration {
+        let Some(woke) = self.woke.get() else { return Duration::ZERO };
+        let spin = spin_after(self.clock.now().since(woke), self.asked, self.period);
+        let (sum, times) = self.granted.get();
+        self.granted.set((sum.saturating_add(spin), times.saturating_add(1)));
+        spin
     }
 }
 
@@ -49,11 +76,7 @@ impl<C: Clock> Clock for Spinning<'_, C> {
         if self.asked.is_zero() {
             return self.clock.sleep_until(deadline);
         }
-        let spin = self
-            .woke
-            .get()
-            .map_or(Duration::ZERO, |woke| spin_after(self.clock.now().since(woke), self.asked, self.period));
-        self.clock.sleep_until(deadline.before(spin));
+        self.clock.sleep_until(deadline.before(self.grant()));
         let mut now = self.clock.now();
         while now < deadline {
             hint::spin_loop();
@@ -136,6 +159,23 @@ mod tests {
         assert_eq!(last_sleep(us(100), 2), 100);
         // A look of a microsecond each at the end of the tick and before.
         assert_eq!(last_sleep(us(900), 2), 900 - 52);
+    }
+
+    #[test]
+    fn what_the_work_leaves_of_the_spin_is_told() {
+        let told = |asked, ticks| {
+            let clock = Looks::default();
+            let spinning = Spinning::new(&clock, us(asked), PERIOD);
+            for tick in 1..=ticks {
+                spinning.sleep_until(MonoTime::default() + PERIOD * tick);
+                clock.now.set(clock.now.get() + 50_000);
+            }
+            spinning.spun()
+        };
+        assert_eq!(told(100, 5), Spun { asked: us(100), granted: us(100) });
+        assert_eq!(told(900, 5), Spun { asked: us(900), granted: us(900 - 51) });
+        assert_eq!(told(900, 1), Spun { asked: us(900), granted: Duration::ZERO });
+        assert_eq!(told(0, 5), Spun::default());
     }
 
     #[test]

@@ -78,7 +78,14 @@ impl Account {
         }
     }
 
-    pub(super) fn on_reply(&mut self, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
+    /// `latencies` takes the latency of an ack beside the account's own histogram.
+    pub(super) fn on_reply(
+        &mut self,
+        frame: FrameNo,
+        code: ReplyCode,
+        at: MonoTime,
+        latencies: &mut Histogram,
+    ) -> Fate {
         let fate = match self.ring.find(frame) {
             Place::Never => Fate::Stray,
             Place::Forgotten => Fate::Stale,
@@ -86,7 +93,7 @@ impl Account {
                 State::Unasked | State::Failed => Fate::Stray,
                 State::Acked | State::Refused => Fate::Duplicate,
                 State::Lost => Fate::Stale,
-                State::InFlight | State::InFlightUntimed => self.settle(index, frame, code, at),
+                State::InFlight | State::InFlightUntimed => self.settle(index, frame, code, at, latencies),
             },
         };
         self.counts.add_reply(fate);
@@ -94,7 +101,14 @@ impl Account {
     }
 
     /// Ends the flight of a frame by its first reply.
-    fn settle(&mut self, index: usize, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
+    fn settle(
+        &mut self,
+        index: usize,
+        frame: FrameNo,
+        code: ReplyCode,
+        at: MonoTime,
+        latencies: &mut Histogram,
+    ) -> Fate {
         let entry = self.ring.get_mut(index);
         let latency = at.since(entry.at);
         if latency > ACK_TIMEOUT {
@@ -106,7 +120,9 @@ impl Account {
         entry.state = if code.refused() { State::Refused } else { State::Acked };
         if !code.refused() {
             if timed {
-                self.latency.saturating_record(crate::time::nanos(latency));
+                let ns = crate::time::nanos(latency);
+                self.latency.saturating_record(ns);
+                latencies.saturating_record(ns);
             }
             if self.last_ack.is_none_or(|(last, _)| frame.since(last) > 0) {
                 self.last_ack = Some((frame, at));

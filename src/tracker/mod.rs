@@ -31,6 +31,7 @@ pub const ACK_TIMEOUT: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Tracker {
     accounts: Vec<Account>,
+    latency: Histogram,
 }
 
 impl Tracker {
@@ -44,7 +45,10 @@ impl Tracker {
     /// Empty books for one controller per element, whose next frame has that number.
     #[must_use]
     pub fn starting_at(first: &[FrameNo], ack_every: u32) -> Self {
-        Self { accounts: first.iter().map(|&first| Account::new(first, ack_every)).collect() }
+        Self {
+            accounts: first.iter().map(|&first| Account::new(first, ack_every)).collect(),
+            latency: histogram(),
+        }
     }
 
     /// How many controllers there are.
@@ -82,7 +86,7 @@ impl Tracker {
     /// A reply later than [`ACK_TIMEOUT`] after its frame is stale, and the frame lost, whenever this is told; one in
     /// time counts, however late it is told, unless [`Tracker::expire`] came first.
     pub fn on_reply(&mut self, controller: usize, frame: FrameNo, code: ReplyCode, at: MonoTime) -> Fate {
-        self.accounts[controller].on_reply(frame, code, at)
+        self.accounts[controller].on_reply(frame, code, at, &mut self.latency)
     }
 
     /// A datagram from a controller that is no reply to a frame.
@@ -127,6 +131,12 @@ impl Tracker {
     #[must_use]
     pub fn latency(&self, controller: usize) -> &Histogram {
         &self.accounts[controller].latency
+    }
+
+    /// The same of all controllers together.
+    #[must_use]
+    pub const fn latency_of_all(&self) -> &Histogram {
+        &self.latency
     }
 
     /// The newest frame that was acked, and when its ack was received.

@@ -17,7 +17,8 @@ fn assert_sound(report: &Value) {
     assert!(
         realtime["policy"].is_string()
             && realtime["priority"].is_u64()
-            && realtime["memory_locked"].is_boolean(),
+            && realtime["memory_locked"].is_boolean()
+            && realtime["spin_us"]["asked"].as_f64() >= realtime["spin_us"]["in_effect"].as_f64(),
         "{report}"
     );
     for one in report["controllers"].as_array().expect("a list") {
@@ -82,7 +83,9 @@ fn people_read_the_report_on_stderr_and_stdout_stays_empty() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let run = play(&folder.nod(&[0.1]), &sim.to(), &[]);
     assert_eq!((run.code, run.stdout.as_str()), (Some(0), ""));
-    for part in ["completed", "ticks", "lateness", "real time", "strangers", "c1", &sim.addresses[0]] {
+    for part in
+        ["completed", "ticks", "lateness", "real time", "no spin", "strangers", "c1", &sim.addresses[0]]
+    {
         assert!(run.stderr.contains(part), "{part}: {}", run.stderr);
     }
     let table = run.stderr.lines().find(|line| line.contains("controller ")).expect("a table");
@@ -125,7 +128,26 @@ fn a_play_that_spins_before_each_tick_is_acked_like_any_other() {
     assert_sound(&report);
     let one = &report["controllers"][0];
     assert_eq!((&report["result"], &one["acked"]), (&"completed".into(), &one["sent"]), "{one}");
+    let spin = &report["realtime"]["spin_us"];
+    assert_eq!(spin["asked"], 900.0);
+    assert!(spin["in_effect"].as_f64() > Some(0.0), "{spin}");
     assert!(sim.end().rest_in_park());
+}
+
+#[test]
+fn the_report_says_what_was_cut_off_the_spin() {
+    let folder = Folder::new();
+    let cue = folder.nod(&[0.1]);
+    let spun = |more: &[&str]| play(&cue, &Sim::one(&[]).to(), more);
+    std::thread::scope(|scope| {
+        let text = scope.spawn(|| spun(&["--spin-us", "100"]).stderr);
+        // At 1 kHz 900 µs are all that work and spin may take together, and there always is work.
+        let cut = spun(&["--json", "--rate", "1000", "--spin-us", "900"]).report_of(0);
+        let spin = &cut["realtime"]["spin_us"];
+        assert!(spin["asked"] == 900.0 && spin["in_effect"].as_f64() < Some(900.0), "{spin}");
+        let text = text.join().expect("it does not panic");
+        assert!(text.contains(" of 100 µs asked"), "{text}");
+    });
 }
 
 #[test]

@@ -1,0 +1,226 @@
+//! `kinocue latency`: how late frames leave and how soon their acks come, over seats that do not move.
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::{Context as _, anyhow};
+
+use super::load::parse_rate;
+use super::play::{judge, leave_on_signals};
+use super::targets::Targets;
+use super::{Exit, Failure, OrExit as _, load, print};
+use crate::app::{Play, PlayError};
+use crate::config::{Config, from_to_args};
+use crate::device::stand::stand;
+use crate::engine::{Rate, Show};
+use crate::latency::{cue, held};
+use crate::motion::{MAX_AXES, Pulses};
+use crate::sim::{Farm, Options, Setup};
+use crate::time::ShowTime;
+
+mod compare;
+mod report;
+mod watch;
+
+use report::{Refused, Report};
+use watch::{Out, Watch};
+
+/// Virtual controllers where no others are named, as many as `demo` has.
+const VIRTUAL: u16 = 4;
+/// Axes of a controller whose `--to` says nothing of them.
+const AXES: &str = "axes=3";
+
+/// Measures how late frames leave and how soon their acks come, as cyclictest does for timers.
+///
+/// It sends as `play` does, from the same loop, and moves nothing: each frame holds the seat where it stands, effects off.
+/// Where each seat stands is read first, twice, and again just before the first frame. A controller is left out unless its
+/// seat stands still, inside its stroke, and nothing about it (axes, PA95, PA55, PA0d, an emergency stop, an error) would
+/// make something else of a position than it says. Without --to and --config it measures against virtual controllers of its
+/// own.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel; ack latency from that
+instant, of each frame, to the kernel's receive time of its ack. The first tells of this machine, the second of the network
+and the controllers too; with virtual controllers, of this machine twice.
+
+--out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of the tags lateness and
+ack_latency. Any program that reads such logs can plot it.
+
+Exit code: 0 measured, 69 a controller did not answer, 75 a seat did not stay where it stood or the frame port is taken,
+76 a controller refused or was left out.
+
+Examples:
+  kinocue latency                                                    this machine, 1,000 ticks a second to four virtual ones
+  kinocue latency --count 64 --seconds 60 --out before.hlog          sixty-four of them, kept
+  kinocue latency --count 64 --seconds 60 --spin-us 100 --out after.hlog
+  kinocue latency --compare before.hlog after.hlog                   what the spin has brought
+  kinocue latency --to 192.168.15.201:7408 --rate 250                a controller of three axes on the network
+  kinocue latency --config hall.toml --ack-every 10 --json | jq .lateness_us")]
+pub(super) struct Args {
+    /// A controller: HOST:PORT, and after commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or mbox;
+    /// repeatable
+    #[arg(long, value_name = "ADDR", conflicts_with = "config")]
+    to: Vec<String>,
+
+    /// Controllers, seats and show settings from a file
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+
+    /// Virtual controllers of three axes, where no others are named [default: 4]
+    #[arg(long, value_name = "N", conflicts_with_all = ["to", "config"], value_parser = clap::value_parser!(u16).range(1..=1000))]
+    count: Option<u16>,
+
+    /// Ticks per second, 1 to 1000
+    #[arg(long, value_name = "HZ", value_parser = parse_rate, default_value = "1000")]
+    rate: f64,
+
+    /// How long, in seconds, at most an hour
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    seconds: u32,
+
+    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any
+    #[arg(long, value_name = "ADDR")]
+    bind: Option<SocketAddrV4>,
+
+    /// Ask for a reply in each Nth frame, 1 to 1000 [default: 1, or the configuration's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
+    ack_every: Option<u32>,
+
+    /// Ask for no replies to frames, and measure lateness alone
+    #[arg(long)]
+    no_acks: bool,
+
+    /// Wake up this long before each tick and spin, 0 to 900 µs [default: 0, or the configuration's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
+    spin_us: Option<u32>,
+
+    /// Write the histograms of each second to a file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Measure nothing: hold two files of --out against each other
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["to", "config", "count", "out"])]
+    compare: Vec<PathBuf>,
+
+    /// Print the report as one JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    if let [a, b] = &args.compare[..] {
+        return compare::run(a, b, args.json);
+    }
+    let out = args.out.as_deref().map(Out::create).transpose()?;
+    if args.config.is_some() || !args.to.is_empty() {
+        return measure(args, configuration(args)?, None, out);
+    }
+    let count = args.count.unwrap_or(VIRTUAL);
+    let setup = Setup { host_port: 0, ..Setup::default() };
+    let farm = Farm::start(Options::loopback(vec![setup; usize::from(count)])).or_exit(Exit::System)?;
+    let to: Vec<_> = farm.addresses().iter().map(|address| format!("{address},{AXES}")).collect();
+    let mut config = from_to_args(&to, &[], MAX_AXES).or_exit(Exit::Internal)?;
+    config.show.bind = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
+    let measured = measure(args, config, Some(count), out);
+    farm.stop().or_exit(Exit::Io)?;
+    measured
+}
+
+/// The controllers that the arguments name.
+fn configuration(args: &Args) -> Result<Config, Failure> {
+    let Some(path) = &args.config else {
+        let says_axes = |to: &str| to.split(',').any(|part| part.trim_start().starts_with("axes="));
+        let with_axes = |to: &String| if says_axes(to) { to.clone() } else { format!("{to},{AXES}") };
+        let to: Vec<_> = args.to.iter().map(with_axes).collect();
+        return from_to_args(&to, &[], MAX_AXES).or_exit(Exit::Usage);
+    };
+    load::config(path)
+}
+
+/// Measures; `of_our_own` is how many of the controllers are virtual ones, where all are.
+fn measure(
+    args: &Args,
+    mut config: Config,
+    of_our_own: Option<u16>,
+    out: Option<Out>,
+) -> Result<Exit, Failure> {
+    config.show.rate_hz = args.rate;
+    config.show.ack_every = args.ack_every.unwrap_or(config.show.ack_every);
+    config.show.spin_us = args.spin_us.unwrap_or(config.show.spin_us);
+    config.show.bind = args.bind.unwrap_or(config.show.bind);
+    let (config, refused) = standing(config)?;
+    if config.controllers.is_empty() {
+        return Err(anyhow!("no seat is left to measure with; nothing was sent but questions"))
+            .or_exit(Refused::exit(&refused));
+    }
+    let timeline = cue(&config.controllers, args.seconds).or_exit(Exit::Internal)?;
+    let show = Show {
+        rate: Rate::from_hz(config.show.rate_hz),
+        timing: config.show.timing,
+        start: ShowTime::ZERO,
+        plays: 1,
+    };
+    let names: Vec<_> =
+        config.controllers.iter().map(|one| format!("{} {}", one.name, one.address)).collect();
+    let about = format!(
+        "{} Hz to {}{}",
+        args.rate,
+        if of_our_own.is_some() { "virtual controllers " } else { "" },
+        names.join(", ")
+    );
+    let play = Play::holding(config, timeline, show, args.no_acks).map_err(failed)?;
+    let control = play.control().clone();
+    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    let live = control.live;
+    let watch = Watch::start(Arc::clone(&live), args.seconds, &about, out)?;
+    let played = play.run(|_| false).map_err(failed);
+    watch.finish(played.is_ok())?;
+    let played = played?;
+    for line in played.refusals.iter().chain(&played.notes) {
+        print::tell(&format!("kinocue: {line}"));
+    }
+    let report = Report::new(&about, args.seconds, of_our_own.is_some(), &live.times(), &refused, &played);
+    if args.json {
+        print::json(&report)?
+    } else {
+        print::out(&report.text(&live.times()))?
+    }
+    match judge(&played)? {
+        Exit::Done => Ok(Refused::exit(&refused)),
+        other => Ok(other),
+    }
+}
+
+/// The configuration with only those controllers whose seats can be held, parked where they stand; and the others, which
+/// are told of.
+fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
+    let targets = Targets { controllers: config.controllers.clone(), show: config.show.clone() };
+    let mut talk = targets.open()?;
+    let stood = stand(&mut talk, &targets.controllers);
+    drop(talk);
+    let (mut controllers, mut places, mut refused) = (Vec::new(), Vec::<Vec<Pulses>>::new(), Vec::new());
+    for (controller, stood) in targets.controllers.into_iter().zip(stood) {
+        match stood {
+            Ok(stands) => {
+                controllers.push(controller);
+                places.push(stands);
+            }
+            Err(error) => {
+                print::tell(&format!("kinocue: {}: left out: {error}", controller.name));
+                refused.push(Refused::new(controller.name, &error));
+            }
+        }
+    }
+    Ok((held(&Config { controllers, ..config }, &places), refused))
+}
+
+/// The exit code of a measurement that did not begin.
+fn failed(error: PlayError) -> Failure {
+    let exit = match &error {
+        PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
+        PlayError::Unsure(_) => Exit::TryAgain,
+        _ => Exit::Internal,
+    };
+    Failure { exit, error: error.into() }
+}

@@ -1,0 +1,65 @@
+//! The figures by which a histogram of times is told.
+
+use serde::Serialize;
+
+use crate::tracker::Histogram;
+
+/// Percentiles of times, µs; all null where there were none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// How many times there were.
+    pub count: u64,
+    /// Median.
+    pub p50: Option<f64>,
+    /// 90th percentile.
+    pub p90: Option<f64>,
+    /// 99th percentile.
+    pub p99: Option<f64>,
+    /// 99.9th percentile.
+    pub p999: Option<f64>,
+    /// The longest.
+    pub max: Option<f64>,
+}
+
+impl Percentiles {
+    /// Those of a histogram of nanoseconds.
+    #[must_use]
+    pub fn of(times: &Histogram) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+        let us = |ns: u64| (!times.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
+        let at = |quantile| us(times.value_at_quantile(quantile));
+        Self {
+            count: times.len(),
+            p50: at(0.5),
+            p90: at(0.9),
+            p99: at(0.99),
+            p999: at(0.999),
+            max: us(times.max()),
+        }
+    }
+
+    /// The figures with their names, in rising order.
+    #[must_use]
+    pub const fn named(&self) -> [(&'static str, Option<f64>); 5] {
+        let Self { p50, p90, p99, p999, max, .. } = *self;
+        [("p50", p50), ("p90", p90), ("p99", p99), ("p99.9", p999), ("max", max)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracker::histogram;
+
+    #[test]
+    fn percentiles_are_in_microseconds_and_none_of_nothing() {
+        assert!(Percentiles::of(&histogram()).named().iter().all(|(_, us)| us.is_none()));
+        let mut times = histogram();
+        times.record_n(10_000, 95).unwrap();
+        times.record_n(2_000_000, 5).unwrap();
+        let Percentiles { count, p50, p90, p99, max, .. } = Percentiles::of(&times);
+        assert_eq!((count, p50, p90), (100, Some(10.0), Some(10.0)));
+        assert_eq!(p99, max);
+        assert!(max.is_some_and(|us| (us - 2_000.0).abs() < 2.0), "{max:?}");
+    }
+}
