@@ -12,19 +12,21 @@ use std::thread;
 use std::time::Duration;
 
 use kinocue::app::Staged;
-use kinocue::config::from_to_args;
+use kinocue::config::{LossPolicy, from_to_args};
 use kinocue::cue::{Source, read};
 use kinocue::engine::{Ending, Rate, Show, TickGrid};
 use kinocue::fanout::{Lane, Manner};
+use kinocue::health::{Groups, Health, Notice};
 use kinocue::net::{DrainGrid, Ports};
 use kinocue::observe::Watched;
 use kinocue::rt::{
     Accounts, AckLoop, Conductor, Ended, Live, MailEnds, PlanLoop, Spinning, TickLoop, mailboxes,
 };
+use kinocue::state::{Event, Machine, Request};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
-use kinocue::wire::{MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing};
+use kinocue::wire::{FrameNo, MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing};
 
 const PERIOD: Duration = Duration::from_millis(1);
 /// The tick at which somebody stops the show.
@@ -352,4 +354,33 @@ fn the_allocator_counts_its_own_thread_and_no_other() {
     }
     assert_eq!(Calls::so_far(), here);
     assert_eq!(there.join().unwrap(), Calls { allocations: 2, frees: 1 });
+}
+
+#[test]
+fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_start() {
+    let mut now = MonoTime::default() + PERIOD;
+    let mut hall = Machine::new(now);
+    let mut health = Health::new(Groups::named(["A", "A", "B"]), LossPolicy::Park, 1, PERIOD);
+    let mut notices = 0;
+    let before = Calls::so_far();
+    for tick in 1..=10_000_u32 {
+        now = now + PERIOD;
+        for controller in 0..3 {
+            health.on_sent(controller, FrameNo(tick), true, now);
+            if tick < 5_000 && tick % 7 > 0 {
+                health.on_ack(controller, FrameNo(tick), now);
+            }
+        }
+        health.tick(now, &mut |notice| {
+            notices += 1;
+            if let Notice::Hall(event) = notice {
+                hall.event(event, now);
+            }
+        });
+        hall.event(Event::Late, now);
+        let _refused = hall.request(Request::Go, now);
+        hall.tick(now);
+    }
+    assert_eq!(Calls::so_far().since(before), Calls { allocations: 0, frees: 0 });
+    assert!(notices > 2, "groups were lost");
 }

@@ -1,6 +1,6 @@
 //! Requests by persons.
 
-use super::{Cause, Goal, Machine, Refusal, Request, Ride, State, Why};
+use super::{Cause, Goal, Machine, Readiness, Refusal, Request, Ride, State, Why};
 use crate::time::MonoTime;
 
 impl Machine {
@@ -53,7 +53,7 @@ impl Machine {
             State::Parked | State::Armed => {}
             state => return Err(in_the_way(state)),
         }
-        if let Some(why) = self.facts.readiness.against_arming() {
+        if let Some(why) = against_arming(self.facts.readiness) {
             return Err(why);
         }
         if self.facts.homed {
@@ -173,6 +173,15 @@ impl Machine {
             State::Stopping => Err(Why::StoppingNow),
             _ => Err(Why::NothingToClear),
         }
+    }
+}
+
+const fn against_arming(readiness: Readiness) -> Option<Why> {
+    match readiness {
+        Readiness::NoCue => Some(Why::NoCue),
+        Readiness::NotProved => Some(Why::NotProved),
+        Readiness::NotPreflighted => Some(Why::NotPreflighted),
+        Readiness::Ready => None,
     }
 }
 

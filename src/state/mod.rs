@@ -13,6 +13,7 @@
 mod ask;
 mod cause;
 mod kinds;
+mod next;
 mod refusal;
 mod tell;
 #[cfg(test)]
@@ -23,6 +24,7 @@ use std::time::Duration;
 
 pub use cause::{Cause, Trouble, Whose};
 pub use kinds::{Demand, Event, Finding, Readiness, Request, Ride, State};
+pub use next::Next;
 pub use refusal::{Refusal, Why};
 
 use crate::time::MonoTime;

@@ -162,7 +162,7 @@ fn a_reboot_disarms() {
     let hall = told(State::Armed, Event::Rebooted(7));
     assert_eq!((hall.state(), hall.cause().whose()), (State::Parked, Some(Whose::Controller(7))));
     assert!(!hall.is_homed());
-    assert_eq!(hall.next(), "keep clear of the seats and arm; they home first");
+    assert_eq!(hall.next(), Next::ArmAndHome);
 }
 
 #[test]
@@ -259,7 +259,7 @@ fn an_emergency_stop_is_stopped_at_once_from_every_state() {
 #[test]
 fn only_a_person_clears_and_only_when_every_emergency_stop_is_released() {
     let mut hall = told(State::Playing(Ride::Following), Event::EmergencyStop(4));
-    assert_eq!(hall.next(), "release the emergency stop, then clear");
+    assert_eq!(hall.next(), Next::Release);
     assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::StillPressed);
     hall.event(Event::AllReleased, s(3));
     hall.tick(s(30_000));
@@ -272,7 +272,7 @@ fn only_a_person_clears_and_only_when_every_emergency_stop_is_released() {
 fn after_clearing_the_positions_are_read_anew_before_the_seats_park() {
     let mut hall = asked(State::Stopped, Request::Clear);
     assert_eq!(hall.request(Request::Park, s(2)).unwrap_err().why, Why::PositionsNotRead);
-    assert_eq!(hall.next(), "wait until the positions are read, then park");
+    assert_eq!(hall.next(), Next::AwaitPositions);
     hall.event(Event::PositionsRead, s(3));
     hall.request(Request::Park, s(4)).unwrap();
     assert_eq!(hall.state(), State::Parking);
@@ -282,7 +282,7 @@ fn after_clearing_the_positions_are_read_anew_before_the_seats_park() {
 fn a_seat_of_unknown_position_is_homed_and_not_parked() {
     let mut hall = told(State::Recovering, Event::Rebooted(1));
     assert_eq!(hall.request(Request::Park, s(2)).unwrap_err().why, Why::PositionUnknown);
-    assert_eq!(hall.next(), "home");
+    assert_eq!(hall.next(), Next::Home);
     hall.request(Request::Home, s(2)).unwrap();
     hall.event(Event::Homed, s(9));
     assert_eq!(hall.state(), State::Parked);
@@ -358,4 +358,17 @@ fn a_refusal_says_what_was_asked_in_which_state_why_not_and_what_to_do() {
         hall.request(Request::Arm, s(1)).unwrap_err().to_string(),
         "cannot arm while stopped: it stays so until it is cleared; clear first"
     );
+}
+
+#[test]
+fn every_state_says_what_comes_next() {
+    let next = State::ALL.map(|state| hall(state).next().to_string());
+    assert!(next.iter().all(|words| !words.is_empty()));
+    assert_eq!(hall(State::Fault).next(), Next::CheckCue);
+    assert_eq!(
+        told(State::Parked, Event::Readiness(Readiness::NoCue)).next().to_string(),
+        "load a cue, then arm"
+    );
+    assert_eq!(told(State::Armed, Event::Trouble(DRIVE)).next(), Next::PutRight);
+    assert_eq!(asked(State::Homing, Request::Stop).next(), Next::AwaitStandstill);
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Cause, Machine, Readiness, Request, Ride, State, Trouble, Why};
+use super::{Cause, Next, Readiness, Request, Ride, State, Trouble, Why};
 
 impl State {
     /// The state in one word, as every surface shows it.
@@ -22,22 +22,6 @@ impl State {
             Self::Stopped => "stopped",
             Self::Parking => "parking",
             Self::Fault => "fault",
-        }
-    }
-
-    /// What a person does next, where it hangs on the state alone.
-    const fn next(self) -> &'static str {
-        match self {
-            Self::Boot => "wait until every controller has answered",
-            Self::Recovering => "park, or home",
-            Self::Parked => "load a cue, then arm",
-            Self::Homing => "wait, and keep clear of the seats",
-            Self::Armed => "go, or disarm",
-            Self::Playing(Ride::Freewheeling) => "nothing; the seats join again by themselves",
-            Self::Playing(_) => "nothing; pause, park or stop as needed",
-            Self::Paused => "resume, or park",
-            Self::Stopping | Self::Parking => "wait until the seats are at rest",
-            Self::Stopped | Self::Fault => "clear, then park or home",
         }
     }
 }
@@ -65,27 +49,32 @@ impl fmt::Display for Request {
     }
 }
 
-impl Machine {
-    /// What a person does next, in words.
-    #[must_use]
-    pub const fn next(&self) -> &'static str {
-        match (self.state(), self.cause()) {
-            (State::Stopped, _) if self.is_pressed() => "release the emergency stop, then clear",
-            (State::Stopped, Cause::StoppedHoming) => "wait until the seats stand still, then clear and home",
-            (State::Stopped | State::Fault, _) if self.has_errors() => {
-                "put the error right at the controller, then clear"
-            }
-            (State::Fault, Cause::Trouble(trouble)) => trouble.next(),
-            (State::Recovering, _) if !self.is_identified() => State::Boot.next(),
-            (State::Recovering, _) if !self.is_homed() => "home",
-            (State::Recovering, _) if !self.is_measured() => "wait until the positions are read, then park",
-            (State::Parked, _) => match self.readiness() {
-                Readiness::Ready if self.is_homed() => "arm",
-                Readiness::Ready => "keep clear of the seats and arm; they home first",
-                readiness => readiness.next(),
-            },
-            (state, _) => state.next(),
-        }
+impl fmt::Display for Next {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AwaitAnswers => "wait until every controller has answered",
+            Self::AwaitPositions => "wait until the positions are read, then park",
+            Self::AwaitHome => "wait until the seats are home, and keep clear of them",
+            Self::AwaitRest => "wait until the seats are at rest",
+            Self::ParkOrHome => "park, or home",
+            Self::Home => "home, with nobody on the seats",
+            Self::Load => "load a cue, then arm",
+            Self::Prove => "check the cue against the seats, then arm",
+            Self::Preflight => "run preflight, then arm",
+            Self::Arm => "arm",
+            Self::ArmAndHome => "arm, with nobody on the seats: they home first",
+            Self::Go => "go, or disarm",
+            Self::Watch => "nothing; pause, park or stop as needed",
+            Self::AwaitJoin => "nothing; the seats join again by themselves",
+            Self::Resume => "resume, or park",
+            Self::Release => "release the emergency stop, then clear",
+            Self::PutRight => "put the error right at the controller, then clear",
+            Self::AwaitStandstill => "wait until the seats stand still, then clear and home",
+            Self::CheckCue => "check the cue against the seats, then clear",
+            Self::LookAtSeat => "look at the seat, then clear and home again",
+            Self::StopOtherMaster => "stop the other master, then clear",
+            Self::Clear => "clear, then park or home",
+        })
     }
 }
 
@@ -102,17 +91,6 @@ impl Trouble {
             Self::OtherMaster(_) => "another master sends frames to a controller",
         }
     }
-
-    const fn next(self) -> &'static str {
-        match self {
-            Self::Gate => "check the cue against the seats, then clear",
-            Self::Homing(_) | Self::HomingTime => "look at the seat, then clear and home again",
-            Self::OtherMaster(_) => "stop the other master, then clear",
-            Self::Controller { .. } | Self::Drive { .. } | Self::Planner | Self::ParkingTime => {
-                State::Fault.next()
-            }
-        }
-    }
 }
 
 impl Readiness {
@@ -122,24 +100,6 @@ impl Readiness {
             Self::NotProved => "the cue is not proved for these seats",
             Self::NotPreflighted => "preflight has not passed",
             Self::Ready => "the cue is ready",
-        }
-    }
-
-    const fn next(self) -> &'static str {
-        match self {
-            Self::NoCue => "load a cue, then arm",
-            Self::NotProved => "check the cue against the seats, then arm",
-            Self::NotPreflighted => "run preflight, then arm",
-            Self::Ready => "arm",
-        }
-    }
-
-    pub(super) const fn against_arming(self) -> Option<Why> {
-        match self {
-            Self::NoCue => Some(Why::NoCue),
-            Self::NotProved => Some(Why::NotProved),
-            Self::NotPreflighted => Some(Why::NotPreflighted),
-            Self::Ready => None,
         }
     }
 }

@@ -1,0 +1,119 @@
+//! How lost groups come back, or do not.
+
+use super::*;
+
+#[test]
+fn lost_controllers_are_read_five_times_a_second() {
+    let mut hall = Hall::with_lost();
+    hall.run(1_000);
+    let reads = hall.reads();
+    assert!(reads.iter().all(|controller| *controller == 2));
+    assert!((49..=51).contains(&reads.len()), "{} in ten seconds", reads.len());
+}
+
+#[test]
+fn a_lost_controller_that_comes_back_as_it_was_rejoins() {
+    let mut hall = Hall::with_lost();
+    hall.back();
+    hall.run(21);
+    assert_eq!(hall.changes(), [(Standing::Rejoining, Why::SeenAgain)]);
+    hall.run(200);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining, "until it has joined");
+    hall.health.on_joined(1);
+    assert_eq!(hall.health.standing(1), Standing::Ok);
+    hall.silence(&[2]);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn a_controller_that_is_lost_again_while_it_rejoins_is_lost() {
+    let mut hall = Hall::with_lost();
+    hall.back();
+    hall.run(21);
+    hall.silence(&[2]);
+    hall.run(40);
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn a_controller_that_rebooted_is_out_until_it_was_homed_and_seen() {
+    let mut hall = Hall::with_lost();
+    hall.packets[2] = 40;
+    hall.back();
+    hall.run(21);
+    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Rebooted(2))]);
+    assert_eq!(hall.told_hall(), [Event::Rebooted(2)]);
+    hall.run(300);
+    assert_eq!(hall.health.standing(1), Standing::Excluded);
+    hall.health.look_anew(1);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Excluded, "clearing does not home");
+    hall.health.on_homed(2);
+    hall.run(2);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}
+
+#[test]
+fn a_controller_that_is_not_home_or_is_another_is_out() {
+    let same = Hall::with_lost().sighting(2);
+    let other = Identity { work_mode: 5, ..IDENTITY };
+    for (sighting, why) in [
+        (Sighting { homed: false, ..same }, Why::NotHome(2)),
+        (Sighting { identity: other, ..same }, Why::Other(2)),
+        (Sighting { packets: None, ..same }, Why::Unproved(2)),
+    ] {
+        let mut hall = Hall::with_lost();
+        hall.health.on_read_sent(2, 1);
+        hall.health.on_sighting(2, &sighting, hall.now);
+        hall.look();
+        assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, why));
+    }
+}
+
+#[test]
+fn a_controller_that_was_never_read_before_it_was_lost_cannot_prove_that_it_did_not_reboot() {
+    let mut health =
+        Hall { health: Health::new(Groups::named(["A"; 4]), LossPolicy::Park, 1, TICK), ..Hall::with_lost() };
+    health.answers_reads = false;
+    health.run(100);
+    assert_eq!(health.health.standing(0), Standing::Lost);
+    health.answers_reads = true;
+    health.ack_after = vec![Some(TICK); 4];
+    health.run(30);
+    assert_eq!(health.health.standing(0), Standing::Excluded);
+    assert!(matches!(health.health.why(0), Why::Unproved(_)));
+}
+
+#[test]
+fn acks_and_reports_do_not_bring_a_lost_controller_back_nor_does_a_sighting_that_nobody_asked_for() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.answers_reads = false;
+    hall.silence(&[2]);
+    hall.run(40);
+    assert_eq!(hall.changes().pop(), Some((Standing::Lost, Why::Silent(2))));
+    hall.notices.clear();
+    for frame in 1..=hall.frame + 50 {
+        hall.health.on_ack(2, FrameNo(frame), hall.now);
+        hall.health.on_status(2, hall.now);
+    }
+    let sighting = hall.sighting(2);
+    hall.now = hall.now + TICK;
+    hall.health.on_sighting(2, &sighting, hall.now);
+    hall.look();
+    assert_eq!(hall.changes(), []);
+}
+
+#[test]
+fn a_counter_is_read_again_before_too_many_frames_that_did_not_ask_make_it_prove_nothing() {
+    let period = Duration::from_millis(1);
+    let mut hall = Hall::asking(LossPolicy::Continue, 10, period);
+    (0..30_000).for_each(|_| hall.tick_after(period));
+    let reads = hall.reads().into_iter().filter(|controller| *controller == 2).count();
+    assert!((2..=4).contains(&reads), "{reads} in 30 s");
+    hall.silence(&[2]);
+    (0..400).for_each(|_| hall.tick_after(period));
+    hall.back();
+    (0..300).for_each(|_| hall.tick_after(period));
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}

@@ -1,0 +1,102 @@
+//! Emergency stops and errors.
+
+use super::*;
+
+#[test]
+fn an_emergency_stop_stops_its_group_at_once_and_the_hall_is_told_once() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(1, ESTOP);
+    hall.observed(2, ESTOP);
+    hall.look();
+    assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok]);
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(1)]);
+    hall.observed(1, What::EmergencyStopOver);
+    hall.look();
+    assert_eq!(hall.told_hall().len(), 1, "one is still pressed");
+    hall.observed(2, What::EmergencyStopOver);
+    hall.look();
+    assert_eq!(hall.told_hall()[1..], [Event::AllReleased]);
+    assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok], "latched");
+}
+
+#[test]
+fn an_emergency_stop_that_came_and_went_between_two_looks_is_told() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.observed(3, ESTOP);
+    hall.observed(3, What::EmergencyStopOver);
+    hall.look();
+    assert_eq!(hall.health.standing(2), Standing::Stopped);
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(3), Event::AllReleased]);
+}
+
+#[test]
+fn a_cleared_group_takes_part_only_after_it_was_seen_and_not_while_it_is_pressed() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(3, ESTOP);
+    hall.look();
+    hall.health.look_anew(2);
+    hall.run(1);
+    assert_eq!(hall.health.standing(2), Standing::Stopped, "pressed");
+    hall.observed(3, What::EmergencyStopOver);
+    hall.look();
+    hall.health.look_anew(2);
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Lost, Why::NotSeenYet));
+    hall.run(2);
+    assert_eq!(hall.health.standing(2), Standing::Rejoining);
+}
+
+#[test]
+fn a_power_cut_under_an_emergency_stop_is_a_reboot() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(2, ESTOP);
+    hall.look();
+    hall.packets[2] = 3;
+    hall.observed(2, What::EmergencyStopOver);
+    hall.run(30);
+    hall.health.look_anew(1);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Excluded);
+}
+
+#[test]
+fn an_error_stops_its_group_and_the_others_go_by_the_configuration() {
+    let mut hall = Hall::new(LossPolicy::Pause);
+    hall.run(100);
+    hall.observed(0, What::Error(21));
+    hall.look();
+    assert_eq!(hall.health.standing(0), Standing::Error);
+    assert_eq!(hall.health.why(0), Why::Error { controller: 0, error: 21 });
+    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Pause, 0)]);
+    hall.observed(0, What::Error(0));
+    hall.look();
+    assert_eq!((hall.health.standing(0), hall.told_hall()[1]), (Standing::Error, Event::ErrorsGone));
+    hall.health.look_anew(0);
+    hall.run(2);
+    assert_eq!(hall.health.standing(0), Standing::Rejoining);
+}
+
+#[test]
+fn a_drive_with_an_alarm_parks_whatever_the_configuration_says() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.observed(3, What::ServoError { axis: 2, error: 16 });
+    hall.look();
+    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Park, 2)]);
+    assert_eq!(hall.health.why(2).to_string(), "drive of axis 2: error 16");
+}
+
+#[test]
+fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(10);
+    hall.answers_reads = false;
+    hall.health.on_refused(2);
+    hall.look();
+    assert_eq!(hall.changes(), [(Standing::Error, Why::Refuses(2))]);
+    assert_eq!(hall.told_hall(), []);
+    hall.answers_reads = true;
+    hall.run(30);
+    assert_eq!((hall.health.standing(1), hall.told_hall()), (Standing::Error, vec![Event::ErrorsGone]));
+}

@@ -1,0 +1,109 @@
+//! What a person does next.
+
+use super::{Cause, Machine, Readiness, Ride, State, Trouble};
+
+/// What a person does next; worded by its `Display`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Next {
+    /// Wait until every controller has answered.
+    AwaitAnswers,
+    /// Wait until the positions are read, then park.
+    AwaitPositions,
+    /// Wait until the seats are home.
+    AwaitHome,
+    /// Wait until the seats are at rest.
+    AwaitRest,
+    /// Park, or home.
+    ParkOrHome,
+    /// Home: a position is unknown.
+    Home,
+    /// Load a cue.
+    Load,
+    /// Prove the cue for these seats.
+    Prove,
+    /// Run preflight.
+    Preflight,
+    /// Arm.
+    Arm,
+    /// Arm, with nobody on the seats: they home first.
+    ArmAndHome,
+    /// Go, or disarm.
+    Go,
+    /// Nothing has to be done.
+    Watch,
+    /// Nothing: the seats join again by themselves.
+    AwaitJoin,
+    /// Resume, or park.
+    Resume,
+    /// Release the emergency stop, then clear.
+    Release,
+    /// Put the error right at the controller, then clear.
+    PutRight,
+    /// Wait until the seats stand still by themselves, then clear.
+    AwaitStandstill,
+    /// Check the cue against the seats, then clear.
+    CheckCue,
+    /// Look at the seat, then clear and home again.
+    LookAtSeat,
+    /// Stop the other master, then clear.
+    StopOtherMaster,
+    /// Clear, then park or home.
+    Clear,
+}
+
+impl Machine {
+    /// What a person does next.
+    #[must_use]
+    pub const fn next(&self) -> Next {
+        match self.state {
+            State::Boot => Next::AwaitAnswers,
+            State::Recovering => self.next_recovering(),
+            State::Parked => self.next_parked(),
+            State::Homing => Next::AwaitHome,
+            State::Armed => Next::Go,
+            State::Playing(Ride::Freewheeling) => Next::AwaitJoin,
+            State::Playing(_) => Next::Watch,
+            State::Paused => Next::Resume,
+            State::Stopping | State::Parking => Next::AwaitRest,
+            State::Stopped | State::Fault => self.next_latched(),
+        }
+    }
+
+    const fn next_recovering(&self) -> Next {
+        if !self.facts.identified {
+            Next::AwaitAnswers
+        } else if !self.facts.homed {
+            Next::Home
+        } else if !self.facts.measured {
+            Next::AwaitPositions
+        } else {
+            Next::ParkOrHome
+        }
+    }
+
+    const fn next_parked(&self) -> Next {
+        match self.facts.readiness {
+            Readiness::NoCue => Next::Load,
+            Readiness::NotProved => Next::Prove,
+            Readiness::NotPreflighted => Next::Preflight,
+            Readiness::Ready if self.facts.homed => Next::Arm,
+            Readiness::Ready => Next::ArmAndHome,
+        }
+    }
+
+    const fn next_latched(&self) -> Next {
+        if self.facts.pressed {
+            return Next::Release;
+        }
+        if self.facts.errors {
+            return Next::PutRight;
+        }
+        match self.cause {
+            Cause::StoppedHoming => Next::AwaitStandstill,
+            Cause::Trouble(Trouble::Gate) => Next::CheckCue,
+            Cause::Trouble(Trouble::Homing(_) | Trouble::HomingTime) => Next::LookAtSeat,
+            Cause::Trouble(Trouble::OtherMaster(_)) => Next::StopOtherMaster,
+            _ => Next::Clear,
+        }
+    }
+}
