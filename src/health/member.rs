@@ -134,9 +134,6 @@ impl Member {
 
     fn against(&self, sighting: &Sighting) -> Option<Why> {
         let controller = self.controller;
-        if !sighting.homed {
-            return Some(Why::NotHome(controller));
-        }
         let verdict = match &self.baseline {
             Some(baseline) => baseline.judge(sighting, self.traffic),
             None if self.trusted => Verdict::Same,
@@ -145,6 +142,7 @@ impl Member {
         match verdict {
             Verdict::Same => None,
             Verdict::Other => Some(Why::Other(controller)),
+            Verdict::NotHome => Some(Why::NotHome(controller)),
             Verdict::Rebooted => Some(Why::Rebooted(controller)),
             Verdict::Unproved => Some(Why::Unproved(controller)),
         }

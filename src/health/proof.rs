@@ -51,6 +51,7 @@ pub(super) struct Traffic {
 pub(super) struct Baseline {
     identity: Identity,
     packets: Option<u16>,
+    homed: bool,
     traffic: Traffic,
 }
 
@@ -59,18 +60,23 @@ pub(super) struct Baseline {
 pub(super) enum Verdict {
     Same,
     Other,
+    NotHome,
     Rebooted,
     Unproved,
 }
 
 impl Baseline {
     pub(super) const fn of(sighting: &Sighting, traffic: Traffic) -> Self {
-        Self { identity: sighting.identity, packets: sighting.packets, traffic }
+        Self { identity: sighting.identity, packets: sighting.packets, homed: sighting.homed, traffic }
     }
 
     pub(super) fn judge(&self, sighting: &Sighting, traffic: Traffic) -> Verdict {
         if sighting.identity != self.identity {
             return Verdict::Other;
+        }
+        // Some seats are played without ever having been homed by DPF0: only the loss of it tells something.
+        if self.homed && !sighting.homed {
+            return Verdict::NotHome;
         }
         let (Some(then), Some(now)) = (self.packets, sighting.packets) else { return Verdict::Unproved };
         let doubt = self.doubt(traffic) + 2 * UNDER_WAY;
@@ -125,6 +131,14 @@ mod tests {
             Baseline::of(&blind, Traffic::default()).judge(&blind, Traffic::default()),
             Verdict::Unproved
         );
+    }
+
+    #[test]
+    fn a_controller_that_was_never_home_is_no_less_so_now() {
+        let away = Sighting { homed: false, ..sighting(7) };
+        let judge = |before, now| Baseline::of(before, Traffic::default()).judge(now, Traffic::default());
+        assert_eq!(judge(&away, &away), Verdict::Same);
+        assert_eq!(judge(&sighting(7), &away), Verdict::NotHome);
     }
 
     #[test]

@@ -260,6 +260,27 @@ fn hold_frames_at_ten_a_second_lose_nobody_by_their_slowness() {
 }
 
 #[test]
+fn nine_hold_frames_without_an_ack_lose_nobody() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.silence(&[2]);
+    (0..9).for_each(|_| hall.tick_after(Duration::from_millis(100)));
+    assert_ne!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn what_was_unanswered_of_the_last_show_does_not_count_in_the_next() {
+    let mut hall = Hall::asking(LossPolicy::Continue, 1, Duration::from_millis(1));
+    hall.silence(&[2]);
+    (0..9).for_each(|_| hall.tick_after(Duration::from_millis(1)));
+    hall.tick_after(Duration::from_mins(1));
+    (0..200).for_each(|_| hall.tick_after(Duration::from_millis(1)));
+    assert_ne!(hall.health.standing(1), Standing::Lost);
+    (0..100).for_each(|_| hall.tick_after(Duration::from_millis(1)));
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
 fn a_process_that_slept_loses_nobody_who_answers_when_it_wakes() {
     let mut hall = Hall::new(LossPolicy::Park);
     for gap_ms in [300, 1_500, 60_000] {

@@ -117,3 +117,53 @@ fn a_counter_is_read_again_before_too_many_frames_that_did_not_ask_make_it_prove
     (0..300).for_each(|_| hall.tick_after(period));
     assert_eq!(hall.health.standing(1), Standing::Rejoining);
 }
+
+#[test]
+fn repeated_and_reordered_acks_do_not_shake_the_proof_by_the_counter() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    for _ in 0..200 {
+        hall.tick();
+        let newest = hall.frame;
+        for frame in newest.saturating_sub(20)..=newest {
+            hall.health.on_ack(2, FrameNo(frame), hall.now);
+        }
+    }
+    hall.silence(&[2]);
+    hall.run(40);
+    hall.back();
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}
+
+#[test]
+fn old_acks_that_come_late_keep_nobody_alive() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    let first = hall.frame + 1;
+    for _ in 0..30 {
+        hall.frame += 1;
+        hall.health.on_sent(2, FrameNo(hall.frame), true, hall.now);
+    }
+    // The newest is acked first, and the others one by one, whenever a frame is sent.
+    hall.health.on_ack(2, FrameNo(hall.frame), hall.now);
+    hall.silence(&[2]);
+    for old in first..first + 29 {
+        hall.tick();
+        hall.health.on_ack(2, FrameNo(old), hall.now);
+    }
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn a_seat_is_back_only_when_all_its_controllers_are() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.silence(&[0, 1]);
+    hall.run(40);
+    hall.ack_after[1] = Some(TICK);
+    hall.run(100);
+    assert_eq!(hall.health.standing(0), Standing::Lost);
+    hall.ack_after[0] = Some(TICK);
+    hall.run(30);
+    assert_eq!(hall.health.standing(0), Standing::Rejoining);
+}

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn an_emergency_stop_stops_its_group_at_once_and_the_hall_is_told_once() {
-    let mut hall = Hall::new(LossPolicy::Continue);
+    let mut hall = Hall::new(LossPolicy::Park);
     hall.run(100);
     hall.observed(1, ESTOP);
     hall.observed(2, ESTOP);
