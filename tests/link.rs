@@ -219,11 +219,13 @@ fn play(link: &Link) -> (Books, Ledger, Traffic) {
         while let Some((at_us, frame, code)) = replies.next_if(|&(at_us, ..)| at_us < now_us) {
             read.push((at_us, frame, code));
             let reply = Reply { controller: 0, frame, code, at: at(at_us) };
-            books.on_reply(reply, |_| unreachable!("fewer than there is room for"));
+            books.on_reply(reply, &mut |_: &mut Tracker| unreachable!("fewer than there is room for"));
         }
         // Frames are sent while the replies are read, too.
         let until_us = now_us + dice.below(500);
-        books.settle(at(now_us), |tracker| records(tracker, &mut ledger, &mut sends, until_us));
+        books.settle(at(now_us), &mut |tracker: &mut Tracker| {
+            records(tracker, &mut ledger, &mut sends, until_us)
+        });
         for (at_us, frame, code) in read {
             ledger.replied(at_us, frame, code);
         }
@@ -232,7 +234,7 @@ fn play(link: &Link) -> (Books, Ledger, Traffic) {
     if let Some(last) = traffic.sends.last() {
         books.tracker_mut().on_last(0, last.frame, at(now_us));
     }
-    books.finish(|_| ());
+    books.finish(&mut |_: &mut Tracker| ());
     ledger.expire(u64::MAX);
     (books, ledger, traffic)
 }

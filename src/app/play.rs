@@ -17,10 +17,11 @@ use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::Show;
 use crate::fanout::{Lane, Manner};
+use crate::health::{Groups, Health};
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
 use crate::plan::PlanError;
-use crate::rt::{AckLoop, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, mailboxes};
+use crate::rt::{AckLoop, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Watch, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -165,7 +166,7 @@ impl Play {
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let show = self.staged.show.clone();
-        let MailEnds { sent, ticks, requests, answers, retired, commands, alarms: _alarms, news } = self.ends;
+        let MailEnds { sent, ticks, requests, answers, retired, commands, alarms, news } = self.ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
@@ -190,6 +191,12 @@ impl Play {
         if self.holds {
             acks.tell(Arc::clone(live));
         }
+        let groups = Groups::of(&self.config.controllers);
+        let policy = self.config.show.loss_policy;
+        let ack_every = self.manner.ack_every(&self.config);
+        let health = Health::new(groups, policy, ack_every, show.rate.period());
+        let (controllers, lanes) = (&self.config.controllers, &self.staged.lanes);
+        acks.watched_by(Watch::new(health, controllers, lanes, sender.clone(), alarms, Arc::clone(live)));
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };

@@ -6,6 +6,28 @@ use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport
 use super::stage::Run;
 use crate::config::Controller;
 use crate::engine::{Ending, Show};
+use crate::health::Groups;
+
+/// What happened to controllers and to groups, in the order of time.
+fn events(controllers: &[Controller], run: &Run) -> Vec<EventReport> {
+    let groups = Groups::of(controllers);
+    let of_controllers = run.accounts.observer.events().map(|event| EventReport {
+        controller: controllers[event.controller].name.clone(),
+        at_s: run.seconds_from_origin(event.at),
+        what: event.what.to_string(),
+    });
+    let of_groups = run.accounts.changes.iter().map(|change| EventReport {
+        controller: match change.why.controller() {
+            Some(controller) => controllers[controller].name.clone(),
+            None => groups.name(change.group).to_owned(),
+        },
+        at_s: run.seconds_from_origin(change.at),
+        what: change.to_string(),
+    });
+    let mut events: Vec<EventReport> = of_controllers.chain(of_groups).collect();
+    events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    events
+}
 
 /// Sums up a play of these controllers, whose accounts are closed; `silent` where no frame asked for a reply.
 pub(super) fn sum_up(
@@ -16,11 +38,6 @@ pub(super) fn sum_up(
     prepared: &Prepared,
     run: &Run,
 ) -> Played {
-    let events = run.accounts.observer.events().map(|event| EventReport {
-        controller: controllers[event.controller].name.clone(),
-        at_s: run.seconds_from_origin(event.at),
-        what: event.what.to_string(),
-    });
     let report = Report {
         cue,
         result: match run.ended.ending {
@@ -37,10 +54,11 @@ pub(super) fn sum_up(
         controllers: (0..controllers.len())
             .map(|index| entry(index, &controllers[index], prepared, run))
             .collect(),
-        events: events.collect(),
+        events: events(controllers, run),
     };
     let tracker = run.accounts.books.tracker();
-    let lost = (0..controllers.len()).filter(|&index| !silent && tracker.lost_at_end(index));
+    let gone = |index: &usize| run.accounts.gone.contains(index) || tracker.lost_at_end(*index);
+    let lost = (0..controllers.len()).filter(|index| !silent && gone(index));
     Played {
         report,
         refusals: run.granted.refusals.clone(),

@@ -275,6 +275,13 @@ impl Engine {
         std::mem::take(&mut self.planless)
     }
 
+    /// A lane that was away and is where the others are again; each is said once.
+    pub fn take_joined(&mut self) -> Option<usize> {
+        let Self { riders, course, reached, .. } = self;
+        let mut lanes = riders.iter_mut().enumerate();
+        lanes.find_map(|(lane, rider)| rider.take_arrival(course.is_settled(lane, *reached)).then_some(lane))
+    }
+
     /// How far missed ticks have put the show behind its grid.
     #[must_use]
     pub fn lag(&self) -> Duration {

@@ -40,6 +40,8 @@ pub(super) struct Rider {
     pub(super) out: bool,
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
+    /// Whether it was away, and is not where the others are yet.
+    returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
     pub(super) refused: bool,
     pub(super) fader: Fader,
@@ -58,6 +60,7 @@ impl Rider {
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             leaving: None,
+            returning: false,
             refused: false,
             fader: Fader::at(level),
             vibration: level,
@@ -102,7 +105,7 @@ impl Rider {
     /// It is there again, at rest in that pose.
     pub(super) fn come_back(&mut self, pose: Pose) {
         self.rest_at(pose);
-        (self.part, self.leaving, self.refused) = (Part::Still, None, false);
+        (self.part, self.leaving, self.refused, self.returning) = (Part::Still, None, false, true);
     }
 
     /// Frames stopped: the controller reached the last pose and stands there.
@@ -197,6 +200,13 @@ impl Rider {
         if as_planned {
             (self.part, self.out) = (Part::With, scene.out);
         }
+    }
+
+    /// Whether it has just arrived where the others are; said once.
+    pub(super) fn take_arrival(&mut self, is_settled: bool) -> bool {
+        let arrives = self.returning && self.part == Part::With && is_settled;
+        self.returning &= !arrives;
+        arrives
     }
 
     /// What it makes of the cue's vibration and effects; its motion is in the poses.

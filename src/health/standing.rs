@@ -32,7 +32,8 @@ impl Standing {
     }
 
     /// Whether its registers are to be read, to see when it is back or put right.
-    pub(super) const fn is_looked_at(self) -> bool {
+    #[must_use]
+    pub const fn is_looked_at(self) -> bool {
         matches!(self, Self::Lost | Self::Stopped | Self::Error)
     }
 }

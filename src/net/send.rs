@@ -63,8 +63,8 @@ impl fmt::Display for SendFault {
     }
 }
 
-/// The sending half of [`Ports`](super::Ports).
-#[derive(Debug)]
+/// The sending half of [`Ports`](super::Ports). Clones send by the same sockets.
+#[derive(Debug, Clone)]
 pub struct Sender {
     lanes: Arc<[Lane]>,
 }

@@ -81,6 +81,13 @@ impl Observer {
         self.events.iter()
     }
 
+    /// Gives `on` what happened since so many events; returns how many there are now. What is no longer kept is left out.
+    pub fn events_since(&self, heard: u64, on: impl FnMut(&Event)) -> u64 {
+        let new = usize::try_from(heard.saturating_sub(self.forgotten)).unwrap_or(usize::MAX);
+        self.events.iter().skip(new).for_each(on);
+        self.forgotten + self.events.len() as u64
+    }
+
     /// Events that are no longer kept.
     #[must_use]
     pub const fn forgotten(&self) -> u64 {
@@ -113,6 +120,7 @@ impl Observer {
         }
         let state = &mut self.states[controller];
         state.reports += 1;
+        state.reported_at = Some(at);
         state.outputs = Some(Heard { value: status.outputs, at });
         state.forces = Some(Heard { value: status.forces, at });
         let before = state.servo_errors.replace(Heard { value: status.servo_errors, at });

@@ -46,6 +46,8 @@ pub struct ControllerState {
     pub outputs: Option<Heard<u16>>,
     /// Reports that it sent unasked (0x3101, 0x1001).
     pub reports: u64,
+    /// When its last status report (0x3101) came.
+    pub reported_at: Option<MonoTime>,
     pub(super) stopped_by_reply: bool,
     pub(super) stopped_by_inputs: bool,
     /// Whether the error number came with a reply, so that a reply without one ends it; else only a report does.

@@ -94,6 +94,12 @@ impl Course {
         plan.pose_at(at, leg.start, window)
     }
 
+    /// Whether a lane's move is over at a show time.
+    #[must_use]
+    pub fn is_settled(&self, lane: usize, at: ShowTime) -> bool {
+        at >= self.legs[lane].settled()
+    }
+
     /// What a lane does.
     pub(super) fn leg(&self, lane: usize) -> &Leg {
         &self.legs[lane]

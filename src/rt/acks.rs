@@ -6,12 +6,13 @@ use std::time::Duration;
 use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
-use super::{Live, Sent, TickReport};
+use super::{Live, Sent, TickReport, Watch};
+use crate::health::Change;
 use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
-use crate::tracker::{ACK_TIMEOUT, Books, Reply, Tracker, histogram};
+use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
 use crate::wire::{FrameNo, MotionReply, PerAxis};
 
 /// How often the times so far are told to whoever looks.
@@ -28,6 +29,10 @@ pub struct Accounts {
     pub observer: Observer,
     /// Datagrams from nobody we sent to.
     pub strangers: u64,
+    /// How the groups stood otherwise than before; the first 1,000 times.
+    pub changes: Vec<Change>,
+    /// Controllers that were given up in the end.
+    pub gone: Vec<usize>,
 }
 
 impl Accounts {
@@ -39,6 +44,8 @@ impl Accounts {
             lateness: histogram(),
             observer: Observer::new(watched),
             strangers: 0,
+            changes: Vec::new(),
+            gone: Vec::new(),
         }
     }
 
@@ -48,7 +55,7 @@ impl Accounts {
         for (controller, frame) in last.enumerate() {
             self.books.tracker_mut().on_last(controller, frame, at);
         }
-        self.books.finish(|_| {});
+        self.books.finish(&mut |_: &mut Tracker| {});
     }
 }
 
@@ -61,6 +68,8 @@ pub struct AckLoop {
     ticks: Consumer<TickReport>,
     /// The newest instant at which a frame was sent.
     last_sent: MonoTime,
+    /// Who judges how the controllers stand.
+    watch: Option<Watch>,
     /// Whom to tell the times so far.
     live: Option<Arc<Live>>,
 }
@@ -76,12 +85,17 @@ impl AckLoop {
         ticks: Consumer<TickReport>,
     ) -> Self {
         let accounts = Accounts::new(watched, ack_every);
-        Self { receiver, accounts, sent, ticks, last_sent: MonoTime::default(), live: None }
+        Self { receiver, accounts, sent, ticks, watch: None, last_sent: MonoTime::default(), live: None }
     }
 
     /// Tells `live` the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);
+    }
+
+    /// Has `watch` judge how the controllers stand.
+    pub fn watched_by(&mut self, watch: Watch) {
+        self.watch = Some(watch);
     }
 
     /// Drains until `done` says that no more frames come and the last of them has had its second; the accounts are still
@@ -114,8 +128,8 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, .. } = self;
-        let Accounts { books, lateness, observer, strangers } = accounts;
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, .. } = self;
+        let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
                 Origin::Controller(controller) => controller,
@@ -128,25 +142,32 @@ impl AckLoop {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
                     let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
-                    books.on_reply(reply, |tracker| take_records(sent, tracker, last_sent));
+                    let mut records = Records { sent, last_sent, watch };
+                    books.on_reply(reply, &mut records);
                 }
-                Err(_) if observer.hear(controller, octets, at) || other(controller, octets) => {}
+                Err(_) if observer.hear(controller, octets, at) => {}
+                Err(_) if watch.as_mut().is_some_and(|watch| watch.hear(controller, octets, at)) => {}
+                Err(_) if other(controller, octets) => {}
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
-        books.settle(began, |tracker| take_records(sent, tracker, last_sent));
+        books.settle(began, &mut Records { sent, last_sent, watch });
         for controller in 0..receiver.lanes() {
             books.tracker_mut().on_port_closed(controller, receiver.port_closed(controller));
         }
         while let Ok(report) = ticks.pop() {
             lateness.saturating_record(report.late_ns);
         }
+        if let Some(watch) = watch {
+            watch.look(observer, began);
+        }
     }
 
     /// The accounts, still open, once nothing more is to be drained.
     #[must_use]
     pub fn into_accounts(self) -> Accounts {
-        self.accounts
+        let (changes, gone) = self.watch.map(Watch::into_outcome).unwrap_or_default();
+        Accounts { changes, gone, ..self.accounts }
     }
 
     /// Notes positions that were read from registers before the tick loop runs.
@@ -160,9 +181,27 @@ impl AckLoop {
     }
 }
 
-fn take_records(sent: &mut Consumer<Sent>, tracker: &mut Tracker, last_sent: &mut MonoTime) {
-    while let Ok(sent) = sent.pop() {
-        record(sent, tracker, last_sent);
+/// What the tick thread told of its frames, and who wants to know what became of them.
+struct Records<'a> {
+    sent: &'a mut Consumer<Sent>,
+    last_sent: &'a mut MonoTime,
+    watch: &'a mut Option<Watch>,
+}
+
+impl Ledger for Records<'_> {
+    fn bring_up_to_date(&mut self, tracker: &mut Tracker) {
+        while let Ok(sent) = self.sent.pop() {
+            record(sent, tracker, self.last_sent);
+            if let Some(watch) = self.watch {
+                watch.on_sent(sent);
+            }
+        }
+    }
+
+    fn on_fate(&mut self, reply: &Reply, fate: Fate) {
+        if let Some(watch) = self.watch {
+            watch.on_fate(reply, fate);
+        }
     }
 }
 
@@ -173,5 +212,6 @@ fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {
             *last_sent = at.max(*last_sent);
         }
         Sent::Failed { lane, frame } => tracker.on_send_failed(usize::from(lane), frame),
+        Sent::Joined { .. } => {}
     }
 }

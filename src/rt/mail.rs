@@ -43,6 +43,11 @@ pub enum Sent {
         /// Its number.
         frame: FrameNo,
     },
+    /// A lane that was away is where the others are again.
+    Joined {
+        /// The controller.
+        lane: u16,
+    },
 }
 
 /// What the tick thread says about one tick that sent.

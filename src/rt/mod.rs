@@ -9,7 +9,9 @@ mod desk;
 mod live;
 mod mail;
 mod planning;
+mod sight;
 mod spin;
+mod watch;
 
 pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
@@ -18,6 +20,7 @@ pub use live::{Live, Phase, Times};
 pub use mail::{Alarm, Answer, Command, Mail, MailEnds, News, Sent, TickReport, mailboxes};
 pub use planning::PlanLoop;
 pub use spin::{Spinning, Spun};
+pub use watch::Watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -168,6 +171,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         if let Some(request) = self.engine.take_request() {
             self.mail.ask(request);
+        }
+        while let Some(lane) = self.engine.take_joined() {
+            let lane = u16::try_from(lane).expect("fewer controllers than ports");
+            self.mail.post(Sent::Joined { lane });
         }
         while let Some(course) = self.engine.take_retired() {
             self.mail.retire(course);

@@ -5,8 +5,9 @@
 //! a pause back to it, or out of what is latched. Where several things happen at once, stopped goes before fault, fault
 //! before stopping, stopping before parking, parking before paused, paused before playing.
 //!
-//! A stop asked for while nothing moves is [`State::Stopped`] at once; while the seats move they decelerate first. A
-//! reported emergency stop is [`State::Stopped`] at once from everywhere: the controllers hold the seats then. A fault
+//! A stop asked for while nothing moves is [`State::Stopped`] at once; while the seats move they decelerate first. So
+//! it is with a reported emergency stop: the seats that it concerns are held by their controllers, and the others slow down
+//! gently. A fault
 //! while the seats move decelerates them as a stop does, because silence would halt them at the end of a straight line;
 //! it is latched from the first moment, and only [`State::Stopped`] goes before it.
 

@@ -101,11 +101,20 @@ impl Machine {
     }
 
     /// An emergency stop goes before a person's stop as a cause; the first controller that told of it is the one named.
+    ///
+    /// Nothing more goes to a group in emergency stop; the others decelerate, because silence would halt them at the end of
+    /// a straight line.
     fn emergency_stop(&mut self, controller: usize, now: MonoTime) {
         self.facts.pressed = true;
-        if !matches!(self.stop, Some(Cause::EmergencyStop(_))) {
-            self.stop = Some(Cause::EmergencyStop(controller));
-            self.enter(State::Stopped, Cause::EmergencyStop(controller), now);
+        if matches!(self.stop, Some(Cause::EmergencyStop(_))) {
+            return;
+        }
+        let cause = Cause::EmergencyStop(controller);
+        self.stop = Some(cause);
+        match self.state {
+            State::Stopping => self.cause = cause,
+            state if state.may_send_motion() => self.enter(State::Stopping, cause, now),
+            _ => self.enter(State::Stopped, cause, now),
         }
     }
 }

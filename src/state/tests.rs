@@ -248,17 +248,29 @@ fn a_stop_while_homing_says_that_no_frame_can_end_homing() {
 }
 
 #[test]
-fn an_emergency_stop_is_stopped_at_once_from_every_state() {
+fn an_emergency_stop_stops_the_hall_from_every_state_and_seats_that_move_slow_down_first() {
     for state in State::ALL {
-        let hall = told(state, Event::EmergencyStop(4));
+        let mut hall = told(state, Event::EmergencyStop(4));
+        let stops = if state.may_send_motion() { State::Stopping } else { State::Stopped };
+        assert_eq!((hall.state(), hall.cause()), (stops, Cause::EmergencyStop(4)), "from {state}");
+        hall.event(Event::AtRest, s(2));
         assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::EmergencyStop(4)), "from {state}");
         assert!(!hall.may_send_motion());
     }
 }
 
 #[test]
+fn an_emergency_stop_during_a_stop_gives_the_seats_no_more_time() {
+    let mut hall = hall(State::Stopping);
+    let since = hall.since();
+    hall.event(Event::EmergencyStop(4), s(3));
+    assert_eq!((hall.state(), hall.since()), (State::Stopping, since));
+}
+
+#[test]
 fn only_a_person_clears_and_only_when_every_emergency_stop_is_released() {
     let mut hall = told(State::Playing(Ride::Following), Event::EmergencyStop(4));
+    hall.event(Event::AtRest, s(1));
     assert_eq!(hall.next(), Next::Release);
     assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::StillPressed);
     hall.event(Event::AllReleased, s(3));

@@ -3,7 +3,7 @@
 use crate::time::MonoTime;
 use crate::wire::{FrameNo, ReplyCode};
 
-use super::{ACK_TIMEOUT, Tracker};
+use super::{ACK_TIMEOUT, Fate, Tracker};
 
 /// Replies put by at most before they are matched.
 const ROOM: usize = 4_096;
@@ -21,11 +21,27 @@ pub struct Reply {
     pub at: MonoTime,
 }
 
+/// Where the records of sends come from, and who hears what became of replies.
+pub trait Ledger {
+    /// Passes every record that has come to the tracker.
+    fn bring_up_to_date(&mut self, tracker: &mut Tracker);
+
+    /// Hears what a reply turned out to be.
+    fn on_fate(&mut self, _reply: &Reply, _fate: Fate) {}
+}
+
+/// What passes the records on, for nobody who wants to know.
+impl<F: FnMut(&mut Tracker)> Ledger for F {
+    fn bring_up_to_date(&mut self, tracker: &mut Tracker) {
+        self(tracker);
+    }
+}
+
 /// A [`Tracker`] and the replies that wait to be matched.
 ///
 /// The record of a send is posted before the send, so whoever reads a reply first and the records after it has the
 /// record of every frame that the reply can be to. Therefore replies are put by as they are read, and the records are
-/// read (by the closure that each method takes, which passes all that have come to the tracker) before any is matched.
+/// read (from the ledger that each method takes) before any is matched.
 #[derive(Debug)]
 pub struct Books {
     tracker: Tracker,
@@ -51,49 +67,50 @@ impl Books {
     }
 
     /// Puts a reply by; where there is no more room, those before it are matched first.
-    pub fn on_reply(&mut self, reply: Reply, records: impl FnOnce(&mut Tracker)) {
+    pub fn on_reply(&mut self, reply: Reply, ledger: &mut impl Ledger) {
         if self.waiting.len() == ROOM {
-            records(&mut self.tracker);
-            self.match_all(reply.at);
+            ledger.bring_up_to_date(&mut self.tracker);
+            self.match_all(reply.at, ledger);
             // Replies to frames that nobody sent must not fill the room.
             if self.waiting.len() > ROOM / 2 {
-                self.give_up_waiting();
+                self.give_up_waiting(ledger);
             }
         }
         self.waiting.push(reply);
     }
 
     /// Ends a drain that began at `began`: matches all replies, then expires the frames that are too old.
-    pub fn settle(&mut self, began: MonoTime, records: impl FnOnce(&mut Tracker)) {
-        records(&mut self.tracker);
-        self.match_all(began);
+    pub fn settle(&mut self, began: MonoTime, ledger: &mut impl Ledger) {
+        ledger.bring_up_to_date(&mut self.tracker);
+        self.match_all(began, ledger);
         self.tracker.expire(began);
     }
 
     /// Ends the show: there will be no more replies, and every frame that asked for one meets its fate.
-    pub fn finish(&mut self, records: impl FnOnce(&mut Tracker)) {
-        records(&mut self.tracker);
-        self.give_up_waiting();
+    pub fn finish(&mut self, ledger: &mut impl Ledger) {
+        ledger.bring_up_to_date(&mut self.tracker);
+        self.give_up_waiting(ledger);
         self.tracker.finish();
     }
 
     /// A reply to a frame newer than every record is kept for a while: its record may have been dropped, which the next
     /// one will tell.
-    fn match_all(&mut self, now: MonoTime) {
+    fn match_all(&mut self, now: MonoTime, ledger: &mut impl Ledger) {
         let tracker = &mut self.tracker;
         self.waiting.retain(|reply| {
             let early = !tracker.recorded(reply.controller, reply.frame);
             if early && now.since(reply.at) <= ACK_TIMEOUT {
                 return true;
             }
-            tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
+            ledger.on_fate(reply, tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at));
             false
         });
     }
 
-    fn give_up_waiting(&mut self) {
+    fn give_up_waiting(&mut self, ledger: &mut impl Ledger) {
         for reply in self.waiting.drain(..) {
-            self.tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
+            let fate = self.tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
+            ledger.on_fate(&reply, fate);
         }
     }
 }
@@ -117,26 +134,26 @@ mod tests {
     #[test]
     fn a_reply_that_overtakes_the_record_of_its_frame_is_matched() {
         let mut books = books();
-        books.on_reply(reply(1, ms(3)), |_| panic!("there is room"));
-        books.settle(ms(4), |tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
+        books.on_reply(reply(1, ms(3)), &mut |_: &mut Tracker| panic!("there is room"));
+        books.settle(ms(4), &mut |tracker: &mut Tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
         assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (1, 0));
     }
 
     #[test]
     fn a_reply_in_time_counts_though_it_is_drained_late() {
         let mut books = books();
-        books.on_reply(reply(1, ms(900)), |_| ());
-        books.settle(ms(3_000), |tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
+        books.on_reply(reply(1, ms(900)), &mut |_: &mut Tracker| ());
+        books.settle(ms(3_000), &mut |tracker: &mut Tracker| tracker.on_sent(0, FrameNo(1), true, ms(1)));
         assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).lost), (1, 0));
     }
 
     #[test]
     fn a_reply_to_a_frame_whose_record_was_dropped_waits_for_the_next_record() {
         let mut books = books();
-        books.on_reply(reply(1, ms(3)), |_| ());
-        books.settle(ms(5), |_| ());
+        books.on_reply(reply(1, ms(3)), &mut |_: &mut Tracker| ());
+        books.settle(ms(5), &mut |_: &mut Tracker| ());
         assert_eq!(books.tracker().counts(0), crate::tracker::Counts::default());
-        books.settle(ms(15), |tracker| tracker.on_sent(0, FrameNo(2), true, ms(11)));
+        books.settle(ms(15), &mut |tracker: &mut Tracker| tracker.on_sent(0, FrameNo(2), true, ms(11)));
         let counts = books.tracker().counts(0);
         assert_eq!((counts.asked, counts.acked, counts.stray), (2, 1, 0));
     }
@@ -144,13 +161,13 @@ mod tests {
     #[test]
     fn a_reply_to_a_frame_that_is_never_recorded_is_stray_after_a_second_or_at_the_end() {
         let mut books = books();
-        books.on_reply(reply(7, ms(3)), |_| ());
-        books.settle(ms(1_003), |_| ());
+        books.on_reply(reply(7, ms(3)), &mut |_: &mut Tracker| ());
+        books.settle(ms(1_003), &mut |_: &mut Tracker| ());
         assert_eq!(books.tracker().counts(0).stray, 0);
-        books.settle(ms(1_004), |_| ());
+        books.settle(ms(1_004), &mut |_: &mut Tracker| ());
         assert_eq!(books.tracker().counts(0).stray, 1);
-        books.on_reply(reply(8, ms(1_005)), |_| ());
-        books.finish(|_| ());
+        books.on_reply(reply(8, ms(1_005)), &mut |_: &mut Tracker| ());
+        books.finish(&mut |_: &mut Tracker| ());
         assert_eq!(books.tracker().counts(0).stray, 2);
     }
 
@@ -160,7 +177,7 @@ mod tests {
         let room = u32::try_from(ROOM).unwrap();
         let mut reads = 0;
         for frame in 1..=room + 5 {
-            books.on_reply(reply(frame, ms(500)), |tracker| {
+            books.on_reply(reply(frame, ms(500)), &mut |tracker: &mut Tracker| {
                 reads += 1;
                 (1..=room).for_each(|sent| tracker.on_sent(0, FrameNo(sent), true, ms(1)));
             });
@@ -173,10 +190,10 @@ mod tests {
         let mut books = books();
         let flood = u32::try_from(3 * ROOM).unwrap();
         for _ in 0..flood {
-            books.on_reply(reply(9, ms(1)), |_| ());
+            books.on_reply(reply(9, ms(1)), &mut |_: &mut Tracker| ());
         }
         assert!(books.waiting.capacity() == ROOM && books.waiting.len() <= ROOM);
-        books.finish(|_| ());
+        books.finish(&mut |_: &mut Tracker| ());
         assert_eq!(books.tracker().counts(0).stray, u64::from(flood));
     }
 }

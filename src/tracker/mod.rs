@@ -12,7 +12,7 @@ mod latency;
 
 use std::time::Duration;
 
-pub use books::{Books, Reply};
+pub use books::{Books, Ledger, Reply};
 pub use counts::{Counts, Fate};
 pub use in_flight::KEPT;
 pub use latency::{Histogram, histogram};

@@ -50,7 +50,11 @@ fn a_mute_controller_is_homed_and_unavailable() {
     );
     let seen = sim.end();
     assert_eq!(seen.controllers[0]["motion"], one["sent"], "it obeyed all the same");
-    assert!(seen.rest_in_park());
+    let told =
+        |what: &str| report["events"].as_array().expect("a list").iter().any(|event| event["what"] == what);
+    assert!(told("lost: no ack and no report for too long"), "{report}");
+    let frames = one["sent"].as_u64().expect("a count");
+    assert!(frames < 80, "it gets nothing more once it is given up, and has come to rest: {frames}");
 }
 
 #[test]
@@ -97,6 +101,7 @@ fn a_controller_that_goes_silent_mid_show_is_told_by_69() {
     let report = playing.finish().report_of(69);
     let one = first(&report);
     assert!(one["acked"].as_u64() >= Some(20) && one["lost"].as_u64() > Some(20), "{one}");
+    assert!(one["sent"].as_u64() < Some(100), "it gets nothing more once it is given up: {one}");
 }
 
 #[test]

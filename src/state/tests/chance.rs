@@ -90,7 +90,8 @@ impl Model {
         }
         let five = matches!(to, State::Playing(_) | State::Paused | State::Stopping | State::Parking);
         assert_eq!(after.may_send_motion(), five);
-        assert!(!self.pressed || to == State::Stopped, "{to} under an emergency stop");
+        let stops = matches!(to, State::Stopping | State::Stopped);
+        assert!(!self.pressed || stops, "{to} under an emergency stop");
         assert!(
             !self.errors || matches!(to, State::Stopping | State::Stopped | State::Fault),
             "{to} with an error"

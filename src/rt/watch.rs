@@ -1,0 +1,199 @@
+//! What the ack thread makes of all that it hears, beside the books: how each group stands, what the tick thread has to
+//! hear of that, and whose registers are read.
+
+use std::sync::Arc;
+
+use rtrb::Producer;
+
+use super::live::{Live, Phase};
+use super::mail::{Alarm, Sent};
+use super::sight::Looker;
+use crate::config::Controller;
+use crate::fanout::Lane;
+use crate::health::{Change, Health, Notice, Standing};
+use crate::motion::Pose;
+use crate::net::Sender;
+use crate::observe::Observer;
+use crate::state::Event;
+use crate::time::MonoTime;
+use crate::tracker::{Fate, Reply};
+use crate::wire::{Dialect, ReplyCode};
+
+/// Changes that are kept for the report.
+const CHANGES_KEPT: usize = 1_000;
+
+/// The watch over the controllers of one play.
+#[derive(Debug)]
+pub struct Watch {
+    health: Health,
+    lookers: Vec<Looker>,
+    /// Where each seat stood when it was last looked at.
+    poses: Vec<Pose>,
+    sender: Sender,
+    alarms: Producer<Alarm>,
+    live: Arc<Live>,
+    /// Events of the observer that were heard.
+    heard: u64,
+    notices: Vec<Notice>,
+    changes: Vec<Change>,
+    /// Whether positions are read anew, because the hall was cleared.
+    anew: bool,
+    phase: Phase,
+    silent: bool,
+}
+
+impl Watch {
+    /// A watch over controllers, in the order of their lanes; `health` is of as many.
+    #[must_use]
+    pub fn new(
+        health: Health,
+        controllers: &[Controller],
+        lanes: &[Lane],
+        sender: Sender,
+        alarms: Producer<Alarm>,
+        live: Arc<Live>,
+    ) -> Self {
+        let groups = health.groups().len();
+        let silent = (0..groups).all(|group| health.standing(group) == Standing::Unwatched);
+        Self {
+            lookers: controllers.iter().zip(lanes).map(|(one, lane)| Looker::new(one, lane)).collect(),
+            poses: lanes.iter().map(|lane| lane.window.park()).collect(),
+            notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
+            changes: Vec::with_capacity(CHANGES_KEPT),
+            heard: 0,
+            anew: false,
+            phase: Phase::default(),
+            health,
+            sender,
+            alarms,
+            live,
+            silent,
+        }
+    }
+
+    /// How the groups stood otherwise than before, the first 1,000 times; and the controllers that were given up in the end.
+    #[must_use]
+    pub fn into_outcome(self) -> (Vec<Change>, Vec<usize>) {
+        let groups = self.health.groups();
+        let is_gone = |controller: &usize| {
+            matches!(self.health.standing(groups.group_of(*controller)), Standing::Lost | Standing::Excluded)
+        };
+        let gone = (0..groups.controllers()).filter(is_gone).collect();
+        (self.changes, gone)
+    }
+
+    pub(super) fn on_sent(&mut self, sent: Sent) {
+        match sent {
+            Sent::Posted { lane, frame, asked, at } => {
+                self.health.on_sent(usize::from(lane), frame, asked, at);
+            }
+            Sent::Failed { .. } => {}
+            Sent::Joined { lane } => {
+                let group = self.health.groups().group_of(usize::from(lane));
+                self.health.on_joined(group);
+            }
+        }
+    }
+
+    /// What became of a reply.
+    pub(super) fn on_fate(&mut self, reply: &Reply, fate: Fate) {
+        let smc = self.lookers.get(reply.controller).is_some_and(|one| one.dialect() == Dialect::Smc);
+        match fate {
+            Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
+            Fate::Answered(ReplyCode::Fault | ReplyCode::Command) if smc => {
+                self.health.on_refused(reply.controller);
+            }
+            _ => {}
+        }
+    }
+
+    /// Hears a datagram that is no reply to a frame; says whether it was an answer to a look.
+    pub(super) fn hear(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
+        let looker = &mut self.lookers[controller];
+        let is_answer = looker.hear(octets);
+        if let Some((sighting, pose)) = looker.take() {
+            self.poses[controller] = pose;
+            self.health.on_sighting(controller, &sighting, at);
+        }
+        is_answer
+    }
+
+    /// Judges all at `now`, an instant up to which all was told.
+    pub(super) fn look(&mut self, observer: &Observer, now: MonoTime) {
+        let health = &mut self.health;
+        self.heard = observer.events_since(self.heard, |event| health.on_event(event));
+        for (controller, state) in observer.states().iter().enumerate() {
+            if let Some(at) = state.reported_at {
+                self.health.on_status(controller, at);
+            }
+        }
+        self.look_anew();
+        let notices = &mut self.notices;
+        self.health.tick(now, &mut |notice| notices.push(notice));
+        for index in 0..self.notices.len() {
+            self.tell(self.notices[index]);
+        }
+        self.notices.clear();
+        self.end_look_anew();
+    }
+
+    fn tell(&mut self, notice: Notice) {
+        match notice {
+            Notice::Hall(event) => self.alarm(Alarm::Event(event)),
+            Notice::Read(controller) => {
+                let datagrams = self.lookers[controller].ask(controller, &self.sender);
+                self.health.on_read_sent(controller, datagrams);
+            }
+            Notice::Group(change) => {
+                if self.changes.len() < CHANGES_KEPT {
+                    self.changes.push(change);
+                }
+                for controller in 0..self.lookers.len() {
+                    if self.health.groups().group_of(controller) == change.group {
+                        self.tell_lane(controller, change);
+                    }
+                }
+            }
+        }
+    }
+
+    /// What a lane has to do because its group stands otherwise.
+    fn tell_lane(&mut self, controller: usize, change: Change) {
+        let lane = u16::try_from(controller).expect("fewer controllers than ports");
+        match change.to {
+            Standing::Stopped => self.alarm(Alarm::Cut(lane)),
+            Standing::Rejoining => self.alarm(Alarm::Found(lane, self.poses[controller])),
+            to if !to.may_move() => self.alarm(Alarm::Leave(lane)),
+            _ => {}
+        }
+    }
+
+    /// Where it finds no room the tick thread has not looked for dozens of ticks, and what it does next is a hold.
+    fn alarm(&mut self, alarm: Alarm) {
+        let _ = self.alarms.push(alarm);
+    }
+
+    /// Whoever cleared the hall wants to know where its seats stand: nothing is taken on trust.
+    fn look_anew(&mut self) {
+        let phase = self.live.phase();
+        if std::mem::replace(&mut self.phase, phase) == phase || phase != Phase::Recovering {
+            return;
+        }
+        if self.silent {
+            // Nobody answers: where the frames left the seats is all there is to know.
+            self.alarm(Alarm::Event(Event::PositionsRead));
+            return;
+        }
+        self.anew = true;
+        (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
+    }
+
+    fn end_look_anew(&mut self) {
+        let health = &self.health;
+        let is_open = |group| health.standing(group).is_looked_at();
+        if self.anew && !(0..health.groups().len()).any(is_open) {
+            self.anew = false;
+            self.alarm(Alarm::Event(Event::PositionsRead));
+        }
+    }
+}
