@@ -39,6 +39,8 @@ pub struct Watch {
     /// Whether positions are read anew, because the hall was cleared.
     anew: bool,
     phase: Phase,
+    /// When it last judged.
+    looked: MonoTime,
     silent: bool,
 }
 
@@ -63,6 +65,7 @@ impl Watch {
             heard: 0,
             anew: false,
             phase: Phase::default(),
+            looked: MonoTime::default(),
             health,
             sender,
             alarms,
@@ -89,9 +92,23 @@ impl Watch {
             }
             Sent::Failed { .. } => {}
             Sent::Joined { lane } => {
-                let group = self.health.groups().group_of(usize::from(lane));
-                self.health.on_joined(group);
+                self.on_joined(self.health.groups().group_of(usize::from(lane)));
             }
+        }
+    }
+
+    fn on_joined(&mut self, group: usize) {
+        let from = self.health.standing(group);
+        self.health.on_joined(group);
+        let (to, why) = (self.health.standing(group), self.health.why(group));
+        if from != to {
+            self.keep(Change { group, at: self.looked, from, to, why });
+        }
+    }
+
+    fn keep(&mut self, change: Change) {
+        if self.changes.len() < CHANGES_KEPT {
+            self.changes.push(change);
         }
     }
 
@@ -120,6 +137,7 @@ impl Watch {
 
     /// Judges all at `now`, an instant up to which all was told.
     pub(super) fn look(&mut self, observer: &Observer, now: MonoTime) {
+        self.looked = now;
         let health = &mut self.health;
         self.heard = observer.events_since(self.heard, |event| health.on_event(event));
         for (controller, state) in observer.states().iter().enumerate() {
@@ -145,9 +163,7 @@ impl Watch {
                 self.health.on_read_sent(controller, datagrams);
             }
             Notice::Group(change) => {
-                if self.changes.len() < CHANGES_KEPT {
-                    self.changes.push(change);
-                }
+                self.keep(change);
                 for controller in 0..self.lookers.len() {
                     if self.health.groups().group_of(controller) == change.group {
                         self.tell_lane(controller, change);
