@@ -38,6 +38,7 @@ pub mod engine;
 pub mod config;
 
 pub mod fanout;
+pub mod gate;
 pub mod rt;
 
 pub mod sim;

@@ -1,0 +1,162 @@
+//! Whether an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
+
+use super::brake::{Brake, Motion};
+use super::history::{Difference, History};
+use super::limits::AxisLimits;
+use crate::motion::Spacing;
+
+/// Poses that a difference can span, without the newest.
+const PAST: usize = 82;
+/// Frames that are looked ahead at the most.
+const AHEAD: usize = 512;
+
+/// Shares of the limits that a way to rest may take. Beyond 1: a short jerk is seen as less than it is.
+const SHARES: [f64; 6] = [0.95, 1.0, 0.8, 0.6, 1.15, 1.4];
+/// Over which part of the shorter distance velocity and acceleration are taken, as its divisor; 0 is one frame.
+const PARTS: [usize; 4] = [0, 4, 2, 1];
+/// Ways to brake in all: each with the acceleration of a cubic and of a parabola.
+const WAYS: usize = SHARES.len() * PARTS.len() * 2;
+
+/// The past of one axis, and room for what may follow.
+pub(super) struct Outlook<'a> {
+    limits: &'a AxisLimits,
+    spacing: Spacing,
+    period: f64,
+    /// Seconds, 0 at the newest pose that is certain; as many of the past as of `positions`.
+    at: [f64; PAST + AHEAD],
+    positions: [f64; PAST + AHEAD],
+    /// The differences, where all frames have the same Time.
+    even: Option<[Difference; 2]>,
+}
+
+impl<'a> Outlook<'a> {
+    /// What lies behind after `next`, if there is one, has been sent `time_ms` after the newest pose.
+    pub(super) fn new(
+        history: &History,
+        axis: usize,
+        limits: &'a AxisLimits,
+        period: f64,
+        next: Option<(f64, u32)>,
+    ) -> Self {
+        let spacing = history.spacing();
+        let (mut at, mut positions) = ([0.0; PAST + AHEAD], [0.0; PAST + AHEAD]);
+        let (skip, time_ms) = next.map_or((1, 0), |(_, time_ms)| (0, time_ms));
+        for back in 0..PAST {
+            let place = PAST - 1 - back;
+            at[place] = -history.seconds_since(back + skip, time_ms);
+            positions[place] = history.before(back + skip)[axis];
+        }
+        if let Some((position, _)) = next {
+            at[PAST - 1] = 0.0;
+            positions[PAST - 1] = position;
+        }
+        let mut outlook = Self { limits, spacing, period, at, positions, even: None };
+        outlook.look_at_times();
+        outlook
+    }
+
+    fn look_at_times(&mut self) {
+        for (ahead, at) in self.at[PAST..].iter_mut().enumerate() {
+            *at = frames(ahead + 1) * self.period;
+        }
+        let reach = 3 * self.spacing.m;
+        let past = &self.at[PAST - 1 - reach.min(PAST - 1)..=PAST];
+        if past.windows(2).all(|pair| (pair[1] - pair[0] - self.period).abs() < 1e-9) {
+            self.even = Some([self.spacing.n, self.spacing.m].map(|apart| self.difference(PAST, apart)));
+        }
+    }
+
+    fn difference(&self, place: usize, apart: usize) -> Difference {
+        Difference::new(apart, [0, 1, 2, 3].map(|count| self.at[place.saturating_sub(count * apart)]))
+    }
+
+    fn nodes(&self, place: usize, apart: usize) -> [f64; 4] {
+        [0, 1, 2, 3].map(|count| self.positions[place.saturating_sub(count * apart)])
+    }
+
+    /// A way to rest that keeps within `allowed` limits, and its place among the ways; `first` is tried before all others.
+    pub(super) fn way(&mut self, first: usize, allowed: f64) -> Option<(Brake, usize)> {
+        let order = std::iter::once(first).chain((0..WAYS).filter(|&way| way != first));
+        for way in order {
+            let brake = self.brake(way);
+            if self.worst(&brake, allowed) <= allowed {
+                return Some((brake, way));
+            }
+        }
+        None
+    }
+
+    /// The way to rest that exceeds the limits least, and by how much.
+    pub(super) fn least(&mut self) -> (Brake, f64) {
+        let mut least = (self.brake(0), f64::INFINITY);
+        for way in 0..WAYS {
+            let brake = self.brake(way);
+            let worst = self.worst(&brake, least.1);
+            if worst < least.1 {
+                least = (brake, worst);
+            }
+        }
+        least
+    }
+
+    fn brake(&self, way: usize) -> Brake {
+        let share = SHARES[way % SHARES.len()];
+        let rest = way / SHARES.len();
+        let (part, cubic) = (PARTS[rest % PARTS.len()], rest < PARTS.len());
+        let apart = self.spacing.n.checked_div(part).unwrap_or(1).max(1);
+        let difference = self.difference(PAST - 1, apart);
+        let mut shown = difference.show(self.nodes(PAST - 1, apart));
+        if !cubic {
+            shown.jerk = 0.0;
+        }
+        let (velocity, acceleration) = difference.newest(shown);
+        let limits = self.limits;
+        let from = Motion {
+            position: self.positions[PAST - 1],
+            velocity: velocity.clamp(-limits.velocity, limits.velocity),
+            acceleration: acceleration.clamp(-1.2 * limits.acceleration, 1.2 * limits.acceleration),
+        };
+        Brake::new(from, share.min(1.0) * limits.acceleration, share * limits.jerk)
+    }
+
+    /// The greatest share of a limit that the brake takes; at least `enough` where it stops looking.
+    fn worst(&mut self, brake: &Brake, enough: f64) -> f64 {
+        let frames_ahead = self.frames_ahead(brake);
+        let mut worst = 0.0_f64;
+        for place in PAST..PAST + frames_ahead {
+            self.positions[place] = brake.position(self.at[place]);
+            worst = worst.max(self.share_at(place));
+            if worst > enough {
+                break;
+            }
+        }
+        worst
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "held inside the room")]
+    fn frames_ahead(&self, brake: &Brake) -> usize {
+        let until_rest = (brake.seconds() / self.period).ceil().min(frames(AHEAD)) as usize;
+        (until_rest + 3 * self.spacing.m + 1).min(AHEAD)
+    }
+
+    fn share_at(&self, place: usize) -> f64 {
+        let [now, before, earlier] = [place, place - 1, place - 2].map(|place| (self.at[place], self.positions[place]));
+        let velocity = (now.1 - before.1) / (now.0 - before.0);
+        let step = velocity - (before.1 - earlier.1) / (before.0 - earlier.0);
+        let limits = self.limits;
+        let mut worst = (velocity.abs() / limits.velocity).max(step.abs() / limits.step);
+        for (count, apart) in [self.spacing.n, self.spacing.m].into_iter().enumerate() {
+            let difference = self.even.map_or_else(|| self.difference(place, apart), |even| even[count]);
+            let shown = difference.show(self.nodes(place, apart));
+            worst = worst
+                .max(shown.acceleration.abs() / limits.acceleration)
+                .max(shown.jerk.abs() / limits.jerk);
+        }
+        worst
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "some hundreds")]
+fn frames(count: usize) -> f64 {
+    count as f64
+}
