@@ -12,6 +12,7 @@ mod counts;
 mod history;
 mod limits;
 mod outlook;
+mod times;
 
 pub use counts::{Clamp, Counts, Limit};
 
@@ -20,7 +21,9 @@ use counts::Counter;
 use history::{Difference, History};
 use limits::{AxisLimits, Next, SLACK};
 use outlook::Outlook;
+use times::Times;
 
+use crate::engine::Rate;
 use crate::motion::{Pose, Spacing, Window};
 
 /// What a way to rest is planned within; its frames may come a little off their even times.
@@ -42,8 +45,7 @@ pub enum Verdict {
 pub struct Gate {
     axes: Vec<Axis>,
     history: History,
-    period: f64,
-    period_ms: i64,
+    times: Times,
     /// Whether every axis is sent what is asked.
     following: bool,
     counter: Counter,
@@ -60,19 +62,18 @@ struct Frame {
 }
 
 impl Gate {
-    /// The gate of a lane at rest in `pose`, as fractions of each slot's stroke; `rate_hz` is 1 to 1,000.
+    /// The gate of a lane at rest in `pose`, as fractions of each slot's stroke.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "1 to 1,000 ms, 1 to 20 periods")]
-    pub fn new(window: &Window, rate_hz: f64, pose: Pose) -> Self {
-        let (spacing, period) = (Spacing::at_rate(rate_hz), 1.0 / rate_hz.clamp(1.0, 1000.0));
-        let period_ms = ((period * 1e3).round() as i64).max(1);
+    #[expect(clippy::cast_precision_loss, reason = "1 to 20 periods")]
+    pub fn new(window: &Window, rate: Rate, pose: Pose) -> Self {
+        let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
+        let period = times.period();
         let apart = spacing.n as f64 * period;
         let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, period, apart));
         Self {
             axes: limits.map(|limits| Axis::new(limits, spacing)).collect(),
-            history: History::new(spacing, held_inside(pose), period_ms),
-            period,
-            period_ms,
+            history: History::new(spacing, held_inside(pose), times.usual_ms()),
+            times,
             following: true,
             counter: Counter::default(),
         }
@@ -85,7 +86,7 @@ impl Gate {
 
     /// Tells that the lane has stood in `pose` for long, wherever it was before.
     pub fn restart(&mut self, pose: Pose) {
-        self.history.rest(held_inside(pose), self.period_ms);
+        self.history.rest(held_inside(pose), self.times.usual_ms());
         self.axes.iter_mut().for_each(Axis::rest);
         self.following = true;
     }
@@ -102,10 +103,11 @@ impl Gate {
         self.history.last()
     }
 
-    /// Puts into `pose`, which a frame of `time_ms` is to carry, what may be sent, and takes it as sent.
+    /// Puts into `pose`, which frame `index` (counted from 0, of [`Rate::time_ms`]) is to carry, what may be sent, and takes
+    /// it as sent. Frames that were left out, few or many, are not missed: see [`Self::rest`].
     #[inline]
-    pub fn admit(&mut self, pose: &mut Pose, time_ms: u32) -> Verdict {
-        let time_ms = time_ms.max(1);
+    pub fn admit(&mut self, pose: &mut Pose, index: u64) -> Verdict {
+        let time_ms = self.times.of(index);
         let frame = self.frame(time_ms);
         if self.following && self.is_easy(pose, &frame) {
             self.history.push(*pose, time_ms);
@@ -209,8 +211,8 @@ impl Gate {
             state.way_out = None;
             return true;
         }
-        let sent = Some((next.position, frame.time_ms));
-        let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.period, sent);
+        let sent = Some(next.position);
+        let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, sent);
         let way = outlook.way(state.habit, PLANNED);
         if let Some((brake, habit)) = way {
             state.way_out = Some(brake);
@@ -229,7 +231,7 @@ impl Gate {
             }
         }
         let state = &self.axes[axis];
-        let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.period, None);
+        let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, None);
         let brake = outlook.way(state.habit, PLANNED).map_or_else(|| outlook.least().0, |way| way.0);
         let next = self.next(axis, brake.position(frame.seconds), frame);
         if !self.axes[axis].limits.hold(&next) {

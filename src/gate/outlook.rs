@@ -3,6 +3,7 @@
 use super::brake::{Brake, Motion};
 use super::history::{Difference, History};
 use super::limits::AxisLimits;
+use super::times::Times;
 use crate::motion::Spacing;
 
 /// Poses that a difference can span, without the newest.
@@ -30,38 +31,43 @@ pub(super) struct Outlook<'a> {
 }
 
 impl<'a> Outlook<'a> {
-    /// What lies behind after `next`, if there is one, has been sent `time_ms` after the newest pose.
+    /// Before a frame of `time_ms` is sent; or after, if it carries `sent`. `times` is past that frame.
     pub(super) fn new(
         history: &History,
         axis: usize,
         limits: &'a AxisLimits,
-        period: f64,
-        next: Option<(f64, u32)>,
+        times: Times,
+        time_ms: u32,
+        sent: Option<f64>,
     ) -> Self {
-        let spacing = history.spacing();
         let (mut at, mut positions) = ([0.0; PAST + AHEAD], [0.0; PAST + AHEAD]);
-        let (skip, time_ms) = next.map_or((1, 0), |(_, time_ms)| (0, time_ms));
+        let skip = usize::from(sent.is_none());
+        let now = history.seconds_since(skip, time_ms);
         for back in 0..PAST {
             let place = PAST - 1 - back;
-            at[place] = -history.seconds_since(back + skip, time_ms);
+            at[place] = now - history.seconds_since(back + skip, time_ms);
             positions[place] = history.before(back + skip)[axis];
         }
-        if let Some((position, _)) = next {
-            at[PAST - 1] = 0.0;
+        if let Some(position) = sent {
             positions[PAST - 1] = position;
         }
-        let mut outlook = Self { limits, spacing, period, at, positions, even: None };
-        outlook.look_at_times();
+        let mut outlook =
+            Self { limits, spacing: history.spacing(), period: times.period(), at, positions, even: None };
+        outlook.look_ahead(times, sent.is_none().then_some(time_ms));
         outlook
     }
 
-    fn look_at_times(&mut self) {
-        for (ahead, at) in self.at[PAST..].iter_mut().enumerate() {
-            *at = frames(ahead + 1) * self.period;
+    /// When the frames ahead are reached, `first` being the Time of the first if it is known already.
+    fn look_ahead(&mut self, mut times: Times, first: Option<u32>) {
+        let mut first = first;
+        let mut sum = 0.0;
+        for at in &mut self.at[PAST..] {
+            sum += f64::from(first.take().unwrap_or_else(|| times.next())) * 1e-3;
+            *at = sum;
         }
         let reach = 3 * self.spacing.m;
         let past = &self.at[PAST - 1 - reach.min(PAST - 1)..=PAST];
-        if past.windows(2).all(|pair| (pair[1] - pair[0] - self.period).abs() < 1e-9) {
+        if times.are_even() && past.windows(2).all(|pair| (pair[1] - pair[0] - self.period).abs() < 1e-9) {
             self.even = Some([self.spacing.n, self.spacing.m].map(|apart| self.difference(PAST, apart)));
         }
     }
