@@ -1,5 +1,6 @@
 //! Judges what was sent, from the definition of the measure alone, frame by frame and with all its multiplications.
 
+use kinocue::engine::Rate;
 use kinocue::motion::Limits;
 
 /// What frames of a rate make of an axis that stood still before.
@@ -44,7 +45,7 @@ impl Judge {
     pub(crate) fn new(limits: Limits, rate_hz: f64, start: f64) -> Self {
         let n = ((0.020 * rate_hz + 0.5).floor() as usize).max(1);
         let m = (13 * n / 10 + 1..).find(|m| (2..=n).all(|f| n % f != 0 || m % f != 0)).expect("a prime comes");
-        let period_ms = (1000.0 / rate_hz).round() as i64;
+        let period_ms = i64::from(Rate::from_hz(rate_hz).time_ms(0));
         let before = 3 * m as i64 + 2;
         Self {
             limits,

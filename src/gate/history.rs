@@ -14,11 +14,12 @@ pub(super) struct History {
     newest: usize,
     /// Frames in a row with the same Time.
     even: usize,
-    differences: [Difference; 2],
+    /// Those of frames of that Time, once all that they span have it.
+    differences: Option<[Difference; 2]>,
 }
 
 /// The reciprocals that the differences of four poses need: of the times between them.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Difference {
     /// Periods from one pose to the next.
     pub(super) apart: usize,
@@ -73,26 +74,27 @@ impl Difference {
 
 impl History {
     /// At rest in a pose all along.
-    pub(super) fn new(spacing: Spacing, pose: Pose, period_ms: i64) -> Self {
+    pub(super) fn new(spacing: Spacing, pose: Pose, period_ms: u32) -> Self {
         let mut history = Self {
             spacing,
             poses: [pose; ROWS],
             at_ms: [0; ROWS],
             newest: 0,
             even: 0,
-            differences: [Difference::default(); 2],
+            differences: None,
         };
         history.rest(pose, period_ms);
         history
     }
 
     /// Forgets what was before: the lane has stood in `pose` for long.
-    pub(super) fn rest(&mut self, pose: Pose, period_ms: i64) {
+    pub(super) fn rest(&mut self, pose: Pose, period_ms: u32) {
         self.poses = [pose; ROWS];
         self.newest = ROWS - 1;
         self.even = 0;
+        self.differences = None;
         for (at, back) in self.at_ms.iter_mut().rev().zip(0..) {
-            *at = -back * period_ms;
+            *at = -back * i64::from(period_ms);
         }
     }
 
@@ -117,18 +119,16 @@ impl History {
 
     /// The two differences that a pose reached `time_ms` after the newest makes.
     pub(super) fn differences(&mut self, time_ms: u32) -> [Difference; 2] {
-        if !self.is_even(time_ms) {
-            let Spacing { n, m } = self.spacing;
-            self.differences = [n, m].map(|apart| {
-                Difference::new(apart, [0, 1, 2, 3].map(|count| -self.seconds_since(count * apart, time_ms)))
-            });
+        let even = self.even > 3 * self.spacing.m && self.last_time() == i64::from(time_ms);
+        if let (true, Some(differences)) = (even, self.differences) {
+            return differences;
         }
-        self.differences
-    }
-
-    /// Whether the differences of the frame before hold for one of that Time too.
-    fn is_even(&self, time_ms: u32) -> bool {
-        self.even > 3 * self.spacing.m + 1 && self.last_time() == i64::from(time_ms)
+        let Spacing { n, m } = self.spacing;
+        let differences = [n, m].map(|apart| {
+            Difference::new(apart, [0, 1, 2, 3].map(|count| -self.seconds_since(count * apart, time_ms)))
+        });
+        self.differences = even.then_some(differences);
+        differences
     }
 
     /// Time of the newest frame, ms.

@@ -8,6 +8,7 @@
 
 mod axis;
 mod brake;
+mod calm;
 mod counts;
 mod history;
 mod limits;
@@ -17,6 +18,7 @@ mod times;
 pub use counts::{Clamp, Counts, Limit};
 
 use axis::{Axis, Mode};
+use calm::Calm;
 use counts::Counter;
 use history::{Difference, History};
 use limits::{AxisLimits, Next, SLACK};
@@ -44,6 +46,7 @@ pub enum Verdict {
 #[derive(Debug, Clone)]
 pub struct Gate {
     axes: Vec<Axis>,
+    calm: Calm,
     history: History,
     times: Times,
     /// Whether every axis is sent what is asked.
@@ -64,15 +67,15 @@ struct Frame {
 impl Gate {
     /// The gate of a lane at rest in `pose`, as fractions of each slot's stroke.
     #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "1 to 20 periods")]
     pub fn new(window: &Window, rate: Rate, pose: Pose) -> Self {
         let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
-        let period = times.period();
-        let apart = spacing.n as f64 * period;
-        let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, period, apart));
+        let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, times.period()));
+        let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
+        let pose = held_inside(pose);
         Self {
-            axes: limits.map(|limits| Axis::new(limits, spacing)).collect(),
-            history: History::new(spacing, held_inside(pose), times.usual_ms()),
+            calm: Calm::new(axes.iter().map(|axis| &axis.limits), spacing, pose, f64::from(times.usual_ms()) * 1e-3),
+            axes,
+            history: History::new(spacing, pose, times.usual_ms()),
             times,
             following: true,
             counter: Counter::default(),
@@ -86,7 +89,9 @@ impl Gate {
 
     /// Tells that the lane has stood in `pose` for long, wherever it was before.
     pub fn restart(&mut self, pose: Pose) {
-        self.history.rest(held_inside(pose), self.times.usual_ms());
+        let pose = held_inside(pose);
+        self.history.rest(pose, self.times.usual_ms());
+        self.calm.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
         self.axes.iter_mut().for_each(Axis::rest);
         self.following = true;
     }
@@ -108,16 +113,15 @@ impl Gate {
     #[inline]
     pub fn admit(&mut self, pose: &mut Pose, index: u64) -> Verdict {
         let time_ms = self.times.of(index);
-        let frame = self.frame(time_ms);
-        if self.following && self.is_easy(pose, &frame) {
+        self.calm.begin(f64::from(time_ms) * 1e-3);
+        if self.following && self.calm.take_calm(pose) {
             self.history.push(*pose, time_ms);
             self.counter.tick(time_ms, false, false);
             return Verdict::Passed;
         }
-        self.judge(pose, &frame)
+        self.judge(pose, time_ms)
     }
 
-    #[inline]
     #[expect(clippy::cast_precision_loss, reason = "some seconds")]
     fn frame(&mut self, time_ms: u32) -> Frame {
         let seconds = f64::from(time_ms) * 1e-3;
@@ -131,16 +135,6 @@ impl Gate {
     }
 
     #[inline]
-    fn is_easy(&self, pose: &Pose, frame: &Frame) -> bool {
-        let mut easy = true;
-        for (axis, (state, &position)) in self.axes.iter().zip(pose).enumerate() {
-            let next = self.next(axis, position, frame);
-            easy &= state.limits.hold(&next) & state.limits.are_far(&next);
-        }
-        easy
-    }
-
-    #[inline]
     fn next(&self, axis: usize, position: f64, frame: &Frame) -> Next {
         let before = |back: usize| self.history.before(back)[axis];
         let velocity = (position - before(1)) * frame.per_second;
@@ -150,18 +144,17 @@ impl Gate {
         });
         Next {
             position,
-            seconds: frame.seconds,
             velocity,
             step: velocity - (before(1) - before(2)) * frame.per_second_before,
             shown,
-            motion: frame.differences[0].newest(shown[0]),
         }
     }
 
     /// The same axis by axis, where not all is plain.
     #[cold]
     #[inline(never)]
-    fn judge(&mut self, pose: &mut Pose, frame: &Frame) -> Verdict {
+    fn judge(&mut self, pose: &mut Pose, time_ms: u32) -> Verdict {
+        let frame = &self.frame(time_ms);
         let (mut refused, mut held) = (false, false);
         for axis in 0..self.axes.len() {
             let asked = pose[axis];
@@ -171,8 +164,9 @@ impl Gate {
             held |= self.axes[axis].mode != Mode::Following;
         }
         self.following = !held;
-        self.history.push(*pose, frame.time_ms);
-        self.counter.tick(frame.time_ms, refused, held);
+        self.calm.take(pose);
+        self.history.push(*pose, time_ms);
+        self.counter.tick(time_ms, refused, held);
         match (held, self.counter.counts.fault) {
             (false, _) => Verdict::Passed,
             (true, false) => Verdict::Held,
@@ -207,7 +201,7 @@ impl Gate {
     /// Whether the axis can come to rest after this pose; the way is kept for the next tick.
     fn leaves_a_way_out(&mut self, axis: usize, next: &Next, frame: &Frame) -> bool {
         let state = &mut self.axes[axis];
-        if state.limits.are_far(next) {
+        if self.calm.is_calm(axis, next.position) {
             state.way_out = None;
             return true;
         }

@@ -1,6 +1,7 @@
 //! Whether an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
 
 use super::brake::{Brake, Motion};
+use super::calm::LEVEL;
 use super::history::{Difference, History};
 use super::limits::AxisLimits;
 use super::times::Times;
@@ -11,8 +12,10 @@ const PAST: usize = 82;
 /// Frames that are looked ahead at the most.
 const AHEAD: usize = 512;
 
-/// Shares of the limits that a way to rest may take. Beyond 1: a short jerk is seen as less than it is.
-const SHARES: [f64; 6] = [0.95, 1.0, 0.8, 0.6, 1.15, 1.4];
+/// Shares of the acceleration and of the jerk that a way to rest may take. Beyond 1: a short jerk is seen as less than it
+/// is.
+const SHARES: [(f64, f64); 7] =
+    [LEVEL, (0.95, 0.95), (1.0, 1.0), (0.8, 0.8), (0.6, 0.6), (1.0, 1.15), (1.0, 1.4)];
 /// Over which part of the shorter distance velocity and acceleration are taken, as its divisor; 0 is one frame.
 const PARTS: [usize; 4] = [0, 4, 2, 1];
 /// Ways to brake in all: each with the acceleration of a cubic and of a parabola.
@@ -122,7 +125,7 @@ impl<'a> Outlook<'a> {
             velocity: velocity.clamp(-limits.velocity, limits.velocity),
             acceleration: acceleration.clamp(-1.2 * limits.acceleration, 1.2 * limits.acceleration),
         };
-        Brake::new(from, share.min(1.0) * limits.acceleration, share * limits.jerk)
+        Brake::new(from, share.0 * limits.acceleration, share.1 * limits.jerk)
     }
 
     /// The greatest share of a limit that the brake takes; at least `enough` where it stops looking.

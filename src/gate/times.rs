@@ -58,8 +58,8 @@ impl Times {
     }
 
     /// The Time that most frames have, ms.
-    pub(super) fn usual_ms(&self) -> i64 {
-        i64::from(self.rate.time_ms(0)).max(1)
+    pub(super) fn usual_ms(&self) -> u32 {
+        self.rate.time_ms(0)
     }
 }
 
