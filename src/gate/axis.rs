@@ -32,8 +32,8 @@ pub(super) enum Mode {
 pub(super) struct Axis {
     pub(super) limits: AxisLimits,
     pub(super) mode: Mode,
-    /// The way to rest from the pose sent last, if one was looked for.
-    pub(super) way_out: Option<Brake>,
+    /// The last way to rest that was looked for in good time, and the frame from whose pose it begins.
+    pub(super) way_out: Option<(u64, Brake)>,
     /// Which of the ways to rest did last.
     pub(super) habit: usize,
     fade: f64,

@@ -18,6 +18,7 @@ mod times;
 pub use counts::{Clamp, Counts, Limit};
 
 use axis::{Axis, Mode};
+use brake::Brake;
 use calm::Calm;
 use counts::Counter;
 use history::{Difference, History};
@@ -57,6 +58,7 @@ pub struct Gate {
 /// What the differences of one tick need.
 #[derive(Clone, Copy)]
 struct Frame {
+    index: u64,
     time_ms: u32,
     seconds: f64,
     per_second: f64,
@@ -119,13 +121,14 @@ impl Gate {
             self.counter.tick(time_ms, false, false);
             return Verdict::Passed;
         }
-        self.judge(pose, time_ms)
+        self.judge(pose, index, time_ms)
     }
 
     #[expect(clippy::cast_precision_loss, reason = "some seconds")]
-    fn frame(&mut self, time_ms: u32) -> Frame {
+    fn frame(&mut self, index: u64, time_ms: u32) -> Frame {
         let seconds = f64::from(time_ms) * 1e-3;
         Frame {
+            index,
             time_ms,
             seconds,
             per_second: 1.0 / seconds,
@@ -153,8 +156,8 @@ impl Gate {
     /// The same axis by axis, where not all is plain.
     #[cold]
     #[inline(never)]
-    fn judge(&mut self, pose: &mut Pose, time_ms: u32) -> Verdict {
-        let frame = &self.frame(time_ms);
+    fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32) -> Verdict {
+        let frame = &self.frame(index, time_ms);
         let (mut refused, mut held) = (false, false);
         for axis in 0..self.axes.len() {
             let asked = pose[axis];
@@ -202,14 +205,13 @@ impl Gate {
     fn leaves_a_way_out(&mut self, axis: usize, next: &Next, frame: &Frame) -> bool {
         let state = &mut self.axes[axis];
         if self.calm.is_calm(axis, next.position) {
-            state.way_out = None;
             return true;
         }
         let sent = Some(next.position);
         let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, sent);
         let way = outlook.way(state.habit, PLANNED);
         if let Some((brake, habit)) = way {
-            state.way_out = Some(brake);
+            state.way_out = Some((frame.index, brake));
             state.habit = habit;
         }
         way.is_some()
@@ -217,7 +219,8 @@ impl Gate {
 
     /// Goes onto a way to rest: the one kept from the tick before, or one that is looked for now.
     fn brake(&mut self, axis: usize, frame: &Frame) -> f64 {
-        if let Some(brake) = self.axes[axis].way_out.take() {
+        let begins_here = |&(index, _): &(u64, Brake)| index + 1 == frame.index;
+        if let Some((_, brake)) = self.axes[axis].way_out.take_if(|way| begins_here(way)) {
             let position = brake.position(frame.seconds);
             let next = self.next(axis, position, frame);
             if self.axes[axis].limits.hold(&next) {
