@@ -1,5 +1,12 @@
 //! A way to rest: from a position, a velocity and an acceleration, in closed form.
 
+/// What a way to rest may end outside the stroke, in strokes; it is held at the end there.
+const STROKE_SLACK: f64 = 1e-7;
+/// How far an acceleration may be from what the poses show, as a share of the limit.
+const FURTHEST: f64 = 0.5;
+/// Halvings that find it, to a hundred thousandth of the limit.
+const HALVINGS: u32 = 16;
+
 /// What an axis does at an instant, in strokes and seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Motion {
@@ -60,9 +67,41 @@ impl Brake {
         self.stretches.iter().map(|stretch| stretch.seconds).sum()
     }
 
-    /// Where it comes to rest; may lie outside the stroke.
-    pub(super) const fn rest(&self) -> f64 {
-        self.rest
+    /// Whether it comes to rest inside the stroke, and is at no time faster than `velocity`, as far as it knows.
+    fn fits(&self, velocity: f64) -> bool {
+        let [build_up, held, _] = &self.stretches;
+        // Fastest where the acceleration is gone, on the way to braking; or at the beginning.
+        let gone = build_up.from.acceleration / -build_up.jerk;
+        let peak = build_up.from.under(build_up.jerk, gone.clamp(0.0, build_up.seconds)).velocity.abs();
+        (-STROKE_SLACK..=1.0 + STROKE_SLACK).contains(&self.rest)
+            && peak.max(held.from.velocity.abs()) <= velocity
+    }
+
+    /// The same, but from an acceleration that is no further from that of `from` than needed to stay inside the stroke and
+    /// under `velocity`: between two poses a jerk can have begun that their differences do not show yet. None where
+    /// [`Self::new`] does as well.
+    pub(super) fn aimed(from: Motion, acceleration: f64, jerk: f64, velocity: f64) -> Option<Self> {
+        let plain = Self::new(from, acceleration, jerk);
+        if plain.fits(velocity) {
+            return None;
+        }
+        let push = if from.velocity + 0.5 * from.acceleration * from.acceleration.abs() / jerk < 0.0 { 1.0 } else { -1.0 };
+        let with = |change: f64| {
+            Self::new(Motion { acceleration: from.acceleration + push * change, ..from }, acceleration, jerk)
+        };
+        let (mut short, mut far) = (0.0, FURTHEST * acceleration);
+        if !with(far).fits(velocity) {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = f64::midpoint(short, far);
+            if with(middle).fits(velocity) {
+                far = middle;
+            } else {
+                short = middle;
+            }
+        }
+        Some(with(far))
     }
 
     /// Where it is after so many seconds, held inside the stroke.

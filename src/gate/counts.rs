@@ -46,6 +46,8 @@ pub struct Counts {
     pub held_ticks: u64,
     /// Poses sent beyond a limit because no way within all of them was found.
     pub beyond: u64,
+    /// Poses after which a way to rest was looked for: those that come near a limit.
+    pub looked: u64,
     /// The clamp that exceeded its limit most.
     pub worst: Option<Clamp>,
     /// Whether three clamps ever began within a second, or one lasted as long.

@@ -29,9 +29,6 @@ use times::Times;
 use crate::engine::Rate;
 use crate::motion::{Pose, Spacing, Window};
 
-/// What a way to rest is planned within; its frames may come a little off their even times.
-const PLANNED: f64 = 1.0009;
-
 /// What became of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -207,9 +204,10 @@ impl Gate {
         if self.calm.is_calm(axis, next.position) {
             return true;
         }
+        self.counter.counts.looked += 1;
         let sent = Some(next.position);
         let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, sent);
-        let way = outlook.way(state.habit, PLANNED);
+        let way = outlook.way(state.habit);
         if let Some((brake, habit)) = way {
             state.way_out = Some((frame.index, brake));
             state.habit = habit;
@@ -229,7 +227,7 @@ impl Gate {
         }
         let state = &self.axes[axis];
         let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, None);
-        let brake = outlook.way(state.habit, PLANNED).map_or_else(|| outlook.least().0, |way| way.0);
+        let brake = outlook.way(state.habit).map_or_else(|| outlook.least(), |way| way.0);
         let next = self.next(axis, brake.position(frame.seconds), frame);
         if !self.axes[axis].limits.hold(&next) {
             self.counter.counts.beyond += 1;

@@ -18,8 +18,10 @@ const SHARES: [(f64, f64); 7] =
     [LEVEL, (0.95, 0.95), (1.0, 1.0), (0.8, 0.8), (0.6, 0.6), (1.0, 1.15), (1.0, 1.4)];
 /// Over which part of the shorter distance velocity and acceleration are taken, as its divisor; 0 is one frame.
 const PARTS: [usize; 4] = [0, 4, 2, 1];
-/// Ways to brake in all: each with the acceleration of a cubic and of a parabola.
-const WAYS: usize = SHARES.len() * PARTS.len() * 2;
+/// Ways to brake in all: each with the acceleration of a cubic and of a parabola, and as they are or aimed.
+const WAYS: usize = SHARES.len() * PARTS.len() * 2 * 2;
+/// What a way to rest is planned within; less than what is allowed, for the sake of rounding.
+const PLANNED: f64 = 1.0009;
 
 /// The past of one axis, and room for what may follow.
 pub(super) struct Outlook<'a> {
@@ -83,34 +85,35 @@ impl<'a> Outlook<'a> {
         [0, 1, 2, 3].map(|count| self.positions[place.saturating_sub(count * apart)])
     }
 
-    /// A way to rest that keeps within `allowed` limits, and its place among the ways; `first` is tried before all others.
-    pub(super) fn way(&mut self, first: usize, allowed: f64) -> Option<(Brake, usize)> {
+    /// A way to rest within the limits, and its place among the ways; `first` is tried before all others.
+    pub(super) fn way(&mut self, first: usize) -> Option<(Brake, usize)> {
         let order = std::iter::once(first).chain((0..WAYS).filter(|&way| way != first));
         for way in order {
-            let brake = self.brake(way);
-            if self.worst(&brake, allowed) <= allowed {
+            if let Some(brake) = self.brake(way)
+                && self.worst(&brake, PLANNED) <= PLANNED
+            {
                 return Some((brake, way));
             }
         }
         None
     }
 
-    /// The way to rest that exceeds the limits least, and by how much.
-    pub(super) fn least(&mut self) -> (Brake, f64) {
-        let mut least = (self.brake(0), f64::INFINITY);
+    /// The way to rest that exceeds the limits least.
+    pub(super) fn least(&mut self) -> Brake {
+        let mut least: Option<(Brake, f64)> = None;
         for way in 0..WAYS {
-            let brake = self.brake(way);
-            let worst = self.worst(&brake, least.1);
-            if worst < least.1 {
-                least = (brake, worst);
+            let Some(brake) = self.brake(way) else { continue };
+            let worst = self.worst(&brake, least.map_or(f64::INFINITY, |(_, worst)| worst));
+            if least.is_none_or(|(_, least)| worst < least) {
+                least = Some((brake, worst));
             }
         }
-        least
+        least.expect("ways that are not aimed are always there").0
     }
 
-    fn brake(&self, way: usize) -> Brake {
+    fn brake(&self, way: usize) -> Option<Brake> {
         let share = SHARES[way % SHARES.len()];
-        let rest = way / SHARES.len();
+        let (aimed, rest) = (way >= WAYS / 2, way % (WAYS / 2) / SHARES.len());
         let (part, cubic) = (PARTS[rest % PARTS.len()], rest < PARTS.len());
         let apart = self.spacing.n.checked_div(part).unwrap_or(1).max(1);
         let difference = self.difference(PAST - 1, apart);
@@ -125,7 +128,11 @@ impl<'a> Outlook<'a> {
             velocity: velocity.clamp(-limits.velocity, limits.velocity),
             acceleration: acceleration.clamp(-1.2 * limits.acceleration, 1.2 * limits.acceleration),
         };
-        Brake::new(from, share.0 * limits.acceleration, share.1 * limits.jerk)
+        let (pull, jerk) = (share.0 * limits.acceleration, share.1 * limits.jerk);
+        if aimed {
+            return Brake::aimed(from, pull, jerk, PLANNED * limits.velocity);
+        }
+        Some(Brake::new(from, pull, jerk))
     }
 
     /// The greatest share of a limit that the brake takes; at least `enough` where it stops looking.
