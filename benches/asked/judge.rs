@@ -44,7 +44,9 @@ impl Judge {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 20, 1 to 1,000")]
     pub(crate) fn new(limits: Limits, rate_hz: f64, start: f64) -> Self {
         let n = ((0.020 * rate_hz + 0.5).floor() as usize).max(1);
-        let m = (13 * n / 10 + 1..).find(|m| (2..=n).all(|f| n % f != 0 || m % f != 0)).expect("a prime comes");
+        let m = (13 * n / 10 + 1..)
+            .find(|m| (2..=n).all(|f| !n.is_multiple_of(f) || !m.is_multiple_of(f)))
+            .expect("a prime comes");
         let period_ms = i64::from(Rate::from_hz(rate_hz).time_ms(0));
         let before = 3 * m as i64 + 2;
         Self {
@@ -85,7 +87,8 @@ impl Judge {
             ..Worst::default()
         };
         for apart in self.apart {
-            worst.acceleration = worst.acceleration.max(2.0 * self.divided(0, apart, 2).abs() / self.limits.acceleration);
+            worst.acceleration =
+                worst.acceleration.max(2.0 * self.divided(0, apart, 2).abs() / self.limits.acceleration);
             worst.jerk = worst.jerk.max(6.0 * self.divided(0, apart, 3).abs() / self.limits.jerk);
         }
         worst

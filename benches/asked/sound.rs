@@ -20,7 +20,8 @@ const SECONDS: u32 = 3;
 const REST_MS: u32 = 400;
 
 /// The sorts of motion, by name.
-pub(crate) const SORTS: [&str; 6] = ["spline", "monotone", "linear", "waves", "from end to end", "jerk by chance"];
+pub(crate) const SORTS: [&str; 6] =
+    ["spline", "monotone", "linear", "waves", "from end to end", "jerk by chance"];
 
 /// A motion that keeps the limits.
 pub(crate) struct Sound {
@@ -68,7 +69,8 @@ fn fit(chance: &mut Chance, mut sound: Sound) -> Sound {
     let Sound { rate, limits, start, .. } = sound;
     let worst = Judge::worst(limits, rate.hz(), start, &sound.frames);
     let most = worst.velocity.max(worst.step).max(worst.acceleration).max(worst.jerk);
-    let (low, high) = sound.frames.iter().fold((start, start), |(low, high), of| (low.min(of.0), high.max(of.0)));
+    let (low, high) =
+        sound.frames.iter().fold((start, start), |(low, high), of| (low.min(of.0), high.max(of.0)));
     let full = sound.sort == 4 && sound.share >= 1.0;
     let scale = if full { 1.0 } else { (sound.share / most).min(1.0 / (high - low)) * chance.sign() };
     sound.share = most * scale.abs();
@@ -111,7 +113,8 @@ fn from_rows(chance: &mut Chance, sort: usize, at: &[f64]) -> Vec<f64> {
         }
         writeln!(text, "{ms},{value:.9}").expect("a string takes all");
     }
-    let cue = read(Path::new("rows.csv"), text.as_bytes(), &Source::Native).expect("the rows are well formed");
+    let cue =
+        read(Path::new("rows.csv"), text.as_bytes(), &Source::Native).expect("the rows are well formed");
     let (timeline, mut hint) = (Timeline::new(cue), Hint::default());
     at.iter().map(|&t| timeline.sample(ShowTime::from_secs_f64(t), &mut hint)[0]).collect()
 }
@@ -126,7 +129,8 @@ fn waves(chance: &mut Chance, at: &[f64]) -> Vec<f64> {
         .map(|&t| {
             let u = (t / 0.8).min((f64::from(SECONDS) - t) / 0.8).clamp(0.0, 1.0);
             let swell = u * u * u * (10.0 + u * (6.0 * u - 15.0));
-            0.01 * swell * waves.iter().map(|(hz, phase, size)| size * (TAU * hz * t + phase).sin()).sum::<f64>()
+            0.01 * swell
+                * waves.iter().map(|(hz, phase, size)| size * (TAU * hz * t + phase).sin()).sum::<f64>()
         })
         .collect()
 }
@@ -137,7 +141,8 @@ fn end_to_end(t: f64, limits: Limits) -> f64 {
     let rise = acceleration / jerk;
     let hold = velocity / acceleration - rise;
     let cruise = 1.0 / velocity - hold - 2.0 * rise;
-    let phases = [(jerk, rise), (0.0, hold), (-jerk, rise), (0.0, cruise), (-jerk, rise), (0.0, hold), (jerk, rise)];
+    let phases =
+        [(jerk, rise), (0.0, hold), (-jerk, rise), (0.0, cruise), (-jerk, rise), (0.0, hold), (jerk, rise)];
     run(phases, t.max(0.0), 0.0, 0.0, 0.0)
 }
 

@@ -12,8 +12,19 @@ const RATES: [f64; 10] = [50.0, 60.0, 100.0, 120.0, 200.0, 250.0, 333.0, 500.0, 
 
 /// The sorts of orders, by name.
 pub(crate) const SORTS: [&str; 13] = [
-    "steps", "noise", "no numbers", "cut off", "alternating", "wiggles", "into the end", "freezes", "jerk by chance", "lines",
-    "full jerk", "at the edge of the measure", "edges by turns",
+    "steps",
+    "noise",
+    "no numbers",
+    "cut off",
+    "alternating",
+    "wiggles",
+    "into the end",
+    "freezes",
+    "jerk by chance",
+    "lines",
+    "full jerk",
+    "at the edge of the measure",
+    "edges by turns",
 ];
 
 /// A sequence of orders to one axis at rest.
@@ -27,6 +38,8 @@ pub(crate) struct Wild {
     centre: f64,
     size: f64,
     span: usize,
+    /// Frames of a wiggle.
+    wiggle: f64,
     state: [f64; 4],
     left: usize,
     pub(crate) chance: Chance,
@@ -53,12 +66,13 @@ impl Wild {
             rate,
             limits,
             start: 0.0,
-            frames: 60 + chance.below(400),
+            frames: 40 + chance.below(280),
             sort,
             waves,
             centre,
             size,
             span: 1 + chance.below(80),
+            wiggle: chance.between(1.0, 80.0).round(),
             state: [0.0; 4],
             left: 0,
             chance,
@@ -86,12 +100,15 @@ impl Wild {
         match self.sort {
             0 => {
                 if self.turn() {
-                    self.state[0] = if self.chance.once_in(2) { self.chance.between(-0.2, 1.2) } else { self.start };
+                    self.state[0] =
+                        if self.chance.once_in(2) { self.chance.between(-0.2, 1.2) } else { self.start };
                 }
                 self.state[0]
             }
             1 => wave + self.size * self.chance.between(-1.0, 1.0),
-            2 if self.chance.once_in(self.span) => self.chance.one_of(&[f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300]),
+            2 if self.chance.once_in(self.span) => {
+                self.chance.one_of(&[f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300])
+            }
             2 => wave,
             3 if k < self.frames / 2 => {
                 self.state[0] = wave;
@@ -99,7 +116,7 @@ impl Wild {
             }
             3 => [self.state[0], self.start, f64::NAN, 0.0][self.span % 4],
             4 => wave + if k.is_multiple_of(2) { self.size } else { -self.size },
-            5 => wave + self.size * (TAU * k as f64 / self.span as f64).sin(),
+            5 => wave + self.size * (TAU * t * self.rate.hz() / self.wiggle).sin(),
             6 => self.run_on(seconds),
             7 => {
                 if self.turn() {
@@ -165,7 +182,11 @@ impl Wild {
     fn edge(&mut self, time_ms: u32, judge: &mut Judge) -> f64 {
         let (low, high) = judge.room(time_ms);
         if self.turn() {
-            self.state[1] = if self.sort == 11 { self.chance.between(-0.2, 1.2).clamp(0.0, 1.0) } else { 1.0 - self.state[1].round() };
+            self.state[1] = if self.sort == 11 {
+                self.chance.between(-0.2, 1.2).clamp(0.0, 1.0)
+            } else {
+                1.0 - self.state[1].round()
+            };
         }
         let share = if self.chance.once_in(8) { self.chance.between(0.0, 1.0) } else { self.state[1] };
         low + (high - low) * share
@@ -178,7 +199,8 @@ fn limits(chance: &mut Chance) -> Limits {
     if !chance.once_in(4) {
         return seat;
     }
-    let [velocity, acceleration, jerk] = [seat.velocity, seat.acceleration, seat.jerk].map(|limit| limit * chance.of_any_size(0.3, 2.0));
+    let [velocity, acceleration, jerk] =
+        [seat.velocity, seat.acceleration, seat.jerk].map(|limit| limit * chance.of_any_size(0.3, 2.0));
     Limits { velocity, acceleration, jerk }
 }
 

@@ -90,8 +90,11 @@ impl Axis {
         match self.mode {
             Mode::Following => (Mode::Following, asked),
             Mode::Braking { brake, after } if after > brake.seconds() && self.asked.is_sound() => {
-                let back =
-                    Mode::Returning { from: brake.position(after), after: 0.0, seconds: self.fade * self.stretch };
+                let back = Mode::Returning {
+                    from: brake.position(after),
+                    after: 0.0,
+                    seconds: self.fade * self.stretch,
+                };
                 fade_on(back, asked, seconds)
             }
             Mode::Braking { brake, after } => {

@@ -16,6 +16,12 @@ pub(super) struct Motion {
 }
 
 impl Motion {
+    /// The same with another acceleration.
+    pub(super) fn nudged_by(self, change: f64, jerk: f64, begun: Begun) -> Self {
+        let speed = if begun == Begun::Earlier { 0.5 * change * change.abs() / jerk } else { 0.0 };
+        Self { velocity: self.velocity + speed, acceleration: self.acceleration + change, ..self }
+    }
+
     /// What it does `after` seconds of constant jerk.
     fn under(self, jerk: f64, after: f64) -> Self {
         let Self { position, velocity, acceleration } = self;
@@ -25,6 +31,15 @@ impl Motion {
             acceleration: acceleration + after * jerk,
         }
     }
+}
+
+/// When a jerk that the poses do not show yet began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Begun {
+    /// At the newest pose: the acceleration jumps there.
+    Now,
+    /// Before it: the velocity has changed already.
+    Earlier,
 }
 
 /// A stretch of constant jerk.
@@ -109,13 +124,13 @@ impl Brake {
 
     /// The shortest way from an acceleration that differs from that of `from` just as much as is needed to fit: between
     /// two poses a jerk can have begun that does not show in them yet. None as with [`Self::turned`].
-    pub(super) fn nudged(from: Motion, means: Means) -> Option<Self> {
+    pub(super) fn nudged(from: Motion, means: Means, begun: Begun) -> Option<Self> {
         let plain = Self::new(from, means);
         if plain.fits(means) {
             return None;
         }
         let sign = plain.away(from);
-        let with = |change: f64| Motion { acceleration: from.acceleration + sign * change, ..from };
+        let with = |change: f64| from.nudged_by(sign * change, means.jerk, begun);
         least(FURTHEST * means.acceleration, |change| Self::new(with(change), means), means)
     }
 

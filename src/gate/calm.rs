@@ -12,7 +12,7 @@ use crate::motion::{MAX_AXES, Pose, Spacing};
 /// Shares of the acceleration and of the jerk up to which frames are calm, and with which an axis is thought to brake.
 pub(super) const LEVEL: (f64, f64) = (0.9, 0.8);
 
-/// Limits of all axes, each in a row of its own.
+/// Limits of all axes, each in a row of its own; none for axes that a lane does not have.
 #[derive(Debug, Clone)]
 struct Rows {
     velocity: Pose,
@@ -50,7 +50,6 @@ struct Spans {
 /// What is known from frame to frame of all axes of a lane.
 #[derive(Debug, Clone)]
 pub(super) struct Calm {
-    axes: usize,
     rows: Rows,
     position: Pose,
     velocity: Pose,
@@ -67,19 +66,23 @@ pub(super) struct Calm {
 
 impl Calm {
     #[expect(clippy::cast_precision_loss, reason = "1 to 20")]
-    pub(super) fn new<'a>(limits: impl Iterator<Item = &'a AxisLimits>, spacing: Spacing, pose: Pose, usual: f64) -> Self {
-        let none = [0.0; MAX_AXES];
+    pub(super) fn new<'a>(
+        limits: impl Iterator<Item = &'a AxisLimits>,
+        spacing: Spacing,
+        pose: Pose,
+        usual: f64,
+    ) -> Self {
+        let (none, any) = ([0.0; MAX_AXES], [f64::INFINITY; MAX_AXES]);
         let mut rows = Rows {
-            velocity: none,
-            step: none,
-            acceleration: none,
-            jerk: none,
-            rest: [none; 2],
+            velocity: any,
+            step: any,
+            acceleration: any,
+            jerk: any,
+            rest: [any; 2],
             half_per_jerk: none,
             half_per_acceleration: none,
             half_rise: none,
         };
-        let mut axes = 0;
         for (axis, limits) in limits.enumerate() {
             let (acceleration, jerk) = (LEVEL.0 * limits.acceleration, LEVEL.1 * limits.jerk);
             rows.velocity[axis] = limits.velocity;
@@ -91,11 +94,9 @@ impl Calm {
             rows.half_per_jerk[axis] = 0.5 / jerk;
             rows.half_per_acceleration[axis] = 0.5 / acceleration;
             rows.half_rise[axis] = 0.5 * acceleration / jerk;
-            axes = axis + 1;
         }
         let stretch = 3 * spacing.m + 1;
         let mut calm = Self {
-            axes,
             rows,
             position: pose,
             velocity: none,
@@ -145,8 +146,9 @@ impl Calm {
     pub(super) fn take_calm(&mut self, pose: &Pose) -> bool {
         let mut seen = Seen::default();
         let mut calm = true;
-        for axis in 0..self.axes.min(MAX_AXES) {
-            let glance = self.glance(axis, pose[axis]);
+        // All rows are as long: the loop is one that a compiler turns into vectors.
+        for (axis, &position) in pose.iter().enumerate() {
+            let glance = self.glance(axis, position);
             seen.keep(axis, &glance);
             calm &= glance.calm;
         }
@@ -164,8 +166,8 @@ impl Calm {
     /// Takes what is sent, calm or not.
     pub(super) fn take(&mut self, pose: &Pose) {
         let mut seen = Seen::default();
-        for axis in 0..self.axes {
-            seen.keep(axis, &self.glance(axis, pose[axis]));
+        for (axis, &position) in pose.iter().enumerate() {
+            seen.keep(axis, &self.glance(axis, position));
         }
         self.keep(pose, &seen);
     }
@@ -188,15 +190,18 @@ impl Calm {
         self.times = [self.spans.frame, self.times[0]];
     }
 
-    #[inline]
+    #[inline(always)]
+    #[expect(clippy::manual_range_contains, reason = "without a branch the loops around it become vectors")]
     fn glance(&self, axis: usize, position: f64) -> Glance {
         let (rows, spans) = (&self.rows, &self.spans);
         let velocity = (position - self.position[axis]) * spans.per_frame;
         let change = velocity - self.velocity[axis];
         let acceleration = change * spans.double_per_two;
         let jerk = (acceleration - self.acceleration[axis]) * spans.triple_per_three;
-        let beyond =
-            [(acceleration.abs() - rows.acceleration[axis]).max(0.0), (jerk.abs() - rows.jerk[axis]).max(0.0)];
+        let beyond = [
+            (acceleration.abs() - rows.acceleration[axis]).max(0.0),
+            (jerk.abs() - rows.jerk[axis]).max(0.0),
+        ];
         // At the pose itself, of the cubic through the newest four.
         let speed = velocity + spans.frame * (0.5 * acceleration + spans.two * jerk * (1.0 / 6.0));
         let pull = acceleration + (spans.frame + spans.two) * jerk * (1.0 / 3.0);
@@ -218,7 +223,7 @@ impl Calm {
     }
 
     /// At least the way to rest from the speed that is left when an acceleration is gone.
-    #[inline]
+    #[inline(always)]
     fn way(&self, axis: usize, speed: f64, acceleration: f64) -> f64 {
         let rows = &self.rows;
         speed
@@ -237,7 +242,7 @@ struct Seen {
 }
 
 impl Seen {
-    #[inline]
+    #[inline(always)]
     fn keep(&mut self, axis: usize, glance: &Glance) {
         self.velocity[axis] = glance.velocity;
         self.acceleration[axis] = glance.acceleration;

@@ -75,14 +75,8 @@ impl Difference {
 impl History {
     /// At rest in a pose all along.
     pub(super) fn new(spacing: Spacing, pose: Pose, period_ms: u32) -> Self {
-        let mut history = Self {
-            spacing,
-            poses: [pose; ROWS],
-            at_ms: [0; ROWS],
-            newest: 0,
-            even: 0,
-            differences: None,
-        };
+        let mut history =
+            Self { spacing, poses: [pose; ROWS], at_ms: [0; ROWS], newest: 0, even: 0, differences: None };
         history.rest(pose, period_ms);
         history
     }

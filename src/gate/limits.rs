@@ -20,12 +20,7 @@ impl AxisLimits {
     /// For frames of that period.
     pub(super) fn new(limits: Limits, period: f64) -> Self {
         let Limits { velocity, acceleration, jerk } = limits;
-        Self {
-            velocity,
-            acceleration,
-            jerk,
-            step: 4.0 * acceleration * period.max(0.005),
-        }
+        Self { velocity, acceleration, jerk, step: 4.0 * acceleration * period.max(0.005) }
     }
 
     /// Whether the next pose keeps the limits: inside the stroke, frame velocity, its step, both distances. Not-a-number does not.

@@ -72,7 +72,12 @@ impl Gate {
         let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
         let pose = held_inside(pose);
         Self {
-            calm: Calm::new(axes.iter().map(|axis| &axis.limits), spacing, pose, f64::from(times.usual_ms()) * 1e-3),
+            calm: Calm::new(
+                axes.iter().map(|axis| &axis.limits),
+                spacing,
+                pose,
+                f64::from(times.usual_ms()) * 1e-3,
+            ),
             axes,
             history: History::new(spacing, pose, times.usual_ms()),
             times,
@@ -142,12 +147,7 @@ impl Gate {
             let apart = difference.apart;
             difference.show([position, before(apart), before(2 * apart), before(3 * apart)])
         });
-        Next {
-            position,
-            velocity,
-            step: velocity - (before(1) - before(2)) * frame.per_second_before,
-            shown,
-        }
+        Next { position, velocity, step: velocity - (before(1) - before(2)) * frame.per_second_before, shown }
     }
 
     /// The same axis by axis, where not all is plain.
@@ -156,10 +156,9 @@ impl Gate {
     fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32) -> Verdict {
         let frame = &self.frame(index, time_ms);
         let (mut refused, mut held) = (false, false);
-        for axis in 0..self.axes.len() {
-            let asked = pose[axis];
-            let (sent, was_refused) = self.judge_axis(axis, asked, frame);
-            pose[axis] = sent;
+        for (axis, position) in pose.iter_mut().enumerate().take(self.axes.len()) {
+            let (sent, was_refused) = self.judge_axis(axis, *position, frame);
+            *position = sent;
             refused |= was_refused;
             held |= self.axes[axis].mode != Mode::Following;
         }
@@ -248,7 +247,8 @@ fn exceeded(limits: &AxisLimits, next: &Next) -> (Limit, f64) {
         (Limit::Acceleration, n.acceleration.abs().max(m.acceleration.abs()) / limits.acceleration),
         (Limit::Jerk, n.jerk.abs().max(m.jerk.abs()) / limits.jerk),
     ];
-    let worst = shares.into_iter().fold((Limit::WayOut, SLACK), |most, of| if of.1 > most.1 { of } else { most });
+    let worst =
+        shares.into_iter().fold((Limit::WayOut, SLACK), |most, of| if of.1 > most.1 { of } else { most });
     if worst.0 == Limit::WayOut { (Limit::WayOut, 1.0) } else { worst }
 }
 

@@ -1,6 +1,6 @@
 //! Whether an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
 
-use super::brake::{Brake, Motion};
+use super::brake::{Begun, Brake, Means, Motion};
 use super::calm::LEVEL;
 use super::history::{Difference, History};
 use super::limits::AxisLimits;
@@ -18,8 +18,10 @@ const SHARES: [(f64, f64); 7] =
     [LEVEL, (0.95, 0.95), (1.0, 1.0), (0.8, 0.8), (0.6, 0.6), (1.0, 1.15), (1.0, 1.4)];
 /// Over which part of the shorter distance velocity and acceleration are taken, as its divisor; 0 is one frame.
 const PARTS: [usize; 4] = [0, 4, 2, 1];
-/// Ways to brake in all: each with the acceleration of a cubic and of a parabola, and as they are or aimed.
-const WAYS: usize = SHARES.len() * PARTS.len() * 2 * 2;
+/// Ways to brake of one kind: each with the acceleration of a cubic and of a parabola.
+const OF_A_KIND: usize = SHARES.len() * PARTS.len() * 2;
+/// Ways to brake in all: shortest, nudged in either way, turned.
+const WAYS: usize = 4 * OF_A_KIND;
 /// What a way to rest is planned within; less than what is allowed, for the sake of rounding.
 const PLANNED: f64 = 1.0009;
 
@@ -113,7 +115,7 @@ impl<'a> Outlook<'a> {
 
     fn brake(&self, way: usize) -> Option<Brake> {
         let share = SHARES[way % SHARES.len()];
-        let (aimed, rest) = (way >= WAYS / 2, way % (WAYS / 2) / SHARES.len());
+        let (kind, rest) = (way / OF_A_KIND, way % OF_A_KIND / SHARES.len());
         let (part, cubic) = (PARTS[rest % PARTS.len()], rest < PARTS.len());
         let apart = self.spacing.n.checked_div(part).unwrap_or(1).max(1);
         let difference = self.difference(PAST - 1, apart);
@@ -123,16 +125,25 @@ impl<'a> Outlook<'a> {
         }
         let (velocity, acceleration) = difference.newest(shown);
         let limits = self.limits;
-        let from = Motion {
-            position: self.positions[PAST - 1],
-            velocity: velocity.clamp(-limits.velocity, limits.velocity),
-            acceleration: acceleration.clamp(-1.2 * limits.acceleration, 1.2 * limits.acceleration),
+        let velocity = velocity.clamp(-limits.velocity, limits.velocity);
+        let most = PLANNED * limits.acceleration;
+        let excess = acceleration.clamp(-most, most) - acceleration;
+        let from = Motion { position: self.positions[PAST - 1], velocity, acceleration }.nudged_by(
+            excess,
+            limits.jerk,
+            Begun::Earlier,
+        );
+        let means = Means {
+            velocity: PLANNED * limits.velocity,
+            acceleration: share.0 * limits.acceleration,
+            jerk: share.1 * limits.jerk,
         };
-        let (pull, jerk) = (share.0 * limits.acceleration, share.1 * limits.jerk);
-        if aimed {
-            return Brake::aimed(from, pull, jerk, PLANNED * limits.velocity);
+        match kind {
+            0 => Some(Brake::new(from, means)),
+            1 => Brake::nudged(from, means, Begun::Now),
+            2 => Brake::nudged(from, means, Begun::Earlier),
+            _ => Brake::turned(from, means),
         }
-        Some(Brake::new(from, pull, jerk))
     }
 
     /// The greatest share of a limit that the brake takes; at least `enough` where it stops looking.
@@ -156,7 +167,8 @@ impl<'a> Outlook<'a> {
     }
 
     fn share_at(&self, place: usize) -> f64 {
-        let [now, before, earlier] = [place, place - 1, place - 2].map(|place| (self.at[place], self.positions[place]));
+        let [now, before, earlier] =
+            [place, place - 1, place - 2].map(|place| (self.at[place], self.positions[place]));
         let velocity = (now.1 - before.1) / (now.0 - before.0);
         let step = velocity - (before.1 - earlier.1) / (before.0 - earlier.0);
         let limits = self.limits;
@@ -164,9 +176,8 @@ impl<'a> Outlook<'a> {
         for (count, apart) in [self.spacing.n, self.spacing.m].into_iter().enumerate() {
             let difference = self.even.map_or_else(|| self.difference(place, apart), |even| even[count]);
             let shown = difference.show(self.nodes(place, apart));
-            worst = worst
-                .max(shown.acceleration.abs() / limits.acceleration)
-                .max(shown.jerk.abs() / limits.jerk);
+            worst =
+                worst.max(shown.acceleration.abs() / limits.acceleration).max(shown.jerk.abs() / limits.jerk);
         }
         worst
     }

@@ -22,7 +22,8 @@ impl Times {
     }
 
     fn seek(&mut self, frame: u64) {
-        let over = (u128::from(frame) * 1_000_000 + u128::from(self.millihertz / 2)) % u128::from(self.millihertz);
+        let over =
+            (u128::from(frame) * 1_000_000 + u128::from(self.millihertz / 2)) % u128::from(self.millihertz);
         self.over = u64::try_from(over).expect("less than what it was divided by");
         self.frame = frame;
     }
