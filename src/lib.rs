@@ -40,6 +40,7 @@ pub mod state;
 pub mod config;
 
 pub mod fanout;
+pub mod gate;
 pub mod rt;
 
 pub mod sim;

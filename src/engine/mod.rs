@@ -24,6 +24,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::cue::Vibration;
+use crate::gate::Counts;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::plan::{Course, Scene};
 use crate::time::ShowTime;
@@ -180,7 +181,7 @@ impl Engine {
         Self {
             greatest_level: levels.fold(headroom.greatest_level(), f64::max),
             scenes: Scenes::like(&Scene::parked(&windows)),
-            riders: windows.into_iter().map(Rider::parked).collect(),
+            riders: windows.into_iter().map(|window| Rider::parked(window, show.rate)).collect(),
             hint: Hint::default(),
             phase: if settles { Phase::Settling } else { Phase::Riding },
             ending: Ending::Completed,
@@ -270,6 +271,17 @@ impl Engine {
         self.phase == Phase::Riding && !self.is_joining() && self.seeking.is_none()
     }
 
+    /// What the gate had to do for a lane.
+    #[must_use]
+    pub fn clamps(&self, lane: usize) -> &Counts {
+        self.riders[lane].clamps()
+    }
+
+    /// Whether the gate has held a lane back three times within a second since this was asked last.
+    pub fn take_gate_fault(&mut self) -> bool {
+        self.riders.iter_mut().fold(false, |any, rider| any | rider.take_fault())
+    }
+
     /// Whether a move that the show needs could not be planned since this was asked last.
     pub fn take_planless(&mut self) -> bool {
         std::mem::take(&mut self.planless)
@@ -356,10 +368,12 @@ impl Engine {
 
     fn pose(&mut self, time: Duration) {
         self.reached = self.playhead;
+        let index = self.frames - 1;
         let cue = self.timeline.sample(self.reached, &mut self.hint);
-        for (lane, rider) in self.riders.iter_mut().enumerate() {
+        let there = self.riders.iter_mut().enumerate().filter(|(_, rider)| rider.part != Part::Away);
+        for (lane, rider) in there {
             let pose = rider.next(lane, time, &mut self.course, self.reached, &cue);
-            rider.send(time, pose);
+            rider.send(index, time, pose);
         }
     }
 

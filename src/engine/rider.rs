@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use super::Rate;
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
+use crate::gate::{Counts, Gate, Verdict};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
 use crate::time::ShowTime;
@@ -44,16 +46,19 @@ pub(super) struct Rider {
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
     pub(super) refused: bool,
+    is_at_fault: bool,
     pub(super) fader: Fader,
     /// The level of its vibration.
     vibration: f64,
     trail: Trail,
     brake: Brake,
+    /// Whatever is asked of it, what is sent keeps the limits.
+    gate: Gate,
 }
 
 impl Rider {
     /// A lane at rest in its park pose; motion at its window's level.
-    pub(super) fn parked(window: Window) -> Self {
+    pub(super) fn parked(window: Window, rate: Rate) -> Self {
         let level = window.level();
         Self {
             part: Part::With,
@@ -62,10 +67,12 @@ impl Rider {
             leaving: None,
             returning: false,
             refused: false,
+            is_at_fault: false,
             fader: Fader::at(level),
             vibration: level,
             trail: Trail::at_rest(window.park()),
             brake: Brake::new(&window, &Trail::at_rest(window.park()).states()),
+            gate: Gate::new(&window, rate, window.park()),
             window,
         }
     }
@@ -102,8 +109,10 @@ impl Rider {
         (self.part, self.leaving) = (Part::Away, None);
     }
 
-    /// It is there again, at rest in that pose.
-    pub(super) fn come_back(&mut self, pose: Pose) {
+    /// It is there again, its moving slots at rest in that pose; the others are at park throughout.
+    pub(super) fn come_back(&mut self, found: Pose) {
+        let mut pose = self.window.park();
+        self.window.moving().for_each(|(slot, _)| pose[slot] = found[slot]);
         self.rest_at(pose);
         (self.part, self.leaving, self.refused, self.returning) = (Part::Still, None, false, true);
     }
@@ -118,6 +127,17 @@ impl Rider {
 
     fn rest_at(&mut self, pose: Pose) {
         self.trail.rest(pose);
+        self.gate.restart(pose);
+    }
+
+    /// What the gate had to do.
+    pub(super) const fn clamps(&self) -> &Counts {
+        self.gate.counts()
+    }
+
+    /// Whether the gate has held it back too often; said once.
+    pub(super) const fn take_fault(&mut self) -> bool {
+        std::mem::replace(&mut self.is_at_fault, false)
     }
 
     /// Whether it moves on its own way to rest.
@@ -157,8 +177,9 @@ impl Rider {
         }
     }
 
-    /// What is sent for it, to be reached in `time`.
-    pub(super) fn send(&mut self, time: Duration, pose: Pose) {
+    /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the gate lets it pass.
+    pub(super) fn send(&mut self, index: u64, time: Duration, mut pose: Pose) {
+        self.is_at_fault |= self.gate.admit(&mut pose, index) == Verdict::Fault;
         self.trail.push(time, pose);
         let step = VIBRATION_RATE * time.as_secs_f64();
         self.vibration += (self.wanted.vibration - self.vibration).clamp(-step, step);

@@ -127,6 +127,9 @@ impl Conductor {
         if planless && !self.machine.state().is_latched() {
             return Some(Event::Trouble(Trouble::Planner));
         }
+        if engine.take_gate_fault() {
+            return Some(Event::Trouble(Trouble::Gate));
+        }
         match self.machine.state() {
             State::Playing(_) if engine.is_homeward() => Some(Event::CueEnded),
             State::Playing(ride) => match (ride, engine.rest()) {

@@ -15,6 +15,7 @@ use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Mix, Rate, Show, TickGrid};
 use kinocue::fanout::Manner;
+use kinocue::gate::Counts;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
 use kinocue::rt::{
@@ -139,10 +140,11 @@ impl Virtual {
             leave: &leave,
         };
         let ended = tick_loop.run();
+        let clamps = (0..tick_loop.lanes.len()).map(|lane| *tick_loop.engine.clamps(lane)).collect();
         let frames = tick_loop.sink.frames;
         let mut news = news;
         let news = std::iter::from_fn(|| news.pop().ok()).collect();
-        Played { ended, frames, happened: clock.happened.take(), news, join, timeline, rate }
+        Played { ended, frames, happened: clock.happened.take(), news, clamps, join, timeline, rate }
     }
 }
 
@@ -262,6 +264,8 @@ pub struct Played {
     pub happened: Vec<(MonoTime, Event)>,
     /// What the hall made known.
     pub news: Vec<News>,
+    /// What the gate had to do, lane by lane.
+    pub clamps: Vec<Counts>,
     /// How long the first join takes.
     pub join: ShowTime,
     pub timeline: Arc<Timeline>,

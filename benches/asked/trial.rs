@@ -1,0 +1,68 @@
+//! Sends sequences through a gate of one axis, and judges what comes out.
+
+use super::judge::Judge;
+use super::sound::Sound;
+use super::wild::Wild;
+use kinocue::gate::{Counts, Gate};
+use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType, Slot, Window};
+
+/// What a sequence made of a gate.
+pub(crate) struct Trial {
+    /// Greatest share of a limit in what was sent; infinite outside the stroke.
+    pub(crate) share: f64,
+    /// Whether all was sent as it was asked for, bit for bit.
+    pub(crate) unchanged: bool,
+    pub(crate) counts: Counts,
+}
+
+impl Trial {
+    /// A sequence of anything.
+    pub(crate) fn of_wild(wild: &mut Wild) -> Self {
+        let mut gate = Gate::new(&window(wild.limits), wild.rate, first(wild.start));
+        let mut judge = Judge::new(wild.limits, wild.rate.hz(), wild.start);
+        let (mut share, mut unchanged, mut ms) = (0.0_f64, true, 0);
+        for (index, frame) in (0..).zip(0..wild.frames) {
+            let time_ms = wild.rate.time_ms(index);
+            ms += time_ms;
+            let asked = wild.next(frame, f64::from(ms) * 1e-3, time_ms, &mut judge);
+            let mut pose = first(asked);
+            gate.admit(&mut pose, index);
+            unchanged &= pose[0].to_bits() == asked.to_bits();
+            share = share.max(judge.push(pose[0], time_ms).share());
+        }
+        Self { share, unchanged, counts: *gate.counts() }
+    }
+
+    /// A motion that keeps the limits.
+    pub(crate) fn of_sound(sound: &Sound) -> Self {
+        let mut gate = Gate::new(&window(sound.limits), sound.rate, first(sound.start));
+        let mut sent = sound.frames.clone();
+        for (index, (position, _)) in (0..).zip(&mut sent) {
+            let mut pose = first(*position);
+            gate.admit(&mut pose, index);
+            *position = pose[0];
+        }
+        let unchanged =
+            sent.iter().zip(&sound.frames).all(|(sent, asked)| sent.0.to_bits() == asked.0.to_bits());
+        let share = Judge::worst(sound.limits, sound.rate.hz(), sound.start, &sent).share();
+        Self { share, unchanged, counts: *gate.counts() }
+    }
+
+    /// Whether a limit was broken: by more than the thousandth that the measure allows, and what rounding takes.
+    pub(crate) fn is_broken(&self) -> bool {
+        self.share > 1.001 * 1.000_001
+    }
+}
+
+fn first(position: f64) -> Pose {
+    let mut pose = [0.0; MAX_AXES];
+    pose[0] = position;
+    pose
+}
+
+/// A frame of one axis with those limits.
+pub(crate) fn window(limits: Limits) -> Window {
+    let mut slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
+    slot.limits = limits;
+    Window::new(vec![slot])
+}

@@ -1,0 +1,258 @@
+//! The last gate before the encoder: whatever came before, what is sent keeps the limits of every axis by the measure of
+//! [`crate::motion::Measure`], on the poses before they are rounded to pulses. Tick thread; told the time; allocates
+//! nothing.
+//!
+//! What keeps the limits passes unchanged, bit for bit. A pose that does not, or after which no way to rest within the
+//! limits is left, is not sent: the axis goes on along a way to rest instead, and once what is asked has kept the limits
+//! for as long as the measure looks back, it fades from rest onto it.
+
+mod axis;
+mod brake;
+mod calm;
+mod counts;
+mod history;
+mod limits;
+mod outlook;
+mod times;
+
+pub use counts::{Clamp, Counts, Limit};
+
+use axis::{Axis, Mode};
+use brake::Brake;
+use calm::Calm;
+use counts::Counter;
+use history::{Difference, History};
+use limits::{AxisLimits, Next, SLACK};
+use outlook::Outlook;
+use times::Times;
+
+use crate::engine::Rate;
+use crate::motion::{Pose, Spacing, Window};
+
+/// What became of a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is sent as it was asked for.
+    Passed,
+    /// At least one axis is sent something else.
+    Held,
+    /// The same, and clamps have come so often that the show must end.
+    Fault,
+}
+
+/// The gate of one lane.
+#[derive(Debug, Clone)]
+pub struct Gate {
+    axes: Vec<Axis>,
+    calm: Calm,
+    history: History,
+    times: Times,
+    /// Whether every axis is sent what is asked.
+    following: bool,
+    counter: Counter,
+}
+
+/// What the differences of one tick need.
+#[derive(Clone, Copy)]
+struct Frame {
+    index: u64,
+    time_ms: u32,
+    seconds: f64,
+    per_second: f64,
+    per_second_before: f64,
+    differences: [Difference; 2],
+}
+
+impl Gate {
+    /// The gate of a lane at rest in `pose`, as fractions of each slot's stroke.
+    #[must_use]
+    pub fn new(window: &Window, rate: Rate, pose: Pose) -> Self {
+        let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
+        let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, times.period()));
+        let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
+        let pose = held_inside(pose);
+        Self {
+            calm: Calm::new(
+                axes.iter().map(|axis| &axis.limits),
+                spacing,
+                pose,
+                f64::from(times.usual_ms()) * 1e-3,
+            ),
+            axes,
+            history: History::new(spacing, pose, times.usual_ms()),
+            times,
+            following: true,
+            counter: Counter::default(),
+        }
+    }
+
+    /// Tells that frames stopped for long: the controller reached the last pose and stands there.
+    pub fn rest(&mut self) {
+        self.restart(*self.history.last());
+    }
+
+    /// Tells that the lane has stood in `pose` for long, wherever it was before.
+    pub fn restart(&mut self, pose: Pose) {
+        let pose = held_inside(pose);
+        self.history.rest(pose, self.times.usual_ms());
+        self.calm.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
+        self.axes.iter_mut().for_each(Axis::rest);
+        self.following = true;
+    }
+
+    /// Counts since the gate was made.
+    #[must_use]
+    pub const fn counts(&self) -> &Counts {
+        &self.counter.counts
+    }
+
+    /// The pose sent last.
+    #[must_use]
+    pub fn sent(&self) -> &Pose {
+        self.history.last()
+    }
+
+    /// Puts into `pose`, which frame `index` (counted from 0, of [`Rate::time_ms`]) is to carry, what may be sent, and takes
+    /// it as sent. Frames that were left out, few or many, are not missed: see [`Self::rest`].
+    #[inline]
+    pub fn admit(&mut self, pose: &mut Pose, index: u64) -> Verdict {
+        let time_ms = self.times.of(index);
+        self.calm.begin(f64::from(time_ms) * 1e-3);
+        if self.following && self.calm.take_calm(pose) {
+            self.history.push(*pose, time_ms);
+            self.counter.tick(time_ms, false, false);
+            return Verdict::Passed;
+        }
+        self.judge(pose, index, time_ms)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "some seconds")]
+    fn frame(&mut self, index: u64, time_ms: u32) -> Frame {
+        let seconds = f64::from(time_ms) * 1e-3;
+        Frame {
+            index,
+            time_ms,
+            seconds,
+            per_second: 1.0 / seconds,
+            per_second_before: 1e3 / self.history.last_time() as f64,
+            differences: self.history.differences(time_ms),
+        }
+    }
+
+    #[inline]
+    fn next(&self, axis: usize, position: f64, frame: &Frame) -> Next {
+        let before = |back: usize| self.history.before(back)[axis];
+        let velocity = (position - before(1)) * frame.per_second;
+        let shown = frame.differences.map(|difference| {
+            let apart = difference.apart;
+            difference.show([position, before(apart), before(2 * apart), before(3 * apart)])
+        });
+        Next { position, velocity, step: velocity - (before(1) - before(2)) * frame.per_second_before, shown }
+    }
+
+    /// The same axis by axis, where not all is plain.
+    #[cold]
+    #[inline(never)]
+    fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32) -> Verdict {
+        let frame = &self.frame(index, time_ms);
+        let (mut refused, mut held) = (false, false);
+        for (axis, position) in pose.iter_mut().enumerate().take(self.axes.len()) {
+            let (sent, was_refused) = self.judge_axis(axis, *position, frame);
+            *position = sent;
+            refused |= was_refused;
+            held |= self.axes[axis].mode != Mode::Following;
+        }
+        self.following = !held;
+        self.calm.take(pose);
+        self.history.push(*pose, time_ms);
+        self.counter.tick(time_ms, refused, held);
+        match (held, self.counter.counts.fault) {
+            (false, _) => Verdict::Passed,
+            (true, false) => Verdict::Held,
+            (true, true) => Verdict::Fault,
+        }
+    }
+
+    /// What one axis is sent, and whether what was asked broke a limit.
+    fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame) -> (f64, bool) {
+        let state = &mut self.axes[axis];
+        let broken = state.mode != Mode::Following && state.look(asked, frame.time_ms);
+        let (mode, wish) = state.wish(asked, frame.seconds);
+        let next = self.next(axis, wish, frame);
+        let held = self.axes[axis].limits.hold(&next);
+        if let Mode::Braking { .. } = mode {
+            if held {
+                self.axes[axis].take_up(mode);
+                return (wish, broken);
+            }
+            return (self.brake(axis, frame), broken);
+        }
+        if held && self.leaves_a_way_out(axis, &next, frame) {
+            self.axes[axis].take_up(mode);
+            return (wish, broken);
+        }
+        let allowed = self.brake(axis, frame);
+        let (limit, times) = exceeded(&self.axes[axis].limits, &next);
+        self.counter.refused(Clamp { axis, asked, allowed, limit, times });
+        (allowed, true)
+    }
+
+    /// Whether the axis can come to rest after this pose; the way is kept for the next tick.
+    fn leaves_a_way_out(&mut self, axis: usize, next: &Next, frame: &Frame) -> bool {
+        let state = &mut self.axes[axis];
+        if self.calm.is_calm(axis, next.position) {
+            return true;
+        }
+        self.counter.counts.looked += 1;
+        let sent = Some(next.position);
+        let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, sent);
+        let way = outlook.way(state.habit);
+        if let Some((brake, habit)) = way {
+            state.way_out = Some((frame.index, brake));
+            state.habit = habit;
+        }
+        way.is_some()
+    }
+
+    /// Goes onto a way to rest: the one kept from the tick before, or one that is looked for now.
+    fn brake(&mut self, axis: usize, frame: &Frame) -> f64 {
+        let begins_here = |&(index, _): &(u64, Brake)| index + 1 == frame.index;
+        if let Some((_, brake)) = self.axes[axis].way_out.take_if(|way| begins_here(way)) {
+            let position = brake.position(frame.seconds);
+            let next = self.next(axis, position, frame);
+            if self.axes[axis].limits.hold(&next) {
+                return self.axes[axis].brake(brake, frame.seconds);
+            }
+        }
+        let state = &self.axes[axis];
+        let mut outlook = Outlook::new(&self.history, axis, &state.limits, self.times, frame.time_ms, None);
+        let brake = outlook.way(state.habit).map_or_else(|| outlook.least(), |way| way.0);
+        let next = self.next(axis, brake.position(frame.seconds), frame);
+        if !self.axes[axis].limits.hold(&next) {
+            self.counter.counts.beyond += 1;
+        }
+        self.axes[axis].brake(brake, frame.seconds)
+    }
+}
+
+/// The limit that a pose exceeds most, and how many times.
+fn exceeded(limits: &AxisLimits, next: &Next) -> (Limit, f64) {
+    if !(0.0..=1.0).contains(&next.position) {
+        return (Limit::Position, f64::INFINITY);
+    }
+    let [n, m] = next.shown;
+    let shares = [
+        (Limit::Velocity, next.velocity.abs() / limits.velocity),
+        (Limit::Step, next.step.abs() / limits.step),
+        (Limit::Acceleration, n.acceleration.abs().max(m.acceleration.abs()) / limits.acceleration),
+        (Limit::Jerk, n.jerk.abs().max(m.jerk.abs()) / limits.jerk),
+    ];
+    let worst =
+        shares.into_iter().fold((Limit::WayOut, SLACK), |most, of| if of.1 > most.1 { of } else { most });
+    if worst.0 == Limit::WayOut { (Limit::WayOut, 1.0) } else { worst }
+}
+
+/// Positions held inside the stroke; what is no number rests at its lower end.
+fn held_inside(pose: Pose) -> Pose {
+    pose.map(|position| if position.is_nan() { 0.0 } else { position.clamp(0.0, 1.0) })
+}
