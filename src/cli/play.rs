@@ -15,14 +15,18 @@ use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::engine::{Rate, Show};
 use crate::fanout::Manner;
-use crate::sys::signal;
+use crate::sys::{signal, terminal};
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 
+mod keys;
+mod leader;
 mod progress;
+mod said;
 
-use progress::{Progress, Said};
+use progress::Progress;
+use said::Said;
 
 const EXAMPLES: [&str; 4] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
@@ -118,12 +122,14 @@ pub(super) fn play(
         let name = &controller.name;
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
+    let names = config.controllers.iter().map(|one| one.name.clone()).collect();
     let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
     let control = play.control().clone();
-    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Said { live: control.live, stop: control.leave, length, join: play.join() };
+    let interrupted =
+        leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    let said = Said { control, interrupted, length, join: play.join(), names };
     let progress = Progress::start(said, for_ever);
-    let played = play.run(|_| false).map_err(|error| refused(error, &cue));
+    let played = play.run(|reins| progress.lead(reins)).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
 }
@@ -166,19 +172,21 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
     Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
 }
 
-/// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once.
-fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<()> {
+/// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once. Returns a flag that
+/// Ctrl-C alone sets.
+fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let code = Exit::Interrupted as i32;
+    terminal::restore_on(SIGINT, Arc::clone(&interrupted))?;
     signal_hook::flag::register_conditional_shutdown(SIGINT, code, Arc::clone(&interrupted))?;
-    signal_hook::flag::register(SIGINT, interrupted)?;
+    signal_hook::flag::register(SIGINT, Arc::clone(&interrupted))?;
     signal_hook::flag::register(SIGINT, Arc::clone(leave))?;
     signal_hook::flag::register(SIGTERM, Arc::clone(leave))?;
     if !signal::is_ignored(SIGHUP)? {
         // The terminal is gone; the seats must not be left in the air for that.
         signal_hook::flag::register(SIGHUP, Arc::clone(leave))?;
     }
-    Ok(())
+    Ok(interrupted)
 }
 
 fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {

@@ -12,8 +12,8 @@ pub struct Conductor {
     machine: Machine,
     /// The state that the engine was told last.
     told: State,
-    /// The state that was made known last, and since when it lasts.
-    known: Option<(State, MonoTime)>,
+    /// The state that was made known last, since when it lasts, and what a person does next.
+    known: Option<(State, MonoTime, &'static str)>,
     /// Whether a person is there to clear what is latched; else the play ends with it.
     attended: bool,
 }
@@ -143,12 +143,12 @@ impl Conductor {
 
     /// What is new since it was asked last.
     pub fn news(&mut self) -> Option<News> {
-        let entered = (self.machine.state(), self.machine.since());
-        if self.known.replace(entered) == Some(entered) {
+        let known = (self.machine.state(), self.machine.since(), self.machine.next());
+        if self.known.replace(known) == Some(known) {
             return None;
         }
-        let (state, at) = entered;
-        Some(News::Entered { state, cause: self.machine.cause(), at })
+        let (state, at, next) = known;
+        Some(News::Entered { state, cause: self.machine.cause(), next, at })
     }
 
     /// How the play ended.

@@ -90,12 +90,14 @@ pub enum Alarm {
 /// What the tick thread makes known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum News {
-    /// The hall is in another state, or in the same for another cause.
+    /// The hall is in another state, or in the same for another cause or with another next action.
     Entered {
         /// Which.
         state: State,
         /// Why.
         cause: Cause,
+        /// What a person does next, in words.
+        next: &'static str,
         /// Since when.
         at: MonoTime,
     },

@@ -33,8 +33,14 @@ fn ctrl_c_and_sigterm_park_the_seats_turn_effects_off_and_report_a_stop() {
                 let report = run.report_of(0);
                 let one = &report["controllers"][0];
                 assert_eq!(report["result"], "stopped");
-                for phase in ["playing", "parking; Ctrl-C again ends at once"] {
-                    let line = format!("kinocue: {phase}\n");
+                let again = if signal == Signal::INT { "; Ctrl-C again ends at once" } else { "" };
+                let parking = "parking: parked by the operator; next: wait until the seats are at rest";
+                for line in [
+                    "playing: the seats are on the cue; next: nothing; pause, park or stop as needed",
+                    &format!("{parking}{again}"),
+                    "parked: the seats have parked",
+                ] {
+                    let line = format!("kinocue: {line}\n");
                     assert_eq!(run.stderr.matches(&line).count(), 1, "{line}: {}", run.stderr);
                 }
                 assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()), "{one}");
