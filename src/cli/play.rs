@@ -1,4 +1,4 @@
-//! `kinocue play`: one cue in the foreground, a progress line, the report at the end.
+//! `kinocue play`: one cue in the foreground, keys and live lines on a terminal, the report at the end.
 
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
@@ -37,8 +37,8 @@ const EXAMPLES: [&str; 4] = [
 
 /// Plays one cue to the controllers, and reports what became of every frame.
 ///
-/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. This is no emergency stop: that one is
-/// hard-wired.
+/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. On a terminal keys lead the play; ?
+/// says which. None of it is an emergency stop: that one is hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help(&EXAMPLES))]
 pub(super) struct Args {

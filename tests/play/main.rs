@@ -6,6 +6,7 @@ mod process;
 mod controllers;
 mod cue_files;
 mod frames;
+mod keyboard;
 mod motion;
 mod report;
 mod stopping;

@@ -25,12 +25,12 @@ pub(super) enum Action {
 
 /// All keys in one line.
 pub(super) const IN_SHORT: &str =
-    "space pause  <- -> 5 s  s stop  c clear  p park  +- level  ,. trim  q leave  ? help";
+    "space pause  ←→ 5s  s stop  c clear  p park  +- level  ,. trim  q leave  ? help";
 
 /// What the keys do.
 pub(super) const HELP: &str = "\
 space    pause, or resume
-<- ->    5 s back or on in the film
+←  →     5 s back or on in the film
 s        stop: the seats slow down and rest; a soft stop, the emergency stop is hard-wired
 c        clear, after a stop or a fault
 p        park the seats, and end
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_keys_fit_a_line_and_the_help_says_that_the_emergency_stop_is_hard_wired() {
-        assert!(IN_SHORT.len() < 84, "{}", IN_SHORT.len());
+        assert!(IN_SHORT.chars().count() < 80, "{IN_SHORT}");
         assert!(HELP.contains("the emergency stop is hard-wired"));
     }
 }

@@ -120,13 +120,13 @@ impl Teller {
             if ended {
                 break;
             }
-            bar.set_position(ms(self.said.show()));
             let (figures, next) = match self.now {
                 Some((state, next)) => (self.said.figures(state), next),
                 None => (self.said.preparing(self.phase), "wait"),
             };
-            bar.set_message(figures);
             bar.set_prefix(self.said.next(next));
+            bar.set_message(figures);
+            bar.set_position(ms(self.said.show()));
             thread::park_timeout(LOOK);
         }
         bar.finish_and_clear();
