@@ -1,9 +1,9 @@
-//! `kinocue play`: one cue in the foreground, a progress line, the report at the end.
+//! `kinocue play`: one cue in the foreground, keys and live lines on a terminal, the report at the end.
 
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -15,14 +15,18 @@ use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::engine::{Rate, Show};
 use crate::fanout::Manner;
-use crate::sys::signal;
+use crate::sys::{signal, terminal};
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 
+mod keys;
+mod leader;
 mod progress;
+mod said;
 
-use progress::{Progress, Said};
+use progress::Progress;
+use said::Said;
 
 const EXAMPLES: [&str; 4] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
@@ -33,8 +37,8 @@ const EXAMPLES: [&str; 4] = [
 
 /// Plays one cue to the controllers, and reports what became of every frame.
 ///
-/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. This is no emergency stop: that one is
-/// hard-wired.
+/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. On a terminal keys lead the play; ?
+/// says which. None of it is an emergency stop: that one is hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help(&EXAMPLES))]
 pub(super) struct Args {
@@ -118,12 +122,14 @@ pub(super) fn play(
         let name = &controller.name;
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
+    let names = config.controllers.iter().map(|one| one.name.clone()).collect();
     let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
     let control = play.control().clone();
-    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Said { live: control.live, stop: control.leave, length, join: play.join() };
+    let ctrl_c =
+        leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    let said = Said { control, ctrl_c, length, join: play.join(), names };
     let progress = Progress::start(said, for_ever);
-    let played = play.run(|_| false).map_err(|error| refused(error, &cue));
+    let played = play.run(|reins| progress.lead(reins)).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
 }
@@ -166,19 +172,47 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
     Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
 }
 
-/// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second Ctrl-C ends the program at once.
-pub(super) fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<()> {
-    let interrupted = Arc::new(AtomicBool::new(false));
+/// What Ctrl-C does besides asking to leave.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CtrlC {
+    pressed: Arc<AtomicBool>,
+    /// Whether the next one ends the program at once.
+    armed: Arc<AtomicBool>,
+}
+
+impl CtrlC {
+    /// Whether it was pressed.
+    pub(super) fn is_pressed(&self) -> bool {
+        self.pressed.load(Ordering::Relaxed)
+    }
+
+    /// The next one ends the program at once.
+    pub(super) fn arm(&self) {
+        self.armed.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the next one ends the program at once.
+    pub(super) fn is_armed(&self) -> bool {
+        self.armed.load(Ordering::Relaxed)
+    }
+}
+
+/// The first Ctrl-C, SIGTERM or SIGHUP sets `leave`. Once it is armed, another Ctrl-C ends the program at once; never
+/// before that, because one press reaches the program twice where something beside the terminal passes it on to the
+/// whole process group, and seats would be left in mid-air for it.
+pub(super) fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<CtrlC> {
+    let ctrl_c = CtrlC::default();
     let code = Exit::Interrupted as i32;
-    signal_hook::flag::register_conditional_shutdown(SIGINT, code, Arc::clone(&interrupted))?;
-    signal_hook::flag::register(SIGINT, interrupted)?;
+    terminal::restore_on(SIGINT, Arc::clone(&ctrl_c.armed))?;
+    signal_hook::flag::register_conditional_shutdown(SIGINT, code, Arc::clone(&ctrl_c.armed))?;
+    signal_hook::flag::register(SIGINT, Arc::clone(&ctrl_c.pressed))?;
     signal_hook::flag::register(SIGINT, Arc::clone(leave))?;
     signal_hook::flag::register(SIGTERM, Arc::clone(leave))?;
     if !signal::is_ignored(SIGHUP)? {
         // The terminal is gone; the seats must not be left in the air for that.
         signal_hook::flag::register(SIGHUP, Arc::clone(leave))?;
     }
-    Ok(())
+    Ok(ctrl_c)
 }
 
 fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {

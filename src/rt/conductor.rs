@@ -3,7 +3,7 @@
 
 use super::mail::{Alarm, Command, News};
 use crate::engine::{Ending, Engine, Rest};
-use crate::state::{Event, Finding, Machine, Readiness, Refusal, Request, Ride, State, Trouble};
+use crate::state::{Event, Finding, Machine, Next, Readiness, Refusal, Request, Ride, State, Trouble};
 use crate::time::MonoTime;
 
 /// The machine, and what was last done for it.
@@ -12,8 +12,8 @@ pub struct Conductor {
     machine: Machine,
     /// The state that the engine was told last.
     told: State,
-    /// The state that was made known last, and since when it lasts.
-    known: Option<(State, MonoTime)>,
+    /// The state that was made known last, since when it lasts, and what a person does next.
+    known: Option<(State, MonoTime, Next)>,
     /// Whether a person is there to clear what is latched; else the play ends with it.
     attended: bool,
 }
@@ -146,12 +146,12 @@ impl Conductor {
 
     /// What is new since it was asked last.
     pub fn news(&mut self) -> Option<News> {
-        let entered = (self.machine.state(), self.machine.since());
-        if self.known.replace(entered) == Some(entered) {
+        let known = (self.machine.state(), self.machine.since(), self.machine.next());
+        if self.known.replace(known) == Some(known) {
             return None;
         }
-        let (state, at) = entered;
-        Some(News::Entered { state, cause: self.machine.cause(), at })
+        let (state, at, next) = known;
+        Some(News::Entered { state, cause: self.machine.cause(), next, at })
     }
 
     /// How the play ended.

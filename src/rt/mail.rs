@@ -9,7 +9,7 @@ use super::live::Live;
 use crate::engine::Rate;
 use crate::motion::Pose;
 use crate::plan::{Course, Request as PlanRequest, Scene};
-use crate::state::{Cause, Event, Refusal, Request, State};
+use crate::state::{Cause, Event, Next, Refusal, Request, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::wire::FrameNo;
 
@@ -95,12 +95,14 @@ pub enum Alarm {
 /// What the tick thread makes known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum News {
-    /// The hall is in another state, or in the same for another cause.
+    /// The hall is in another state, or in the same for another cause or with another next action.
     Entered {
         /// Which.
         state: State,
         /// Why.
         cause: Cause,
+        /// What a person does next, in words.
+        next: Next,
         /// Since when.
         at: MonoTime,
     },

@@ -6,3 +6,4 @@ pub mod clock;
 pub mod machine;
 pub mod realtime;
 pub mod signal;
+pub mod terminal;

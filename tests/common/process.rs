@@ -17,7 +17,7 @@ use serde_json::Value;
 use tempfile::NamedTempFile;
 
 /// No process lives longer, and nothing is waited for longer; where all is well a few seconds do.
-const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// What a process left behind.
 #[derive(Debug)]
@@ -56,9 +56,13 @@ struct Guarded {
 
 impl Guarded {
     fn start(args: &[&str]) -> Self {
+        Self::start_with(args, Stdio::null(), Stdio::piped())
+    }
+
+    fn start_with(args: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
         command.current_dir(env!("CARGO_MANIFEST_DIR")).args(args);
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.stdin(stdin).stdout(Stdio::piped()).stderr(stderr);
         let child = command.spawn().expect("the program starts");
         let handle = Arc::new(pidfd_open(Pid::from_child(&child), PidfdFlags::empty()).expect("it is ours"));
         let (ended, waits) = channel::<()>();
@@ -101,15 +105,31 @@ pub(crate) struct Playing(Guarded);
 impl Playing {
     /// Plays `cue` to each of `to` from any free port, with further arguments.
     pub(crate) fn start(cue: &Path, to: &[String], more: &[&str]) -> Self {
+        Self::start_with(cue, to, more, Stdio::null(), Stdio::piped())
+    }
+
+    /// The same with a standard input and a standard error of the caller's.
+    pub(crate) fn start_with(cue: &Path, to: &[String], more: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
         let cue = cue.to_str().expect("text");
         let mut args = vec!["play", cue, "--bind", "127.0.0.1:0"];
         args.extend(to.iter().flat_map(|to| ["--to", to]));
         args.extend(more);
-        Self(Guarded::start(&args))
+        Self(Guarded::start_with(&args, stdin, stderr))
     }
 
     pub(crate) fn signal(&self, signal: Signal) {
         self.0.signal(signal);
+    }
+
+    /// Waits until it says that on the standard error; what it said up to there is not in its [`Run`].
+    pub(crate) fn wait_for(&mut self, text: &str) {
+        let child = self.0.child.as_mut().expect("it was not taken");
+        let stderr = child.stderr.as_mut().expect("piped");
+        let (mut said, mut octet) = (String::new(), [0]);
+        while !said.contains(text) {
+            assert_eq!(stderr.read(&mut octet).expect("it can be read"), 1, "it ended: {said}");
+            said.push(char::from(octet[0]));
+        }
     }
 
     /// Waits for its end.

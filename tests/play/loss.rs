@@ -18,16 +18,6 @@ fn tell(control: &Path, command: &str) {
     assert_eq!(answer.trim(), "ok", "{command}");
 }
 
-/// A wave of 1 Hz on one axis for so many seconds, 15 mm to either side.
-fn wave(folder: &Folder, seconds: u32) -> std::path::PathBuf {
-    let mut text = "time_ms,a1\n".to_owned();
-    for row in 0..=50 * seconds {
-        let at = f64::from(row) * 0.02;
-        text += &format!("{},{:.9}\n", row * 20, 0.5 + 0.1 * (at * std::f64::consts::TAU).sin());
-    }
-    folder.write("wave.csv", text)
-}
-
 /// Two controllers of the simulator with safe settings, each behind a relay.
 struct Hall {
     folder: Folder,
@@ -47,7 +37,7 @@ impl Hall {
 
     fn play(&self, seconds: u32) -> Playing {
         let to: Vec<String> = self.relays.iter().map(Relay::to).collect();
-        Playing::start(&wave(&self.folder, seconds), &to, &["--json"])
+        Playing::start(&self.folder.wave(seconds), &to, &["--json"])
     }
 
     /// Waits until the first controller has had so many frames.

@@ -6,6 +6,7 @@ mod process;
 mod controllers;
 mod cue_files;
 mod frames;
+mod keyboard;
 mod loss;
 mod motion;
 mod report;
@@ -35,6 +36,16 @@ impl Folder {
         let path = self.path(name);
         std::fs::write(&path, octets).expect("the folder is ours");
         path
+    }
+
+    /// A wave of 1 Hz on one axis for so many seconds, 15 mm to either side of the middle of the stroke.
+    fn wave(&self, seconds: u32) -> PathBuf {
+        let mut text = "time_ms,a1\n".to_owned();
+        for row in 0..=50 * seconds {
+            let at = f64::from(row) * 0.02;
+            text += &format!("{},{:.9}\n", row * 20, 0.5 + 0.1 * (at * std::f64::consts::TAU).sin());
+        }
+        self.write("wave.csv", text)
     }
 
     /// A short cue that begins and ends at rest in the park pose, and in between stands at `heights`, fractions of the

@@ -1,0 +1,167 @@
+//! From what a terminal sends for a key to what the key asks for.
+
+/// What a key asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Action {
+    /// Pause, or go on after a pause.
+    PauseOrResume,
+    /// Go on so many seconds of the film later, or earlier.
+    Jump(i64),
+    /// Stop.
+    Stop,
+    /// Leave a stop or a fault.
+    Clear,
+    /// Park, and end.
+    Park,
+    /// More of motion and vibration by so many percent of the whole, or less.
+    Level(i32),
+    /// Motion later by so many milliseconds, or earlier.
+    Trim(i32),
+    /// Park as far as the hall may move, and leave.
+    Leave,
+    /// Say what the keys do.
+    Help,
+}
+
+/// All keys in one line.
+pub(super) const IN_SHORT: &str =
+    "space pause  ←→ 5s  s stop  c clear  p park  +- level  ,. trim  q leave  ? help";
+
+/// What the keys do.
+pub(super) const HELP: &str = "\
+space    pause, or resume
+←  →     5 s back or on in the film
+s        stop: the seats slow down and rest; a soft stop, the emergency stop is hard-wired
+c        clear, after a stop or a fault
+p        park the seats, and end
++ -      motion and vibration of all seats 5 % up or down, never above the level at the start
+, .      motion 10 ms earlier or later than the film
+q        park as far as the seats may move, and leave; Ctrl-C does the same, a second one ends at once";
+
+/// Where in the octets of one key we are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Within {
+    /// In none.
+    #[default]
+    None,
+    /// After an escape.
+    Escape,
+    /// In a control sequence, which ends with a letter or ~.
+    Sequence,
+}
+
+/// Puts octets together to keys.
+#[derive(Debug, Default)]
+pub(super) struct Decoder(Within);
+
+impl Decoder {
+    /// Takes the next octet; the action, if it ends a key that has one.
+    pub(super) const fn take(&mut self, octet: u8) -> Option<Action> {
+        match (self.0, octet) {
+            (_, 0x1b) => self.0 = Within::Escape,
+            (Within::Escape, b'[' | b'O') => self.0 = Within::Sequence,
+            (Within::Sequence, b'@'..=b'~') => {
+                self.0 = Within::None;
+                return match octet {
+                    b'C' => Some(Action::Jump(5)),
+                    b'D' => Some(Action::Jump(-5)),
+                    _ => None,
+                };
+            }
+            (Within::Sequence, _) => {}
+            // A key after Esc is that key: an Esc typed by mistake must not swallow a stop.
+            (Within::Escape | Within::None, _) => {
+                self.0 = Within::None;
+                return of_letter(octet);
+            }
+        }
+        None
+    }
+
+    /// Nothing came for a while: what has begun is no key.
+    pub(super) const fn forget(&mut self) {
+        self.0 = Within::None;
+    }
+}
+
+const fn of_letter(octet: u8) -> Option<Action> {
+    Some(match octet.to_ascii_lowercase() {
+        b' ' => Action::PauseOrResume,
+        b's' => Action::Stop,
+        b'c' => Action::Clear,
+        b'p' => Action::Park,
+        b'+' | b'=' => Action::Level(5),
+        b'-' | b'_' => Action::Level(-5),
+        b'.' => Action::Trim(10),
+        b',' => Action::Trim(-10),
+        b'q' => Action::Leave,
+        b'?' | b'h' => Action::Help,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn typed(octets: &[u8]) -> Vec<Action> {
+        let mut decoder = Decoder::default();
+        octets.iter().filter_map(|octet| decoder.take(*octet)).collect()
+    }
+
+    #[test]
+    fn every_key_of_the_help_does_what_it_says() {
+        let all = [
+            (" ", Action::PauseOrResume),
+            ("s", Action::Stop),
+            ("c", Action::Clear),
+            ("p", Action::Park),
+            ("+", Action::Level(5)),
+            ("-", Action::Level(-5)),
+            (",", Action::Trim(-10)),
+            (".", Action::Trim(10)),
+            ("q", Action::Leave),
+            ("?", Action::Help),
+            ("h", Action::Help),
+        ];
+        for (key, action) in all {
+            assert_eq!(typed(key.as_bytes()), [action], "{key}");
+        }
+    }
+
+    #[test]
+    fn a_stop_is_a_stop_also_with_caps_lock_on_or_after_an_escape() {
+        for octets in ["S", "\u{1b}s", "\u{1b}\u{1b}s"] {
+            assert_eq!(typed(octets.as_bytes()), [Action::Stop], "{octets:?}");
+        }
+    }
+
+    #[test]
+    fn arrows_seek_in_both_modes_that_terminals_have() {
+        let both = [Action::Jump(-5), Action::Jump(5)];
+        assert_eq!(typed(b"\x1b[D\x1b[C"), both);
+        assert_eq!(typed(b"\x1bOD\x1bOC"), both);
+    }
+
+    #[test]
+    fn other_keys_do_nothing_not_even_by_the_letters_they_are_sent_as() {
+        // Delete, page up, F5, the arrows up and down, u umlaut, tab, backspace.
+        for octets in ["\u{1b}[3~", "\u{1b}[5~", "\u{1b}[15~", "\u{1b}OA\u{1b}[B", "ü", "\t", "\u{7f}"] {
+            assert_eq!(typed(octets.as_bytes()), [], "{octets:?}");
+        }
+    }
+
+    #[test]
+    fn a_sequence_that_does_not_go_on_swallows_no_later_key() {
+        let mut decoder = Decoder::default();
+        assert_eq!((decoder.take(0x1b), decoder.take(b'[')), (None, None));
+        decoder.forget();
+        assert_eq!(decoder.take(b's'), Some(Action::Stop));
+    }
+
+    #[test]
+    fn the_keys_fit_a_line_and_the_help_says_that_the_emergency_stop_is_hard_wired() {
+        assert!(IN_SHORT.chars().count() < 80, "{IN_SHORT}");
+        assert!(HELP.contains("the emergency stop is hard-wired"));
+    }
+}
