@@ -21,7 +21,8 @@ use wild::Wild;
 
 #[test]
 fn whatever_is_asked_for_what_is_sent_keeps_the_limits() {
-    for seed in 2_000_000..2_000_080 {
+    // The last one has runs of equal Times after an odd one.
+    for seed in (2_000_000..2_000_080).chain([80_233]) {
         let mut wild = Wild::new(seed);
         let trial = Trial::of_wild(&mut wild);
         assert!(!trial.is_broken(), "sequence {seed}, {}: {}", wild::SORTS[wild.sort], trial.share);

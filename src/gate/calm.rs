@@ -40,6 +40,8 @@ struct Glance {
 /// Seconds and their reciprocals: of the newest frame, and together with one and two before it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Spans {
+    /// The Times they are of, newest first.
+    times: [f64; 3],
     frame: f64,
     two: f64,
     per_frame: f64,
@@ -126,6 +128,7 @@ impl Calm {
     fn look_at_times(&mut self, frame: f64) {
         let two = frame + self.times[0];
         self.spans = Spans {
+            times: [frame, self.times[0], self.times[1]],
             frame,
             two,
             per_frame: 1.0 / frame,
@@ -137,7 +140,8 @@ impl Calm {
     /// Tells of the frame that comes next.
     #[inline]
     pub(super) fn begin(&mut self, frame: f64) {
-        if frame != self.spans.frame || frame != self.times[0] || frame != self.times[1] {
+        let times = [frame, self.times[0], self.times[1]];
+        if times != self.spans.times {
             self.look_at_times(frame);
         }
     }
