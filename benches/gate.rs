@@ -39,8 +39,8 @@ fn main() {
     let usual = |full: u64, short: u64| if quick { short } else { full };
     cost(argument("--rounds").unwrap_or_else(|| usual(15, 3)));
     pass_sound(argument("--sound").unwrap_or_else(|| usual(20_000, 500)));
-    let from = argument("--from").unwrap_or(1);
-    hold_wild(from, argument("--sequences").unwrap_or_else(|| usual(1_000_000, 2_000)));
+    let sequences = argument("--sequences").unwrap_or_else(|| usual(1_000_000, 2_000));
+    hold_wild(argument("--from").unwrap_or(1), sequences);
 }
 
 fn argument(name: &str) -> Option<u64> {
@@ -63,7 +63,7 @@ fn cost(rounds: u64) {
     println!("{ours_ns:>24} {bare_ns:>24} {ratio:>24}  <= {GOAL_NS} ns: {}", verdict(ours, GOAL_NS));
 }
 
-/// ns for each axis and tick: of the gates, and of the bare loop.
+/// ns for each axis in the middlemost tick: of the gates, and of the bare loop.
 fn round() -> [f64; 2] {
     let window = Window::new(
         (0..AXES).map(|axis| Slot::new(&SeatType::bench3(AXES), axis, Some(axis), 1.0)).collect(),
@@ -71,26 +71,25 @@ fn round() -> [f64; 2] {
     let mut gates: Vec<Gate> =
         (0..LANES).map(|_| Gate::new(&window, Rate::from_hz(1000.0), wave(0))).collect();
     let mut kept = vec![[0.0; MAX_AXES]; LANES];
-    let (mut ours, mut bare) = (Duration::ZERO, Duration::ZERO);
+    let (mut ours, mut bare) = (Vec::new(), Vec::new());
     for tick in 0..TICKS {
         let pose = wave(tick);
-        ours += timed(|| {
+        ours.push(timed(|| {
             for gate in &mut gates {
                 let mut pose = black_box(pose);
                 let verdict = gate.admit(&mut pose, u64::from(tick));
                 assert_eq!(verdict, Verdict::Passed);
                 black_box(&pose);
             }
-        });
-        bare += timed(|| {
+        }));
+        bare.push(timed(|| {
             for kept in &mut kept {
                 *kept = black_box(pose);
                 black_box(&kept);
             }
-        });
+        }));
     }
-    let count = f64::from(TICKS) * f64::from(u8::try_from(LANES * AXES / 2).expect("192")) * 2.0;
-    [ours, bare].map(|span| span.as_secs_f64() * 1e9 / count)
+    [ours, bare].map(|ticks| Spread::of(ticks).median)
 }
 
 /// A swell of 30 mm in 2 s and more about the middle of the stroke, each axis at its own pace.
@@ -103,10 +102,12 @@ fn wave(tick: u32) -> Pose {
     pose
 }
 
-fn timed(work: impl FnOnce()) -> Duration {
+/// ns for each axis that some work took.
+fn timed(work: impl FnOnce()) -> f64 {
     let start = Monotonic.now();
     work();
-    Monotonic.now().since(start)
+    let axes = f64::from(u32::try_from(LANES * AXES).expect("some hundreds"));
+    Monotonic.now().since(start).div_duration_f64(Duration::from_nanos(1)) / axes
 }
 
 /// What was found in sequences of one sort.

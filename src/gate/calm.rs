@@ -1,7 +1,7 @@
 //! The quick test that nearly every pose passes, from frame to frame alone.
 //!
 //! A divided difference over a distance is a mean of the differences from frame to frame inside it, each with a weight of
-//! at most one over the distance. So where acceleration and jerk from frame to frame stay below a level, or are above it
+//! at most two over the distance in periods. So where acceleration and jerk from frame to frame stay below a level, or are above it
 //! by little in sum over what the measure looks back on, the measure sees less than the limits; and will still do so if
 //! next frame the axis begins to brake with no more than the level. Nothing of this is a guess: what is not sure by these
 //! sums goes to the long test.
@@ -40,6 +40,8 @@ struct Glance {
 /// Seconds and their reciprocals: of the newest frame, and together with one and two before it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Spans {
+    /// The Times they are of, newest first.
+    times: [f64; 3],
     frame: f64,
     two: f64,
     per_frame: f64,
@@ -89,8 +91,9 @@ impl Calm {
             rows.step[axis] = limits.step;
             rows.acceleration[axis] = acceleration;
             rows.jerk[axis] = jerk;
-            rows.rest[0][axis] = (limits.acceleration - acceleration) * spacing.n as f64;
-            rows.rest[1][axis] = (limits.jerk - jerk) * spacing.n as f64;
+            // Where Times are 1 and 2 ms in turns, a difference over long ones weighs up to twice as much as the others.
+            rows.rest[0][axis] = (limits.acceleration - acceleration) * spacing.n as f64 / 2.0;
+            rows.rest[1][axis] = (limits.jerk - jerk) * spacing.n as f64 / 2.0;
             rows.half_per_jerk[axis] = 0.5 / jerk;
             rows.half_per_acceleration[axis] = 0.5 / acceleration;
             rows.half_rise[axis] = 0.5 * acceleration / jerk;
@@ -125,6 +128,7 @@ impl Calm {
     fn look_at_times(&mut self, frame: f64) {
         let two = frame + self.times[0];
         self.spans = Spans {
+            times: [frame, self.times[0], self.times[1]],
             frame,
             two,
             per_frame: 1.0 / frame,
@@ -136,7 +140,8 @@ impl Calm {
     /// Tells of the frame that comes next.
     #[inline]
     pub(super) fn begin(&mut self, frame: f64) {
-        if frame != self.spans.frame || frame != self.times[0] || frame != self.times[1] {
+        let times = [frame, self.times[0], self.times[1]];
+        if times != self.spans.times {
             self.look_at_times(frame);
         }
     }

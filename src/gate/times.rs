@@ -7,6 +7,8 @@ use crate::engine::Rate;
 pub(super) struct Times {
     rate: Rate,
     millihertz: u64,
+    /// A period, whole milliseconds, and what it leaves over.
+    period: (u32, u64),
     /// The frame that comes next, as far as is known.
     frame: u64,
     /// What the sum of all Times before that frame leaves over when it is rounded, in shares of a millisecond.
@@ -16,7 +18,9 @@ pub(super) struct Times {
 impl Times {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1,000 to 1,000,000")]
     pub(super) fn new(rate: Rate) -> Self {
-        let mut times = Self { rate, millihertz: (rate.hz() * 1000.0).round() as u64, frame: 0, over: 0 };
+        let millihertz = (rate.hz() * 1000.0).round() as u64;
+        let period = ((1_000_000 / millihertz) as u32, 1_000_000 % millihertz);
+        let mut times = Self { rate, millihertz, period, frame: 0, over: 0 };
         times.seek(0);
         times
     }
@@ -40,12 +44,13 @@ impl Times {
     /// The Time of the frame after the last one that was asked for, ms.
     #[inline]
     pub(super) fn next(&mut self) -> u32 {
-        let passed = self.over + 1_000_000;
-        // At most a second, and a thousandth of one for what is left over.
-        let time = u32::try_from(passed / self.millihertz).unwrap_or(u32::MAX);
-        self.over = passed % self.millihertz;
         self.frame += 1;
-        time
+        self.over += self.period.1;
+        if self.over < self.millihertz {
+            return self.period.0;
+        }
+        self.over -= self.millihertz;
+        self.period.0 + 1
     }
 
     /// Whether all frames have the same Time.

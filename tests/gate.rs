@@ -1,0 +1,120 @@
+//! The last gate, asked for anything: what it sends keeps the limits, and what keeps the limits it sends unchanged. Judged from
+//! the definition of the measure, not by the gate's own sums; `benches/gate.rs` does the same for a million sequences.
+
+#[path = "../benches/asked/chance.rs"]
+mod chance;
+#[path = "../benches/asked/judge.rs"]
+mod judge;
+#[path = "../benches/asked/sound.rs"]
+mod sound;
+#[path = "../benches/asked/trial.rs"]
+mod trial;
+#[path = "../benches/asked/wild.rs"]
+mod wild;
+
+use kinocue::engine::Rate;
+use kinocue::gate::{Gate, Limit, Verdict};
+use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType};
+use sound::Sound;
+use trial::{Trial, window};
+use wild::Wild;
+
+#[test]
+fn whatever_is_asked_for_what_is_sent_keeps_the_limits() {
+    // The last one has runs of equal Times after an odd one.
+    for seed in (2_000_000..2_000_080).chain([80_233]) {
+        let mut wild = Wild::new(seed);
+        let trial = Trial::of_wild(&mut wild);
+        assert!(!trial.is_broken(), "sequence {seed}, {}: {}", wild::SORTS[wild.sort], trial.share);
+        assert!(trial.unchanged || trial.counts.clamps > 0, "sequence {seed}: a clamp is counted");
+        assert_eq!(trial.counts.beyond, 0, "sequence {seed}");
+    }
+}
+
+#[test]
+fn what_keeps_nine_tenths_of_the_limits_passes_bit_for_bit() {
+    let gentle = (1..).map(|seed| (seed, Sound::new(seed))).filter(|(_, sound)| sound.share <= 0.9);
+    for (seed, sound) in gentle.take(30) {
+        let trial = Trial::of_sound(&sound);
+        assert!(trial.unchanged, "motion {seed}, {}: {:?}", sound::SORTS[sound.sort], trial.counts);
+    }
+}
+
+#[test]
+fn a_move_over_the_whole_stroke_at_the_very_limits_passes_from_200_hz_on() {
+    let full = (1..).map(|seed| (seed, Sound::new(seed))).filter(|(_, sound)| {
+        sound.sort == sound::SORTS.len() - 2 && sound.share > 0.99 && sound.rate.hz() >= 200.0
+    });
+    for (seed, sound) in full.take(4) {
+        let trial = Trial::of_sound(&sound);
+        assert!(trial.unchanged, "motion {seed}, {} Hz: {:?}", sound.rate.hz(), trial.counts);
+    }
+}
+
+fn at(position: f64) -> Pose {
+    let mut pose = [0.0; MAX_AXES];
+    pose[0] = position;
+    pose
+}
+
+/// A gate at 100 Hz that stands in the middle of the stroke.
+fn standing() -> Gate {
+    Gate::new(&window(Limits::of(&SeatType::bench3(1))), Rate::from_hz(100.0), at(0.5))
+}
+
+/// What it sends from frame `from` on when it is asked for these.
+fn sent(gate: &mut Gate, from: u64, asked: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let send = |(index, asked): (u64, f64)| {
+        let mut pose = at(asked);
+        gate.admit(&mut pose, index);
+        pose[0]
+    };
+    (from..).zip(asked).map(send).collect()
+}
+
+#[test]
+fn after_a_step_it_comes_back_softly_and_then_lets_pass_again() {
+    let mut gate = standing();
+    let way = sent(&mut gate, 0, [0.7; 600]);
+    assert_eq!(way[0], 0.5, "it stands");
+    assert!(way.windows(2).all(|pair| pair[0] <= pair[1]), "it never turns back");
+    assert_eq!(way[599], 0.7);
+    assert_eq!(gate.counts().clamps, 1);
+    assert_eq!(gate.admit(&mut at(0.7), 600), Verdict::Passed);
+    let worst = gate.counts().worst.expect("there was one");
+    assert_eq!((worst.axis, worst.asked, worst.allowed, worst.limit), (0, 0.7, 0.5, Limit::Jerk));
+}
+
+#[test]
+fn what_is_no_number_stays_at_rest_for_as_long_as_it_lasts() {
+    let mut gate = standing();
+    let way = sent(&mut gate, 0, (0..200).map(|k| [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][k % 3]));
+    assert!(way.iter().all(|&position| position == 0.5));
+    let counts = gate.counts();
+    assert_eq!((counts.clamps, counts.worst.map(|worst| worst.limit)), (1, Some(Limit::Position)));
+    assert!(counts.fault, "it lasted for more than a second");
+}
+
+#[test]
+fn three_clamps_within_a_second_are_a_fault() {
+    let mut gate = standing();
+    let mut verdicts = Vec::new();
+    for index in 0..100 {
+        let mut pose = at(if (index / 30) % 2 == 0 { 0.5 } else { 0.6 });
+        verdicts.push(gate.admit(&mut pose, index));
+    }
+    let first = verdicts.iter().position(|verdict| *verdict == Verdict::Fault);
+    assert_eq!(first, Some(90), "the third step");
+    assert_eq!(gate.counts().clamps, 3);
+}
+
+#[test]
+fn after_a_rest_what_was_before_is_forgotten() {
+    let mut gate = standing();
+    sent(&mut gate, 0, (1..=60).map(|k| 0.5 + 1e-5 * f64::from(k * k)));
+    let stands = gate.sent()[0];
+    gate.rest();
+    assert_eq!(sent(&mut gate, 60, [stands; 100]), [stands; 100], "it stands where it was");
+    gate.restart(at(0.25));
+    assert_eq!(sent(&mut gate, 160, [0.25; 100]), [0.25; 100]);
+}
