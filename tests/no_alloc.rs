@@ -4,7 +4,7 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -285,9 +285,11 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace, spin: Duration) -> Outcome {
 
 /// Plays ten thousand ticks with that spin, in which `missed` are missed.
 fn assert_quiet(spin: Duration, missed: u64) {
-    let peers = [0; 2].map(|_| UdpSocket::bind("127.0.0.1:0").unwrap());
-    let addresses =
-        [0, 1].map(|index: usize| peers[index].local_addr().unwrap().to_string().parse().unwrap());
+    let peers = [0; 2].map(|_| UdpSocket::bind("127.0.0.1:0").expect("loopback has a free port"));
+    let addresses = [0, 1].map(|index: usize| match peers[index].local_addr().expect("it is bound") {
+        SocketAddr::V4(address) => address,
+        other => unreachable!("bound to an IPv4 address, not {other}"),
+    });
     let pace = Pace::default();
     let outcome = thread::scope(|scope| {
         for peer in &peers {
@@ -295,7 +297,7 @@ fn assert_quiet(spin: Duration, missed: u64) {
         }
         let outcome = play(&addresses, &pace, spin);
         for address in addresses {
-            peers[0].send_to(&[], address).unwrap();
+            peers[0].send_to(&[], address).expect("loopback works");
         }
         outcome
     });
