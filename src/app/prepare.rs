@@ -77,11 +77,15 @@ impl<C: Clock> Preparation<'_, C> {
         prepared
     }
 
-    /// Moves nothing; the names of the controllers whose seat does not tell that it stands at its park pose.
-    pub(super) fn unsure(&mut self) -> Vec<String> {
+    /// Moves nothing: only makes sure that every seat stands at its park pose.
+    ///
+    /// # Errors
+    /// The names of the controllers whose seat does not tell that it does.
+    pub(super) fn make_sure(&mut self) -> Result<Prepared, Vec<String>> {
         let told = self.ask();
         let unsure = told.iter().enumerate().filter(|(lane, told)| !self.is_parked(*lane, told));
-        unsure.map(|(lane, _)| self.controllers[lane].name.clone()).collect()
+        let unsure: Vec<_> = unsure.map(|(lane, _)| self.controllers[lane].name.clone()).collect();
+        if unsure.is_empty() { Ok(Prepared::nothing(self.lanes.len())) } else { Err(unsure) }
     }
 
     /// Reads where the seats stand, for the report as well.

@@ -10,12 +10,13 @@ use super::load::parse_rate;
 use super::play::{judge, leave_on_signals};
 use super::targets::Targets;
 use super::{Exit, Failure, OrExit as _, load, print};
-use crate::app::{Play, PlayError};
+use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::device::stand::stand;
 use crate::engine::{Rate, Show};
 use crate::latency::{cue, held};
 use crate::motion::{MAX_AXES, Pulses};
+use crate::rt::Times;
 use crate::sim::{Farm, Options, Setup};
 use crate::time::ShowTime;
 
@@ -112,84 +113,82 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if let [a, b] = &args.compare[..] {
         return compare::run(a, b, args.json);
     }
-    let out = args.out.as_deref().map(Out::create).transpose()?;
     if args.config.is_some() || !args.to.is_empty() {
-        return measure(args, configuration(args)?, None, out);
+        return measure(args, configuration(args)?, false);
     }
-    let count = args.count.unwrap_or(VIRTUAL);
     let setup = Setup { host_port: 0, ..Setup::default() };
-    let farm = Farm::start(Options::loopback(vec![setup; usize::from(count)])).or_exit(Exit::System)?;
+    let setups = vec![setup; usize::from(args.count.unwrap_or(VIRTUAL))];
+    let farm = Farm::start(Options::loopback(setups)).or_exit(Exit::System)?;
     let to: Vec<_> = farm.addresses().iter().map(|address| format!("{address},{AXES}")).collect();
     let mut config = from_to_args(&to, &[], MAX_AXES).or_exit(Exit::Internal)?;
     config.show.bind = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
-    let measured = measure(args, config, Some(count), out);
+    let measured = measure(args, config, true);
     farm.stop().or_exit(Exit::Io)?;
     measured
 }
 
 /// The controllers that the arguments name.
 fn configuration(args: &Args) -> Result<Config, Failure> {
-    let Some(path) = &args.config else {
-        let says_axes = |to: &str| to.split(',').any(|part| part.trim_start().starts_with("axes="));
-        let with_axes = |to: &String| if says_axes(to) { to.clone() } else { format!("{to},{AXES}") };
-        let to: Vec<_> = args.to.iter().map(with_axes).collect();
-        return from_to_args(&to, &[], MAX_AXES).or_exit(Exit::Usage);
-    };
-    load::config(path)
+    if let Some(path) = &args.config {
+        return load::config(path);
+    }
+    let says_axes = |to: &str| to.split(',').any(|part| part.trim_start().starts_with("axes="));
+    let with_axes = |to: &String| if says_axes(to) { to.clone() } else { format!("{to},{AXES}") };
+    let to: Vec<_> = args.to.iter().map(with_axes).collect();
+    from_to_args(&to, &[], MAX_AXES).or_exit(Exit::Usage)
 }
 
-/// Measures; `of_our_own` is how many of the controllers are virtual ones, where all are.
-fn measure(
-    args: &Args,
-    mut config: Config,
-    of_our_own: Option<u16>,
-    out: Option<Out>,
-) -> Result<Exit, Failure> {
-    config.show.rate_hz = args.rate;
-    config.show.ack_every = args.ack_every.unwrap_or(config.show.ack_every);
-    config.show.spin_us = args.spin_us.unwrap_or(config.show.spin_us);
-    config.show.bind = args.bind.unwrap_or(config.show.bind);
+/// Measures and reports; `of_our_own` says that the controllers are virtual ones.
+fn measure(args: &Args, mut config: Config, of_our_own: bool) -> Result<Exit, Failure> {
+    let show = &mut config.show;
+    show.rate_hz = args.rate;
+    show.ack_every = args.ack_every.unwrap_or(show.ack_every);
+    show.spin_us = args.spin_us.unwrap_or(show.spin_us);
+    show.bind = args.bind.unwrap_or(show.bind);
     let (config, refused) = standing(config)?;
     if config.controllers.is_empty() {
-        return Err(anyhow!("no seat is left to measure with; nothing was sent but questions"))
-            .or_exit(Refused::exit(&refused));
+        let why = anyhow!("no seat is left to measure with; nothing was sent but questions");
+        return Err(why).or_exit(Refused::exit(&refused));
     }
-    let timeline = cue(&config.controllers, args.seconds).or_exit(Exit::Internal)?;
-    let show = Show {
-        rate: Rate::from_hz(config.show.rate_hz),
-        timing: config.show.timing,
-        start: ShowTime::ZERO,
-        plays: 1,
-    };
-    let names: Vec<_> =
-        config.controllers.iter().map(|one| format!("{} {}", one.name, one.address)).collect();
-    let about = format!(
-        "{} Hz to {}{}",
-        args.rate,
-        if of_our_own.is_some() { "virtual controllers " } else { "" },
-        names.join(", ")
-    );
-    let play = Play::holding(config, timeline, show, args.no_acks).map_err(failed)?;
-    let control = play.control().clone();
-    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let live = control.live;
-    let watch = Watch::start(Arc::clone(&live), args.seconds, &about, out)?;
-    let played = play.run(|_| false).map_err(failed);
-    watch.finish(played.is_ok())?;
-    let played = played?;
+    let about = about(args.rate, config.controllers.len(), of_our_own);
+    let (times, played) = send(args, config, &about)?;
     for line in played.refusals.iter().chain(&played.notes) {
         print::tell(&format!("kinocue: {line}"));
     }
-    let report = Report::new(&about, args.seconds, of_our_own.is_some(), &live.times(), &refused, &played);
+    let report = Report::new(&about, args.seconds, of_our_own, &times, &refused, &played);
     if args.json {
-        print::json(&report)?
+        print::json(&report)?;
     } else {
-        print::out(&report.text(&live.times()))?
+        print::out(&report.text(&times))?;
     }
     match judge(&played)? {
         Exit::Done => Ok(Refused::exit(&refused)),
         other => Ok(other),
     }
+}
+
+/// What is measured, in words.
+fn about(rate_hz: f64, controllers: usize, of_our_own: bool) -> String {
+    let kind = if of_our_own { "virtual " } else { "" };
+    let noun = if controllers == 1 { "controller" } else { "controllers" };
+    format!("{rate_hz} Hz to {controllers} {kind}{noun}")
+}
+
+/// Sends the frames that hold the seats, and gives the times of all.
+fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Failure> {
+    let timeline = cue(&config.controllers, args.seconds).or_exit(Exit::Internal)?;
+    let rate = Rate::from_hz(config.show.rate_hz);
+    let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
+    let play = Play::holding(config, timeline, show, args.no_acks).map_err(failed)?;
+    let control = play.control().clone();
+    leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
+    let live = control.live;
+    // Created before anything is measured, so that nobody measures for an hour and then cannot keep it.
+    let out = args.out.as_deref().map(Out::create).transpose()?;
+    let watch = Watch::start(Arc::clone(&live), args.seconds, about, out)?;
+    let played = play.run(|_| false).map_err(failed);
+    watch.finish(played.is_ok())?;
+    Ok((live.times(), played?))
 }
 
 /// The configuration with only those controllers whose seats can be held, parked where they stand; and the others, which

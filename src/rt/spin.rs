@@ -178,6 +178,53 @@ mod tests {
         assert_eq!(told(0, 5), Spun::default());
     }
 
+    /// What the looks of one tick take.
+    const LOOKS: Duration = us(5);
+
+    /// Time in which a thread sleeps, wakes up late, and is otherwise awake; a look at it takes a microsecond.
+    #[derive(Default)]
+    struct Awake {
+        now: Cell<u64>,
+        asleep: Cell<u64>,
+        late: Cell<u64>,
+    }
+
+    impl Clock for Awake {
+        fn now(&self) -> MonoTime {
+            self.now.set(self.now.get() + 1_000);
+            MonoTime::from_nanos(self.now.get())
+        }
+
+        fn sleep_until(&self, deadline: MonoTime) {
+            if deadline.as_nanos() > self.now.get() {
+                let woken = deadline.as_nanos() + self.late.get();
+                self.asleep.set(self.asleep.get() + woken - self.now.get());
+                self.now.set(woken);
+            }
+        }
+    }
+
+    #[test]
+    fn whatever_the_work_a_tenth_of_each_period_is_slept_and_no_tick_begins_later_than_its_thread_woke() {
+        let clock = Awake::default();
+        let spinning = Spinning::new(&clock, us(900), PERIOD);
+        spinning.sleep_until(MonoTime::default() + PERIOD);
+        let mut began_late = Duration::ZERO;
+        for tick in 2..=2_000_u32 {
+            let deadline = MonoTime::default() + PERIOD * tick;
+            let (work, late) = (u64::from(tick * 7_919 % 880), u64::from(tick * 104_729 % 90));
+            clock.now.set(clock.now.get() + work * 1_000);
+            clock.late.set(late * 1_000);
+            let asleep = clock.asleep.get();
+            spinning.sleep_until(deadline);
+            // What it overslept before its deadline was sleep of this period as well.
+            let slept = Duration::from_nanos(clock.asleep.get() - asleep) + began_late;
+            assert!(slept + LOOKS >= us(100), "tick {tick}: {work} worked, {late} late, {slept:?} slept");
+            began_late = MonoTime::from_nanos(clock.now.get()).since(deadline);
+            assert!(began_late <= us(late) + LOOKS, "tick {tick}: {work} worked, {began_late:?} late");
+        }
+    }
+
     #[test]
     fn without_a_spin_the_clock_is_not_even_looked_at() {
         let clock = Looks::default();

@@ -34,7 +34,7 @@ pub(super) struct Out {
 }
 
 impl Out {
-    /// Creates the file, so that nobody measures for an hour and then cannot keep it.
+    /// Creates the file under another name.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let mut part = path.as_os_str().to_owned();
         part.push(".part");
