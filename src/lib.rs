@@ -40,6 +40,8 @@ pub mod config;
 pub mod fanout;
 pub mod rt;
 
+pub mod proof;
+
 pub mod sim;
 
 pub mod device;
