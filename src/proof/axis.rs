@@ -85,6 +85,8 @@ impl Subject<'_> {
         let acceleration = judge(Quantity::Acceleration, &stencils.acceleration, 2, limits.acceleration);
         let jerk = judge(Quantity::Jerk, &stencils.jerk, 3, limits.jerk);
         let (lowest, highest) = pieces.range(0, pieces.end());
+        // Where a curve is held at an end, that end's own rounding is left of what was over it.
+        let [lowest, highest] = [lowest, highest].map(|met| At { value: met.value.clamp(0.0, 1.0), ..met });
         let shaken = self.shaken(&pieces, terms, found);
         AxisProof {
             axis: self.axis,
