@@ -79,7 +79,7 @@ fn a_cue_is_held_against_the_hall() {
 #[test]
 fn an_editors_rows_are_judged_in_their_unit_against_the_seat() {
     let folder = tempfile::tempdir().unwrap();
-    let rows = "1,1000,10,20\n2,1000,160,20\n3,1000,10,20\n";
+    let rows = "1,2000,10,20\n2,2000,160,20\n3,2000,10,20\n";
     let cue = write(folder.path(), "rows.csv", &format!("line,time_ms,x,y\n{rows}"));
     let args = ["check", &cue, "--from", "rows", "--units", "mm", "--json"];
     let run = kinocue(&args);
@@ -172,7 +172,7 @@ fn completions_name_the_commands() {
 #[test]
 fn one_axis_and_one_frequency_are_told_as_one() {
     let folder = tempfile::tempdir().unwrap();
-    let cue = write(folder.path(), "one.csv", "time_s,a1,v1_hz,v1_amp\n0,0,20,0.001\n1,0,20,0.001\n");
+    let cue = write(folder.path(), "one.csv", "time_s,a1,v1_hz,v1_amp\n0,0.5,20,0.001\n1,0.5,20,0.001\n");
     let run = kinocue(&["check", &cue]);
     assert!(run.stdout.contains("passed: 1 axis, "), "{}", run.stdout);
     let run = kinocue(&["info", &cue]);

@@ -20,7 +20,9 @@ pub use digest::Digest;
 pub use terms::{LimitedEffect, Part, Terms};
 pub use violation::{Breach, Quantity, Violation};
 
+use std::num::NonZero;
 use std::sync::Arc;
+use std::{iter, thread};
 
 use crate::cue::{FAULTS_TOLD, Place};
 use crate::engine::Rate;
@@ -99,13 +101,43 @@ pub fn prove(timeline: &Timeline, terms: Terms) -> Proof {
     hall(&terms, &mut found);
     let stencils = Stencils::at(terms.rate);
     let subjects = subjects(timeline, &terms);
-    let axes = subjects.iter().map(|subject| subject.prove(&terms, &stencils, &mut found)).collect();
+    let axes = prove_all(&subjects, &terms, &stencils, &mut found);
     effects::prove(timeline, &terms, &mut found);
     found.sort_by_key(|one| one.at);
     let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
     found.truncate(FAULTS_TOLD);
     let violations = found.into_iter().map(|one| placed(timeline, one)).collect();
     Proof { terms, axes, violations, more }
+}
+
+/// Proves the axes, on as many threads as there are processors.
+fn prove_all(
+    subjects: &[Subject<'_>],
+    terms: &Terms,
+    stencils: &Stencils,
+    found: &mut Vec<Found>,
+) -> Vec<AxisProof> {
+    let processors = thread::available_parallelism().map_or(1, NonZero::get);
+    let share = subjects.len().div_ceil(processors).max(1);
+    let prove_some = |some: &[Subject<'_>]| {
+        let mut found = Vec::new();
+        let axes: Vec<_> = some.iter().map(|one| one.prove(terms, stencils, &mut found)).collect();
+        (axes, found)
+    };
+    let mut axes = Vec::with_capacity(subjects.len());
+    thread::scope(|scope| {
+        let (own, others) = subjects.split_at(share.min(subjects.len()));
+        let workers: Vec<_> =
+            others.chunks(share).map(|some| scope.spawn(move || prove_some(some))).collect();
+        let proved = iter::once(prove_some(own));
+        let proved =
+            proved.chain(workers.into_iter().map(|worker| worker.join().expect("a proof does not panic")));
+        for (some, broken) in proved {
+            axes.extend(some);
+            found.extend(broken);
+        }
+    });
+    axes
 }
 
 /// Each axis of the cue on each different seat that takes it.

@@ -22,12 +22,15 @@ pub(super) struct Block {
     pub(super) derivatives: [f64; 3],
     /// Sums of the jumps of position, slope and second derivative where its cubics begin.
     pub(super) jumps: [f64; 3],
+    /// How long each of its cubics lasts, nanoseconds; 0 where none lasts, -1 where they differ.
+    pub(super) span: i64,
 }
 
 impl Block {
     /// What this run and another do at most.
     pub(super) fn and(self, other: &Self) -> Self {
         Self {
+            span: common(self.span, other.span),
             derivatives: std::array::from_fn(|i| self.derivatives[i].max(other.derivatives[i])),
             jumps: std::array::from_fn(|i| self.jumps[i] + other.jumps[i]),
         }
@@ -131,6 +134,15 @@ impl Pieces {
     }
 }
 
+/// What two spans have in common: 0 goes with all, others with themselves alone.
+fn common(a: i64, b: i64) -> i64 {
+    match (a, b) {
+        (0, other) | (other, 0) => other,
+        (a, b) if a == b => a,
+        _ => -1,
+    }
+}
+
 /// Between which positions the slot is held, fractions of the stroke.
 fn ends(unit: Unit, slot: &Slot) -> (f64, f64) {
     match unit {
@@ -206,6 +218,7 @@ impl Block {
     /// Notes a piece that lasts `span` nanoseconds after one that had come to `before`; gives what it comes to itself.
     fn take(&mut self, piece: &Piece, span: i64, before: Cubic) -> Cubic {
         let [c0, c1, c2, c3] = piece.cubic.0;
+        self.span = common(self.span, span);
         let end = piece.cubic.from(seconds(span));
         let [_, slope, bend, _] = end.0;
         // The slope is a parabola; its third Bezier point is the first two ends' tangents' crossing.

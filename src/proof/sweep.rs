@@ -8,6 +8,9 @@ use crate::timeline::Cubic;
 /// Stretches over a limit with less than this between them are one, nanoseconds.
 const ONE_STRETCH: i64 = 100_000_000;
 
+/// How much the greatest size may be overstated, by order: what is surely no worse than that is not looked at.
+const TOLERANCE: [f64; 3] = [0.002, 0.01, 0.01];
+
 /// A stretch of show time in which a limit is broken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stretch {
@@ -30,13 +33,16 @@ pub(super) struct Swept {
     pub(super) over: Vec<Stretch>,
 }
 
-/// Sweeps stencils of the differences of an order (1 to 3) over an axis.
+/// Sweeps stencils of the differences of an order (1 to 3) over an axis. The greatest size is given as up to
+/// [`TOLERANCE`] more than it is, never as less, and never as over the threshold where it is not.
 pub(super) fn sweep(pieces: &Pieces, stencils: &[Stencil], order: usize, threshold: f64) -> Swept {
     let mut swept = Swept::default();
+    let mut passed_over = 0.0_f64;
     for stencil in stencils {
         let mut one = Sweep { pieces, stencil, threshold, swept: &mut swept };
-        one.run(order);
+        passed_over = passed_over.max(one.run(order));
     }
+    swept.worst = swept.worst.max(passed_over);
     swept.over.sort_by_key(|stretch| stretch.from);
     swept.over = merged(&swept.over);
     swept
@@ -62,6 +68,16 @@ impl Stretch {
     }
 }
 
+/// Show times of the first pose, and what holds for all of them.
+struct Run {
+    from: i64,
+    until: i64,
+    /// What the sum cannot be above.
+    bound: f64,
+    /// How long each cubic that is met lasts; -1 where they differ.
+    span: i64,
+}
+
 struct Sweep<'a> {
     pieces: &'a Pieces,
     stencil: &'a Stencil,
@@ -70,30 +86,34 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    fn run(&mut self, order: usize) {
+    /// Gives the greatest bound of what was passed over.
+    fn run(&mut self, order: usize) -> f64 {
         let last = self.pieces.end() - self.stencil.reach();
         if last < 0 {
-            return;
+            return 0.0;
         }
-        let bounds = self.bounds(order, last);
+        let runs = self.runs(order, last);
         // The most promising first: what it gives rules most others out.
-        if let Some(&(from, until, _)) = bounds.iter().max_by(|a, b| a.2.total_cmp(&b.2)) {
+        if let Some(run) = runs.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) {
             let over = self.swept.over.len();
-            self.cells(from, until);
+            self.cells(run);
             self.swept.over.truncate(over); // it is met again in its turn
         }
-        for (from, until, bound) in bounds {
-            if bound > self.swept.worst.min(self.threshold) {
-                self.cells(from, until);
+        let mut passed_over = 0.0_f64;
+        for run in runs {
+            if run.bound > self.threshold || run.bound > self.swept.worst * (1.0 + TOLERANCE[order - 1]) {
+                self.cells(&run);
+            } else {
+                passed_over = passed_over.max(run.bound);
             }
         }
         self.at_the_end(last);
+        passed_over
     }
 
-    /// For each run of cubics the show times of the first pose, and what the sum cannot be above.
-    fn bounds(&self, order: usize, last: i64) -> Vec<(i64, i64, f64)> {
+    fn runs(&self, order: usize, last: i64) -> Vec<Run> {
         let blocks: Vec<(i64, i64, &Block)> = self.pieces.blocks().collect();
-        let mut bounds = Vec::with_capacity(blocks.len());
+        let mut runs = Vec::with_capacity(blocks.len());
         for (index, &(from, until, block)) in blocks.iter().enumerate() {
             let until = until.min(last);
             if from >= until {
@@ -102,13 +122,48 @@ impl Sweep<'_> {
             let reached =
                 blocks[index + 1..].iter().take_while(|next| next.0 <= until + self.stencil.reach());
             let all = reached.fold(*block, |all, next| all.and(next.2));
-            bounds.push((from, until, self.stencil.bound(all.derivatives[order - 1], all.jumps)));
+            let bound = self.stencil.bound(all.derivatives[order - 1], all.jumps);
+            runs.push(Run { from, until, bound, span: all.span });
         }
-        bounds
+        runs
+    }
+
+    fn cells(&mut self, run: &Run) {
+        let aligned = run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0);
+        match self.stencil.offsets.len() {
+            2 if aligned => self.aligned::<2>(run),
+            3 if aligned => self.aligned::<3>(run),
+            4 if aligned => self.aligned::<4>(run),
+            _ => self.cells_between(run.from, run.until),
+        }
+    }
+
+    /// The same as [`Self::cells_between`] where all rows are equally far apart and the distances are multiples of that, so
+    /// that each cell is as long as a row.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds over a row")]
+    fn aligned<const NODES: usize>(&mut self, run: &Run) {
+        let list = self.pieces.list();
+        let span = seconds(run.span);
+        let ahead: [usize; NODES] =
+            std::array::from_fn(|node| (self.stencil.offsets[node] / run.span) as usize);
+        let weights: [f64; NODES] =
+            std::array::from_fn(|node| self.stencil.weights[node] * self.stencil.scale);
+        let first = self.pieces.index(run.from);
+        for index in first..self.pieces.index(run.until) {
+            let mut sum = [0.0; 4];
+            for (ahead, weight) in ahead.iter().zip(weights) {
+                let Cubic(part) = list[index + ahead].cubic;
+                for (sum, part) in sum.iter_mut().zip(part) {
+                    *sum += weight * part;
+                }
+            }
+            let at = list[index].start;
+            self.judge(at, at + run.span, Cubic(sum).scaled(span));
+        }
     }
 
     /// Looks at every cell with its first pose between two show times.
-    fn cells(&mut self, from: i64, until: i64) {
+    fn cells_between(&mut self, from: i64, until: i64) {
         let list = self.pieces.list();
         let nodes = self.stencil.offsets.len();
         let mut cursors = [0; 4];
@@ -143,7 +198,12 @@ impl Sweep<'_> {
                 *sum += weight * part;
             }
         }
-        let cubic = Cubic(sum.map(|part| part * self.stencil.scale)).scaled(seconds(next - at));
+        self.judge(at, next, Cubic(sum.map(|part| part * self.stencil.scale)).scaled(seconds(next - at)));
+    }
+
+    /// Takes the sum over a cell, as a cubic over 0 to 1.
+    #[inline]
+    fn judge(&mut self, at: i64, next: i64, cubic: Cubic) {
         let (low, high) = cubic.bounds();
         let bound = high.max(-low);
         if bound > self.swept.worst.min(self.threshold) {
