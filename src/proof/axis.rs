@@ -64,6 +64,8 @@ impl AxisProof {
 pub(super) struct Subject<'a> {
     pub(super) timeline: &'a Timeline,
     pub(super) axis: usize,
+    /// The axis of the cue that is the seat's first.
+    pub(super) first: usize,
     pub(super) seat: &'a Arc<SeatType>,
     pub(super) slot: Slot,
 }
@@ -177,6 +179,15 @@ impl Subject<'_> {
         let (low, high) = pieces.range(step.at.as_nanos(), until.as_nanos());
         let low = At { value: low.value - amplitude, ..low };
         Some((low, At { value: high.value + amplitude, ..high }, amplitude))
+    }
+
+    /// The largest amplitude that the stroke has room for while a vibration lasts, in the cue's unit; none where nothing
+    /// vibrates.
+    pub(super) fn most_amplitude(&self, pieces: &Pieces, terms: &Terms, index: usize) -> Option<f64> {
+        let steps = self.timeline.cue().vibration().get(self.axis)?.as_slice();
+        let (low, high, amplitude) = self.swing(pieces, terms, steps.get(index)?, steps.get(index + 1))?;
+        let room = (low.value + amplitude).min(1.0 - (high.value - amplitude));
+        Some(room.max(0.0) / self.slot.to_stroke)
     }
 
     fn past_stroke(&self, worst: At, amplitude: f64, low: At) -> Found {

@@ -7,7 +7,9 @@
 mod axis;
 mod digest;
 mod effects;
+mod fit;
 mod pieces;
+mod smooth;
 mod stencil;
 mod sweep;
 mod terms;
@@ -17,6 +19,8 @@ mod violation;
 
 pub use axis::AxisProof;
 pub use digest::Digest;
+pub use fit::{Change, FitError, Fitted, Manner, fit};
+pub use smooth::Smoothing;
 pub use terms::{LimitedEffect, Part, Terms};
 pub use violation::{Breach, Quantity, Violation};
 
@@ -151,7 +155,7 @@ fn subjects<'a>(timeline: &'a Timeline, terms: &'a Terms) -> Vec<Subject<'a>> {
                 .iter()
                 .any(|one| one.axis == axis && one.slot == slot && one.seat.name == part.seat.name)
             {
-                subjects.push(Subject { timeline, axis, seat: &part.seat, slot });
+                subjects.push(Subject { timeline, axis, first: part.axes.start, seat: &part.seat, slot });
             }
         }
     }
