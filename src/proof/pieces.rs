@@ -5,7 +5,7 @@ use crate::motion::Slot;
 use crate::timeline::{Cubic, Timeline};
 
 /// So many cubics share one set of bounds.
-const BLOCK: usize = 32;
+const BLOCK: usize = 16;
 
 /// A cubic of the seconds since its start, in strokes.
 #[derive(Debug, Clone, Copy)]

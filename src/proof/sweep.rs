@@ -1,7 +1,7 @@
 //! The greatest size of a divided difference over all phases of the grid: between the rows, shifted by the distances of
 //! the stencil, it is a cubic of the phase, whose extremes are known in closed form.
 
-use super::pieces::{Block, Pieces, between, seconds};
+use super::pieces::{Block, Piece, Pieces, between, seconds};
 use super::stencil::Stencil;
 use crate::timeline::Cubic;
 
@@ -122,14 +122,43 @@ impl Sweep<'_> {
             let reached =
                 blocks[index + 1..].iter().take_while(|next| next.0 <= until + self.stencil.reach());
             let all = reached.fold(*block, |all, next| all.and(next.2));
-            let bound = self.stencil.bound(all.derivatives[order - 1], all.jumps);
-            runs.push(Run { from, until, bound, span: all.span });
+            let mut run = Run { from, until, bound: 0.0, span: all.span };
+            let derivative = all.derivatives[order - 1];
+            run.bound = match self.mean_jerk(order, &run) {
+                // The mean of the third derivative over a distance: what it is on the way does not count.
+                Some(mean) => self.stencil.bound(mean.min(derivative), all.jumps),
+                None => self.stencil.bound(derivative, all.jumps),
+            };
+            runs.push(run);
         }
         runs
     }
 
+    /// The greatest change of the second derivative over the distance of a third difference, per second: the difference is
+    /// a mean of such means. Known where rows and distances are even.
+    fn mean_jerk(&self, order: usize, run: &Run) -> Option<f64> {
+        let apart = *self.stencil.offsets.get(1)?;
+        if order < 3 || !self.is_aligned(run) || self.stencil.reach() != 3 * apart {
+            return None;
+        }
+        let list = self.pieces.list();
+        let ahead = usize::try_from(apart / run.span).ok()?;
+        let (first, last) = (self.pieces.index(run.from), self.pieces.index(run.until));
+        // The second derivative runs straight between the rows, so the change is greatest at one; where it jumps there, the
+        // bound has the jumps on top.
+        // The piece at the end of the cue has no length, and no bend of its own.
+        let bends = list[..list.len() - 1].get(first..=last + 3 * ahead)?;
+        let change = |(here, there): (&Piece, &Piece)| (there.cubic.0[2] - here.cubic.0[2]).abs();
+        let most = bends.iter().zip(&bends[ahead..]).map(change).fold(0.0, f64::max);
+        Some(2.0 * most / seconds(apart))
+    }
+
+    fn is_aligned(&self, run: &Run) -> bool {
+        run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0)
+    }
+
     fn cells(&mut self, run: &Run) {
-        let aligned = run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0);
+        let aligned = self.is_aligned(run);
         match self.stencil.offsets.len() {
             2 if aligned => self.aligned::<2>(run),
             3 if aligned => self.aligned::<3>(run),
@@ -157,8 +186,11 @@ impl Sweep<'_> {
                     *sum += weight * part;
                 }
             }
-            let at = list[index].start;
-            self.judge(at, at + run.span, Cubic(sum).scaled(span));
+            let cubic = Cubic(sum).scaled(span);
+            if cubic.may_leave(self.swept.worst.min(self.threshold)) {
+                let at = list[index].start;
+                self.judge(at, at + run.span, cubic);
+            }
         }
     }
 
@@ -198,19 +230,17 @@ impl Sweep<'_> {
                 *sum += weight * part;
             }
         }
-        self.judge(at, next, Cubic(sum.map(|part| part * self.stencil.scale)).scaled(seconds(next - at)));
+        let cubic = Cubic(sum.map(|part| part * self.stencil.scale)).scaled(seconds(next - at));
+        if cubic.may_leave(self.swept.worst.min(self.threshold)) {
+            self.judge(at, next, cubic);
+        }
     }
 
     /// Takes the sum over a cell, as a cubic over 0 to 1.
-    #[inline]
     fn judge(&mut self, at: i64, next: i64, cubic: Cubic) {
-        let (low, high) = cubic.bounds();
-        let bound = high.max(-low);
-        if bound > self.swept.worst.min(self.threshold) {
-            let met = [0.0, 1.0].into_iter().chain(cubic.still()).map(|u| (cubic.at(u).abs(), u));
-            let (worst, u) = met.fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
-            self.note(at, next, worst, between(at, next, u));
-        }
+        let met = [0.0, 1.0].into_iter().chain(cubic.still()).map(|u| (cubic.at(u).abs(), u));
+        let (worst, u) = met.fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
+        self.note(at, next, worst, between(at, next, u));
     }
 
     /// The last pose on the last row: where the curve jumps, as one that holds does, no cell has that.

@@ -33,6 +33,15 @@ impl Cubic {
         Self([c0, c1 * unit, c2 * unit * unit, c3 * unit * unit * unit])
     }
 
+    /// Whether the curve may be farther than `size` from 0 somewhere within 0 to 1; where not, it surely is not.
+    pub(crate) fn may_leave(self, size: f64) -> bool {
+        const THIRD: f64 = 1.0 / 3.0;
+        let [c0, c1, c2, c3] = self.0;
+        let second = c0 + c1 * THIRD;
+        let points = [c0, second, second + (c1 + c2) * THIRD, c0 + c1 + c2 + c3];
+        points.iter().fold(false, |leaves, point| leaves | (point.abs() > size))
+    }
+
     /// Bounds that the curve cannot leave within 0 to 1: the least and greatest of its Bezier points.
     pub(crate) fn bounds(self) -> (f64, f64) {
         let [c0, c1, c2, c3] = self.0;
@@ -54,6 +63,9 @@ mod tests {
             let u = f64::from(step) / 10.0;
             assert!((part.at(u) - whole.at(0.4 + 0.5 * u)).abs() < 1e-12);
             assert!((low..=high).contains(&part.at(u)));
+            assert!(
+                !part.may_leave(low.abs().max(high.abs()) + 1e-12) && part.may_leave(part.at(u).abs() - 1e-9)
+            );
         }
     }
 
