@@ -43,6 +43,8 @@ pub mod fanout;
 pub mod gate;
 pub mod rt;
 
+pub mod proof;
+
 pub mod sim;
 
 pub mod device;

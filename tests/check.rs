@@ -79,14 +79,17 @@ fn a_cue_is_held_against_the_hall() {
 #[test]
 fn an_editors_rows_are_judged_in_their_unit_against_the_seat() {
     let folder = tempfile::tempdir().unwrap();
-    let rows = "1,1000,10,20\n2,1000,160,20\n3,1000,10,20\n";
+    let rows = "1,2000,10,20\n2,2000,15,20\n3,2000,160,20\n";
     let cue = write(folder.path(), "rows.csv", &format!("line,time_ms,x,y\n{rows}"));
     let args = ["check", &cue, "--from", "rows", "--units", "mm", "--json"];
     let run = kinocue(&args);
     assert_eq!(run.code, Some(65), "{}", run.stderr);
-    assert_eq!(run.json()["faults"][0]["line"], 3);
+    let faults = run.json()["faults"].clone();
+    assert_eq!((&faults[0]["line"], faults[0]["message"].to_string().contains("outside")), (&4.into(), true));
     let run = kinocue(&[&args[..], &["--config", HALL, "--seat", "platform6"]].concat());
-    assert_eq!((run.code, &run.json()["seat"]), (Some(0), &"platform6".into()), "{}", run.stderr);
+    assert_eq!((run.code, &run.json()["seat"]), (Some(1), &"platform6".into()), "its corner is too sharp");
+    let messages = run.json()["faults"].to_string();
+    assert!(messages.contains("acceleration") && !messages.contains("outside the stroke"), "{messages}");
     assert_eq!(kinocue(&["check", &cue, "--from", "rows"]).code, Some(64), "the unit is not guessed");
 }
 
@@ -172,9 +175,92 @@ fn completions_name_the_commands() {
 #[test]
 fn one_axis_and_one_frequency_are_told_as_one() {
     let folder = tempfile::tempdir().unwrap();
-    let cue = write(folder.path(), "one.csv", "time_s,a1,v1_hz,v1_amp\n0,0,20,0.001\n1,0,20,0.001\n");
+    let cue = write(folder.path(), "one.csv", "time_s,a1,v1_hz,v1_amp\n0,0.5,20,0.001\n1,0.5,20,0.001\n");
     let run = kinocue(&["check", &cue]);
     assert!(run.stdout.contains("passed: 1 axis, "), "{}", run.stdout);
     let run = kinocue(&["info", &cue]);
     assert!(run.stdout.contains("a1: 20 Hz, up to 0.15 mm"), "{}", run.stdout);
+}
+
+/// Rests, then moves by half its stroke in so many milliseconds.
+fn leap(ms: u32) -> String {
+    format!(
+        "# interpolation: linear\ntime_ms,a1,a2\n0,0.5,0.2\n1000,0.5,0.2\n{},0.5,0.7\n4000,0.5,0.7\n",
+        1000 + ms
+    )
+}
+
+#[test]
+fn a_broken_limit_is_told_with_its_place_and_ends_with_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "leap.csv", &leap(200));
+    let run = kinocue(&["check", &cue]);
+    assert_eq!(run.code, Some(1));
+    let velocity = run.stderr.lines().find(|line| line.contains("velocity 375.0 mm/s")).expect("it is told");
+    assert!(velocity.contains("leap.csv:4:10: a2: velocity 375.0 mm/s at 00:01."), "{velocity}");
+    assert!(velocity.contains("is over 240.0, the limit of seat bench3"), "{velocity}");
+    assert!(run.stderr.contains("kinocue fit"), "{}", run.stderr);
+    assert!(run.stdout.contains("375.0 mm/s") && run.stdout.contains("-56.2 % !"), "{}", run.stdout);
+    let report = kinocue(&["check", &cue, "--json"]).json();
+    assert_eq!((&report["passed"], &report["level"]), (&false.into(), &1.0.into()));
+    let margin = report["axes"][1]["velocity"]["margin"].as_f64().unwrap();
+    assert!((margin + 0.5625).abs() < 1e-6, "{report}");
+    assert!(report["axes"][0]["jerk"]["margin"].as_f64().unwrap() > 0.999_999, "the other axis rests");
+}
+
+#[test]
+fn a_level_may_make_a_cue_pass_and_a_trim_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "leap.csv", &leap(1000)); // 75 mm/s, and corners for 12
+    assert_eq!(kinocue(&["check", &cue]).code, Some(1));
+    let low = kinocue(&["check", &cue, "--level", "15%", "--trim", "-120ms", "--json"]);
+    assert_eq!((low.code, &low.json()["trim_ms"]), (Some(0), &(-120).into()), "{}", low.stderr);
+    let figures = |trim| kinocue(&["check", &cue, "--json", "--trim", trim]).json()["axes"].clone();
+    assert_eq!(figures("0ms"), figures("333ms"));
+    for (option, value) in [("--level", "110%"), ("--trim", "501ms"), ("--trim", "1s")] {
+        assert_eq!(kinocue(&["check", &cue, option, value]).code, Some(64), "{option} {value}");
+    }
+}
+
+#[test]
+fn effects_and_controllers_have_limits_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let hall = std::fs::read_to_string(HALL).unwrap();
+    let limited = hall.replace("[effects]", "[effect_limits]\nair = { min_on_ms = 50 }\n\n[effects]");
+    let limited = limited.replace("lead_mm = 5.0", "lead_mm = 5.0\nmax_rpm = 2000");
+    let limited = write(folder.path(), "limited.toml", &limited);
+    let cue =
+        write(folder.path(), "puff.csv", "time_ms,a1,fx_air\n0,0.5,0\n1000,0.5,1\n1040,0.5,0\n2000,0.5,0\n");
+    assert_eq!(kinocue(&["check", &cue, "--config", HALL]).code, Some(0));
+    let run = kinocue(&["check", &cue, "--config", &limited]);
+    assert_eq!(run.code, Some(1));
+    assert!(run.stderr.contains("fx_air: on at 00:01.000 for 40ms"), "{}", run.stderr);
+    assert!(run.stderr.contains("2000 rpm (PA07), 166.7 mm/s"), "{}", run.stderr);
+    for (text, message) in [
+        ("air = { min_on = 50 }", "min_on: unknown key in [effect_limits.air]; did you mean min_on_ms?"),
+        ("airr = { min_on_ms = 50 }", "airr is not in [effects]; did you mean air?"),
+        ("air = { min_on_ms = 50, max_on_ms = 40 }", "air: min_on_ms 50 is over max_on_ms 40"),
+        ("air = { max_duty = 1.5 }", "max_duty: 1.5 is outside 0.001..=1"),
+    ] {
+        let bad = hall.replace("[effects]", &format!("[effect_limits]\n{text}\n\n[effects]"));
+        let bad = write(folder.path(), "bad.toml", &bad);
+        let run = kinocue(&["check", &bad]);
+        assert_eq!(run.code, Some(78), "{text}");
+        assert!(
+            run.stderr.contains(message) && run.stderr.contains("bad.toml:33:"),
+            "{text}: {}",
+            run.stderr
+        );
+    }
+}
+
+#[test]
+fn play_refuses_a_cue_without_a_passing_proof_before_anything_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "leap.csv", &leap(200));
+    // Nobody listens there, and nobody is asked.
+    let run = kinocue(&["play", &cue, "--to", "127.0.0.1:9", "--bind", "127.0.0.1:0", "--json"]);
+    assert_eq!((run.code, run.stdout.as_str()), (Some(1), ""), "{}", run.stderr);
+    assert!(run.stderr.contains("leap.csv:4:10: a2: velocity 375.0 mm/s"), "{}", run.stderr);
+    assert!(run.stderr.contains("kinocue fit"), "{}", run.stderr);
 }

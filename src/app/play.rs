@@ -15,12 +15,13 @@ use rtrb::{Consumer, Producer};
 
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
-use crate::engine::Show;
+use crate::engine::{Rate, Show};
 use crate::fanout::{Lane, Manner};
 use crate::health::{Groups, Health};
 use crate::net::{NetError, Ports};
 use crate::observe::Watched;
 use crate::plan::PlanError;
+use crate::proof::{self, Digest, Proof, Terms, Violation};
 use crate::rt::{AckLoop, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Watch, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
@@ -41,6 +42,16 @@ pub enum PlayError {
     /// The cue leaves the stroke of some seats.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Stroke(Vec<CueFaults>),
+    /// The cue breaks limits of the seats, the effects or the controllers.
+    #[error("{}", broken(cue, violations, *more))]
+    Limits {
+        /// The cue's file.
+        cue: PathBuf,
+        /// What is broken, each with its place in the file.
+        violations: Vec<Violation>,
+        /// How many more there are.
+        more: u64,
+    },
     /// No move leads onto the cue.
     #[error(transparent)]
     Plan(PlanError),
@@ -58,6 +69,17 @@ pub enum PlayError {
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
     let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", cue.display());
     misfits.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
+    let cue = cue.display();
+    let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
+    if more > 0 {
+        text += &format!("{cue}: and {more} more\n");
+    }
+    text + &format!(
+        "the limits proof failed, so nothing is played; `kinocue fit {cue} -o OUT` makes a cue that keeps the limits"
+    )
 }
 
 /// A play that fits: cue, controllers and the first move are proved; nothing is open yet.
@@ -107,12 +129,13 @@ pub struct Played {
 }
 
 impl Play {
-    /// Proves that the cue fits the controllers and that a move leads onto it.
+    /// Proves that the cue fits the controllers, that it keeps all limits at its level, and that a move leads onto it.
     ///
     /// # Errors
     /// Everything that [`PlayError`] names but the network.
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
+        keeps_limits(&config, &timeline, show.rate, manner.level)?;
         let staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
         Ok(Self::of(config, staged, manner))
     }
@@ -220,4 +243,14 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
         return Err(PlayError::Misfit { cue: timeline.cue().path().to_path_buf(), misfits });
     }
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
+}
+
+fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) -> Result<(), PlayError> {
+    let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, level);
+    let proof = proof::prove(timeline, terms);
+    if proof.passed() {
+        return Ok(());
+    }
+    let Proof { violations, more, .. } = proof;
+    Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more })
 }

@@ -1,28 +1,34 @@
 //! `kinocue check`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
+use super::times::{parse_level, parse_trim};
 use super::{Exit, Failure, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults};
 use crate::cue::{self, CueFaults, Fault, Place, Source};
+use crate::proof::{Proof, Violation, prove};
 use crate::timeline::Timeline;
 
 /// The codes of bad files, the one that counts most first.
-const WORST_FIRST: [Exit; 4] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::BadCue];
+const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::BadCue, Exit::CheckFailed];
 
 /// Checks cue and configuration files: every fault, with its place.
 ///
-/// Proves format, units, axes and stroke of a cue, and with --config that each axis has a controller and each
-/// effect an output. Velocity, acceleration and jerk are shown, and not judged.
+/// Proves format, units, axes and stroke of a cue, and with --config that each axis has a controller and each effect an
+/// output. Then proves its limits, over the whole cue and however the frames fall on it: velocity, acceleration and jerk of
+/// each axis, vibration on top of motion, the times of effects, and what the controllers themselves allow. Exit code 1 where
+/// a limit is broken; `kinocue fit` lowers the motion until it fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue check cues/*.csv",
     "kinocue check hall.toml",
     "kinocue check cues/voyage.csv --config hall.toml",
+    "kinocue check ride.csv --config hall.toml --level 60%",
     "kinocue check cues/coaster.csv --config hall.toml --seat platform6 --rate 1000 --json",
     "kinocue check ride.txt --from rows --units percent",
 ]))]
@@ -37,13 +43,21 @@ pub(super) struct Args {
     #[command(flatten)]
     seat: SeatArgs,
 
+    /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. What passes at a level passes below it.
+    #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
+    level: f64,
+
+    /// Offset against the film, -500ms to 500ms. It only moves the frames on the cue, and the proof holds wherever they fall.
+    #[arg(long, value_name = "MS", value_parser = parse_trim, default_value = "0ms", allow_hyphen_values = true)]
+    trim: i32,
+
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let mut report = Report::default();
+    let mut report = Report { level: args.level, trim_ms: args.trim, ..Report::default() };
     let judge = match args.seat.config.as_deref().map(|path| report.configuration(path)) {
         Some(None) => None, // cues are then checked by themselves
         Some(hall) => Some(args.seat.judge(hall)?),
@@ -63,7 +77,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if args.json {
         print::json(&report)?;
     } else {
-        print::out(&report.text)?;
+        print::out(&format!("{}{}", report.text, report.tables))?;
         if !report.passed {
             print::tell(report.in_words().trim_end());
         }
@@ -80,12 +94,21 @@ struct Report {
     faults_unlisted: u64,
     seat: String,
     rate_hz: Option<f64>,
+    /// Of motion and vibration, 0 to 1.
+    level: f64,
+    trim_ms: i32,
     axes: Vec<AxisReport>,
     #[serde(skip)]
     exits: Vec<Exit>,
     /// What is said of the files that passed.
     #[serde(skip)]
     text: String,
+    /// What was measured, of the cues that can be measured.
+    #[serde(skip)]
+    tables: String,
+    /// Whether a cue breaks limits.
+    #[serde(skip)]
+    unfit: bool,
 }
 
 /// One fault; line and column count from 1, and are null where the file has none.
@@ -113,6 +136,14 @@ impl FaultReport {
             _ => fault.to_string().trim_start().to_owned(),
         };
         Self::new(file, &fault.place, message)
+    }
+
+    fn of_proof(file: &Path, violation: &Violation) -> Self {
+        let message = match violation.place {
+            Place::Text { .. } => violation.message(),
+            _ => violation.to_string().trim_start().to_owned(),
+        };
+        Self::new(file, &violation.place, message)
     }
 
     fn of_config(fault: &ConfigFault) -> Self {
@@ -173,22 +204,32 @@ impl Report {
             let place = timeline.cue().column_place(&misfit.column());
             self.fault(Exit::BadCue, FaultReport::new(path, &place, misfit.to_string()));
         }
-        let seats = judge.seats(timeline.axes());
-        let figures = timeline.figures(judge.rate_hz, &seats);
-        self.axes.extend(figures::report(&path.display().to_string(), &figures));
-        self.seat = figures::seat_names(&seats);
+        self.proof(path, &prove(&timeline, judge.terms(&timeline, self.level)));
         if self.exits.len() == before {
             let axes = timeline.axes();
             let noun = if axes == 1 { "axis" } else { "axes" };
-            let words = format!(
-                "{axes} {noun}, {}; velocity, acceleration and jerk for seat {} at {} frames a second are shown, not judged",
-                timeline.duration(),
-                self.seat,
-                judge.rate_hz
+            let (length, rate, level) = (timeline.duration(), judge.rate_hz, 100.0 * self.level);
+            let seat = &self.seat;
+            self.passes(
+                path,
+                &format!(
+                    "{axes} {noun}, {length}; within all limits of seat {seat} at {rate} frames a second, level {level:.0} %"
+                ),
             );
-            self.passes(path, &words);
-            self.text += &figures::table(&figures);
         }
+    }
+
+    /// Notes what a proof shows: the table in any case, and what is broken.
+    fn proof(&mut self, path: &Path, proof: &Proof) {
+        self.axes.extend(figures::proved(&path.display().to_string(), &proof.axes));
+        let seats: Vec<_> = proof.axes.iter().map(|axis| Arc::clone(&axis.seat)).collect();
+        self.seat = figures::seat_names(&seats);
+        self.tables += &figures::proof_table(&proof.axes);
+        for violation in &proof.violations {
+            self.fault(Exit::CheckFailed, FaultReport::of_proof(path, violation));
+        }
+        self.faults_unlisted += proof.more;
+        self.unfit |= !proof.passed();
     }
 
     fn passes(&mut self, path: &Path, words: &str) {
@@ -208,11 +249,15 @@ impl Report {
         if self.faults_unlisted > 0 {
             text += &format!("and {} more\n", self.faults_unlisted);
         }
-        match self.faults.len() as u64 + self.faults_unlisted {
-            0 => text,
-            1 => text + "1 fault\n",
-            count => format!("{text}{count} faults\n"),
+        text += &match self.faults.len() as u64 + self.faults_unlisted {
+            0 => String::new(),
+            1 => "1 fault\n".to_owned(),
+            count => format!("{count} faults\n"),
+        };
+        if self.unfit {
+            text += "kinocue fit CUE -o OUT makes a cue that keeps the limits\n";
         }
+        text
     }
 }
 

@@ -57,17 +57,14 @@ enum Format {
 
 /// What is written, by the name of the output.
 #[derive(Debug, Clone, Copy)]
-enum Target {
+pub(super) enum Target {
     Csv,
     Mcap,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let target = target(&args.output).or_exit(Exit::Usage)?;
-    if !args.force && args.output.try_exists().or_exit(Exit::Io)? {
-        let error = anyhow!("{} exists; --force replaces it", args.output.display());
-        return Err(error).or_exit(Exit::Usage);
-    }
+    refuse_to_replace(&args.output, args.force)?;
     let mut cue = match read(args) {
         Ok((cue, lost)) => {
             tell_lost(&cue, lost.as_ref());
@@ -88,7 +85,17 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn target(output: &Path) -> anyhow::Result<Target> {
+/// An output that exists is replaced only where that was asked for.
+pub(super) fn refuse_to_replace(output: &Path, force: bool) -> Result<(), Failure> {
+    if !force && output.try_exists().or_exit(Exit::Io)? {
+        let error = anyhow!("{} exists; --force replaces it", output.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
+    Ok(())
+}
+
+/// What the name of an output says that it is to be.
+pub(super) fn target(output: &Path) -> anyhow::Result<Target> {
     let named = |extension| output.extension().is_some_and(|it| it.eq_ignore_ascii_case(extension));
     if named("csv") {
         Ok(Target::Csv)
@@ -144,7 +151,7 @@ fn exit_of(faults: &CueFaults) -> Exit {
 }
 
 /// Writes beside the output and renames, so that there is the old file or the whole new one at any time.
-fn write(cue: &Cue, output: &Path, target: Target) -> Result<(), Failure> {
+pub(super) fn write(cue: &Cue, output: &Path, target: Target) -> Result<(), Failure> {
     let part = Part::create(output).or_exit(Exit::Io)?;
     let bar = ProgressBar::no_length().with_style(style("writing {bytes}"));
     let mut out = BufWriter::new(bar.wrap_write(&part.file));

@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use serde::Serialize;
 
 use crate::motion::SeatType;
+use crate::proof::{AxisProof, Quantity, SLACK, Worst};
 use crate::timeline::{AxisFigures, Figure};
 
 /// An axis in `--json`; positions in mm from the stroke's lower end.
@@ -17,6 +18,9 @@ pub(super) struct AxisReport {
     unit: &'static str,
     position: Position,
     velocity: Most,
+    /// Change of velocity from frame to frame, mm/s; `check` alone has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    step: Option<Most>,
     acceleration: Most,
     jerk: Most,
 }
@@ -31,6 +35,8 @@ struct Position {
     min_at_s: f64,
     min_line: u64,
     stroke: f64,
+    /// What is left to the nearer end, as a part of the stroke, vibration on top in `check`.
+    margin: f64,
 }
 
 /// The greatest size of something, and what the seat allows.
@@ -40,11 +46,34 @@ struct Most {
     limit: f64,
     at_s: f64,
     line: u64,
+    /// What is left of the limit, as a part of it.
+    margin: f64,
 }
 
 impl Most {
     fn new(figure: Figure, limit: f64) -> Self {
-        Self { max: figure.value, limit, at_s: figure.at.as_secs_f64(), line: figure.line }
+        let Figure { value, at, line } = figure;
+        Self::proved(Worst { value, limit, at, line })
+    }
+
+    fn proved(worst: Worst) -> Self {
+        let Worst { value, limit, at, line } = worst;
+        Self { max: value, limit, at_s: at.as_secs_f64(), line, margin: worst.margin() }
+    }
+}
+
+impl Position {
+    fn new(lowest: Figure, highest: Figure, seat: &SeatType, margin: f64) -> Self {
+        Self {
+            min: lowest.value,
+            max: highest.value,
+            at_s: highest.at.as_secs_f64(),
+            line: highest.line,
+            min_at_s: lowest.at.as_secs_f64(),
+            min_line: lowest.line,
+            stroke: seat.stroke_mm,
+            margin,
+        }
     }
 }
 
@@ -57,21 +86,83 @@ pub(super) fn report(file: &str, figures: &[AxisFigures]) -> Vec<AxisReport> {
             file: file.to_owned(),
             seat: seat.name.clone(),
             unit: "mm",
-            position: Position {
-                min: lowest.value,
-                max: highest.value,
-                at_s: highest.at.as_secs_f64(),
-                line: highest.line,
-                min_at_s: lowest.at.as_secs_f64(),
-                min_line: lowest.line,
-                stroke: seat.stroke_mm,
-            },
+            position: Position::new(*lowest, *highest, seat, room(lowest, highest, seat)),
             velocity: Most::new(*velocity, seat.max_velocity_mm_s),
+            step: None,
             acceleration: Most::new(*acceleration, seat.max_acceleration_mm_s2),
             jerk: Most::new(*jerk, seat.max_jerk_mm_s3),
         }
     };
     figures.iter().enumerate().map(axis).collect()
+}
+
+fn room(lowest: &Figure, highest: &Figure, seat: &SeatType) -> f64 {
+    lowest.value.min(seat.stroke_mm - highest.value) / seat.stroke_mm
+}
+
+/// The proved axes of the cue in `file`.
+pub(super) fn proved(file: &str, axes: &[AxisProof]) -> Vec<AxisReport> {
+    let axis = |proof: &AxisProof| AxisReport {
+        name: format!("a{}", proof.axis + 1),
+        file: file.to_owned(),
+        seat: proof.seat.name.clone(),
+        unit: "mm",
+        position: Position::new(proof.lowest, proof.highest, &proof.seat, proof.position_margin()),
+        velocity: Most::proved(proof.velocity),
+        step: Some(Most::proved(proof.step)),
+        acceleration: Most::proved(proof.acceleration),
+        jerk: Most::proved(proof.jerk),
+    };
+    axes.iter().map(axis).collect()
+}
+
+/// One row a limit: what is worst, what is left, and where; `!` marks what is over its limit.
+pub(super) fn proof_table(axes: &[AxisProof]) -> String {
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header(["axis", "limit", "", "worst", "margin", "at", "row"]);
+    for proof in axes {
+        let name = format!("a{} {}", proof.axis + 1, proof.seat.name);
+        table.add_row(position_row(name, proof));
+        for (quantity, worst) in proof.worst() {
+            let unit = quantity.unit();
+            let short = if quantity == Quantity::Step { "frame to frame" } else { quantity.name() };
+            table.add_row([
+                String::new(),
+                short.to_owned(),
+                format!("{:.0} {unit}", worst.limit),
+                format!("{:.1} {unit}", worst.value),
+                margin(worst.margin(), worst.value > SLACK * worst.limit),
+                worst.at.to_string(),
+                worst.line.to_string(),
+            ]);
+        }
+    }
+    table.column_iter_mut().skip(2).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    format!("{}\n", table.trim_fmt())
+}
+
+/// The position that comes nearest to an end of the stroke, vibration on top.
+fn position_row(name: String, proof: &AxisProof) -> [String; 7] {
+    let stroke = proof.seat.stroke_mm;
+    let lowest = proof.lowest_shaken.filter(|shaken| shaken.value < proof.lowest.value);
+    let highest = proof.highest_shaken.filter(|shaken| shaken.value > proof.highest.value);
+    let (low, high) = (lowest.unwrap_or(proof.lowest), highest.unwrap_or(proof.highest));
+    let near = if low.value < stroke - high.value { low } else { high };
+    let left = proof.position_margin();
+    [
+        name,
+        "position".to_owned(),
+        format!("0 to {stroke:.0} mm"),
+        format!("{:.1} to {:.1} mm", low.value + 0.0, high.value),
+        margin(left, left < -1e-6),
+        near.at.to_string(),
+        near.line.to_string(),
+    ]
+}
+
+fn margin(part: f64, is_over: bool) -> String {
+    format!("{:.1} %{}", 100.0 * part + 0.0, if is_over { " !" } else { "" })
 }
 
 /// The names of the seat types that axes were judged for, each once.

@@ -9,7 +9,9 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use super::{Exit, Failure};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
+use crate::engine::Rate;
 use crate::motion::SeatType;
+use crate::proof::{Digest, Terms};
 use crate::timeline::Timeline;
 
 /// What stands behind the options in the help of a command that reads cues.
@@ -117,6 +119,22 @@ impl Judge {
             self.seat.as_ref().or(taker.map(|controller| &controller.seat)).unwrap_or(&bench)
         };
         (0..axes).map(|axis| Arc::clone(seat_of(axis))).collect()
+    }
+
+    /// What a cue has to be proved for: on the seat asked for, else on all seats of the configuration, else on the bench
+    /// seat.
+    pub(super) fn terms(&self, timeline: &Timeline, level: f64) -> Terms {
+        let (cue, rate) = (Digest::of(timeline.cue()), Rate::from_hz(self.rate_hz));
+        let axes = timeline.axes();
+        let of_seat = |seat: &Arc<SeatType>| Terms::of_seat(Arc::clone(seat), axes, cue, rate, level);
+        match (&self.seat, &self.hall) {
+            (None, Some(hall)) => Terms::of_hall(hall, cue, rate, level),
+            (Some(seat), Some(hall)) => {
+                Terms { parts: of_seat(seat).parts, ..Terms::of_hall(hall, cue, rate, level) }
+            }
+            (Some(seat), None) => of_seat(seat),
+            (None, None) => of_seat(&Arc::new(SeatType::bench3(axes))),
+        }
     }
 
     /// Holds a cue against the stroke of the seat asked for, else of each seat of the configuration, else of the

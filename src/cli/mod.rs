@@ -13,6 +13,7 @@ mod demo;
 mod doctor;
 mod exit;
 mod figures;
+mod fit;
 mod home;
 mod info;
 mod latency;
@@ -45,6 +46,7 @@ enum Command {
     Check(check::Args),
     Info(info::Args),
     Convert(convert::Args),
+    Fit(fit::Args),
     Decode(decode::Args),
     Preflight(preflight::Args),
     Register(register::Args),
@@ -82,6 +84,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
+        Command::Fit(args) => fit::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Preflight(args) => preflight::run(&args),
         Command::Register(args) => register::run(&args),

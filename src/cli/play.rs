@@ -165,8 +165,11 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
 
 /// The exit code of a play that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
-    let system = matches!(error, PlayError::Net(_) | PlayError::Thread(_));
-    let exit = if system { Exit::System } else { Exit::BadCue };
+    let exit = match error {
+        PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
+        PlayError::Limits { .. } => Exit::CheckFailed,
+        _ => Exit::BadCue,
+    };
     let names_cue = !matches!(error, PlayError::Plan(_));
     let error = anyhow::Error::new(error);
     Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }

@@ -69,6 +69,16 @@ pub fn parse_level(text: &str) -> Result<f64, String> {
     if (0.0..=1.0).contains(&level) { Ok(level) } else { Err(refuse()) }
 }
 
+/// An offset against the film, -500 to 500 ms in whole milliseconds: `40`, `-120ms`.
+///
+/// # Errors
+/// What is wrong with the text, for a person.
+pub fn parse_trim(text: &str) -> Result<i32, String> {
+    let digits = text.strip_suffix("ms").unwrap_or(text);
+    let trim = digits.parse().ok().filter(|ms| (-500..=500).contains(ms));
+    trim.ok_or_else(|| "a trim is -500ms to 500ms, in whole milliseconds".to_owned())
+}
+
 fn hours_minutes(h: &str, m: &str) -> Option<u128> {
     Some((whole(h)? * 3_600 + sexagesimal(m)? * 60) * SECOND)
 }

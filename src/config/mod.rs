@@ -10,6 +10,7 @@ use crate::motion::{MAX_AXES, SeatType};
 use crate::preflight::Check;
 
 mod accept;
+mod effect_limits;
 mod fault;
 mod fit;
 mod read;
@@ -19,6 +20,7 @@ mod target;
 mod tests;
 
 pub use crate::wire::{Dialect, Timing};
+pub use effect_limits::EffectLimit;
 pub use fault::{ConfigFault, ConfigFaults};
 pub use fit::{Amplitude, HallStroke, Misfit, Swing};
 pub use target::{TargetError, from_to_args};
@@ -38,6 +40,8 @@ pub struct Config {
     pub seats: Vec<Arc<SeatType>>,
     /// The site's wiring. Two names may mean one output.
     pub effects: Vec<Effect>,
+    /// How long, and how much of the time, effects may be on; at most one entry for each name.
+    pub effect_limits: Vec<EffectLimit>,
     /// The controllers, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
 }

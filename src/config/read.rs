@@ -8,9 +8,10 @@ use std::sync::Arc;
 
 use toml::de::DeTable;
 
-use crate::motion::{MAX_AXES, SeatType};
+use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 
 use super::accept::acceptances;
+use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::section::{Entry, Section, did_you_mean};
 use super::{
@@ -61,8 +62,8 @@ pub(super) fn document(path: &Path, text: &str) -> Result<Config, ConfigFaults> 
 
 fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
-    let [show_at, seat_at, effects_at, controller_at] =
-        ["show", "seat", "effects", "controller"].map(|key| section.get(key));
+    let [show_at, seat_at, effects_at, limits_at, controller_at] =
+        ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
@@ -70,9 +71,10 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
     let effects = effects_at.map_or_else(Vec::new, |entry| effects(entry, faults));
+    let effect_limits = limits_at.map_or_else(Vec::new, |entry| effect_limits(entry, &effects, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
-    Some(Config { show: show?, seats, effects, controllers })
+    Some(Config { show: show?, seats, effects, effect_limits, controllers })
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
@@ -125,6 +127,8 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
     let velocity = section.above_zero("max_velocity_mm_s");
     let acceleration = section.above_zero("max_acceleration_mm_s2");
     let jerk = section.above_zero("max_jerk_mm_s3");
+    let max_rpm = section.whole_in("max_rpm", 1..=65_535);
+    let interval = section.whole_in("max_interval_ms", 1..=65_535);
     let park = fractions(&mut section, "park", axes).unwrap_or_default();
     let neutral = fractions(&mut section, "neutral", axes).unwrap_or(park);
     section.finish();
@@ -137,6 +141,8 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
         max_velocity_mm_s: velocity?,
         max_acceleration_mm_s2: acceleration?,
         max_jerk_mm_s3: jerk?,
+        max_rpm,
+        max_interval_ms: interval.unwrap_or(FACTORY_INTERVAL_MS),
         park,
         neutral,
     };

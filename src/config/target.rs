@@ -79,7 +79,13 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         controllers.push(controller);
     }
     let seats = distinct_seats(&controllers);
-    Ok(Config { show: Show::default(), seats, effects: with_bench_effects(named), controllers })
+    Ok(Config {
+        show: Show::default(),
+        seats,
+        effects: with_bench_effects(named),
+        effect_limits: Vec::new(),
+        controllers,
+    })
 }
 
 impl Config {

@@ -231,6 +231,39 @@ impl Cue {
         self.origin.column_place(&self.path, column)
     }
 
+    /// The same cue with other rows. What has a place in it is then placed by the number of its row.
+    ///
+    /// # Panics
+    /// Where there are not as many positions as rows times axes.
+    #[must_use]
+    pub(crate) fn with_rows(
+        &self,
+        times: Vec<ShowTime>,
+        positions: Vec<f64>,
+        interpolation: Interpolation,
+    ) -> Self {
+        assert_eq!(positions.len(), times.len() * self.axes, "each row has a position for each axis");
+        Self {
+            path: self.path.clone(),
+            title: self.title.clone(),
+            origin: Origin::Messages,
+            vibration: self.vibration.clone(),
+            effects: self.effects.clone(),
+            markers: self.markers.clone(),
+            times,
+            positions,
+            interpolation,
+            ..*self
+        }
+    }
+
+    /// The same cue with other vibrations, one for each change of each axis.
+    #[must_use]
+    pub(crate) fn with_vibration(self, tracks: &[Vec<Vibration>]) -> Self {
+        let vibration = self.vibration.iter().zip(tracks).map(|(steps, track)| steps.with_values(track));
+        Self { vibration: vibration.collect(), ..self }
+    }
+
     fn shrink(&mut self) {
         self.times.shrink_to_fit();
         self.positions.shrink_to_fit();

@@ -36,6 +36,14 @@ impl<T: Copy + PartialEq + Default> Steps<T> {
         self.0.shrink_to_fit();
     }
 
+    /// The same changes with other values.
+    #[must_use]
+    pub(super) fn with_values(&self, values: &[T]) -> Self {
+        let mut steps = Self::default();
+        self.0.iter().zip(values).for_each(|(step, value)| steps.push(step.at, *value));
+        steps
+    }
+
     /// The changes in order of time.
     #[must_use]
     pub fn as_slice(&self) -> &[Step<T>] {

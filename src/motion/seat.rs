@@ -2,6 +2,11 @@
 
 use super::MAX_AXES;
 
+/// The speed limit of a controller as it leaves the factory, turns a minute (PA07, IMAX manual 2.3.1).
+const FACTORY_RPM: u32 = 3_000;
+/// The longest Time that a controller executes as it leaves the factory, ms (PA0b, IMAX manual 2.3.1).
+pub const FACTORY_INTERVAL_MS: u32 = 3_000;
+
 /// A motor position as the controller counts it: whole pulses from the lower end of the stroke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Pulses(pub i32);
@@ -25,6 +30,10 @@ pub struct SeatType {
     pub max_acceleration_mm_s2: f64,
     /// Greatest jerk, mm/s³, above 0.
     pub max_jerk_mm_s3: f64,
+    /// The controller's own limit on speed, turns a minute (PA07), where the site says what it is.
+    pub max_rpm: Option<u32>,
+    /// The longest Time that the controller executes as it is, ms (PA0b).
+    pub max_interval_ms: u32,
     /// Where each axis rests between shows, fraction of the stroke; axes past the last one rest at 0.
     pub park: [f64; MAX_AXES],
     /// What levels scale about, fraction of the stroke.
@@ -44,6 +53,8 @@ impl SeatType {
             max_velocity_mm_s: 240.0,
             max_acceleration_mm_s2: 3_000.0,
             max_jerk_mm_s3: 60_000.0,
+            max_rpm: None,
+            max_interval_ms: FACTORY_INTERVAL_MS,
             park: [0.0; MAX_AXES],
             neutral: [0.0; MAX_AXES],
         }
@@ -53,6 +64,12 @@ impl SeatType {
     #[must_use]
     pub fn stroke_pulses(&self) -> f64 {
         self.stroke_mm / self.lead_mm * self.pulses_per_rev
+    }
+
+    /// How fast the controller lets an axis move, mm/s: its own limit, else that of the factory.
+    #[must_use]
+    pub fn speed_ceiling_mm_s(&self) -> f64 {
+        f64::from(self.max_rpm.unwrap_or(FACTORY_RPM)) * self.lead_mm / 60.0
     }
 
     /// Where the motor stands at `fraction` of the stroke: rounded to nearest, ties away from zero, saturating.

@@ -71,6 +71,13 @@ impl Slot {
         Self { level, ..self }
     }
 
+    /// What the cue's unit is at its level, fraction of the stroke, and what is added to that: where the cue's values put
+    /// the axis, were it not held inside the stroke.
+    #[must_use]
+    pub fn scale(&self) -> (f64, f64) {
+        (self.to_stroke * self.level, self.neutral * (1.0 - self.level))
+    }
+
     /// Where the cue's `value` puts the axis: fraction of the stroke, held inside it.
     #[must_use]
     pub fn place(&self, value: f64) -> f64 {

@@ -81,8 +81,7 @@ impl Timeline {
 
     fn figure(&self, peak: Peak) -> Figure {
         let cue = self.cue();
-        let row = cue.times().partition_point(|&time| time <= peak.at).saturating_sub(1);
-        Figure { value: peak.value, at: peak.at, line: cue.line(row) }
+        Figure { value: peak.value, at: peak.at, line: cue.line(self.row_before(peak.at)) }
     }
 
     /// How much each effect that the cue names, or each bit of its raw output words, is used.

@@ -8,6 +8,7 @@ mod figures;
 mod fit;
 mod spline;
 
+pub(crate) use cubic::Cubic;
 pub use extremes::{AxisExtremes, Extreme};
 pub use figures::{AxisFigures, EffectUse, Figure};
 pub use fit::{HELD_BACK, Held, StrokeFit};
@@ -117,6 +118,12 @@ impl Timeline {
             };
         }
         *hint
+    }
+
+    /// The row at or before a show time; the first one before it.
+    #[must_use]
+    pub fn row_before(&self, at: ShowTime) -> usize {
+        self.cue.times().partition_point(|time| *time <= at).saturating_sub(1)
     }
 
     /// The vibration of each axis that holds at a show time; none past the cue's axes.

@@ -95,9 +95,10 @@ fn absolute_time_goes_on_by_one_period_from_frame_to_frame() {
 #[test]
 fn vibration_goes_in_frames_of_its_own_kind_and_is_still_at_the_end() {
     let folder = Folder::new();
-    // From 0.3 s on the first axis shakes at 20 Hz by a hundredth of its stroke.
-    let cells = |at_ms| if at_ms < 300 { ",0,0".to_owned() } else { ",20,0.01".to_owned() };
-    let cue = folder.nod_with(&[0.1, 0.1], ",v1_hz,v1_amp", cells);
+    // The seat stands at a tenth of its stroke, and in the last fifth of a second the first axis shakes.
+    let row = |at_ms: u32| format!("{at_ms},0.1,0.1{}\n", if at_ms < 2_200 { ",0,0" } else { ",20,0.01" });
+    let rows: String = (0..=2_400).step_by(10).map(row).collect();
+    let cue = folder.write("shake.csv", format!("time_ms,a1,a2,v1_hz,v1_amp\n{rows}"));
     let sim = Sim::one(&[]);
     let relay = Relay::start(&sim.addresses[0]);
     let playing = Playing::start(&cue, &[relay.to()], &["--json"]);
@@ -111,10 +112,10 @@ fn vibration_goes_in_frames_of_its_own_kind_and_is_still_at_the_end() {
         });
         shaken
     };
-    assert!(!shakes(28));
-    assert!(shakes(33));
-    assert!(shakes(NOD_MS / 10 - 2));
-    assert!(!shakes(NOD_MS / 10 + 2), "closing frames are still");
+    assert!(!shakes(218));
+    assert!(shakes(223));
+    assert!(shakes(238));
+    assert!(!shakes(242), "parking frames are still");
     assert_all_acked(&playing.finish().report_of(0));
     let seen = sim.end();
     assert_eq!(functions(&seen), ["0x1901"]);

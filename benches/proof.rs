@@ -1,0 +1,99 @@
+//! How long the limits proof of a two-hour six-axis cue at 100 Hz takes, as a ratio to loading that cue in the same run:
+//! of smooth motion, and of motion with noise on every row, where nothing can be ruled out at a glance.
+//!
+//! `cargo bench --bench proof`
+
+use std::fs::File;
+use std::hint::black_box;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use kinocue::cue::{self, Source};
+use kinocue::engine::Rate;
+use kinocue::motion::SeatType;
+use kinocue::proof::{Digest, Terms, prove};
+use kinocue::timeline::Timeline;
+
+const ROWS: u32 = 720_000;
+const AXES: usize = 6;
+const ROUNDS: usize = 7;
+/// The goal that the ratios are held against.
+const GOAL: f64 = 1.0;
+
+type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> Outcome<()> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("two-hours.csv");
+    println!("{ROWS} rows of {AXES} axes, {ROUNDS} rounds                  median      min      max");
+    for (what, noise) in [("smooth", 0.0), ("noisy", 2e-5)] {
+        write_cue(&path, noise)?;
+        for rate in [100.0, 1000.0, 60.0] {
+            compare(&path, what, rate)?;
+        }
+    }
+    Ok(())
+}
+
+/// Motion with six decimals, as an editor exports it.
+fn write_cue(path: &Path, noise: f64) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(path)?);
+    writeln!(out, "# kinocue-csv: 1\ntime_ms,a1,a2,a3,a4,a5,a6")?;
+    let mut chance = 1_u32;
+    for row in 0..ROWS {
+        write!(out, "{}", row * 10)?;
+        for axis in 0..6_u8 {
+            let phase = f64::from(row) * 0.01 * (0.7 + 0.3 * f64::from(axis));
+            chance = chance.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let shake = noise * (f64::from(chance >> 16) / 32_768.0 - 1.0);
+            write!(out, ",{:.6}", 0.5 + 0.3 * phase.sin() + 0.1 * (2.7 * phase).cos() + shake)?;
+        }
+        writeln!(out)?;
+    }
+    out.flush()
+}
+
+fn compare(path: &Path, what: &str, rate: f64) -> Outcome<()> {
+    let seat = Arc::new(SeatType::bench3(AXES));
+    let (mut loads, mut proofs) = (Vec::new(), Vec::new());
+    for _ in 0..ROUNDS {
+        let (timeline, load) = timed(|| Ok(Timeline::new(cue::load(path, &Source::Native)?)))?;
+        let (_, proof) = timed(|| {
+            let digest = Digest::of(timeline.cue());
+            let terms = Terms::of_seat(Arc::clone(&seat), AXES, digest, Rate::from_hz(rate), 1.0);
+            Ok(prove(&timeline, terms))
+        })?;
+        loads.push(load);
+        proofs.push(proof);
+    }
+    let ratios: Vec<_> = proofs.iter().zip(&loads).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()).collect();
+    println!("{what}, {rate} frames a second");
+    print_times("  cue::load and Timeline::new", &loads);
+    print_times("  digest and proof", &proofs);
+    let (low, middle, high) = spread(&ratios);
+    let verdict = if middle <= GOAL { "met" } else { "MISSED" };
+    println!("{:<42} {middle:>8.2} {low:>8.2} {high:>8.2}   goal {GOAL:.1}: {verdict}", "  ratio");
+    Ok(())
+}
+
+#[expect(clippy::disallowed_methods, reason = "a bench measures")]
+fn timed<T>(work: impl FnOnce() -> Outcome<T>) -> Outcome<(T, Duration)> {
+    let start = Instant::now();
+    let made = black_box(work()?);
+    Ok((made, start.elapsed()))
+}
+
+fn print_times(what: &str, times: &[Duration]) {
+    let ms: Vec<_> = times.iter().map(|time| time.as_secs_f64() * 1e3).collect();
+    let (low, middle, high) = spread(&ms);
+    println!("{what:<42} {middle:>5.0} ms {low:>5.0} ms {high:>5.0} ms");
+}
+
+/// Least, median and greatest.
+fn spread(values: &[f64]) -> (f64, f64, f64) {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    (sorted[0], sorted[sorted.len() / 2], sorted[sorted.len() - 1])
+}

@@ -1,0 +1,172 @@
+//! `kinocue fit`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use serde::Serialize;
+
+use super::convert;
+use super::figures::{self, AxisReport};
+use super::load::{self, SeatArgs, SourceArgs};
+use super::times::parse_level;
+use super::{Exit, Failure, OrExit as _, print};
+use crate::proof::{self, Fitted, Manner};
+use crate::timeline::Timeline;
+
+/// Makes a cue keep the limits of its seats: lowers its amplitude about the neutral pose just as far as needed, never its
+/// time.
+///
+/// What amplitude cannot cure, as the steps of coarse sources and the corners of straight lines, --smooth takes out with a
+/// low-pass that moves nothing in time; of low-pass and amplitude it takes the pair that changes the cue least. Vibration
+/// that would leave the stroke is lowered too. What is written passes `kinocue check` on the same terms.
+#[derive(Debug, clap::Args)]
+#[command(after_help = load::after_help(&[
+    "kinocue fit ride.csv -o fitted.csv",
+    "kinocue fit ride.mcap -o fitted.mcap --config hall.toml --per-axis",
+    "kinocue fit bytes.csv -o smooth.csv --smooth",
+    "kinocue fit ride.txt -o ride.csv --from rows --units mm --smooth --json",
+]))]
+pub(super) struct Args {
+    /// The cue to read, CSV or MCAP.
+    cue: PathBuf,
+
+    /// The file to write; its name ends in .csv or .mcap.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+
+    #[command(flatten)]
+    source: SourceArgs,
+
+    #[command(flatten)]
+    seat: SeatArgs,
+
+    /// The level that the cue is to be played at: 60% or -6dB.
+    #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
+    level: f64,
+
+    /// Lower each axis by itself; else all are lowered alike, and the seat moves as it was meant to, but less.
+    #[arg(long)]
+    per_axis: bool,
+
+    /// Allow a low-pass without delay.
+    #[arg(long)]
+    smooth: bool,
+
+    /// Replace OUT where it exists; never the cue itself.
+    #[arg(long)]
+    force: bool,
+
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let target = convert::target(&args.output).or_exit(Exit::Usage)?;
+    refuse_the_input(&args.cue, &args.output)?;
+    convert::refuse_to_replace(&args.output, args.force)?;
+    let hall = args.seat.config.as_deref().map(load::config).transpose()?;
+    let judge = args.seat.judge(hall)?;
+    let timeline = Timeline::new(load::cue(&args.cue, &args.source.source())?);
+    let terms = judge.terms(&timeline, args.level);
+    let manner = Manner { per_axis: args.per_axis, smooth: args.smooth };
+    let fitted = proof::fit(timeline, &terms, manner)
+        .map_err(|error| anyhow!("{}: {error}", args.cue.display()))
+        .or_exit(Exit::CheckFailed)?;
+    if !fitted.after.passed() || !judge.stroke(&fitted.timeline).faults.is_empty() {
+        let error =
+            anyhow!("{}: what was made of it still breaks limits; nothing is written", args.cue.display());
+        return Err(error).or_exit(Exit::CheckFailed);
+    }
+    convert::write(fitted.timeline.cue(), &args.output, target)?;
+    let report = Report::new(args, &fitted);
+    if args.json {
+        print::json(&report)?;
+    } else {
+        print::tell(&report.text(&fitted));
+    }
+    Ok(Exit::Done)
+}
+
+/// Whatever was asked for, a cue is never written over itself.
+fn refuse_the_input(cue: &Path, output: &Path) -> Result<(), Failure> {
+    let same = matches!((fs::canonicalize(cue), fs::canonicalize(output)), (Ok(a), Ok(b)) if a == b);
+    if same {
+        let error = anyhow!("{} is the cue itself; give another name with -o", output.display());
+        return Err(error).or_exit(Exit::Usage);
+    }
+    Ok(())
+}
+
+/// What was done.
+#[derive(Debug, Serialize)]
+struct Report {
+    cue: String,
+    output: String,
+    seat: String,
+    rate_hz: f64,
+    level: f64,
+    /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
+    factors: Vec<f64>,
+    /// The low-pass; null where none was used.
+    cut_off_hz: Option<f64>,
+    /// The largest change of a position, its axis and its time.
+    change_mm: f64,
+    change_axis: String,
+    change_at_s: f64,
+    /// Stretches of vibration that swing less than they did.
+    vibration_lowered: usize,
+    before: Vec<AxisReport>,
+    after: Vec<AxisReport>,
+}
+
+impl Report {
+    fn new(args: &Args, fitted: &Fitted) -> Self {
+        let seats: Vec<_> = fitted.after.axes.iter().map(|axis| axis.seat.clone()).collect();
+        let (cue, output) = (args.cue.display().to_string(), args.output.display().to_string());
+        Self {
+            seat: figures::seat_names(&seats),
+            rate_hz: fitted.after.terms.rate.hz(),
+            level: args.level,
+            factors: fitted.factors.clone(),
+            cut_off_hz: fitted.smoothing.map(|smoothing| smoothing.cut_off_hz),
+            change_mm: fitted.change.mm,
+            change_axis: format!("a{}", fitted.change.axis + 1),
+            change_at_s: fitted.change.at.as_secs_f64(),
+            vibration_lowered: fitted.lowered,
+            before: figures::proved(&cue, &fitted.before.axes),
+            after: figures::proved(&output, &fitted.after.axes),
+            cue,
+            output,
+        }
+    }
+
+    fn text(&self, fitted: &Fitted) -> String {
+        let mut lines = Vec::new();
+        if let Some(hz) = self.cut_off_hz {
+            lines.push(format!("low-pass at {hz:.2} Hz, without delay"));
+        }
+        let lowered = self.factors.iter().enumerate().filter(|(_, factor)| **factor < 1.0);
+        lines.extend(lowered.map(|(axis, factor)| format!("a{}: amplitude x {factor:.4}", axis + 1)));
+        if self.vibration_lowered > 0 {
+            lines.push(format!(
+                "vibration lowered {} times, to stay inside the stroke",
+                self.vibration_lowered
+            ));
+        }
+        if lines.is_empty() {
+            lines.push("kept all limits before; written as it was".to_owned());
+        } else {
+            let (mm, axis, at) = (self.change_mm, &self.change_axis, fitted.change.at);
+            lines.push(format!("largest change of position: {mm:.3} mm ({axis} at {at})"));
+        }
+        let changes: String = lines.iter().map(|line| format!("{}: {line}\n", self.cue)).collect();
+        let (before, after) =
+            (figures::proof_table(&fitted.before.axes), figures::proof_table(&fitted.after.axes));
+        let Self { output, seat, rate_hz, .. } = self;
+        format!(
+            "{changes}\nbefore:\n{before}\nafter:\n{after}\n{output}: keeps all limits of seat {seat} at {rate_hz} frames a second"
+        )
+    }
+}

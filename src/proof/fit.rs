@@ -1,0 +1,285 @@
+//! Makes a cue keep its limits: amplitude about the neutral pose, never time; and vibration that would leave the stroke.
+
+use std::sync::Arc;
+
+use super::pieces::Pieces;
+use super::smooth::{Resampled, Smoothing};
+use super::{Breach, Digest, Proof, SLACK, Subject, Terms, prove, subjects};
+use crate::cue::{Cue, Interpolation, Vibration};
+use crate::motion::{MAX_AXES, SeatType};
+use crate::time::ShowTime;
+use crate::timeline::{HELD_BACK, Timeline};
+
+/// What is left below a limit that was met, so that no rounding on the way to a file takes it over.
+const ROUNDING: f64 = 0.9995;
+/// How often the amplitude is lowered again: where a curve is held at the stroke's end, what is broken does not shrink in
+/// proportion.
+const ROUNDS: usize = 8;
+
+/// How a cue is made to fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Manner {
+    /// Whether each axis has its own amplitude; else all have the least of them, so that they keep their proportions.
+    pub per_axis: bool,
+    /// Whether a low-pass may help.
+    pub smooth: bool,
+}
+
+/// A change of position.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Change {
+    /// How far, mm.
+    pub mm: f64,
+    /// The axis, from 0.
+    pub axis: usize,
+    /// When.
+    pub at: ShowTime,
+}
+
+/// A cue that was made to fit, and what was done to it.
+#[derive(Debug)]
+pub struct Fitted {
+    /// The new cue.
+    pub timeline: Timeline,
+    /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
+    pub factors: Vec<f64>,
+    /// The low-pass, where one was used.
+    pub smoothing: Option<Smoothing>,
+    /// The largest change of a position.
+    pub change: Change,
+    /// How many stretches of vibration swing less than they did.
+    pub lowered: usize,
+    /// Of the cue as it was.
+    pub before: Proof,
+    /// Of the new cue.
+    pub after: Proof,
+}
+
+/// Why a cue cannot be made to fit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// What is broken is not motion.
+    #[error("{}", list(.0))]
+    NotMotion(Vec<String>),
+    /// Even next to no motion breaks limits.
+    #[error(
+        "no amplitude makes this cue keep its limits{}",
+        if *smooth { "" } else { "; steps and corners need a low-pass: --smooth" }
+    )]
+    NoAmplitude {
+        /// Whether a low-pass was tried too.
+        smooth: bool,
+    },
+}
+
+fn list(broken: &[String]) -> String {
+    format!(
+        "{}\nonly motion and vibration can be made to fit; change these in the cue or the hall",
+        broken.join("\n")
+    )
+}
+
+/// Makes a cue fit, changing it as little as it can be: not at all where it keeps its limits. Of a low-pass and a lower
+/// amplitude, where both are allowed, it takes the pair whose largest change of position is the smallest.
+///
+/// # Errors
+/// [`FitError`].
+pub fn fit(timeline: Timeline, terms: &Terms, manner: Manner) -> Result<Fitted, FitError> {
+    let before = prove(&timeline, terms.clone());
+    refuse_others(&before)?;
+    let plain = amplitude(&timeline, timeline.cue().clone(), terms, manner.per_axis);
+    let needs_none = plain.as_ref().is_some_and(|plain| plain.factors.iter().all(|factor| *factor == 1.0));
+    let best = if manner.smooth && !needs_none {
+        smoothest(&timeline, terms, manner.per_axis, plain)
+    } else {
+        plain
+    };
+    let Some(Candidate { cue, factors, smoothing, change }) = best else {
+        return Err(FitError::NoAmplitude { smooth: manner.smooth });
+    };
+    let (cue, lowered) = lower_vibration(cue, terms);
+    let fitted = Timeline::new(cue);
+    let after = prove(&fitted, Terms { cue: Digest::of(fitted.cue()), ..terms.clone() });
+    refuse_others(&after)?;
+    Ok(Fitted { timeline: fitted, factors, smoothing, change, lowered, before, after })
+}
+
+fn refuse_others(proof: &Proof) -> Result<(), FitError> {
+    let movable =
+        |breach: &Breach| matches!(breach, Breach::Motion { .. } | Breach::VibrationPastStroke { .. });
+    let others = proof.violations.iter().filter(|violation| !movable(&violation.breach));
+    let others: Vec<_> = others.map(|violation| violation.message()).collect();
+    if others.is_empty() { Ok(()) } else { Err(FitError::NotMotion(others)) }
+}
+
+/// One way to make the cue fit, its vibration left aside.
+struct Candidate {
+    cue: Cue,
+    factors: Vec<f64>,
+    smoothing: Option<Smoothing>,
+    change: Change,
+}
+
+/// Tries low-passes from mild to strong, and keeps the one whose largest change is the smallest.
+fn smoothest(
+    original: &Timeline,
+    terms: &Terms,
+    per_axis: bool,
+    plain: Option<Candidate>,
+) -> Option<Candidate> {
+    let source = Resampled::new(original);
+    let mut attempt = |strength: usize| {
+        let (cue, smoothing) = source.smoothed(original, strength);
+        let candidate = amplitude(original, cue, terms, per_axis)?;
+        Some((strength, Candidate { smoothing: Some(smoothing), ..candidate }))
+    };
+    let least =
+        |a: (usize, Candidate), b: (usize, Candidate)| if b.1.change.mm < a.1.change.mm { b } else { a };
+    let ladder = source.strengths();
+    let (best, candidate) = ladder.iter().filter_map(|strength| attempt(*strength)).reduce(least)?;
+    // Between the rungs beside the best one.
+    let place = ladder.iter().position(|strength| *strength == best).unwrap_or(0);
+    let (low, high) = (place.checked_sub(1).map_or(0, |i| ladder[i]), ladder.get(place + 1).unwrap_or(&best));
+    let step = ((high - low) / 8).max(1);
+    let between = (low + 1..*high).step_by(step).filter(|strength| *strength != best);
+    let (_, candidate) = between.filter_map(&mut attempt).fold((best, candidate), least);
+    match plain {
+        Some(plain) if plain.change.mm <= candidate.change.mm => Some(plain),
+        _ => Some(candidate),
+    }
+}
+
+/// Lowers the amplitude of `cue` until no limit of motion is broken; nothing where that would leave no motion.
+fn amplitude(original: &Timeline, cue: Cue, terms: &Terms, per_axis: bool) -> Option<Candidate> {
+    let neutral = neutral(&cue, terms);
+    let source = Timeline::new(cue);
+    let mut factors = vec![1.0; source.axes()];
+    let mut scaled: Option<Timeline> = None;
+    for _ in 0..ROUNDS {
+        let now = scaled.as_ref().unwrap_or(&source);
+        let needed = needed(now, terms);
+        if needed.iter().all(|factor| *factor >= 1.0) {
+            let cue = now.cue().clone();
+            let change = largest_change(original, &cue, terms);
+            return Some(Candidate { cue, factors, smoothing: None, change });
+        }
+        let least = needed.iter().copied().fold(1.0, f64::min);
+        for (factor, needed) in factors.iter_mut().zip(&needed) {
+            *factor *= if per_axis { *needed } else { least };
+        }
+        if factors.iter().any(|factor| *factor < 1e-3) {
+            return None;
+        }
+        scaled = Some(Timeline::new(scale(source.cue(), &factors, &neutral)));
+    }
+    None
+}
+
+/// How much of its amplitude each axis may keep; 1 where it breaks no limit.
+fn needed(timeline: &Timeline, terms: &Terms) -> Vec<f64> {
+    let motion = Terms { effects: Vec::new(), ..terms.clone() };
+    let mut factors = vec![1.0_f64; timeline.axes()];
+    for axis in prove(timeline, motion).axes {
+        let worst = axis.worst().into_iter().map(|(_, worst)| worst);
+        let over = worst.filter(|worst| worst.value > worst.limit * SLACK);
+        let factor = over.map(|worst| ROUNDING * worst.limit / worst.value).fold(1.0, f64::min);
+        factors[axis.axis] = factors[axis.axis].min(factor);
+    }
+    for subject in subjects(timeline, terms) {
+        factors[subject.axis] = factors[subject.axis].min(within_stroke(&subject));
+    }
+    factors
+}
+
+/// How much of its amplitude an axis may keep to stay inside the stroke, where its rows or its curve leave it.
+fn within_stroke(subject: &Subject<'_>) -> f64 {
+    let extremes = &subject.timeline.extremes()[subject.axis];
+    let unit = subject.timeline.unit();
+    let neutral = neutral_of(subject.seat, subject.axis - subject.first);
+    let reach = |value: f64| {
+        let place = value * unit.to_stroke(subject.seat);
+        let room = if place < neutral { neutral } else { 1.0 - neutral };
+        let is_inside = (-HELD_BACK..=1.0 + HELD_BACK).contains(&place);
+        if is_inside { 1.0 } else { ROUNDING * room / (place - neutral).abs() }
+    };
+    reach(extremes.min.value).min(reach(extremes.max.value))
+}
+
+fn neutral_of(seat: &SeatType, seat_axis: usize) -> f64 {
+    seat.neutral.get(seat_axis).copied().unwrap_or(0.0)
+}
+
+/// The neutral pose of the first seat that takes each axis, in the cue's unit.
+fn neutral(cue: &Cue, terms: &Terms) -> [f64; MAX_AXES] {
+    let mut pose = [0.0; MAX_AXES];
+    for part in terms.parts.iter().rev() {
+        for axis in part.axes.clone().filter(|axis| *axis < MAX_AXES) {
+            pose[axis] = neutral_of(&part.seat, axis - part.axes.start) * cue.unit().stroke(&part.seat);
+        }
+    }
+    pose
+}
+
+fn scale(cue: &Cue, factors: &[f64], neutral: &[f64; MAX_AXES]) -> Cue {
+    let axes = cue.axes();
+    let place = |(index, value): (usize, &f64)| {
+        let axis = index % axes;
+        neutral[axis] + factors[axis] * (value - neutral[axis])
+    };
+    let positions = cue.positions().iter().enumerate().map(place).collect();
+    cue.with_rows(cue.times().to_vec(), positions, cue.interpolation())
+}
+
+/// Where a cue stands farthest from where it stood, at its rows.
+fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
+    let mut seats: [Option<&Arc<SeatType>>; MAX_AXES] = [None; MAX_AXES];
+    for part in &terms.parts {
+        part.axes.clone().filter(|axis| *axis < MAX_AXES).for_each(|axis| seats[axis] = Some(&part.seat));
+    }
+    let mm = seats.map(|seat| seat.map_or(0.0, |seat| cue.unit().to_stroke(seat) * seat.stroke_mm));
+    let mut hint = crate::timeline::Hint::default();
+    let mut most = Change::default();
+    for (row, &at) in cue.times().iter().enumerate() {
+        let before = original.sample(at, &mut hint);
+        for (axis, after) in cue.row(row).iter().enumerate() {
+            let change = (after - before[axis]).abs() * mm[axis];
+            if change > most.mm {
+                most = Change { mm: change, axis, at };
+            }
+        }
+    }
+    most
+}
+
+/// Lowers the vibration that would leave the stroke to what there is room for; says how many stretches that were.
+fn lower_vibration(cue: Cue, terms: &Terms) -> (Cue, usize) {
+    if cue.vibration().iter().all(|steps| steps.as_slice().is_empty()) {
+        return (cue, 0);
+    }
+    let timeline = Timeline::new(cue);
+    let mut lowered = 0;
+    let mut tracks: Vec<Vec<Vibration>> = timeline
+        .cue()
+        .vibration()
+        .iter()
+        .map(|steps| steps.as_slice().iter().map(|step| step.value).collect())
+        .collect();
+    for subject in subjects(&timeline, terms) {
+        let Some(track) = tracks.get_mut(subject.axis) else { continue };
+        let pieces = Pieces::new(&timeline, subject.axis, &subject.slot);
+        for (index, vibration) in track.iter_mut().enumerate() {
+            if let Some(most) = subject.most_amplitude(&pieces, terms, index)
+                && vibration.amplitude > most
+            {
+                vibration.amplitude = most;
+                lowered += 1;
+            }
+        }
+    }
+    let cue = timeline.cue().clone();
+    (cue.with_vibration(&tracks), lowered)
+}
+
+/// The interpolation of a cue that was smoothed.
+pub(super) const SMOOTH: Interpolation = Interpolation::Spline;

@@ -1,0 +1,215 @@
+//! Whether a cue keeps the limits of the seats that play it, over its whole length and however the frames fall on it, by
+//! the measure that the last gate enforces. From a [`Timeline`] and [`Terms`] to a [`Proof`]. Control thread; pure.
+//!
+//! A divided difference over fixed distances is, between the rows shifted by those distances, a cubic of the phase: its
+//! extremes are found in closed form, so that no phase has to be tried.
+
+mod axis;
+mod digest;
+mod effects;
+mod fit;
+mod pieces;
+mod smooth;
+mod stencil;
+mod sweep;
+mod terms;
+#[cfg(test)]
+mod tests;
+mod violation;
+
+pub use axis::AxisProof;
+pub use digest::Digest;
+pub use fit::{Change, FitError, Fitted, Manner, fit};
+pub use smooth::Smoothing;
+pub use terms::{LimitedEffect, Part, Terms};
+pub use violation::{Breach, Quantity, Violation};
+
+use std::num::NonZero;
+use std::sync::Arc;
+use std::{iter, thread};
+
+use crate::cue::{FAULTS_TOLD, Place};
+use crate::engine::Rate;
+use crate::motion::{SeatType, Slot};
+use crate::time::ShowTime;
+use crate::timeline::Timeline;
+use axis::Subject;
+use stencil::Stencils;
+
+/// What may be over a limit: 0.1 % of it.
+pub const SLACK: f64 = 1.001;
+
+/// The greatest size of something that has a limit.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Worst {
+    /// In mm/s, mm/s² or mm/s³.
+    pub value: f64,
+    /// The most that is allowed, in the same unit.
+    pub limit: f64,
+    /// Show time in the middle of the poses that gave it.
+    pub at: ShowTime,
+    /// The line of the row at or before that; the number of its message where the file has no lines.
+    pub line: u64,
+}
+
+impl Worst {
+    /// What is left of the limit, as a part of it; below 0 over it.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        1.0 - self.value / self.limit
+    }
+}
+
+/// What a cue does at most on the seats that take it, and every limit that it breaks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proof {
+    /// What it was proved for.
+    pub terms: Terms,
+    /// One entry for each axis on each different seat that takes it.
+    pub axes: Vec<AxisProof>,
+    /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
+    pub violations: Vec<Violation>,
+    /// How many there are beyond those.
+    pub more: u64,
+}
+
+impl Proof {
+    /// Whether no limit is broken.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        self.violations.is_empty()
+    }
+
+    /// Whether a play on these terms is proved to keep all limits.
+    #[must_use]
+    pub fn covers(&self, terms: &Terms) -> bool {
+        self.passed() && self.terms.cover(terms)
+    }
+}
+
+/// Something that is broken, before its place in the file is looked up.
+struct Found {
+    at: ShowTime,
+    /// The axis whose cell is to be named, from 0.
+    axis: Option<usize>,
+    column: String,
+    breach: Breach,
+}
+
+/// Proves a cue. Takes time in proportion to its rows and to the different seats; reads the file again only to name the
+/// columns of what is broken. That every row stays inside the stroke is not part of it:
+/// [`crate::config::Config::fits_stroke`].
+#[must_use]
+pub fn prove(timeline: &Timeline, terms: Terms) -> Proof {
+    let mut found = Vec::new();
+    hall(&terms, &mut found);
+    let stencils = Stencils::at(terms.rate);
+    let subjects = subjects(timeline, &terms);
+    let axes = prove_all(&subjects, &terms, &stencils, &mut found);
+    effects::prove(timeline, &terms, &mut found);
+    found.sort_by_key(|one| one.at);
+    let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
+    found.truncate(FAULTS_TOLD);
+    let violations = found.into_iter().map(|one| placed(timeline, one)).collect();
+    Proof { terms, axes, violations, more }
+}
+
+/// Proves the axes, on as many threads as there are processors.
+fn prove_all(
+    subjects: &[Subject<'_>],
+    terms: &Terms,
+    stencils: &Stencils,
+    found: &mut Vec<Found>,
+) -> Vec<AxisProof> {
+    let processors = thread::available_parallelism().map_or(1, NonZero::get);
+    let share = subjects.len().div_ceil(processors).max(1);
+    let prove_some = |some: &[Subject<'_>]| {
+        let mut found = Vec::new();
+        let axes: Vec<_> = some.iter().map(|one| one.prove(terms, stencils, &mut found)).collect();
+        (axes, found)
+    };
+    let mut axes = Vec::with_capacity(subjects.len());
+    thread::scope(|scope| {
+        let (own, others) = subjects.split_at(share.min(subjects.len()));
+        let workers: Vec<_> =
+            others.chunks(share).map(|some| scope.spawn(move || prove_some(some))).collect();
+        let proved = iter::once(prove_some(own));
+        let proved =
+            proved.chain(workers.into_iter().map(|worker| worker.join().expect("a proof does not panic")));
+        for (some, broken) in proved {
+            axes.extend(some);
+            found.extend(broken);
+        }
+    });
+    axes
+}
+
+/// Each axis of the cue on each different seat that takes it.
+fn subjects<'a>(timeline: &'a Timeline, terms: &'a Terms) -> Vec<Subject<'a>> {
+    let mut subjects: Vec<Subject<'a>> = Vec::new();
+    for part in &terms.parts {
+        for axis in part.axes.clone().take_while(|axis| *axis < timeline.axes()) {
+            let seat_axis = axis - part.axes.start;
+            let slot = slot(timeline, &part.seat, seat_axis, axis, terms.level);
+            if !subjects
+                .iter()
+                .any(|one| one.axis == axis && one.slot == slot && one.seat.name == part.seat.name)
+            {
+                subjects.push(Subject { timeline, axis, first: part.axes.start, seat: &part.seat, slot });
+            }
+        }
+    }
+    subjects.sort_by_key(|subject| subject.axis);
+    subjects
+}
+
+fn slot(timeline: &Timeline, seat: &SeatType, seat_axis: usize, axis: usize, level: f64) -> Slot {
+    Slot::new(seat, seat_axis, Some(axis), timeline.unit().to_stroke(seat)).at_level(level)
+}
+
+/// What the seats ask of their controllers, whatever the cue.
+fn hall(terms: &Terms, found: &mut Vec<Found>) {
+    let mut judged: Vec<&Arc<SeatType>> = Vec::new();
+    for part in &terms.parts {
+        if !judged.contains(&&part.seat) {
+            judged.push(&part.seat);
+            let breaches = [too_fast(&part.seat), too_far_apart(&part.seat, terms.rate)];
+            let at = ShowTime::ZERO;
+            let whole = |breach| Found { at, axis: None, column: String::new(), breach };
+            found.extend(breaches.into_iter().flatten().map(whole));
+        }
+    }
+}
+
+/// A limit on speed above the controller's own, where the configuration says what that is (PA07, IMAX manual 2.3.1).
+fn too_fast(seat: &SeatType) -> Option<Breach> {
+    let rpm = f64::from(seat.max_rpm?);
+    let (ceiling, needed) = (seat.speed_ceiling_mm_s(), seat.max_velocity_mm_s * 60.0 / seat.lead_mm);
+    (seat.max_velocity_mm_s > ceiling * SLACK).then(|| Breach::SpeedCeiling {
+        seat: seat.name.clone(),
+        rpm,
+        ceiling,
+        lead: seat.lead_mm,
+        wanted: seat.max_velocity_mm_s,
+        needed: needed.ceil(),
+    })
+}
+
+/// Frames whose Time the controller cuts (PA0b, IMAX manual 2.3.1).
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 1,000")]
+fn too_far_apart(seat: &SeatType, rate: Rate) -> Option<Breach> {
+    let frame = (1000.0 / rate.hz()).ceil() as u32;
+    let most = seat.max_interval_ms;
+    (frame > most).then(|| Breach::Interval { seat: seat.name.clone(), most, frame })
+}
+
+fn placed(timeline: &Timeline, found: Found) -> Violation {
+    let Found { at, axis, column, breach } = found;
+    let cue = timeline.cue();
+    let place = match axis {
+        Some(axis) => cue.place(timeline.row_before(at), axis),
+        None if column.is_empty() => Place::File,
+        None => cue.place(timeline.row_before(at), 0),
+    };
+    Violation { place, column, breach }
+}

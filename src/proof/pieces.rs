@@ -1,0 +1,242 @@
+//! One axis of a cue as it is sent: cubics between the rows, on a slot's stroke, at its level, held inside its ends.
+
+use crate::cue::Unit;
+use crate::motion::Slot;
+use crate::timeline::{Cubic, Timeline};
+
+/// So many cubics share one set of bounds.
+const BLOCK: usize = 16;
+
+/// A cubic of the seconds since its start, in strokes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    /// Show time, nanoseconds.
+    pub(super) start: i64,
+    pub(super) cubic: Cubic,
+}
+
+/// What a run of cubics does at most.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Block {
+    /// Greatest sizes of the first, second and third derivative.
+    pub(super) derivatives: [f64; 3],
+    /// Sums of the jumps of position, slope and second derivative where its cubics begin.
+    pub(super) jumps: [f64; 3],
+    /// How long each of its cubics lasts, nanoseconds; 0 where none lasts, -1 where they differ.
+    pub(super) span: i64,
+}
+
+impl Block {
+    /// What this run and another do at most.
+    pub(super) fn and(self, other: &Self) -> Self {
+        Self {
+            span: common(self.span, other.span),
+            derivatives: std::array::from_fn(|i| self.derivatives[i].max(other.derivatives[i])),
+            jumps: std::array::from_fn(|i| self.jumps[i] + other.jumps[i]),
+        }
+    }
+}
+
+/// A value and where it is taken.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct At {
+    pub(super) value: f64,
+    /// Show time, nanoseconds.
+    pub(super) at: i64,
+}
+
+/// The whole axis; its last piece begins at the end of the cue, and has no length.
+#[derive(Debug)]
+pub(super) struct Pieces {
+    list: Vec<Piece>,
+    blocks: Vec<Block>,
+}
+
+impl Pieces {
+    /// Where `slot` stands while it follows its axis of the cue.
+    pub(super) fn new(timeline: &Timeline, axis: usize, slot: &Slot) -> Self {
+        let ends = ends(timeline.unit(), slot);
+        let cue = timeline.cue();
+        let times = cue.times();
+        let mut list = Vec::with_capacity(cue.rows());
+        let extremes = &timeline.extremes()[axis];
+        let (scale, shift) = slot.scale();
+        let place = |value: f64| value * scale + shift;
+        let leaves = place(extremes.min.value) < ends.0 || place(extremes.max.value) > ends.1;
+        for row in 0..cue.rows() - 1 {
+            let (start, end) = (times[row].as_nanos(), times[row + 1].as_nanos());
+            let span = seconds(end - start);
+            let Cubic([c0, c1, c2, c3]) = timeline.cubic(row, axis);
+            let cubic = Cubic([c0 * scale + shift, c1 * scale, c2 * scale, c3 * scale]);
+            if leaves {
+                hold(start, end, cubic, ends, &mut list);
+            } else {
+                list.push(Piece { start, cubic: cubic.scaled(span.recip()) });
+            }
+        }
+        let last = place(cue.row(cue.rows() - 1)[axis]).clamp(ends.0, ends.1);
+        list.push(Piece { start: timeline.duration().as_nanos(), cubic: Cubic([last, 0.0, 0.0, 0.0]) });
+        let blocks = blocks(&list);
+        Self { list, blocks }
+    }
+
+    /// The cubics, in order of time.
+    pub(super) fn list(&self) -> &[Piece] {
+        &self.list
+    }
+
+    /// Show time of the end, nanoseconds.
+    pub(super) fn end(&self) -> i64 {
+        self.list[self.list.len() - 1].start
+    }
+
+    /// The bounds of each run of cubics, and the show times between which they hold.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = (i64, i64, &Block)> {
+        self.blocks.iter().enumerate().map(|(index, block)| {
+            let start = self.list[index * BLOCK].start;
+            let end = self.list.get((index + 1) * BLOCK).map_or(self.end(), |piece| piece.start);
+            (start, end, block)
+        })
+    }
+
+    /// The piece that holds at a show time.
+    pub(super) fn index(&self, at: i64) -> usize {
+        self.list.partition_point(|piece| piece.start <= at).saturating_sub(1)
+    }
+
+    /// The least and greatest position from one show time to another, which is not before it.
+    pub(super) fn range(&self, from: i64, until: i64) -> (At, At) {
+        let (from, until) = (from.clamp(0, self.end()), until.clamp(0, self.end()));
+        let start = self.list[self.index(from)];
+        let first = At { value: start.cubic.at(seconds(from - start.start)), at: from };
+        let (mut low, mut high) = (first, first);
+        let mut index = self.index(from);
+        while index < self.list.len() && self.list[index].start <= until {
+            let piece = self.list[index];
+            let begin = piece.start.max(from);
+            let end = self.list.get(index + 1).map_or(until, |next| next.start.min(until));
+            let part = piece.cubic.from(seconds(begin - piece.start)).scaled(seconds(end - begin));
+            let (least, most) = part.bounds();
+            if least < low.value || most > high.value {
+                for u in [0.0, 1.0].into_iter().chain(part.still()) {
+                    let met = At { value: part.at(u), at: between(begin, end, u) };
+                    low = if met.value < low.value { met } else { low };
+                    high = if met.value > high.value { met } else { high };
+                }
+            }
+            index += 1;
+        }
+        (low, high)
+    }
+}
+
+/// What two spans have in common: 0 goes with all, others with themselves alone.
+fn common(a: i64, b: i64) -> i64 {
+    match (a, b) {
+        (0, other) | (other, 0) => other,
+        (a, b) if a == b => a,
+        _ => -1,
+    }
+}
+
+/// Between which positions the slot is held, fractions of the stroke.
+fn ends(unit: Unit, slot: &Slot) -> (f64, f64) {
+    let (scale, shift) = slot.scale();
+    match unit {
+        // Held at full level, and then scaled.
+        Unit::Fraction => (shift.max(0.0), (shift + scale).min(1.0)),
+        Unit::Millimetre | Unit::Pulse => (0.0, 1.0),
+    }
+}
+
+/// Adds a cubic over 0 to 1 with what leaves the ends replaced by the end.
+fn hold(start: i64, end: i64, cubic: Cubic, ends: (f64, f64), list: &mut Vec<Piece>) {
+    let (low, high) = cubic.bounds();
+    let per_second = seconds(end - start).recip();
+    if low >= ends.0 && high <= ends.1 {
+        list.push(Piece { start, cubic: cubic.scaled(per_second) });
+        return;
+    }
+    let mut turns: Vec<f64> = cubic.still().collect();
+    turns.extend([0.0, 1.0]);
+    turns.sort_by(f64::total_cmp);
+    let mut cuts = turns.clone();
+    for pair in turns.windows(2) {
+        cuts.extend(
+            [ends.0, ends.1].into_iter().filter_map(|level| crossing(cubic, pair[0], pair[1], level)),
+        );
+    }
+    cuts.sort_by(f64::total_cmp);
+    for pair in cuts.windows(2) {
+        let (begin, until) = (between(start, end, pair[0]), between(start, end, pair[1]));
+        if begin >= until {
+            continue;
+        }
+        let middle = cubic.at(f64::midpoint(pair[0], pair[1]));
+        let held = middle.clamp(ends.0, ends.1);
+        let part = if held == middle {
+            cubic.from(seconds(begin - start) * per_second).scaled(per_second)
+        } else {
+            Cubic([held, 0.0, 0.0, 0.0])
+        };
+        list.push(Piece { start: begin, cubic: part });
+    }
+}
+
+/// Where a cubic that only rises or only falls between two arguments takes a value there.
+fn crossing(cubic: Cubic, mut from: f64, mut to: f64, level: f64) -> Option<f64> {
+    let rises = cubic.at(to) > cubic.at(from);
+    let is_past = |u: f64| (cubic.at(u) > level) == rises;
+    if is_past(from) || !is_past(to) {
+        return None;
+    }
+    for _ in 0..60 {
+        let middle = f64::midpoint(from, to);
+        if is_past(middle) { to = middle } else { from = middle }
+    }
+    Some(to)
+}
+
+fn blocks(list: &[Piece]) -> Vec<Block> {
+    let mut before = list[0].cubic;
+    let mut all = Vec::with_capacity(list.len().div_ceil(BLOCK));
+    for (index, run) in list.chunks(BLOCK).enumerate() {
+        let mut block = Block::default();
+        for (place, piece) in run.iter().enumerate() {
+            let next = list.get(index * BLOCK + place + 1);
+            before = block.take(piece, next.map_or(0, |next| next.start - piece.start), before);
+        }
+        all.push(block);
+    }
+    all
+}
+
+impl Block {
+    /// Notes a piece that lasts `span` nanoseconds after one that had come to `before`; gives what it comes to itself.
+    fn take(&mut self, piece: &Piece, span: i64, before: Cubic) -> Cubic {
+        let [c0, c1, c2, c3] = piece.cubic.0;
+        self.span = common(self.span, span);
+        let end = piece.cubic.from(seconds(span));
+        let [_, slope, bend, _] = end.0;
+        // The slope is a parabola; its third Bezier point is the first two ends' tangents' crossing.
+        let slopes = c1.abs().max(slope.abs()).max((c1 + c2 * seconds(span)).abs());
+        let sizes = [slopes, 2.0 * c2.abs().max(bend.abs()), 6.0 * c3.abs()];
+        let jumps = [c0 - before.0[0], c1 - before.0[1], 2.0 * (c2 - before.0[2])];
+        for i in 0..3 {
+            self.derivatives[i] = self.derivatives[i].max(sizes[i]);
+            self.jumps[i] += jumps[i].abs();
+        }
+        end
+    }
+}
+
+/// The instant a part of the way from one to another.
+#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "spans under a day")]
+pub(super) fn between(from: i64, to: i64, part: f64) -> i64 {
+    from + ((to - from) as f64 * part).round() as i64
+}
+
+#[expect(clippy::cast_precision_loss, reason = "spans under a day are exact")]
+pub(super) fn seconds(ns: i64) -> f64 {
+    ns as f64 * 1e-9
+}

@@ -1,0 +1,270 @@
+//! The greatest size of a divided difference over all phases of the grid: between the rows, shifted by the distances of
+//! the stencil, it is a cubic of the phase, whose extremes are known in closed form.
+
+use super::pieces::{Block, Piece, Pieces, between, seconds};
+use super::stencil::Stencil;
+use crate::timeline::Cubic;
+
+/// Stretches over a limit with less than this between them are one, nanoseconds.
+const ONE_STRETCH: i64 = 100_000_000;
+
+/// How much the greatest size may be overstated, by order: what is surely no worse than that is not looked at.
+const TOLERANCE: [f64; 3] = [0.002, 0.01, 0.01];
+
+/// A stretch of show time in which a limit is broken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stretch {
+    /// Show times, nanoseconds.
+    pub(super) from: i64,
+    pub(super) until: i64,
+    /// The greatest size, and where.
+    pub(super) worst: f64,
+    pub(super) at: i64,
+}
+
+/// What was met on the way through an axis.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Swept {
+    /// The greatest size.
+    pub(super) worst: f64,
+    /// Where, show time in nanoseconds.
+    pub(super) at: i64,
+    /// Where it is over the threshold, in order of time.
+    pub(super) over: Vec<Stretch>,
+}
+
+/// Sweeps stencils of the differences of an order (1 to 3) over an axis. The greatest size is given as up to
+/// [`TOLERANCE`] more than it is, never as less, and never as over the threshold where it is not.
+pub(super) fn sweep(pieces: &Pieces, stencils: &[Stencil], order: usize, threshold: f64) -> Swept {
+    let mut swept = Swept::default();
+    let mut passed_over = 0.0_f64;
+    for stencil in stencils {
+        let mut one = Sweep { pieces, stencil, threshold, swept: &mut swept };
+        passed_over = passed_over.max(one.run(order));
+    }
+    swept.worst = swept.worst.max(passed_over);
+    swept.over.sort_by_key(|stretch| stretch.from);
+    swept.over = merged(&swept.over);
+    swept
+}
+
+fn merged(sorted: &[Stretch]) -> Vec<Stretch> {
+    let mut merged: Vec<Stretch> = Vec::new();
+    for &next in sorted {
+        match merged.last_mut().filter(|last| next.from - last.until <= ONE_STRETCH) {
+            Some(last) => last.join(next),
+            None => merged.push(next),
+        }
+    }
+    merged
+}
+
+impl Stretch {
+    fn join(&mut self, next: Self) {
+        self.until = self.until.max(next.until);
+        if next.worst > self.worst {
+            (self.worst, self.at) = (next.worst, next.at);
+        }
+    }
+}
+
+/// Show times of the first pose, and what holds for all of them.
+struct Run {
+    from: i64,
+    until: i64,
+    /// What the sum cannot be above.
+    bound: f64,
+    /// How long each cubic that is met lasts; -1 where they differ.
+    span: i64,
+}
+
+struct Sweep<'a> {
+    pieces: &'a Pieces,
+    stencil: &'a Stencil,
+    threshold: f64,
+    swept: &'a mut Swept,
+}
+
+impl Sweep<'_> {
+    /// Gives the greatest bound of what was passed over.
+    fn run(&mut self, order: usize) -> f64 {
+        let last = self.pieces.end() - self.stencil.reach();
+        if last < 0 {
+            return 0.0;
+        }
+        let runs = self.runs(order, last);
+        // The most promising first: what it gives rules most others out.
+        if let Some(run) = runs.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) {
+            let over = self.swept.over.len();
+            self.cells(run);
+            self.swept.over.truncate(over); // it is met again in its turn
+        }
+        let mut passed_over = 0.0_f64;
+        for run in runs {
+            if run.bound > self.threshold || run.bound > self.swept.worst * (1.0 + TOLERANCE[order - 1]) {
+                self.cells(&run);
+            } else {
+                passed_over = passed_over.max(run.bound);
+            }
+        }
+        self.at_the_end(last);
+        passed_over
+    }
+
+    fn runs(&self, order: usize, last: i64) -> Vec<Run> {
+        let blocks: Vec<(i64, i64, &Block)> = self.pieces.blocks().collect();
+        let mut runs = Vec::with_capacity(blocks.len());
+        for (index, &(from, until, block)) in blocks.iter().enumerate() {
+            let until = until.min(last);
+            if from >= until {
+                break;
+            }
+            let reached =
+                blocks[index + 1..].iter().take_while(|next| next.0 <= until + self.stencil.reach());
+            let all = reached.fold(*block, |all, next| all.and(next.2));
+            let mut run = Run { from, until, bound: 0.0, span: all.span };
+            let derivative = all.derivatives[order - 1];
+            run.bound = match self.mean_jerk(order, &run) {
+                // The mean of the third derivative over a distance: what it is on the way does not count.
+                Some(mean) => self.stencil.bound(mean.min(derivative), all.jumps),
+                None => self.stencil.bound(derivative, all.jumps),
+            };
+            runs.push(run);
+        }
+        runs
+    }
+
+    /// The greatest change of the second derivative over the distance of a third difference, per second: the difference is
+    /// a mean of such means. Known where rows and distances are even.
+    fn mean_jerk(&self, order: usize, run: &Run) -> Option<f64> {
+        let apart = *self.stencil.offsets.get(1)?;
+        if order < 3 || !self.is_aligned(run) || self.stencil.reach() != 3 * apart {
+            return None;
+        }
+        let list = self.pieces.list();
+        let ahead = usize::try_from(apart / run.span).ok()?;
+        let (first, last) = (self.pieces.index(run.from), self.pieces.index(run.until));
+        // The second derivative runs straight between the rows, so the change is greatest at one; where it jumps there, the
+        // bound has the jumps on top.
+        // The piece at the end of the cue has no length, and no bend of its own.
+        let bends = list[..list.len() - 1].get(first..=last + 3 * ahead)?;
+        let change = |(here, there): (&Piece, &Piece)| (there.cubic.0[2] - here.cubic.0[2]).abs();
+        let most = bends.iter().zip(&bends[ahead..]).map(change).fold(0.0, f64::max);
+        Some(2.0 * most / seconds(apart))
+    }
+
+    fn is_aligned(&self, run: &Run) -> bool {
+        run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0)
+    }
+
+    fn cells(&mut self, run: &Run) {
+        let aligned = self.is_aligned(run);
+        match self.stencil.offsets.len() {
+            2 if aligned => self.aligned::<2>(run),
+            3 if aligned => self.aligned::<3>(run),
+            4 if aligned => self.aligned::<4>(run),
+            _ => self.cells_between(run.from, run.until),
+        }
+    }
+
+    /// The same as [`Self::cells_between`] where all rows are equally far apart and the distances are multiples of that, so
+    /// that each cell is as long as a row.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few seconds over a row")]
+    fn aligned<const NODES: usize>(&mut self, run: &Run) {
+        let list = self.pieces.list();
+        let span = seconds(run.span);
+        let ahead: [usize; NODES] =
+            std::array::from_fn(|node| (self.stencil.offsets[node] / run.span) as usize);
+        let weights: [f64; NODES] =
+            std::array::from_fn(|node| self.stencil.weights[node] * self.stencil.scale);
+        let first = self.pieces.index(run.from);
+        for index in first..self.pieces.index(run.until) {
+            let mut sum = [0.0; 4];
+            for (ahead, weight) in ahead.iter().zip(weights) {
+                let Cubic(part) = list[index + ahead].cubic;
+                for (sum, part) in sum.iter_mut().zip(part) {
+                    *sum += weight * part;
+                }
+            }
+            let cubic = Cubic(sum).scaled(span);
+            if cubic.may_leave(self.swept.worst.min(self.threshold)) {
+                let at = list[index].start;
+                self.judge(at, at + run.span, cubic);
+            }
+        }
+    }
+
+    /// Looks at every cell with its first pose between two show times.
+    fn cells_between(&mut self, from: i64, until: i64) {
+        let list = self.pieces.list();
+        let nodes = self.stencil.offsets.len();
+        let mut cursors = [0; 4];
+        for (cursor, offset) in cursors.iter_mut().zip(&self.stencil.offsets) {
+            *cursor = self.pieces.index(from + offset);
+        }
+        let mut at = from;
+        while at < until {
+            let mut next = until;
+            for (cursor, offset) in cursors[..nodes].iter().zip(&self.stencil.offsets) {
+                next = next.min(list.get(cursor + 1).map_or(until, |piece| piece.start - offset));
+            }
+            self.cell(at, next, &cursors[..nodes]);
+            for (cursor, offset) in cursors[..nodes].iter_mut().zip(&self.stencil.offsets) {
+                *cursor +=
+                    usize::from(list.get(*cursor + 1).is_some_and(|piece| piece.start - offset <= next));
+            }
+            at = next;
+        }
+    }
+
+    /// The sum as a function of the first pose's show time, while each pose stays on its cubic.
+    fn cell(&mut self, at: i64, next: i64, cursors: &[usize]) {
+        let list = self.pieces.list();
+        let mut sum = [0.0; 4];
+        for ((cursor, offset), weight) in cursors.iter().zip(&self.stencil.offsets).zip(&self.stencil.weights)
+        {
+            let piece = &list[*cursor];
+            let since = at + offset - piece.start;
+            let Cubic(shifted) = if since == 0 { piece.cubic } else { piece.cubic.from(seconds(since)) };
+            for (sum, part) in sum.iter_mut().zip(shifted) {
+                *sum += weight * part;
+            }
+        }
+        let cubic = Cubic(sum.map(|part| part * self.stencil.scale)).scaled(seconds(next - at));
+        if cubic.may_leave(self.swept.worst.min(self.threshold)) {
+            self.judge(at, next, cubic);
+        }
+    }
+
+    /// Takes the sum over a cell, as a cubic over 0 to 1.
+    fn judge(&mut self, at: i64, next: i64, cubic: Cubic) {
+        let met = [0.0, 1.0].into_iter().chain(cubic.still()).map(|u| (cubic.at(u).abs(), u));
+        let (worst, u) = met.fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
+        self.note(at, next, worst, between(at, next, u));
+    }
+
+    /// The last pose on the last row: where the curve jumps, as one that holds does, no cell has that.
+    fn at_the_end(&mut self, last: i64) {
+        let mut cursors = [0; 4];
+        let nodes = self.stencil.offsets.len();
+        for (cursor, offset) in cursors.iter_mut().zip(&self.stencil.offsets) {
+            *cursor = self.pieces.index(last + offset);
+        }
+        self.cell(last, last, &cursors[..nodes]);
+    }
+
+    fn note(&mut self, from: i64, until: i64, worst: f64, at: i64) {
+        let middle = self.stencil.middle;
+        if worst > self.swept.worst {
+            (self.swept.worst, self.swept.at) = (worst, at + middle);
+        }
+        if worst > self.threshold {
+            let next = Stretch { from: from + middle, until: until + middle, worst, at: at + middle };
+            let last = self.swept.over.last_mut();
+            match last.filter(|last| (0..=ONE_STRETCH).contains(&(next.from - last.until))) {
+                Some(last) => last.join(next),
+                None => self.swept.over.push(next),
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! What a proof is about: which cue, on which seats, with which effects, at which rate and level.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::Digest;
+use crate::config::{Config, Controller, EffectLimit};
+use crate::engine::Rate;
+use crate::motion::SeatType;
+
+/// Axes of the cue, and the seat type that takes them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// The seat type.
+    pub seat: Arc<SeatType>,
+    /// The cue's axes, from 0; the first of them is the seat's first.
+    pub axes: Range<usize>,
+}
+
+/// An effect with limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitedEffect {
+    /// Its limits.
+    pub limit: EffectLimit,
+    /// Its output, as a bit of the Port Out word.
+    pub output: u16,
+}
+
+/// What a cue is proved for. Two that are equal need one proof.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Terms {
+    /// The cue.
+    pub cue: Digest,
+    /// The different parts of the hall; seats of one type that take the same axes are one.
+    pub parts: Vec<Part>,
+    /// The effects whose times are limited.
+    pub effects: Vec<LimitedEffect>,
+    /// Frames a second.
+    pub rate: Rate,
+    /// Level of motion and vibration, 0 to 1.
+    pub level: f64,
+}
+
+impl Terms {
+    /// The terms of a play in a hall.
+    #[must_use]
+    pub fn of_hall(config: &Config, cue: Digest, rate: Rate, level: f64) -> Self {
+        let mut parts: Vec<Part> = Vec::new();
+        for part in config.controllers.iter().map(Part::of) {
+            if !parts.contains(&part) {
+                parts.push(part);
+            }
+        }
+        let effect = |limit: &EffectLimit| {
+            let known = config.effects.iter().find(|effect| effect.name == limit.name);
+            LimitedEffect { limit: limit.clone(), output: known.map_or(0, |effect| effect.word()) }
+        };
+        let effects = config.effect_limits.iter().map(effect).collect();
+        Self { cue, parts, effects, rate, level }
+    }
+
+    /// The terms of a seat type by itself, which takes so many axes.
+    #[must_use]
+    pub fn of_seat(seat: Arc<SeatType>, axes: usize, cue: Digest, rate: Rate, level: f64) -> Self {
+        Self { cue, parts: vec![Part { seat, axes: 0..axes }], effects: Vec::new(), rate, level }
+    }
+
+    /// Whether what is proved for these terms holds for `other`: all is the same, but the level may be lower. Motion and
+    /// vibration shrink in proportion to the level, about a pose inside the stroke.
+    #[must_use]
+    pub fn cover(&self, other: &Self) -> bool {
+        let same = Self { level: self.level, ..other.clone() } == *self;
+        same && (0.0..=self.level).contains(&other.level)
+    }
+}
+
+impl Part {
+    fn of(controller: &Controller) -> Self {
+        Self { seat: Arc::clone(&controller.seat), axes: controller.window() }
+    }
+}

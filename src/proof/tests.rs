@@ -1,0 +1,298 @@
+//! The proof against every phase of the grid tried one by one, and each rule broken by itself.
+
+use std::path::Path;
+use std::time::Duration;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::config::{Config, EffectLimit, from_to_args};
+use crate::cue::{Source, read};
+use crate::motion::{MAX_AXES, Spacing};
+use crate::timeline::Hint;
+
+fn timeline(text: &str) -> Timeline {
+    Timeline::new(read(Path::new("test.csv"), text.as_bytes(), &Source::Native).unwrap())
+}
+
+fn terms(timeline: &Timeline, seat: SeatType, hz: f64, level: f64) -> Terms {
+    let digest = Digest::of(timeline.cue());
+    Terms::of_seat(Arc::new(seat), timeline.axes(), digest, Rate::from_hz(hz), level)
+}
+
+/// The proof on the bench seat at 100 Hz and full level.
+fn on_bench(text: &str) -> Proof {
+    let timeline = timeline(text);
+    let terms = terms(&timeline, SeatType::bench3(timeline.axes()), 100.0, 1.0);
+    prove(&timeline, terms)
+}
+
+fn messages(proof: &Proof) -> Vec<String> {
+    proof.violations.iter().map(ToString::to_string).collect()
+}
+
+/// The greatest velocity, change of velocity, acceleration and jerk of axis 1, in mm, over 100 phases of the grid: what
+/// frames do, by nothing but the definition.
+fn brute(timeline: &Timeline, seat: &SeatType, hz: f64, level: f64) -> [f64; 4] {
+    let rate = Rate::from_hz(hz);
+    let Spacing { n, m } = Spacing::at_rate(hz);
+    let end = timeline.duration().as_nanos();
+    let mut worst = [0.0_f64; 4];
+    // Where Times alternate, each phase is met with several arrangements of them, though not with each.
+    let first_frames = if has_whole_periods(hz) { 1 } else { 3 };
+    for (phase, first) in (0..100_u32).flat_map(|phase| (0..first_frames).map(move |first| (phase, first))) {
+        let mut at = i64::from(phase) * i64::try_from(rate.period().as_nanos()).unwrap() / 100;
+        let mut frame = first;
+        let (mut times, mut places) = (Vec::new(), Vec::new());
+        let mut hint = Hint::default();
+        while at <= end {
+            let value =
+                timeline.sample(ShowTime::from_nanos(at), &mut hint)[0] * timeline.unit().to_stroke(seat);
+            let scaled = seat.neutral[0] + level * (value - seat.neutral[0]);
+            times.push(at as f64 * 1e-9);
+            places.push(scaled.clamp(0.0, 1.0) * seat.stroke_mm);
+            at += i64::from(rate.time_ms(frame)) * 1_000_000;
+            frame += 1;
+        }
+        let slope = |a: usize, b: usize| (places[b] - places[a]) / (times[b] - times[a]);
+        let second =
+            |a: usize, d: usize| (slope(a + d, a + 2 * d) - slope(a, a + d)) / (times[a + 2 * d] - times[a]);
+        for a in 0..times.len() {
+            if a + 1 < times.len() {
+                worst[0] = worst[0].max(slope(a, a + 1).abs());
+            }
+            if a + 2 < times.len() {
+                worst[1] = worst[1].max((slope(a + 1, a + 2) - slope(a, a + 1)).abs());
+            }
+            for d in [n, m] {
+                if a + 2 * d < times.len() {
+                    worst[2] = worst[2].max(2.0 * second(a, d).abs());
+                }
+                if a + 3 * d < times.len() {
+                    let third = (second(a + d, d) - second(a, d)) / (times[a + 3 * d] - times[a]);
+                    worst[3] = worst[3].max(6.0 * third.abs());
+                }
+            }
+        }
+    }
+    worst
+}
+
+fn has_whole_periods(hz: f64) -> bool {
+    Rate::from_hz(hz).period().subsec_nanos() % 1_000_000 == 0
+}
+
+fn cue_text(interpolation: &str, rows: &[(u32, f64)]) -> String {
+    let mut text = format!("# interpolation: {interpolation}\ntime_ms,a1\n");
+    let mut time = 0;
+    for (wait, value) in rows {
+        text += &format!("{time},{value}\n");
+        time += wait;
+    }
+    text
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 30, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_phase_of_the_grid_is_worse_than_the_proof_and_the_proof_is_no_worse_than_they(
+        interpolation in prop::sample::select(vec!["spline", "monotone", "linear", "hold"]),
+        hz in prop::sample::select(vec![50.0, 59.94, 60.0, 100.0, 144.0, 240.0, 600.0, 1000.0]),
+        level in prop::sample::select(vec![1.0, 0.6]),
+        neutral in 0.0..1.0_f64,
+        regular in prop::option::of(prop::sample::select(vec![5_u32, 10, 20, 50])),
+        rows in prop::collection::vec((5_u32..150, 0.0..1.0_f64), 8..25),
+    ) {
+        let rows: Vec<_> = rows.iter().map(|row| (regular.unwrap_or(row.0), row.1)).collect();
+        let timeline = timeline(&cue_text(interpolation, &rows));
+        let seat = SeatType { neutral: [neutral; MAX_AXES], ..SeatType::bench3(1) };
+        let tried = brute(&timeline, &seat, hz, level);
+        let proof = prove(&timeline, terms(&timeline, seat, hz, level));
+        for (((what, proved), tried), most) in proof.axes[0].worst().iter().zip(tried).zip([1.01, 1.05, 1.05, 1.05]) {
+            prop_assert!(proved.value >= tried * (1.0 - 1e-6) - 1e-6, "{what:?}: {} under {tried}", proved.value);
+            prop_assert!(!has_whole_periods(hz) || proved.value <= tried * most + 1e-6, "{what:?}: {} far over {tried}", proved.value);
+            let broken = proof.violations.iter().any(|v| matches!(v.breach, Breach::Motion { quantity, .. } if quantity == *what));
+            prop_assert!(proof.more > 0 || broken == (proved.value > proved.limit * SLACK), "{what:?}");
+        }
+    }
+
+    #[test]
+    fn positions_are_those_of_the_curve_that_is_sent(
+        interpolation in prop::sample::select(vec!["spline", "monotone", "linear", "hold"]),
+        rows in prop::collection::vec((1_u32..150, 0.0..1.0_f64), 4..20),
+    ) {
+        let timeline = timeline(&cue_text(interpolation, &rows));
+        let proof = prove(&timeline, terms(&timeline, SeatType::bench3(1), 100.0, 1.0));
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        let mut hint = Hint::default();
+        for at in (0..=timeline.duration().as_nanos()).step_by(100_000) {
+            let place = 150.0 * timeline.sample(ShowTime::from_nanos(at), &mut hint)[0];
+            (low, high) = (low.min(place), high.max(place));
+        }
+        let axis = &proof.axes[0];
+        prop_assert!(axis.lowest.value <= low + 1e-6 && axis.lowest.value >= low - 0.01 * 150.0);
+        prop_assert!(axis.highest.value >= high - 1e-6 && axis.highest.value <= high + 0.01 * 150.0);
+    }
+}
+
+#[test]
+fn where_times_alternate_the_proof_of_a_smooth_cue_is_as_close() {
+    for hz in [23.976, 60.0, 144.0, 600.0] {
+        let ride = |row: u32| 0.5 + 0.2 * (f64::from(row) * 0.1).sin() + 0.1 * (f64::from(row) * 0.23).cos();
+        let rows: Vec<_> = (0..100).map(|row| (25, ride(row))).collect();
+        let timeline = timeline(&cue_text("spline", &rows));
+        let tried = brute(&timeline, &SeatType::bench3(1), hz, 1.0);
+        let proof = prove(&timeline, terms(&timeline, SeatType::bench3(1), hz, 1.0));
+        for (((what, proved), tried), most) in
+            proof.axes[0].worst().iter().zip(tried).zip([1.01, 1.05, 1.05, 1.05])
+        {
+            assert!(
+                proved.value >= tried * (1.0 - 1e-6),
+                "{hz} Hz: {what:?}: {} under {tried}",
+                proved.value
+            );
+            assert!(proved.value <= tried * most, "{hz} Hz: {what:?}: {} far over {tried}", proved.value);
+        }
+    }
+}
+
+#[test]
+fn a_cue_within_all_limits_passes_and_its_margins_are_told() {
+    let proof = on_bench("time_s,a1\n0,0.2\n1,0.5\n2,0.8\n3,0.5\n");
+    assert!(proof.passed(), "{:?}", messages(&proof));
+    let axis = &proof.axes[0];
+    assert!((axis.highest.value - 120.0).abs() < 2.0 && axis.velocity.margin() > 0.5, "{axis:?}");
+    assert!((axis.velocity.limit, axis.jerk.limit) == (240.0, 60_000.0));
+}
+
+#[test]
+fn a_jump_is_named_with_line_column_value_and_limit() {
+    let proof = on_bench(
+        "# interpolation: linear\ntime_ms,a1,a2\n0,0.5,0.1\n1000,0.5,0.1\n1100,0.5,0.5\n2000,0.5,0.5\n",
+    );
+    assert!(!proof.passed());
+    let velocity = messages(&proof).into_iter().find(|text| text.contains("velocity")).unwrap();
+    assert!(velocity.contains("a2: velocity 600.0 mm/s at 00:01."), "{velocity}");
+    assert!(velocity.contains("is over 240.0, the limit of seat bench3"), "{velocity}");
+    assert!(proof.violations.iter().all(|v| v.column == "a2"), "{:?}", messages(&proof));
+}
+
+#[test]
+fn what_one_phase_of_the_grid_hides_is_found() {
+    // Between the frames of a grid that begins with the cue nothing happens.
+    let proof =
+        on_bench("# interpolation: linear\ntime_ms,a1\n0,0.5\n1002,0.5\n1005,0.52\n1008,0.5\n2000,0.5\n");
+    assert!(proof.axes[0].velocity.value > 240.0, "{:?}", proof.axes[0]);
+}
+
+#[test]
+fn a_lower_level_breaks_less() {
+    let text = "# interpolation: linear\ntime_ms,a1\n0,0.2\n1000,0.2\n2000,0.2\n";
+    let timeline = timeline(text);
+    let full = terms(&timeline, SeatType::bench3(1), 100.0, 1.0);
+    let proof = prove(&timeline, full.clone());
+    assert!(proof.covers(&full));
+    assert!(proof.covers(&Terms { level: 0.4, ..full.clone() }));
+    assert!(!proof.covers(&Terms { rate: Rate::from_hz(101.0), ..full.clone() }));
+    assert!(!proof.covers(&Terms { cue: Digest([0; 32]), ..full.clone() }));
+    let low = prove(&timeline, Terms { level: 0.4, ..full.clone() });
+    assert!(!low.covers(&full), "what is proved at 40 % is not proved at 100 %");
+    let other = SeatType { max_jerk_mm_s3: 50_000.0, ..SeatType::bench3(1) };
+    assert!(!proof.covers(&terms(&timeline, other, 100.0, 1.0)));
+}
+
+#[test]
+fn vibration_must_stay_inside_the_stroke_between_rows_too() {
+    // 4 mm about a parabola from 15 mm down to 3.75 mm and back.
+    let rows = "time_s,a1,v1_hz,v1_amp\n0,0.1,0,0\n1,0.025,20,{}\n2,0.1,0,0\n3,0.1,0,0\n";
+    let shake = |amplitude: &str| on_bench(&rows.replace("{}", amplitude));
+    let proof = shake("0.02");
+    assert!(proof.passed(), "{:?}", messages(&proof));
+    let lowest = proof.axes[0].lowest_shaken.unwrap();
+    assert!(lowest.value > 0.0 && lowest.value < 0.8, "{lowest:?}");
+    let proof = shake("0.03");
+    let [message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
+    assert!(message.contains("v1_amp: vibration of 4.500 mm about 3."), "{message}");
+    assert!(message.contains("leaves the stroke of seat bench3, 0 to 150 mm"), "{message}");
+}
+
+fn hall(limit: EffectLimit) -> Config {
+    let mut config = from_to_args(&["127.0.0.1:1".to_owned()], &[], 1).unwrap();
+    config.effect_limits = vec![limit];
+    config
+}
+
+fn air() -> EffectLimit {
+    let window = Duration::from_secs(10);
+    EffectLimit {
+        name: "air".to_owned(),
+        min_on: Duration::ZERO,
+        max_on: None,
+        max_duty: None,
+        duty_window: window,
+    }
+}
+
+fn with_effects(limit: EffectLimit, text: &str) -> Vec<String> {
+    let timeline = timeline(text);
+    let terms = Terms::of_hall(&hall(limit), Digest::of(timeline.cue()), Rate::from_hz(100.0), 1.0);
+    messages(&prove(&timeline, terms))
+}
+
+#[test]
+fn an_effect_is_on_long_enough_and_not_too_long_in_frames_too() {
+    let text = "time_ms,a1,fx_air\n0,0.5,0\n1000,0.5,1\n1055,0.5,0\n2000,0.5,0\n";
+    let at_least = |ms| EffectLimit { min_on: Duration::from_millis(ms), ..air() };
+    let at_most = |ms| EffectLimit { max_on: Some(Duration::from_millis(ms)), ..air() };
+    assert_eq!(with_effects(at_least(50), text), [""; 0]);
+    let found = with_effects(at_least(55), text);
+    assert_eq!(found.len(), 1, "five frames may be all of it: {found:?}");
+    assert!(found[0].contains("fx_air: on at 00:01.000 for 55ms, which may be 50ms in frames"), "{found:?}");
+    assert_eq!(with_effects(at_most(60), text), [""; 0]);
+    assert_eq!(with_effects(at_most(55), text).len(), 1);
+    let word = text.replace("fx_air", "io");
+    assert_eq!(with_effects(at_least(55), &word).len(), 1, "air is Y01");
+}
+
+#[test]
+fn the_duty_of_an_effect_is_that_of_its_busiest_window() {
+    let text = "time_s,a1,fx_air\n0,0.5,0\n2,0.5,1\n5,0.5,0\n9,0.5,1\n12,0.5,0\n30,0.5,0\n";
+    let duty = |max_duty| with_effects(EffectLimit { max_duty: Some(max_duty), ..air() }, text);
+    assert_eq!(duty(0.6), [""; 0]);
+    let found = duty(0.5);
+    assert_eq!(found.len(), 1);
+    assert!(found[0].contains("on for 60.0 % of the 10s from 00:02.000 on; at most 50.0 %"), "{found:?}");
+}
+
+#[test]
+fn a_seat_faster_than_its_controller_and_frames_too_far_apart_are_named() {
+    let timeline = timeline("time_s,a1\n0,0.5\n10,0.5\n");
+    let seat = SeatType { max_rpm: Some(2_000), max_interval_ms: 900, ..SeatType::bench3(1) };
+    let found = messages(&prove(&timeline, terms(&timeline, seat.clone(), 1.0, 1.0)));
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found[0].contains("2000 rpm (PA07), 166.7 mm/s at a lead of 5 mm; seat bench3 goes up to 240 mm/s")
+    );
+    assert!(found[1].contains("PA0b = 900: frames of the show, of 1000 ms, are cut to 900 ms"), "{found:?}");
+    let slower = SeatType { max_velocity_mm_s: 160.0, ..seat };
+    assert!(prove(&timeline, terms(&timeline, slower, 2.0, 1.0)).passed());
+}
+
+#[test]
+fn a_cue_never_passes_for_faster_than_the_controllers_own_limit() {
+    let timeline = timeline("# interpolation: linear\ntime_s,a1\n0,0\n0.5,1\n");
+    let seat = SeatType { max_velocity_mm_s: 400.0, ..SeatType::bench3(1) };
+    let proof = prove(&timeline, terms(&timeline, seat, 100.0, 1.0));
+    assert_eq!(proof.axes[0].velocity.limit, 250.0, "3000 rpm at a lead of 5 mm");
+    assert!(!proof.passed());
+}
+
+#[test]
+fn seats_of_one_type_are_proved_once() {
+    let timeline = timeline("time_s,a1,a2\n0,0.5,0.5\n10,0.5,0.5\n");
+    let tos: Vec<String> = (1..=8).map(|port| format!("127.0.0.1:{port}")).collect();
+    let config = from_to_args(&tos, &[], 2).unwrap();
+    let terms = Terms::of_hall(&config, Digest::of(timeline.cue()), Rate::from_hz(100.0), 1.0);
+    assert_eq!(prove(&timeline, terms).axes.len(), 2);
+}

@@ -1,0 +1,189 @@
+//! What a cue does that it must not, in words.
+
+use std::time::Duration;
+
+use crate::cue::Place;
+use crate::time::ShowTime;
+
+/// One limit that is broken, and where in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// The row that stands at or before the worst of it.
+    pub place: Place,
+    /// The column of the file that it is about, or nothing.
+    pub column: String,
+    /// What is broken.
+    pub breach: Breach,
+}
+
+impl std::fmt::Display for Violation {
+    /// The place and what is broken, to be put behind the file's name and a colon.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}{}", self.place, self.message())
+    }
+}
+
+impl Violation {
+    /// What is broken, with the column that it is about.
+    #[must_use]
+    pub fn message(&self) -> String {
+        match self.column.as_str() {
+            "" => self.breach.to_string(),
+            column => format!("{column}: {}", self.breach),
+        }
+    }
+}
+
+/// A figure of motion that has a limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Distance over Time, mm/s.
+    Velocity,
+    /// Change of velocity from one frame to the next, mm/s.
+    Step,
+    /// mm/s².
+    Acceleration,
+    /// mm/s³.
+    Jerk,
+}
+
+impl Quantity {
+    /// What people call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Step => "change of velocity from frame to frame",
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+        }
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Velocity | Self::Step => "mm/s",
+            Self::Acceleration => "mm/s²",
+            Self::Jerk => "mm/s³",
+        }
+    }
+}
+
+/// A limit that is broken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Breach {
+    /// An axis moves faster, or more roughly, than its seat may.
+    #[error(
+        "{} {value:.1} {} at {at} is over {limit:.1}, the limit of seat {seat} ({from} to {until})",
+        quantity.name(), quantity.unit()
+    )]
+    Motion {
+        /// Which figure.
+        quantity: Quantity,
+        /// Its greatest size in this stretch, in its unit.
+        value: f64,
+        /// The most that the seat may do, in the same unit.
+        limit: f64,
+        /// The seat type.
+        seat: String,
+        /// When it is worst.
+        at: ShowTime,
+        /// Since when it is over the limit.
+        from: ShowTime,
+        /// Until when.
+        until: ShowTime,
+    },
+    /// Vibration takes an axis past an end of its stroke.
+    #[error(
+        "vibration of {amplitude:.3} mm about {position:.3} mm at {at} leaves the stroke of seat {seat}, 0 to {stroke} mm; \
+         lower the amplitude, or keep away from the end"
+    )]
+    VibrationPastStroke {
+        /// How far it swings to either side, mm.
+        amplitude: f64,
+        /// Where the axis stands, mm from the stroke's lower end.
+        position: f64,
+        /// The seat's stroke, mm.
+        stroke: f64,
+        /// The seat type.
+        seat: String,
+        /// When it is worst.
+        at: ShowTime,
+    },
+    /// An effect is switched off too soon.
+    #[error(
+        "on at {at} for {on:?}, which may be {sent:?} in frames; at least {least:?} is needed (min_on_ms)"
+    )]
+    OnTooShort {
+        /// When it goes on.
+        at: ShowTime,
+        /// How long it is on in the cue.
+        on: Duration,
+        /// The shortest that frames can make of it.
+        sent: Duration,
+        /// The least that it needs.
+        least: Duration,
+    },
+    /// An effect is left on too long.
+    #[error(
+        "on at {at} for {on:?}, which may be {sent:?} in frames; at most {most:?} is allowed (max_on_ms)"
+    )]
+    OnTooLong {
+        /// When it goes on.
+        at: ShowTime,
+        /// How long it is on in the cue.
+        on: Duration,
+        /// The longest that frames can make of it.
+        sent: Duration,
+        /// The most that it stands.
+        most: Duration,
+    },
+    /// An effect is on for too much of the time.
+    #[error(
+        "on for {:.1} % of the {window:?} from {from} on; at most {:.1} % is allowed (max_duty)", 100.0 * duty, 100.0 * most
+    )]
+    DutyTooHigh {
+        /// Where the busiest window begins.
+        from: ShowTime,
+        /// How long the window is.
+        window: Duration,
+        /// The part of it that the effect is on.
+        duty: f64,
+        /// The most that it stands.
+        most: f64,
+    },
+    /// The seat may move faster than its controller lets it.
+    #[error(
+        "axes may turn {rpm:.0} rpm (PA07), {ceiling:.1} mm/s at a lead of {lead} mm; seat {seat} goes up to {wanted} mm/s; \
+         allow {needed:.0} rpm and say so in max_rpm, or lower max_velocity_mm_s of the seat type"
+    )]
+    SpeedCeiling {
+        /// The seat type.
+        seat: String,
+        /// The controller's own limit, turns a minute.
+        rpm: f64,
+        /// The same, mm/s.
+        ceiling: f64,
+        /// Travel per turn, mm.
+        lead: f64,
+        /// The seat's limit, mm/s.
+        wanted: f64,
+        /// Turns a minute that the seat's limit takes.
+        needed: f64,
+    },
+    /// Frames are farther apart than the longest Time that the controller executes as it is.
+    #[error(
+        "PA0b = {most}: frames of the show, of {frame} ms, are cut to {most} ms and so made faster; set PA0b and max_interval_ms \
+         of seat {seat} to {frame} or more, or raise the rate"
+    )]
+    Interval {
+        /// The seat type.
+        seat: String,
+        /// PA0b, ms.
+        most: u32,
+        /// The longest Time of the show's frames, ms.
+        frame: u32,
+    },
+}

@@ -1,0 +1,182 @@
+//! `fit` as a person runs it: what it writes passes `check`, and it says what it did.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+struct Run {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+fn kinocue(args: &[&str]) -> Run {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+    let output = command.current_dir(env!("CARGO_MANIFEST_DIR")).args(args).output().expect("kinocue runs");
+    let text = |octets| String::from_utf8(octets).expect("UTF-8");
+    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+/// A file of this folder, as arguments have it.
+fn path(folder: &Path, name: &str) -> String {
+    folder.join(name).display().to_string()
+}
+
+fn write(folder: &Path, name: &str, text: impl AsRef<[u8]>) -> String {
+    std::fs::write(folder.join(name), text).expect("the folder is ours");
+    path(folder, name)
+}
+
+/// A ride of two axes over 4 s, the first swinging by `swing` of its stroke at 1 Hz, the second by a quarter of that.
+fn ride(swing: f64) -> String {
+    let mut text = "time_ms,a1,a2,fx_air\n".to_owned();
+    for row in 0..=200 {
+        let t = f64::from(row) * 0.02;
+        let sine = (t * std::f64::consts::TAU).sin();
+        text +=
+            &format!("{},{:.6},{:.6},{}\n", row * 20, 0.5 + swing * sine, 0.5 + swing / 4.0 * sine, row % 2);
+    }
+    text
+}
+
+fn fit(args: &[&str]) -> Value {
+    let run = kinocue(&[&["fit"], args, &["--json"]].concat());
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{args:?}");
+    serde_json::from_str(&run.stdout).expect("one JSON object")
+}
+
+fn assert_passes(args: &[&str]) {
+    let run = kinocue(&[&["check"], args].concat());
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+}
+
+#[test]
+fn amplitude_is_lowered_just_as_far_as_needed_and_the_outcome_passes_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "ride.csv", ride(0.35)); // 330 mm/s
+    assert_eq!(kinocue(&["check", &cue]).code, Some(1));
+    for name in ["out.csv", "out.mcap"] {
+        let out = path(folder.path(), name);
+        let report = fit(&[&cue, "-o", &out]);
+        let factor = report["factors"][0].as_f64().unwrap();
+        assert!((factor / (240.0 / 329.9) - 1.0).abs() < 0.01, "{report}");
+        assert_eq!(report["factors"][0], report["factors"][1], "all axes alike");
+        assert!(report["after"][0]["velocity"]["margin"].as_f64().unwrap().abs() < 0.005, "{report}");
+        assert!(report["change_mm"].as_f64().unwrap() > 10.0 && report["cut_off_hz"].is_null());
+        assert_passes(&[&out]);
+    }
+    let out = path(folder.path(), "axes.csv");
+    let report = fit(&[&cue, "-o", &out, "--per-axis"]);
+    assert_eq!(report["factors"][1], 1.0, "{report}");
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(
+        text.contains("fx_air") && text.lines().last().unwrap().starts_with("4000,"),
+        "no time was changed"
+    );
+    assert_passes(&[&out]);
+    assert_eq!(kinocue(&["check", &out, "--rate", "60"]).code, Some(0));
+}
+
+#[test]
+fn a_cue_that_keeps_its_limits_is_written_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = path(folder.path(), "same.csv");
+    let report = fit(&["cues/coaster.csv", "-o", &out, "--smooth"]);
+    assert_eq!((&report["change_mm"], &report["cut_off_hz"]), (&0.0.into(), &Value::Null));
+    let run = kinocue(&["fit", "cues/coaster.csv", "-o", &out, "--force"]);
+    assert!(run.stderr.contains("kept all limits before"), "{}", run.stderr);
+}
+
+#[test]
+fn coarse_bytes_are_smoothed_without_a_shift_in_time() {
+    let folder = tempfile::tempdir().unwrap();
+    // A slow swing to 40 mm and back at 20 bytes a second: steps of more than half a millimetre.
+    let octets: Vec<u8> =
+        (0..=200).map(|row| (34.0 * (1.0 - (f64::from(row) * 0.031_415_926).cos())).round() as u8).collect();
+    let raw = write(folder.path(), "ride.bin", octets);
+    let cue = path(folder.path(), "ride.csv");
+    assert_eq!(
+        kinocue(&["convert", &raw, &cue, "--from", "u8", "--axes", "1", "--rate", "20"]).code,
+        Some(0)
+    );
+    let stepped =
+        std::fs::read_to_string(&cue).unwrap().replace("interpolation: monotone", "interpolation: hold");
+    let cue = write(folder.path(), "steps.csv", stepped);
+    let out = path(folder.path(), "smooth.csv");
+    assert_eq!(kinocue(&["check", &cue]).code, Some(1));
+    let run = kinocue(&["fit", &cue, "-o", &out]);
+    let left = run.code != Some(0)
+        || run.stderr.contains("amplitude x 0.0")
+        || run.stderr.contains("amplitude x 0.2");
+    assert!(left, "no amplitude cures steps: {}", run.stderr);
+    let report = fit(&[&cue, "-o", &out, "--smooth", "--force"]);
+    assert!(report["cut_off_hz"].as_f64().unwrap() > 0.5, "{report}");
+    assert!(report["factors"][0].as_f64().unwrap() > 0.9, "{report}");
+    assert!(report["change_mm"].as_f64().unwrap() < 3.0, "{report}");
+    assert!(report["change_at_s"].as_f64().is_some());
+    assert_passes(&[&out]);
+    assert_passes(&[&out, "--rate", "1000"]);
+}
+
+#[test]
+fn the_corners_of_an_editors_rows_are_rounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = "line,time_ms,x,y\n1,1000,0,0\n2,1000,60,40\n3,1000,0,0\n";
+    let cue = write(folder.path(), "rows.csv", rows);
+    let out = path(folder.path(), "out.csv");
+    let from = ["--from", "rows", "--units", "mm"];
+    assert_eq!(kinocue(&[&["check", &cue][..], &from].concat()).code, Some(1));
+    let report = fit(&[&[cue.as_str(), "-o", &out, "--smooth"][..], &from].concat());
+    assert!(report["change_mm"].as_f64().unwrap() < 5.0, "{report}");
+    assert_passes(&[&out]);
+}
+
+#[test]
+fn vibration_past_the_stroke_is_lowered() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(
+        folder.path(),
+        "shake.csv",
+        "time_s,a1,v1_hz,v1_amp\n0,0.01,20,0.02\n1,0.01,20,0.02\n2,0.01,0,0\n",
+    );
+    let out = path(folder.path(), "out.csv");
+    let report = fit(&[&cue, "-o", &out]);
+    assert_eq!((&report["vibration_lowered"], &report["factors"][0]), (&1.into(), &1.0.into()));
+    assert!(std::fs::read_to_string(&out).unwrap().contains("0,0.01,20,0.01\n"));
+    assert_passes(&[&out]);
+}
+
+#[test]
+fn what_is_no_motion_is_not_made_to_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let hall = std::fs::read_to_string("tests/data/config/hall.toml").unwrap();
+    let hall = write(folder.path(), "hall.toml", hall + "\n[effect_limits]\nair = { min_on_ms = 50 }\n");
+    let cue = write(folder.path(), "ride.csv", ride(0.1));
+    let out = path(folder.path(), "out.csv");
+    let run = kinocue(&["fit", &cue, "-o", &out, "--config", &hall]);
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    assert!(run.stderr.contains("fx_air: on at") && run.stderr.contains("min_on_ms"), "{}", run.stderr);
+    assert!(!Path::new(&out).exists());
+}
+
+#[test]
+fn no_file_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let cue = write(folder.path(), "ride.csv", ride(0.35));
+    let other = write(folder.path(), "other.csv", "mine");
+    for args in [
+        &["fit", &cue, "-o", &cue, "--force"][..],
+        &["fit", &cue, "-o", &other],
+        &["fit", &cue, "-o", "out.txt"],
+        &["fit", &cue],
+    ] {
+        let run = kinocue(args);
+        assert_eq!(run.code, Some(64), "{args:?}: {}", run.stderr);
+    }
+    assert_eq!(std::fs::read_to_string(&other).unwrap(), "mine");
+    assert_eq!(std::fs::read_to_string(&cue).unwrap(), ride(0.35));
+    assert_eq!(kinocue(&["fit", "nowhere.csv", "-o", &path(folder.path(), "x.csv")]).code, Some(66));
+    let help = kinocue(&["fit", "--help"]).stdout;
+    assert!(help.contains("Examples:") && help.contains("--smooth"), "{help}");
+}
