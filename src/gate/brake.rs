@@ -99,13 +99,16 @@ impl Brake {
 
     /// Whether it stays inside the stroke, and at no time is faster than its means.
     fn fits(&self, means: Means) -> bool {
-        let stroke = -STROKE_SLACK..=1.0 + STROKE_SLACK;
-        stroke.contains(&self.rest)
-            && self.stretches.iter().all(|stretch| {
+        !self.runs_past(1.0, means) && !self.runs_past(-1.0, means)
+    }
+
+    /// Whether it passes that end of the stroke, 1 or -1 for upper and lower, or is too fast on its way there.
+    fn runs_past(&self, onward: f64, means: Means) -> bool {
+        let past = |position: f64| onward * (position - 0.5) > 0.5 + STROKE_SLACK;
+        past(self.rest)
+            || self.stretches.iter().any(|stretch| {
                 let turns = stretch.turns().map(|after| stretch.from.under(stretch.jerk, after).position);
-                stroke.contains(&stretch.from.position)
-                    && turns.iter().all(|position| stroke.contains(position))
-                    && stretch.fastest() <= means.velocity
+                turns.into_iter().any(past) || stretch.fastest(onward) > means.velocity
             })
     }
 
@@ -117,9 +120,9 @@ impl Brake {
         if plain.fits(means) {
             return None;
         }
-        let sign = plain.away(from);
-        let most = 2.0 * means.velocity / means.acceleration;
-        least(most, |seconds| Self::pulling(from, means, sign, seconds), means)
+        let onward = plain.onward(means);
+        let pulled = |seconds: f64| Self::pulling(from, means, -onward, seconds);
+        least(means.velocity / means.acceleration, pulled, onward, means)
     }
 
     /// The shortest way from an acceleration that differs from that of `from` just as much as is needed to fit: between
@@ -129,21 +132,14 @@ impl Brake {
         if plain.fits(means) {
             return None;
         }
-        let sign = plain.away(from);
-        let with = |change: f64| from.nudged_by(sign * change, means.jerk, begun);
-        least(FURTHEST * means.acceleration, |change| Self::new(with(change), means), means)
+        let onward = plain.onward(means);
+        let nudged = |change: f64| Self::new(from.nudged_by(-onward * change, means.jerk, begun), means);
+        least(FURTHEST * means.acceleration, nudged, onward, means)
     }
 
-    /// The direction away from where it does not fit.
-    fn away(&self, from: Motion) -> f64 {
-        let onward = if self.rest > 1.0 {
-            1.0
-        } else if self.rest < 0.0 {
-            -1.0
-        } else {
-            from.velocity.signum()
-        };
-        -onward
+    /// Towards which end it runs too far or too fast.
+    fn onward(&self, means: Means) -> f64 {
+        if self.runs_past(1.0, means) { 1.0 } else { -1.0 }
     }
 
     /// Seconds until rest.
@@ -164,13 +160,6 @@ impl Brake {
     }
 }
 
-impl Brake {
-    /// Whether it comes to rest beyond the other end than `other`.
-    fn overdone(&self, other: &Self) -> bool {
-        (self.rest < 0.0 && other.rest >= 0.0) || (self.rest > 1.0 && other.rest <= 1.0)
-    }
-}
-
 impl Stretch {
     /// When its velocity is zero, as seconds from its beginning; its beginning where it is not.
     fn turns(&self) -> [f64; 2] {
@@ -184,33 +173,65 @@ impl Stretch {
         roots.map(|after| if (0.0..self.seconds).contains(&after) { after } else { 0.0 })
     }
 
-    /// Its greatest speed.
-    fn fastest(&self) -> f64 {
+    /// Its greatest speed in one direction.
+    fn fastest(&self, onward: f64) -> f64 {
         let gone = -self.from.acceleration / self.jerk;
         let middle = if (0.0..self.seconds).contains(&gone) { gone } else { 0.0 };
-        [0.0, middle, self.seconds]
-            .map(|after| self.from.under(self.jerk, after).velocity.abs())
-            .into_iter()
-            .fold(0.0, f64::max)
+        let speeds =
+            [0.0, middle, self.seconds].map(|after| onward * self.from.under(self.jerk, after).velocity);
+        speeds.into_iter().fold(0.0, f64::max)
     }
 }
 
-/// The way with the least of something, up to `most`, that fits.
-fn least(most: f64, way: impl Fn(f64) -> Brake, means: Means) -> Option<Brake> {
+/// The way with the least of something, up to `most`, that no longer runs past the end that lies `onward`; none where it
+/// does not fit elsewhere.
+fn least(most: f64, way: impl Fn(f64) -> Brake, onward: f64, means: Means) -> Option<Brake> {
     let (mut short, mut far) = (0.0, most);
-    // What is too much may fit no better than what is too little: come from far above.
-    let mut found = None;
     for _ in 0..HALVINGS {
         let middle = f64::midpoint(short, far);
-        let brake = way(middle);
-        if brake.fits(means) {
-            found = Some(brake);
-            far = middle;
-        } else if found.is_none() && brake.overdone(&way(0.0)) {
-            far = middle;
-        } else {
+        if way(middle).runs_past(onward, means) {
             short = middle;
+        } else {
+            far = middle;
         }
     }
-    found
+    Some(way(far)).filter(|way| way.fits(means))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MEANS: Means = Means { velocity: 1.6, acceleration: 20.0, jerk: 400.0 };
+
+    fn moving(position: f64, velocity: f64, acceleration: f64) -> Motion {
+        Motion { position, velocity, acceleration }
+    }
+
+    #[test]
+    fn it_comes_to_rest_within_its_means_from_any_motion() {
+        for from in
+            [moving(0.5, 1.5, 0.0), moving(0.5, -0.3, 18.0), moving(0.5, 0.2, -20.0), moving(0.5, 0.0, 0.0)]
+        {
+            let brake = Brake::new(from, MEANS);
+            let at = |step: i32| brake.position(f64::from(step) * 1e-4);
+            let steps = 3_000;
+            assert!(brake.seconds() < 0.2 && at(steps) == at(steps + 1), "{from:?} rests");
+            for step in 3..steps {
+                let jerk = (at(step) - 3.0 * at(step - 1) + 3.0 * at(step - 2) - at(step - 3)) * 1e12;
+                let acceleration = (at(step) - 2.0 * at(step - 1) + at(step - 2)) * 1e8;
+                assert!(jerk.abs() < 401.0 && acceleration.abs() < 20.01, "{from:?}, step {step}: {jerk}");
+            }
+        }
+    }
+
+    #[test]
+    fn where_there_is_no_room_to_rest_it_turns_back() {
+        let from = moving(0.9970, 0.27, -11.0);
+        assert!(Brake::new(from, MEANS).rest > 1.0);
+        let brake = Brake::turned(from, MEANS).expect("there is room to turn");
+        assert!(brake.fits(MEANS) && brake.rest < 1.0, "{brake:?}");
+        assert_eq!(Brake::turned(moving(0.9, 1.5, 0.0), MEANS), None, "there is no room at all");
+        assert_eq!(Brake::turned(moving(0.5, 0.3, 0.0), MEANS), None, "there is no need");
+    }
 }
