@@ -2,7 +2,7 @@
 
 use crate::cue::Unit;
 use crate::motion::Slot;
-use crate::timeline::{Cubic, Timeline};
+use crate::timeline::{AxisExtremes, Cubic, Extreme, Timeline};
 
 /// So many cubics share one set of bounds.
 const BLOCK: usize = 16;
@@ -18,6 +18,10 @@ pub(super) struct Piece {
 /// What a run of cubics does at most.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Block {
+    /// Its first cubic, and the one after its last.
+    pub(super) pieces: (usize, usize),
+    /// The show times at which these begin, nanoseconds.
+    pub(super) times: (i64, i64),
     /// Greatest sizes of the first, second and third derivative.
     pub(super) derivatives: [f64; 3],
     /// Sums of the jumps of position, slope and second derivative where its cubics begin.
@@ -27,10 +31,12 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// What this run and another do at most.
+    /// What this run and a later one do at most; the place is that of this one.
     pub(super) fn and(self, other: &Self) -> Self {
         Self {
             span: common(self.span, other.span),
+            pieces: self.pieces,
+            times: self.times,
             derivatives: std::array::from_fn(|i| self.derivatives[i].max(other.derivatives[i])),
             jumps: std::array::from_fn(|i| self.jumps[i] + other.jumps[i]),
         }
@@ -43,6 +49,22 @@ pub(super) struct At {
     pub(super) value: f64,
     /// Show time, nanoseconds.
     pub(super) at: i64,
+}
+
+/// Where a slot stands at a value of its axis, before it is held inside its ends.
+fn place(slot: &Slot, value: f64) -> f64 {
+    value * slot.to_stroke + slot.shift
+}
+
+/// The lowest and highest position of the whole axis.
+pub(super) fn extremes(timeline: &Timeline, axis: usize, slot: &Slot) -> (At, At) {
+    let ends = ends(timeline.unit(), slot);
+    let extreme = |extreme: Extreme| At {
+        value: place(slot, extreme.value).clamp(ends.0, ends.1),
+        at: extreme.at.as_nanos(),
+    };
+    let AxisExtremes { min, max } = timeline.extremes()[axis];
+    (extreme(min), extreme(max))
 }
 
 /// The whole axis; its last piece begins at the end of the cue, and has no length.
@@ -60,8 +82,7 @@ impl Pieces {
         let times = cue.times();
         let mut list = Vec::with_capacity(cue.rows());
         let extremes = &timeline.extremes()[axis];
-        let place = |value: f64| value * slot.to_stroke + slot.shift;
-        let leaves = place(extremes.min.value) < ends.0 || place(extremes.max.value) > ends.1;
+        let leaves = place(slot, extremes.min.value) < ends.0 || place(slot, extremes.max.value) > ends.1;
         for row in 0..cue.rows() - 1 {
             let (start, end) = (times[row].as_nanos(), times[row + 1].as_nanos());
             let span = seconds(end - start);
@@ -78,7 +99,7 @@ impl Pieces {
                 list.push(Piece { start, cubic: cubic.scaled(span.recip()) });
             }
         }
-        let last = place(cue.row(cue.rows() - 1)[axis]).clamp(ends.0, ends.1);
+        let last = place(slot, cue.row(cue.rows() - 1)[axis]).clamp(ends.0, ends.1);
         list.push(Piece { start: timeline.duration().as_nanos(), cubic: Cubic([last, 0.0, 0.0, 0.0]) });
         let blocks = blocks(&list);
         Self { list, blocks }
@@ -94,13 +115,9 @@ impl Pieces {
         self.list[self.list.len() - 1].start
     }
 
-    /// The bounds of each run of cubics, and the show times between which they hold.
-    pub(super) fn blocks(&self) -> impl Iterator<Item = (i64, i64, &Block)> {
-        self.blocks.iter().enumerate().map(|(index, block)| {
-            let start = self.list[index * BLOCK].start;
-            let end = self.list.get((index + 1) * BLOCK).map_or(self.end(), |piece| piece.start);
-            (start, end, block)
-        })
+    /// The bounds of each run of cubics, in order of time.
+    pub(super) fn blocks(&self) -> &[Block] {
+        &self.blocks
     }
 
     /// The piece that holds at a show time.
@@ -204,9 +221,11 @@ fn blocks(list: &[Piece]) -> Vec<Block> {
     let mut before = list[0].cubic;
     let mut all = Vec::with_capacity(list.len().div_ceil(BLOCK));
     for (index, run) in list.chunks(BLOCK).enumerate() {
-        let mut block = Block::default();
+        let (first, after) = (index * BLOCK, list.len().min((index + 1) * BLOCK));
+        let mut block = Block { pieces: (first, after), ..Block::default() };
+        block.times = (list[first].start, list[after.min(list.len() - 1)].start);
         for (place, piece) in run.iter().enumerate() {
-            let next = list.get(index * BLOCK + place + 1);
+            let next = list.get(first + place + 1);
             before = block.take(piece, next.map_or(0, |next| next.start - piece.start), before);
         }
         all.push(block);
