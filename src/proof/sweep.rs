@@ -1,7 +1,7 @@
 //! The greatest size of a divided difference over all phases of the grid: between the rows, shifted by the distances of
 //! the stencil, it is a cubic of the phase, whose extremes are known in closed form.
 
-use super::pieces::{Block, Piece, Pieces, between, seconds};
+use super::pieces::{Block, Piece, Pieces, between, larger, seconds};
 use super::stencil::Stencil;
 use crate::timeline::Cubic;
 
@@ -46,11 +46,6 @@ pub(super) fn sweep(pieces: &Pieces, stencils: &[Stencil], order: usize, thresho
     swept.over.sort_by_key(|stretch| stretch.from);
     swept.over = merged(&swept.over);
     swept
-}
-
-/// The larger of two numbers; unlike `f64::max` a single instruction.
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
 }
 
 fn merged(sorted: &[Stretch]) -> Vec<Stretch> {
