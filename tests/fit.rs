@@ -92,8 +92,9 @@ fn a_cue_that_keeps_its_limits_is_written_as_it_was() {
 fn coarse_bytes_are_smoothed_without_a_shift_in_time() {
     let folder = tempfile::tempdir().unwrap();
     // A slow swing to 40 mm and back at 20 bytes a second: steps of more than half a millimetre.
-    let octets: Vec<u8> =
-        (0..=200).map(|row| (34.0 * (1.0 - (f64::from(row) * 0.031_415_926).cos())).round() as u8).collect();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 68")]
+    let octet = |row: u32| (34.0 * (1.0 - (f64::from(row) * 0.031_415_926).cos())).round() as u8;
+    let octets: Vec<u8> = (0..=200).map(octet).collect();
     let raw = write(folder.path(), "ride.bin", octets);
     let cue = path(folder.path(), "ride.csv");
     assert_eq!(

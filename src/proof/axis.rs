@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::pieces::{At, Pieces};
+use super::pieces::{At, Pieces, extremes};
 use super::stencil::{Stencils, step_limit};
 use super::sweep::{Swept, sweep};
 use super::violation::{Breach, Quantity};
@@ -86,9 +86,7 @@ impl Subject<'_> {
         let step = judge(Quantity::Step, &stencils.step, 2, step);
         let acceleration = judge(Quantity::Acceleration, &stencils.acceleration, 2, limits.acceleration);
         let jerk = judge(Quantity::Jerk, &stencils.jerk, 3, limits.jerk);
-        let (lowest, highest) = pieces.range(0, pieces.end());
-        // Where a curve is held at an end, that end's own rounding is left of what was over it.
-        let [lowest, highest] = [lowest, highest].map(|met| At { value: met.value.clamp(0.0, 1.0), ..met });
+        let (lowest, highest) = extremes(self.timeline, self.axis, &self.slot);
         let shaken = self.shaken(&pieces, terms, found);
         AxisProof {
             axis: self.axis,

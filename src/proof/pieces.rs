@@ -2,7 +2,7 @@
 
 use crate::cue::Unit;
 use crate::motion::Slot;
-use crate::timeline::{Cubic, Timeline};
+use crate::timeline::{AxisExtremes, Cubic, Extreme, Timeline};
 
 /// So many cubics share one set of bounds.
 const BLOCK: usize = 16;
@@ -18,6 +18,10 @@ pub(super) struct Piece {
 /// What a run of cubics does at most.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Block {
+    /// Its first cubic, and the one after its last.
+    pub(super) pieces: (usize, usize),
+    /// The show times at which these begin, nanoseconds.
+    pub(super) times: (i64, i64),
     /// Greatest sizes of the first, second and third derivative.
     pub(super) derivatives: [f64; 3],
     /// Sums of the jumps of position, slope and second derivative where its cubics begin.
@@ -27,10 +31,12 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// What this run and another do at most.
+    /// What this run and a later one do at most; the place is that of this one.
     pub(super) fn and(self, other: &Self) -> Self {
         Self {
             span: common(self.span, other.span),
+            pieces: self.pieces,
+            times: self.times,
             derivatives: std::array::from_fn(|i| self.derivatives[i].max(other.derivatives[i])),
             jumps: std::array::from_fn(|i| self.jumps[i] + other.jumps[i]),
         }
@@ -45,39 +51,100 @@ pub(super) struct At {
     pub(super) at: i64,
 }
 
+/// Where a slot stands at a value of its axis, before it is held inside its ends.
+fn place(slot: &Slot, value: f64) -> f64 {
+    let (scale, shift) = slot.scale();
+    value * scale + shift
+}
+
+/// The lowest and highest position of the whole axis.
+pub(super) fn extremes(timeline: &Timeline, axis: usize, slot: &Slot) -> (At, At) {
+    let ends = ends(timeline.unit(), slot);
+    let extreme = |extreme: Extreme| At {
+        value: place(slot, extreme.value).clamp(ends.0, ends.1),
+        at: extreme.at.as_nanos(),
+    };
+    let AxisExtremes { min, max } = timeline.extremes()[axis];
+    (extreme(min), extreme(max))
+}
+
 /// The whole axis; its last piece begins at the end of the cue, and has no length.
 #[derive(Debug)]
 pub(super) struct Pieces {
     list: Vec<Piece>,
     blocks: Vec<Block>,
+    /// What the last piece comes to at its end, while they are added.
+    reached: Option<Cubic>,
 }
 
 impl Pieces {
     /// Where `slot` stands while it follows its axis of the cue.
     pub(super) fn new(timeline: &Timeline, axis: usize, slot: &Slot) -> Self {
-        let ends = ends(timeline.unit(), slot);
-        let cue = timeline.cue();
-        let times = cue.times();
-        let mut list = Vec::with_capacity(cue.rows());
+        let (ends, (scale, shift)) = (ends(timeline.unit(), slot), slot.scale());
+        let (cue, times) = (timeline.cue(), timeline.cue().times());
         let extremes = &timeline.extremes()[axis];
-        let (scale, shift) = slot.scale();
-        let place = |value: f64| value * scale + shift;
-        let leaves = place(extremes.min.value) < ends.0 || place(extremes.max.value) > ends.1;
+        let leaves = place(slot, extremes.min.value) < ends.0 || place(slot, extremes.max.value) > ends.1;
+        let mut pieces = Self::with_capacity(cue.rows());
+        let (mut usual, mut per_second) = (0, 0.0);
         for row in 0..cue.rows() - 1 {
             let (start, end) = (times[row].as_nanos(), times[row + 1].as_nanos());
-            let span = seconds(end - start);
+            if end - start != usual {
+                // A division for each row would be a tenth of the proof.
+                (usual, per_second) = (end - start, seconds(end - start).recip());
+            }
             let Cubic([c0, c1, c2, c3]) = timeline.cubic(row, axis);
             let cubic = Cubic([c0 * scale + shift, c1 * scale, c2 * scale, c3 * scale]);
             if leaves {
-                hold(start, end, cubic, ends, &mut list);
+                pieces.push_held(start, end, cubic, ends);
             } else {
-                list.push(Piece { start, cubic: cubic.scaled(span.recip()) });
+                pieces.push(start, end, cubic.scaled(per_second));
             }
         }
-        let last = place(cue.row(cue.rows() - 1)[axis]).clamp(ends.0, ends.1);
-        list.push(Piece { start: timeline.duration().as_nanos(), cubic: Cubic([last, 0.0, 0.0, 0.0]) });
-        let blocks = blocks(&list);
-        Self { list, blocks }
+        let last = place(slot, cue.row(cue.rows() - 1)[axis]).clamp(ends.0, ends.1);
+        let end = timeline.duration().as_nanos();
+        pieces.push(end, end, Cubic([last, 0.0, 0.0, 0.0]));
+        pieces
+    }
+
+    fn with_capacity(count: usize) -> Self {
+        let blocks = Vec::with_capacity(count.div_ceil(BLOCK));
+        Self { list: Vec::with_capacity(count), blocks, reached: None }
+    }
+
+    /// Adds a cubic of the seconds since `start`.
+    fn push(&mut self, start: i64, end: i64, cubic: Cubic) {
+        let index = self.list.len();
+        if index.is_multiple_of(BLOCK) {
+            let block = Block { pieces: (index, index), times: (start, start), ..Block::default() };
+            self.blocks.push(block);
+        }
+        let block = self.blocks.last_mut().expect("one was begun with the first piece");
+        (block.pieces.1, block.times.1) = (index + 1, end);
+        self.reached = Some(block.take(cubic, end - start, self.reached.unwrap_or(cubic)));
+        self.list.push(Piece { start, cubic });
+    }
+
+    /// Adds a cubic over 0 to 1 with what leaves the ends replaced by the end.
+    fn push_held(&mut self, start: i64, end: i64, cubic: Cubic, ends: (f64, f64)) {
+        let (low, high) = cubic.bounds();
+        let per_second = seconds(end - start).recip();
+        if low >= ends.0 && high <= ends.1 {
+            return self.push(start, end, cubic.scaled(per_second));
+        }
+        for pair in cuts(cubic, ends).windows(2) {
+            let (begin, until) = (between(start, end, pair[0]), between(start, end, pair[1]));
+            if begin >= until {
+                continue;
+            }
+            let middle = cubic.at(f64::midpoint(pair[0], pair[1]));
+            let held = middle.clamp(ends.0, ends.1);
+            let part = if held == middle {
+                cubic.from(seconds(begin - start) * per_second).scaled(per_second)
+            } else {
+                Cubic([held, 0.0, 0.0, 0.0])
+            };
+            self.push(begin, until, part);
+        }
     }
 
     /// The cubics, in order of time.
@@ -90,13 +157,9 @@ impl Pieces {
         self.list[self.list.len() - 1].start
     }
 
-    /// The bounds of each run of cubics, and the show times between which they hold.
-    pub(super) fn blocks(&self) -> impl Iterator<Item = (i64, i64, &Block)> {
-        self.blocks.iter().enumerate().map(|(index, block)| {
-            let start = self.list[index * BLOCK].start;
-            let end = self.list.get((index + 1) * BLOCK).map_or(self.end(), |piece| piece.start);
-            (start, end, block)
-        })
+    /// The bounds of each run of cubics, in order of time.
+    pub(super) fn blocks(&self) -> &[Block] {
+        &self.blocks
     }
 
     /// The piece that holds at a show time.
@@ -149,16 +212,9 @@ fn ends(unit: Unit, slot: &Slot) -> (f64, f64) {
     }
 }
 
-/// Adds a cubic over 0 to 1 with what leaves the ends replaced by the end.
-fn hold(start: i64, end: i64, cubic: Cubic, ends: (f64, f64), list: &mut Vec<Piece>) {
-    let (low, high) = cubic.bounds();
-    let per_second = seconds(end - start).recip();
-    if low >= ends.0 && high <= ends.1 {
-        list.push(Piece { start, cubic: cubic.scaled(per_second) });
-        return;
-    }
-    let mut turns: Vec<f64> = cubic.still().collect();
-    turns.extend([0.0, 1.0]);
+/// Where a cubic over 0 to 1 turns or crosses an end, and 0 and 1, in order.
+fn cuts(cubic: Cubic, ends: (f64, f64)) -> Vec<f64> {
+    let mut turns: Vec<f64> = cubic.still().chain([0.0, 1.0]).collect();
     turns.sort_by(f64::total_cmp);
     let mut cuts = turns.clone();
     for pair in turns.windows(2) {
@@ -167,20 +223,7 @@ fn hold(start: i64, end: i64, cubic: Cubic, ends: (f64, f64), list: &mut Vec<Pie
         );
     }
     cuts.sort_by(f64::total_cmp);
-    for pair in cuts.windows(2) {
-        let (begin, until) = (between(start, end, pair[0]), between(start, end, pair[1]));
-        if begin >= until {
-            continue;
-        }
-        let middle = cubic.at(f64::midpoint(pair[0], pair[1]));
-        let held = middle.clamp(ends.0, ends.1);
-        let part = if held == middle {
-            cubic.from(seconds(begin - start) * per_second).scaled(per_second)
-        } else {
-            Cubic([held, 0.0, 0.0, 0.0])
-        };
-        list.push(Piece { start: begin, cubic: part });
-    }
+    cuts
 }
 
 /// Where a cubic that only rises or only falls between two arguments takes a value there.
@@ -197,37 +240,28 @@ fn crossing(cubic: Cubic, mut from: f64, mut to: f64, level: f64) -> Option<f64>
     Some(to)
 }
 
-fn blocks(list: &[Piece]) -> Vec<Block> {
-    let mut before = list[0].cubic;
-    let mut all = Vec::with_capacity(list.len().div_ceil(BLOCK));
-    for (index, run) in list.chunks(BLOCK).enumerate() {
-        let mut block = Block::default();
-        for (place, piece) in run.iter().enumerate() {
-            let next = list.get(index * BLOCK + place + 1);
-            before = block.take(piece, next.map_or(0, |next| next.start - piece.start), before);
-        }
-        all.push(block);
-    }
-    all
-}
-
 impl Block {
-    /// Notes a piece that lasts `span` nanoseconds after one that had come to `before`; gives what it comes to itself.
-    fn take(&mut self, piece: &Piece, span: i64, before: Cubic) -> Cubic {
-        let [c0, c1, c2, c3] = piece.cubic.0;
+    /// Notes a cubic that lasts `span` nanoseconds after one that had come to `before`; gives what it comes to itself.
+    fn take(&mut self, cubic: Cubic, span: i64, before: Cubic) -> Cubic {
+        let [c0, c1, c2, c3] = cubic.0;
         self.span = common(self.span, span);
-        let end = piece.cubic.from(seconds(span));
+        let end = cubic.from(seconds(span));
         let [_, slope, bend, _] = end.0;
         // The slope is a parabola; its third Bezier point is the first two ends' tangents' crossing.
-        let slopes = c1.abs().max(slope.abs()).max((c1 + c2 * seconds(span)).abs());
-        let sizes = [slopes, 2.0 * c2.abs().max(bend.abs()), 6.0 * c3.abs()];
+        let slopes = larger(larger(c1.abs(), slope.abs()), (c1 + c2 * seconds(span)).abs());
+        let sizes = [slopes, 2.0 * larger(c2.abs(), bend.abs()), 6.0 * c3.abs()];
         let jumps = [c0 - before.0[0], c1 - before.0[1], 2.0 * (c2 - before.0[2])];
         for i in 0..3 {
-            self.derivatives[i] = self.derivatives[i].max(sizes[i]);
+            self.derivatives[i] = larger(self.derivatives[i], sizes[i]);
             self.jumps[i] += jumps[i].abs();
         }
         end
     }
+}
+
+/// The larger of two numbers; unlike `f64::max` a single instruction.
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// The instant a part of the way from one to another.

@@ -115,7 +115,7 @@ impl Resampled {
 
 /// How far the three means reach to either side, in samples.
 fn halves(strength: usize) -> [usize; 3] {
-    [strength / 3, (strength + 1) / 3, (strength + 2) / 3]
+    [strength, strength + 1, strength + 2].map(|part| part / 3)
 }
 
 /// The mean over `half` samples to either side. Beyond its ends a curve goes on as its point reflection there, so that the
@@ -176,12 +176,15 @@ mod tests {
     fn a_sine_at_the_cut_off_keeps_seven_tenths() {
         let mut text = "time_ms,a1\n".to_owned();
         for row in 0..=800 {
-            text +=
-                &format!("{},{}\n", row * 10, 0.5 + 0.4 * (f64::from(row) * 0.01 * 6.283_185_3 * 2.0).sin());
+            text += &format!(
+                "{},{}\n",
+                row * 10,
+                0.5 + 0.4 * (f64::from(row) * 0.01 * std::f64::consts::TAU * 2.0).sin()
+            );
         }
         let timeline = Timeline::new(read(Path::new("t.csv"), text.as_bytes(), &Source::Native).unwrap());
         let source = Resampled::new(&timeline);
-        let nearest = (1..200).min_by_key(|k| ((source.cut_off_hz(*k) - 2.0).abs() * 1e6) as u64).unwrap();
+        let nearest = (1..200).find(|strength| source.cut_off_hz(*strength) < 2.0).unwrap();
         let (cue, smoothing) = source.smoothed(&timeline, nearest);
         assert!((smoothing.cut_off_hz - 2.0).abs() < 0.1, "{smoothing:?}");
         let middle = &cue.positions()[200..600];

@@ -1,7 +1,7 @@
 //! The greatest size of a divided difference over all phases of the grid: between the rows, shifted by the distances of
 //! the stencil, it is a cubic of the phase, whose extremes are known in closed form.
 
-use super::pieces::{Block, Piece, Pieces, between, seconds};
+use super::pieces::{Block, Piece, Pieces, between, larger, seconds};
 use super::stencil::Stencil;
 use crate::timeline::Cubic;
 
@@ -72,6 +72,8 @@ impl Stretch {
 struct Run {
     from: i64,
     until: i64,
+    /// The pieces that the first pose is on: the first, and the one after the last.
+    pieces: (usize, usize),
     /// What the sum cannot be above.
     bound: f64,
     /// How long each cubic that is met lasts; -1 where they differ.
@@ -112,23 +114,25 @@ impl Sweep<'_> {
     }
 
     fn runs(&self, order: usize, last: i64) -> Vec<Run> {
-        let blocks: Vec<(i64, i64, &Block)> = self.pieces.blocks().collect();
+        let blocks = self.pieces.blocks();
         let mut runs = Vec::with_capacity(blocks.len());
-        for (index, &(from, until, block)) in blocks.iter().enumerate() {
-            let until = until.min(last);
+        for (index, block) in blocks.iter().enumerate() {
+            let (from, mut until) = block.times;
+            let mut pieces = block.pieces;
+            if until >= last {
+                (until, pieces.1) = (last, self.pieces.index(last));
+            }
             if from >= until {
                 break;
             }
-            let reached =
-                blocks[index + 1..].iter().take_while(|next| next.0 <= until + self.stencil.reach());
-            let all = reached.fold(*block, |all, next| all.and(next.2));
-            let mut run = Run { from, until, bound: 0.0, span: all.span };
+            let reached = until + self.stencil.reach();
+            let reached = blocks[index + 1..].iter().take_while(|next| next.times.0 <= reached);
+            let all = reached.fold(*block, Block::and);
+            let mut run = Run { from, until, pieces, bound: 0.0, span: all.span };
             let derivative = all.derivatives[order - 1];
-            run.bound = match self.mean_jerk(order, &run) {
-                // The mean of the third derivative over a distance: what it is on the way does not count.
-                Some(mean) => self.stencil.bound(mean.min(derivative), all.jumps),
-                None => self.stencil.bound(derivative, all.jumps),
-            };
+            // Of the third derivative its mean over a distance counts, not what it is on the way.
+            let derivative = self.mean_jerk(order, &run).map_or(derivative, |mean| mean.min(derivative));
+            run.bound = self.stencil.bound(derivative, all.jumps);
             runs.push(run);
         }
         runs
@@ -143,13 +147,13 @@ impl Sweep<'_> {
         }
         let list = self.pieces.list();
         let ahead = usize::try_from(apart / run.span).ok()?;
-        let (first, last) = (self.pieces.index(run.from), self.pieces.index(run.until));
-        // The second derivative runs straight between the rows, so the change is greatest at one; where it jumps there, the
-        // bound has the jumps on top.
+        let (first, last) = run.pieces;
         // The piece at the end of the cue has no length, and no bend of its own.
         let bends = list[..list.len() - 1].get(first..=last + 3 * ahead)?;
+        // The second derivative runs straight between the rows, so the change is greatest at one; where it jumps there, the
+        // bound has the jumps on top.
         let change = |(here, there): (&Piece, &Piece)| (there.cubic.0[2] - here.cubic.0[2]).abs();
-        let most = bends.iter().zip(&bends[ahead..]).map(change).fold(0.0, f64::max);
+        let most = bends.iter().zip(&bends[ahead..]).map(change).fold(0.0, larger);
         Some(2.0 * most / seconds(apart))
     }
 
@@ -177,8 +181,7 @@ impl Sweep<'_> {
             std::array::from_fn(|node| (self.stencil.offsets[node] / run.span) as usize);
         let weights: [f64; NODES] =
             std::array::from_fn(|node| self.stencil.weights[node] * self.stencil.scale);
-        let first = self.pieces.index(run.from);
-        for index in first..self.pieces.index(run.until) {
+        for index in run.pieces.0..run.pieces.1 {
             let mut sum = [0.0; 4];
             for (ahead, weight) in ahead.iter().zip(weights) {
                 let Cubic(part) = list[index + ahead].cubic;

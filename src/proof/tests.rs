@@ -49,7 +49,7 @@ fn brute(timeline: &Timeline, seat: &SeatType, hz: f64, level: f64) -> [f64; 4] 
             let value =
                 timeline.sample(ShowTime::from_nanos(at), &mut hint)[0] * timeline.unit().to_stroke(seat);
             let scaled = seat.neutral[0] + level * (value - seat.neutral[0]);
-            times.push(at as f64 * 1e-9);
+            times.push(ShowTime::from_nanos(at).as_secs_f64());
             places.push(scaled.clamp(0.0, 1.0) * seat.stroke_mm);
             at += i64::from(rate.time_ms(frame)) * 1_000_000;
             frame += 1;
@@ -79,7 +79,7 @@ fn brute(timeline: &Timeline, seat: &SeatType, hz: f64, level: f64) -> [f64; 4] 
 }
 
 fn has_whole_periods(hz: f64) -> bool {
-    Rate::from_hz(hz).period().subsec_nanos() % 1_000_000 == 0
+    Rate::from_hz(hz).period().subsec_nanos().is_multiple_of(1_000_000)
 }
 
 fn cue_text(interpolation: &str, rows: &[(u32, f64)]) -> String {

@@ -6,6 +6,7 @@ use crate::cue::{Cue, Interpolation};
 
 impl Timeline {
     /// The curve of an axis from `row` to the next row, which there is.
+    #[inline]
     pub(crate) fn cubic(&self, row: usize, axis: usize) -> Cubic {
         let (y0, y1) = (value(&self.cue, row, axis), value(&self.cue, row + 1, axis));
         match self.cue.interpolation() {
