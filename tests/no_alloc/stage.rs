@@ -1,9 +1,6 @@
-//! The tick thread allocates and frees nothing: the real loop over real sockets, ten thousand ticks in virtual time with
-//! acks arriving, from the join through two laps, missed ticks and a stall into park, under an allocator that counts
-//! each thread's calls.
+//! The real loop over real sockets, in virtual time that never leaves the other threads behind.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 use std::sync::Arc;
@@ -14,89 +11,45 @@ use std::time::Duration;
 use kinocue::app::Staged;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
-use kinocue::engine::{Ending, Rate, Show, TickGrid};
+use kinocue::engine::{Mix, Rate, Show, TickGrid};
 use kinocue::fanout::{Lane, Manner};
-use kinocue::net::{DrainGrid, Ports};
+use kinocue::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::observe::Watched;
-use kinocue::rt::{Accounts, AckLoop, Conductor, Ended, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::rt::{
+    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop,
+    TickLoop, mailboxes,
+};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing};
+use rtrb::Producer;
+
+use super::counting::Calls;
 
 const PERIOD: Duration = Duration::from_millis(1);
-/// The tick at which somebody stops the show.
-const STOP_AT: u64 = 10_000;
-/// Ticks whose replies may be under way; the least receive buffer that a system has by default holds them.
-const UNDER_WAY: u64 = 64;
-const CONTROLLERS: usize = 2;
-/// Ticks before which the tick thread sleeps too long, and for how many periods: a lag that is slewed away, and one
-/// after which the lanes hold and join again.
-const OVERSLEPT: [(u64, u32); 2] = [(3_000, 3), (5_000, 80)];
+/// Frames whose replies may be under way; the least receive buffer that a system has by default holds them.
+const UNDER_WAY: u64 = 128;
+pub(crate) const CONTROLLERS: usize = 2;
 
-/// Counts what each thread asks of it.
-struct Counting;
-
-thread_local! {
-    static CALLS: Cell<Calls> = const { Cell::new(Calls { allocations: 0, frees: 0 }) };
+/// Something that happens before a tick.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Deed {
+    /// The tick thread sleeps that many periods too long.
+    Oversleep(u32),
+    /// Somebody asks for something.
+    Ask(Command),
+    /// Something is seen of a controller.
+    See(Alarm),
+    /// Somebody sets what a lane makes of the cue.
+    Mix(usize, Mix),
+    /// Somebody sets the trim.
+    Trim(i32),
+    /// Somebody presses stop.
+    Stop,
+    /// Somebody wants the play to end.
+    Leave,
 }
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Calls {
-    allocations: u64,
-    frees: u64,
-}
-
-impl Calls {
-    /// Those of the calling thread so far.
-    fn so_far() -> Self {
-        CALLS.get()
-    }
-
-    fn since(self, earlier: Self) -> Self {
-        Self { allocations: self.allocations - earlier.allocations, frees: self.frees - earlier.frees }
-    }
-}
-
-fn count(allocations: u64, frees: u64) {
-    // Not there any more while its thread ends; nobody measures then.
-    let _ = CALLS.try_with(|calls| {
-        let before = calls.get();
-        calls.set(Calls { allocations: before.allocations + allocations, frees: before.frees + frees });
-    });
-}
-
-#[expect(unsafe_code, reason = "an allocator is unsafe by its trait")]
-// SAFETY: every method passes its arguments on to the system's allocator as they are, and returns what that returns;
-// counting touches only a thread-local without a destructor, which needs no memory of its own.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(1, 0);
-        // SAFETY: the caller keeps the trait's contract, which is that of `System`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count(1, 0);
-        // SAFETY: as above.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn realloc(&self, block: *mut u8, layout: Layout, len: usize) -> *mut u8 {
-        count(1, 1);
-        // SAFETY: as above; `block` came from `System` with that layout.
-        unsafe { System.realloc(block, layout, len) }
-    }
-
-    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        count(0, 1);
-        // SAFETY: as above; `block` came from `System` with that layout.
-        unsafe { System.dealloc(block, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// How far the threads are, so that virtual time never leaves real work behind.
 #[derive(Debug, Default)]
@@ -105,18 +58,20 @@ struct Pace {
     ticks: AtomicU64,
     /// Ticks up to which the planner has served all that was asked.
     planned: AtomicU64,
+    /// Frames sent.
+    sent: AtomicU64,
     /// Frames that the peers have answered.
     answered: AtomicU64,
     /// Answers that the ack thread has read for certain.
     read: AtomicU64,
     over: AtomicBool,
-    stop: AtomicBool,
+    leave: AtomicBool,
 }
 
 impl Pace {
-    /// Waits until the answers to all but `under_way` of the first `ticks` ticks have been read.
-    fn wait_for_answers_to(&self, ticks: u64, under_way: u64) {
-        let wanted = ticks.saturating_sub(under_way) * CONTROLLERS as u64;
+    /// Waits until the answers to all but `under_way` of the frames so far have been read.
+    fn wait_for_answers(&self, under_way: u64) {
+        let wanted = self.sent.load(Ordering::Acquire).saturating_sub(under_way);
         while self.read.load(Ordering::Acquire) < wanted {
             thread::yield_now();
         }
@@ -135,15 +90,46 @@ impl Pace {
     }
 }
 
-/// Time that jumps to each deadline, once the other threads have caught up.
+/// The sockets, which tell how much they have sent.
+struct Counted<'a> {
+    sender: Sender,
+    pace: &'a Pace,
+}
+
+impl FrameSink for Counted<'_> {
+    fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
+        self.pace.sent.fetch_add(1, Ordering::AcqRel);
+        self.sender.send(lane, datagram)
+    }
+}
+
+/// Time that jumps to each deadline, once the other threads have caught up and the script's deeds are done.
 struct Jumps<'a> {
     pace: &'a Pace,
+    script: &'a [(u64, Deed)],
+    desk: &'a Desk,
+    commands: RefCell<Producer<Command>>,
+    alarms: RefCell<Producer<Alarm>>,
     live: Arc<Live>,
     now: Cell<MonoTime>,
     /// Show time at the tick before.
     show: Cell<ShowTime>,
     /// How often show time went back.
     laps: Cell<u32>,
+}
+
+impl Jumps<'_> {
+    fn happen(&self, deed: Deed) {
+        match deed {
+            Deed::Oversleep(periods) => self.now.set(self.now.get() + PERIOD * periods),
+            Deed::Ask(command) => self.commands.borrow_mut().push(command).expect("there is room"),
+            Deed::See(alarm) => self.alarms.borrow_mut().push(alarm).expect("there is room"),
+            Deed::Mix(lane, mix) => self.desk.set(lane, mix),
+            Deed::Trim(ms) => self.desk.set_trim_ms(ms),
+            Deed::Stop => self.desk.stop(),
+            Deed::Leave => self.pace.leave.store(true, Ordering::Relaxed),
+        }
+    }
 }
 
 impl Clock for Jumps<'_> {
@@ -156,13 +142,12 @@ impl Clock for Jumps<'_> {
         while self.pace.planned.load(Ordering::Acquire) < tick {
             thread::yield_now();
         }
-        self.pace.wait_for_answers_to(tick - 1, UNDER_WAY);
+        self.pace.wait_for_answers(UNDER_WAY);
         if self.live.show() < self.show.replace(self.live.show()) {
             self.laps.set(self.laps.get() + 1);
         }
-        let overslept = OVERSLEPT.iter().find(|(at, _)| *at == tick).map_or(0, |(_, periods)| *periods);
-        self.now.set(deadline + PERIOD * overslept);
-        self.pace.stop.store(tick >= STOP_AT, Ordering::Relaxed);
+        self.now.set(deadline);
+        self.script.iter().filter(|(at, _)| *at == tick).for_each(|(_, deed)| self.happen(*deed));
     }
 }
 
@@ -226,7 +211,7 @@ fn ride() -> Timeline {
 }
 
 /// The ride to a controller of six axes and one of three, in loops until it is stopped.
-fn staged(addresses: &[SocketAddrV4; 2]) -> (Staged, Vec<Watched>) {
+fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (Staged, Vec<Watched>) {
     let timeline = ride();
     let tos = [format!("{},axes=6", addresses[0]), format!("{},axes=3", addresses[1])];
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
@@ -237,24 +222,52 @@ fn staged(addresses: &[SocketAddrV4; 2]) -> (Staged, Vec<Watched>) {
     (staged, config.controllers.iter().map(Watched::of).collect())
 }
 
-struct Outcome {
-    ended: Ended,
-    calls: Calls,
-    laps: u32,
-    accounts: Accounts,
+/// What came of a play.
+pub(crate) struct Outcome {
+    pub(crate) ended: Ended,
+    /// What the tick thread asked of the allocator.
+    pub(crate) calls: Calls,
+    /// How often the ride began again.
+    pub(crate) laps: u32,
+    pub(crate) accounts: Accounts,
+    pub(crate) news: Vec<News>,
+}
+
+/// Plays to peers that answer everything, while the script's deeds happen before the ticks of those numbers, the first of
+/// which is 1. Where nobody is there to clear what is latched, a stop is the end.
+pub(crate) fn play(script: &[(u64, Deed)], attended: bool) -> Outcome {
+    let peers = [0; CONTROLLERS].map(|_| UdpSocket::bind("127.0.0.1:0").unwrap());
+    let addresses =
+        [0, 1].map(|index: usize| peers[index].local_addr().unwrap().to_string().parse().unwrap());
+    let pace = Pace::default();
+    thread::scope(|scope| {
+        for peer in &peers {
+            scope.spawn(|| answer(peer, &pace));
+        }
+        let outcome = play_to(&addresses, &pace, script, attended);
+        for address in addresses {
+            peers[0].send_to(&[], address).unwrap();
+        }
+        outcome
+    })
 }
 
 /// Plays as `kinocue play` does, on the calling thread.
-fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
+fn play_to(
+    addresses: &[SocketAddrV4; CONTROLLERS],
+    pace: &Pace,
+    script: &[(u64, Deed)],
+    attended: bool,
+) -> Outcome {
     let (staged, watched) = staged(addresses);
     let rate = staged.show.rate;
-    let desk = staged.desk();
+    let desk = &staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::default());
     let (mut mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
-    let MailEnds { sent, ticks, requests, answers, retired, .. } = ends;
+    let MailEnds { sent, ticks, requests, answers, retired, commands, alarms, mut news } = ends;
     let mut plans = PlanLoop { planner, timeline, requests, answers, retired };
     // The kernel stamps replies with the real time; ahead of it, no frame is ever given up in a slow test.
     let origin = Monotonic.now() + Duration::from_secs(3_600);
@@ -267,74 +280,36 @@ fn play(addresses: &[SocketAddrV4; 2], pace: &Pace) -> Outcome {
         });
         let plan_thread = scope.spawn(move || pace.serve(&mut plans));
         mail.wakes(plan_thread.thread().clone());
-        let clock = Jumps { pace, live, now: Cell::new(origin), show: Cell::default(), laps: Cell::new(0) };
-        let conductor = Conductor::of_a_play(origin, false);
-        let grid = TickGrid::new(origin, rate);
+        let clock = Jumps {
+            pace,
+            script,
+            desk,
+            commands: RefCell::new(commands),
+            alarms: RefCell::new(alarms),
+            live,
+            now: Cell::new(origin),
+            show: Cell::default(),
+            laps: Cell::new(0),
+        };
         let mut tick_loop = TickLoop {
             clock: &clock,
-            grid,
+            grid: TickGrid::new(origin, rate),
             engine,
-            conductor,
+            conductor: Conductor::of_a_play(origin, attended),
             lanes,
-            sink: sender,
+            sink: Counted { sender, pace },
             mail,
-            desk: &desk,
-            leave: &pace.stop,
+            desk,
+            leave: &pace.leave,
         };
         let before = Calls::so_far();
         let ended = tick_loop.run();
         let calls = Calls::so_far().since(before);
-        pace.wait_for_answers_to(ended.ticks, 0);
+        pace.wait_for_answers(0);
         pace.over.store(true, Ordering::Release);
         let mut accounts = ack_thread.join().expect("the ack thread does not panic");
         accounts.close(tick_loop.lanes.iter().map(Lane::last_frame), clock.now());
-        Outcome { ended, calls, laps: clock.laps.get(), accounts }
+        let news = std::iter::from_fn(|| news.pop().ok()).collect();
+        Outcome { ended, calls, laps: clock.laps.get(), accounts, news }
     })
-}
-
-#[test]
-fn ten_thousand_ticks_neither_allocate_nor_free() {
-    let peers = [0; 2].map(|_| UdpSocket::bind("127.0.0.1:0").unwrap());
-    let addresses =
-        [0, 1].map(|index: usize| peers[index].local_addr().unwrap().to_string().parse().unwrap());
-    let pace = Pace::default();
-    let outcome = thread::scope(|scope| {
-        for peer in &peers {
-            scope.spawn(|| answer(peer, &pace));
-        }
-        let outcome = play(&addresses, &pace);
-        for address in addresses {
-            peers[0].send_to(&[], address).unwrap();
-        }
-        outcome
-    });
-    let Outcome { ended, calls, laps, accounts } = outcome;
-    assert_eq!(calls, Calls { allocations: 0, frees: 0 });
-    assert!(ended.ticks > STOP_AT && laps >= 3, "{ended:?}, {laps} laps");
-    assert_eq!((ended.missed, ended.ending, ended.unposted), (83, Ending::Stopped, 0));
-    for controller in 0..CONTROLLERS {
-        let counts = accounts.books.tracker().counts(controller);
-        assert_eq!((counts.sent, counts.asked, counts.acked), (ended.ticks, ended.ticks, ended.ticks));
-        assert_eq!((counts.refused(), counts.lost, counts.duplicate, counts.stray), (0, 0, 0, 0));
-    }
-    assert_eq!(accounts.lateness.len(), ended.ticks);
-}
-
-#[test]
-fn the_allocator_counts_its_own_thread_and_no_other() {
-    let before = Calls::so_far();
-    drop(std::hint::black_box(Box::new(1)));
-    assert_eq!(Calls::so_far().since(before), Calls { allocations: 1, frees: 1 });
-    let there = thread::spawn(|| {
-        let before = Calls::so_far();
-        let mut grown = std::hint::black_box(vec![1_u8; 1]);
-        grown.reserve_exact(100);
-        Calls::so_far().since(before)
-    });
-    let here = Calls::so_far();
-    while !there.is_finished() {
-        thread::yield_now();
-    }
-    assert_eq!(Calls::so_far(), here);
-    assert_eq!(there.join().unwrap(), Calls { allocations: 2, frees: 1 });
 }
