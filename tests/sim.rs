@@ -219,10 +219,12 @@ impl Drop for Program {
 }
 
 #[test]
-fn the_program_says_when_it_is_ready_logs_and_counts_and_ends_with_0() {
+fn the_program_says_when_it_is_ready_logs_frames_and_moves_counts_and_ends_with_0() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("frames.csv");
     let log_arg = log.to_str().expect("text");
+    let moves = folder.path().join("moves.csv");
+    let moves_arg = moves.to_str().expect("text");
     let mut sim = Program::start(&[
         "--listen",
         "127.0.0.1:0",
@@ -233,6 +235,8 @@ fn the_program_says_when_it_is_ready_logs_and_counts_and_ends_with_0() {
         "--json",
         "--log",
         log_arg,
+        "--moves",
+        moves_arg,
     ]);
     let addresses = sim.ready(2);
     let host = host();
@@ -247,14 +251,21 @@ fn the_program_says_when_it_is_ready_logs_and_counts_and_ends_with_0() {
         assert_eq!(controller["address"], address.to_string());
         assert_eq!((&controller["accepted"], &controller["refused"]["fault"]), (&1.into(), &0.into()));
     }
-    let rows: Vec<Vec<String>> = std::fs::read_to_string(&log)
-        .expect("a log")
-        .lines()
-        .map(|row| row.split(',').map(str::to_owned).collect())
-        .collect();
+    let rows = rows(&log);
     assert_eq!(rows.len(), 5, "a header, two frames, two ends");
     assert!(rows.iter().all(|row| row.len() == 7 + 24));
     assert_eq!(rows[1][2..10], ["1", "0x1401", "1", "2", "0x0000", "10", "20", "30"]);
+    let moves = self::rows(&moves);
+    assert_eq!(moves.len(), 3, "a header, two moves");
+    assert!(moves.iter().all(|row| row.len() == 3 + 24));
+    let from = ["0", "0", "0", ""];
+    assert!(moves[1..].iter().all(|row| row[3..7] == from && row[18].is_empty()), "{moves:?}");
+}
+
+/// The cells of a log.
+fn rows(path: &std::path::Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(path).expect("a log");
+    text.lines().map(|row| row.split(',').map(str::to_owned).collect()).collect()
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
@@ -34,6 +34,7 @@ Examples:
   kinocue sim --count 4 --axes 6 --json              four of six axes at ports 7408 to 7411, counts at the end
   kinocue sim --loss 0.05 --delay 80ms --seed 7      one frame in twenty unanswered, the other answers late
   kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame, and logs it
+  kinocue sim --pa 06=0 --moves moves.csv            never hurries after frames, and logs how its motors moved
   kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      somebody presses the emergency stop, and releases it
   kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
 
@@ -111,6 +112,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
 
+    /// Write a CSV row for each move the motors ran: when it began, how long it took, from where to where, in pulses
+    /// and without vibration; a move begins with its frame, or where the one before it ends
+    #[arg(long, value_name = "FILE")]
+    moves: Option<PathBuf>,
+
     /// At the end, one JSON object with all counts on the standard output
     #[arg(long)]
     json: bool,
@@ -184,23 +190,24 @@ fn options(args: &Args) -> Result<Options, Failure> {
     };
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, args.host_port);
     let setup = if args.safe { setup.safe(host) } else { setup };
-    let log = match &args.log {
-        Some(path) => {
-            // It is emptied only once the ports are ours: a second sim must not wipe the log of the first.
-            let file = File::options().write(true).create(true).truncate(false).open(path);
-            let file = file.with_context(|| format!("cannot write the log {}", path.display()));
-            Some(file.or_exit(Exit::Io)?)
-        }
-        None => None,
-    };
     Ok(Options {
         listen: args.listen,
         controllers: vec![setup; usize::from(args.count)],
         faults: LinkFaults { loss: args.loss, duplicate: args.duplicate, delay: args.delay },
         seed: seed(args),
-        log,
+        log: log_file(args.log.as_deref())?,
+        moves: log_file(args.moves.as_deref())?,
         script: args.script.to_vec(),
     })
+}
+
+/// A file to log to. It is emptied only once the ports are ours: a second sim must not wipe the log of the first.
+fn log_file(path: Option<&Path>) -> Result<Option<File>, Failure> {
+    let open = |path: &Path| {
+        let file = File::options().write(true).create(true).truncate(false).open(path);
+        file.with_context(|| format!("cannot write the log {}", path.display())).or_exit(Exit::Io)
+    };
+    path.map(open).transpose()
 }
 
 /// The seed that was given, or one that is told so that it can be given again.

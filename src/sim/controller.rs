@@ -5,7 +5,7 @@ use std::net::SocketAddrV4;
 
 use super::errors::{self, Errors, Memory};
 use super::inputs::Inputs;
-use super::player::{Pace, Player};
+use super::player::{Executed, Pace, Player};
 use super::registers::Registers;
 use super::{Action, Commands, Counts, Invented, Setup, pa};
 use crate::motion::{MAX_AXES, Pulses};
@@ -287,13 +287,34 @@ impl Controller {
     /// Where the axes that work are.
     pub fn positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
         self.advance(at);
-        PerAxis::new(&self.player.positions(at)[..self.registers.axes().min(MAX_AXES)])
+        PerAxis::new(&self.player.positions(at)[..self.axes()])
     }
 
     /// Where the axes that work are, with what shakes them.
     pub fn shaken_positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
         self.advance(at);
-        PerAxis::new(&self.player.shaken(at)[..self.registers.axes().min(MAX_AXES)])
+        PerAxis::new(&self.player.shaken(at)[..self.axes()])
+    }
+
+    /// How many axes work.
+    pub(super) fn axes(&self) -> usize {
+        self.registers.axes().min(MAX_AXES)
+    }
+
+    /// Keeps a record of the moves that end from now on; what is kept grows until it is taken.
+    pub(super) fn keep_record(&mut self) {
+        self.player.keep_record();
+    }
+
+    /// Ends the move that still runs at the end of it all, so that the record has that, too.
+    pub(super) fn close_record(&mut self, at: MonoTime) {
+        self.advance(at);
+        self.player.halt(at);
+    }
+
+    /// The moves that ended since they were last asked for.
+    pub(super) fn take_record(&mut self) -> impl Iterator<Item = Executed> {
+        self.player.take_record()
     }
 
     /// The outputs that are on, bit 0 = Y01.

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use serde::Serialize;
 
 use super::keeper::{DELAYED, Keeper, Order, wait_for};
-use super::log::Log;
+use super::log::Logs;
 use super::station::{Station, listen};
 use super::{Command, CommandError, Counts, Options, Setup};
 use crate::sys::clock::Monotonic;
@@ -97,14 +97,13 @@ impl Farm {
         let bell = Arc::new(bell);
         let (sender, orders) = mpsc::channel();
         let keeper = Keeper {
-            start,
             stations,
             epoll,
             bell: Arc::clone(&bell),
             orders,
             script,
             room: DELAYED,
-            log: options.log.map(Log::new),
+            logs: Logs::new(start, options.log, options.moves),
             due: start,
         };
         let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());

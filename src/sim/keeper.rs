@@ -11,7 +11,7 @@ use rustix::buffer::spare_capacity;
 use rustix::event::{EventfdFlags, Timespec, epoll, eventfd};
 
 use super::farm::Outcome;
-use super::log::Log;
+use super::log::Logs;
 use super::station::Station;
 use super::{Command, CommandError};
 use crate::sys::clock::Monotonic;
@@ -39,7 +39,6 @@ pub(super) enum Order {
 /// All that the thread owns.
 #[derive(Debug)]
 pub(super) struct Keeper {
-    pub(super) start: MonoTime,
     pub(super) stations: Vec<Station>,
     pub(super) epoll: OwnedFd,
     /// Rings when there are orders.
@@ -49,7 +48,7 @@ pub(super) struct Keeper {
     pub(super) script: VecDeque<(MonoTime, Command)>,
     /// Answers for which there is still room to wait.
     pub(super) room: usize,
-    pub(super) log: Option<Log>,
+    pub(super) logs: Logs,
     /// When anything is due at the earliest, if nothing comes before.
     pub(super) due: MonoTime,
 }
@@ -81,9 +80,8 @@ impl Keeper {
 
     /// Takes one datagram, if there is one; where more are there, the wait names the socket again.
     fn serve(&mut self, index: usize) -> bool {
-        let log = self.log.as_mut().map(|log| (log, self.start));
         let station = &mut self.stations[index];
-        let served = station.serve(|| Monotonic.now(), log, &mut self.room);
+        let served = station.serve(|| Monotonic.now(), &mut self.logs, &mut self.room);
         self.due = self.due.min(station.due().unwrap_or(NEVER));
         served
     }
@@ -141,10 +139,9 @@ impl Keeper {
         let at = Monotonic.now();
         let mut outcomes = Vec::with_capacity(self.stations.len());
         for station in &mut self.stations {
-            let log = self.log.as_mut().map(|log| (log, self.start));
-            outcomes.push(station.end(at, log));
+            outcomes.push(station.end(at, &mut self.logs));
         }
-        self.log.map_or(Ok(()), Log::close).map(|()| outcomes)
+        self.logs.close().map(|()| outcomes)
     }
 }
 

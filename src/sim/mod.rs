@@ -26,6 +26,7 @@ pub mod pa;
 mod player;
 mod registers;
 mod setup;
+mod sheet;
 mod station;
 
 pub use command::{Action, Command, CommandError};

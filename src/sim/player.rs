@@ -45,6 +45,19 @@ struct Move {
     arrived: bool,
 }
 
+/// A straight line that the motors ran, to its end or until something cut it short.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Executed {
+    /// When it began.
+    pub(super) start: MonoTime,
+    /// How long it took.
+    pub(super) duration: Duration,
+    /// Where it began.
+    pub(super) from: Positions,
+    /// Where it ended.
+    pub(super) to: Positions,
+}
+
 /// The queue had no room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Overflow;
@@ -65,6 +78,8 @@ pub(super) struct Player {
     pub(super) executed: u64,
     /// Moves that ran in less than their time.
     pub(super) fast_forwarded: u64,
+    /// Moves that ended since they were asked for, where somebody does ask.
+    record: Option<Vec<Executed>>,
 }
 
 impl Player {
@@ -79,12 +94,24 @@ impl Player {
             taken: 0,
             executed: 0,
             fast_forwarded: 0,
+            record: None,
         }
+    }
+
+    /// Keeps the moves that end from now on, until they are asked for.
+    pub(super) fn keep_record(&mut self) {
+        self.record.get_or_insert_default();
+    }
+
+    /// The moves that ended since they were last asked for, in their order; none where no record is kept.
+    pub(super) fn take_record(&mut self) -> impl Iterator<Item = Executed> {
+        self.record.as_mut().map(|record| record.drain(..)).into_iter().flatten()
     }
 
     /// Runs all that is due until `at`.
     pub(super) fn advance(&mut self, at: MonoTime, pace: &Pace) {
         while !self.current.arrived && self.current.end() <= at {
+            self.note(self.current.end());
             self.current.arrived = true;
             self.executed += 1;
             if self.paused {
@@ -116,7 +143,7 @@ impl Player {
     /// Stops where the motors are and forgets what waits.
     pub(super) fn hold(&mut self, at: MonoTime, pace: &Pace) {
         self.advance(at, pace);
-        self.current = Move::rest(self.positions(at), at);
+        self.halt(at);
         self.waiting.clear();
         self.interrupted = None;
         self.paused = false;
@@ -129,7 +156,7 @@ impl Player {
             let duration = self.current.end().since(at);
             self.interrupted = Some(Leg { duration, ..self.current.leg });
         }
-        self.current = Move::rest(self.positions(at), at);
+        self.halt(at);
         self.paused = true;
     }
 
@@ -143,7 +170,7 @@ impl Player {
     pub(super) fn resume(&mut self, at: MonoTime, pace: &Pace) {
         self.advance(at, pace);
         self.paused = false;
-        self.current = Move::rest(self.positions(at), at);
+        self.halt(at);
         if let Some(next) = self.interrupted.take().or_else(|| self.waiting.pop_front()) {
             self.begin(next, at, pace);
         }
@@ -211,6 +238,22 @@ impl Player {
     /// Counts what is taken from the start again.
     pub(super) const fn restart(&mut self) {
         self.taken = 0;
+    }
+
+    /// Ends the present move where the motors are; the player has been advanced to `at`.
+    pub(super) fn halt(&mut self, at: MonoTime) {
+        if !self.current.arrived && self.current.start < at {
+            self.note(at);
+        }
+        self.current = Move::rest(self.positions(at), at);
+    }
+
+    /// Records the present move, which is over at `end`.
+    fn note(&mut self, end: MonoTime) {
+        let (start, from, to) = (self.current.start, self.current.from, self.current.positions(end));
+        if let Some(record) = &mut self.record {
+            record.push(Executed { start, duration: end.since(start), from, to });
+        }
     }
 
     fn begin(&mut self, leg: Leg, start: MonoTime, pace: &Pace) {

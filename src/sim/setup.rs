@@ -91,6 +91,8 @@ pub struct Options {
     pub seed: u64,
     /// Takes a CSV row for each motion frame; emptied once all sockets are bound.
     pub log: Option<File>,
+    /// Takes a CSV row for each move that the motors ran; emptied like the other.
+    pub moves: Option<File>,
     /// What happens when, counted from the start; in any order.
     pub script: Vec<(Duration, Command)>,
 }
@@ -105,6 +107,7 @@ impl Options {
             faults: LinkFaults { loss: 0.0, duplicate: 0.0, delay: Duration::ZERO },
             seed: 0,
             log: None,
+            moves: None,
             script: Vec::new(),
         }
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::farm::Outcome;
 use super::link::{Fate, Link};
-use super::log::Log;
+use super::log::Logs;
 use super::{Action, Controller, Counts, Options, Setup};
 use crate::time::MonoTime;
 use crate::wire::MAX_LEN;
@@ -51,10 +51,14 @@ impl Station {
         (socket, address): (UdpSocket, SocketAddrV4),
         start: MonoTime,
     ) -> Self {
+        let mut controller = Controller::new(setup, address, start);
+        if options.moves.is_some() {
+            controller.keep_record();
+        }
         Self {
             address,
             socket,
-            controller: Controller::new(setup, address, start),
+            controller,
             link: Link::new(&options.faults, options.seed, index),
             report_link: Link::new(&options.faults, options.seed, REPORTS + index),
             delay: options.faults.delay,
@@ -76,7 +80,7 @@ impl Station {
     pub(super) fn serve(
         &mut self,
         now: impl FnOnce() -> MonoTime,
-        log: Option<(&mut Log, MonoTime)>,
+        logs: &mut Logs,
         room: &mut usize,
     ) -> bool {
         let mut datagram = [0; MAX_DATAGRAM];
@@ -91,10 +95,11 @@ impl Station {
         let mut buf = [0; MAX_LEN];
         let handled = self.controller.on_datagram(from, &datagram[..len], at, &mut buf);
         let answer = handled.reply.map(<[u8]>::len);
-        if let (Some((log, start)), Some(seen)) = (log, &handled.motion) {
+        if let (true, Some(seen)) = (logs.want_frames(), &handled.motion) {
             let executed = self.controller.shaken_positions(at);
-            log.frame(at.since(start), self.address, seen, answer.is_some(), &executed);
+            logs.frame(at, self.address, seen, answer.is_some(), &executed);
         }
+        self.log_moves(logs);
         if let Some(len) = answer {
             self.post(fate, from, &buf[..len], at, room);
         }
@@ -166,14 +171,19 @@ impl Station {
     }
 
     /// What became of it, `since` the start.
-    pub(super) fn end(&mut self, at: MonoTime, log: Option<(&mut Log, MonoTime)>) -> Outcome {
+    pub(super) fn end(&mut self, at: MonoTime, logs: &mut Logs) -> Outcome {
         let positions = self.controller.positions(at);
         let outputs = self.controller.outputs();
-        if let Some((log, start)) = log {
-            log.rest(at.since(start), self.address, outputs, &positions);
-        }
+        self.controller.close_record(at);
+        self.log_moves(logs);
+        logs.rest(at, self.address, outputs, &positions);
         let positions = positions.iter().map(|position| position.0).collect();
         Outcome { address: self.address, counts: self.counts(), positions, outputs }
+    }
+
+    fn log_moves(&mut self, logs: &mut Logs) {
+        let (address, axes) = (self.address, self.controller.axes());
+        self.controller.take_record().for_each(|executed| logs.executed(address, axes, &executed));
     }
 
     fn counts(&self) -> Counts {

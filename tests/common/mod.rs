@@ -345,29 +345,14 @@ impl Played {
         frames: Range<usize>,
         before: impl Fn(f64) -> f64,
     ) -> Worst {
-        let seat = SeatType::bench3(1);
-        let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / self.rate.hz()).max(0.005);
         let sent: Vec<&Frame> = self.lane(lane).collect();
-        let mut worst = Worst::default();
         let mm = self.positions_mm(lane, axis);
-        let mut measure = Measure::new(Spacing::at_rate(self.rate.hz()));
-        let mut at = ShowTime::ZERO;
-        for _ in 0..100 {
-            measure.push(at, before(mm[frames.start]));
-            at += self.rate.period();
-        }
-        for (index, frame) in frames.enumerate() {
-            if index > 0 {
-                at += Duration::from_millis(u64::from(self.time_ms(sent[frame], frame)));
-            }
-            let seen = measure.push(at, mm[frame]);
-            worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
-            worst.acceleration =
-                worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
-            worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
-            worst.step = worst.step.max(seen.step.value.abs() / step);
-        }
-        worst
+        let time = |frame: usize| Duration::from_millis(u64::from(self.time_ms(sent[frame], frame)));
+        let lines = frames.clone().map(|frame| {
+            let first = frame == frames.start;
+            (if first { self.rate.period() } else { time(frame) }, mm[frame])
+        });
+        worst_of_lines(self.rate, before(mm[frames.start]), lines)
     }
 
     /// How long a frame gives its seat.
@@ -377,6 +362,31 @@ impl Played {
             Timing::Absolute => self.rate.time_ms(index as u64),
         }
     }
+}
+
+/// What straight lines make an axis of the bench seat do, from rest `before` mm up: each takes that long, and ends that
+/// many mm up. By the measure of what is sent at that rate.
+pub fn worst_of_lines(rate: Rate, before: f64, lines: impl IntoIterator<Item = (Duration, f64)>) -> Worst {
+    let seat = SeatType::bench3(1);
+    let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / rate.hz()).max(0.005);
+    let mut worst = Worst::default();
+    let mut measure = Measure::new(Spacing::at_rate(rate.hz()));
+    let mut at = ShowTime::ZERO;
+    measure.push(at, before);
+    for _ in 1..100 {
+        at += rate.period();
+        measure.push(at, before);
+    }
+    for (span, mm) in lines {
+        at += span;
+        let seen = measure.push(at, mm);
+        worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
+        worst.acceleration =
+            worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
+        worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
+        worst.step = worst.step.max(seen.step.value.abs() / step);
+    }
+    worst
 }
 
 /// A cue of sines about the middle of the stroke, rows 20 ms apart: `mm` of swing at `hz` on each of `axes` axes.

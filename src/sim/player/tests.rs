@@ -129,3 +129,27 @@ fn a_vibration_swings_about_the_move_and_ends_with_it() {
     push(&mut player, 0, 100, 100).unwrap();
     assert_eq!(shaken(&player, 112)[1], 0);
 }
+
+#[test]
+fn the_record_says_when_each_move_began_how_long_it_took_and_from_where_to_where() {
+    let mut player = Player::new(200, ms(0));
+    push(&mut player, 100, 10, 0).unwrap();
+    assert_eq!(at(&mut player, 20), 100);
+    player.keep_record();
+    push(&mut player, 200, 10, 30).unwrap();
+    push(&mut player, 200, 10, 32).unwrap();
+    push(&mut player, 300, 10, 34).unwrap();
+    player.hold(ms(54), &PACE);
+    push(&mut player, 40_240, 10, 60).unwrap(); // 80 ms at 500 pulses a millisecond
+    assert_eq!(at(&mut player, 200), 40_240);
+    let record: Vec<_> = player.take_record().collect();
+    let line = |start, took, from, to| Executed {
+        start: ms(start),
+        duration: Duration::from_millis(took),
+        from: all(from),
+        to: all(to),
+    };
+    let lines = [(30, 10, 100, 200), (40, 10, 200, 200), (50, 4, 200, 240), (60, 80, 240, 40_240)];
+    assert_eq!(record, lines.map(|(start, took, from, to)| line(start, took, from, to)));
+    assert_eq!(player.take_record().count(), 0, "each is told once");
+}

@@ -1,0 +1,162 @@
+//! The tick thread allocates and frees nothing: the real loop over real sockets, ten thousand ticks and more in virtual
+//! time with acks arriving, from the join through laps, missed ticks, a stall and all that it can be told, into park,
+//! under an allocator that counts each thread's calls.
+
+mod counting;
+mod stage;
+
+use std::thread;
+use std::time::Duration;
+
+use counting::Calls;
+use kinocue::config::LossPolicy;
+use kinocue::engine::{Ending, Mix};
+use kinocue::health::{Groups, Health, Notice};
+use kinocue::motion::MAX_AXES;
+use kinocue::rt::{Alarm, Command, News};
+use kinocue::state::{Event, Machine, Request, Ride, State, Why};
+use kinocue::time::{MonoTime, ShowTime};
+use kinocue::wire::FrameNo;
+use stage::{CONTROLLERS, Deed, Outcome, PERIOD, play};
+
+const NOTHING: Calls = Calls { allocations: 0, frees: 0 };
+
+/// Plays ten thousand ticks with that spin, in which `missed` are missed.
+fn assert_quiet(spin: Duration, missed: u64) {
+    // A lag that is slewed away, and one after which the lanes hold and join again.
+    let script = [(3_000, Deed::Oversleep(3)), (5_000, Deed::Oversleep(80)), (10_000, Deed::Leave)];
+    let Outcome { ended, calls, laps, accounts, .. } = play(&script, false, spin);
+    assert_eq!(calls, NOTHING);
+    assert!(ended.ticks > 10_000 && laps >= 3, "{ended:?}, {laps} laps");
+    assert_eq!((ended.missed, ended.ending, ended.unposted), (missed, Ending::Stopped, 0));
+    for controller in 0..CONTROLLERS {
+        let counts = accounts.books.tracker().counts(controller);
+        assert_eq!((counts.sent, counts.asked, counts.acked), (ended.ticks, ended.ticks, ended.ticks));
+        assert_eq!((counts.refused(), counts.lost, counts.duplicate, counts.stray), (0, 0, 0, 0));
+    }
+    assert_eq!(accounts.lateness.len(), ended.ticks);
+}
+
+#[test]
+fn ten_thousand_ticks_neither_allocate_nor_free() {
+    assert_quiet(Duration::ZERO, 83);
+}
+
+#[test]
+fn nor_do_they_where_the_rest_of_each_wait_is_spun() {
+    // Who oversleeps from before the deadline on misses one tick less.
+    assert_quiet(Duration::from_micros(100), 81);
+}
+
+/// Everything that the tick thread can be told, each with time to do it.
+fn everything() -> Vec<(u64, Deed)> {
+    let ask = |request| Deed::Ask(Command::Request(request));
+    let mut found = [0.0; MAX_AXES];
+    found[..3].copy_from_slice(&[0.2, 0.5, 0.3]);
+    vec![
+        (1_700, ask(Request::Pause)),
+        (2_100, Deed::Ask(Command::Seek(ShowTime::from_millis(1_000)))),
+        (2_200, ask(Request::Resume)),
+        (2_300, ask(Request::Pause)), // in the middle of the join
+        (2_700, ask(Request::Resume)),
+        (4_500, Deed::Ask(Command::Seek(ShowTime::from_millis(500)))),
+        (4_600, Deed::Ask(Command::Seek(ShowTime::from_millis(200)))),
+        (6_400, Deed::Mix(0, Mix { motion: 0.4, vibration: 0.5, ..Mix::FULL })),
+        (6_500, Deed::Trim(60)),
+        (6_600, Deed::Mix(1, Mix { on: false, ..Mix::FULL })),
+        (9_000, Deed::Mix(1, Mix::FULL)),
+        (9_100, Deed::Trim(-500)),
+        (11_500, Deed::See(Alarm::Leave(1))),
+        (12_000, Deed::See(Alarm::Found(1, found))),
+        (14_500, Deed::See(Alarm::Cut(1))),
+        (14_600, Deed::See(Alarm::Found(1, found))),
+        (17_000, Deed::Oversleep(80)),
+        (17_010, Deed::Stop),
+        (17_500, ask(Request::Resume)), // refused: a stop is latched
+        (17_600, ask(Request::Clear)),
+        (17_700, Deed::See(Alarm::Event(Event::PositionsRead))),
+        (17_800, ask(Request::Park)),
+    ]
+}
+
+#[test]
+fn commands_alarms_levels_and_a_stop_neither_allocate_nor_free_on_the_tick_thread() {
+    let Outcome { ended, calls, accounts, news, .. } = play(&everything(), true, Duration::ZERO);
+    assert_eq!(calls, NOTHING);
+    assert_eq!((ended.missed, ended.unposted), (80, 0), "{ended:?}");
+    let states: Vec<State> = news.iter().filter_map(entered).collect();
+    let following = State::Playing(Ride::Following);
+    for state in [following, State::Paused, State::Stopping, State::Stopped, State::Recovering, State::Parked]
+    {
+        assert!(states.contains(&state), "{state:?} of {states:?}");
+    }
+    let refused: Vec<Why> = news.iter().filter_map(refusal).collect();
+    assert_eq!(refused, [Why::Latched]);
+    let counts = [0, 1].map(|controller| accounts.books.tracker().counts(controller));
+    assert!(counts[1].sent + 200 < counts[0].sent, "the second was away for a while");
+    for counts in counts {
+        assert_eq!((counts.sent, counts.asked), (counts.acked, counts.acked));
+    }
+}
+
+fn entered(news: &News) -> Option<State> {
+    match news {
+        News::Entered { state, .. } => Some(*state),
+        News::Refused(_) => None,
+    }
+}
+
+fn refusal(news: &News) -> Option<Why> {
+    match news {
+        News::Entered { .. } => None,
+        News::Refused(refusal) => Some(refusal.why),
+    }
+}
+
+#[test]
+fn the_allocator_counts_its_own_thread_and_no_other() {
+    let before = Calls::so_far();
+    drop(std::hint::black_box(Box::new(1)));
+    assert_eq!(Calls::so_far().since(before), Calls { allocations: 1, frees: 1 });
+    let there = thread::spawn(|| {
+        let before = Calls::so_far();
+        let mut grown = std::hint::black_box(vec![1_u8; 1]);
+        grown.reserve_exact(100);
+        Calls::so_far().since(before)
+    });
+    let here = Calls::so_far();
+    while !there.is_finished() {
+        thread::yield_now();
+    }
+    assert_eq!(Calls::so_far(), here);
+    assert_eq!(there.join().unwrap(), Calls { allocations: 2, frees: 1 });
+}
+
+#[test]
+fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_start() {
+    let mut now = MonoTime::default() + PERIOD;
+    let mut hall = Machine::new(now);
+    let mut health = Health::new(Groups::named(["A", "A", "B"]), LossPolicy::Park, 1, PERIOD);
+    let mut notices = 0;
+    let before = Calls::so_far();
+    for tick in 1..=10_000_u32 {
+        now = now + PERIOD;
+        for controller in 0..3 {
+            health.on_sent(controller, FrameNo(tick), true, now);
+            if tick < 5_000 && tick % 7 > 0 {
+                health.on_ack(controller, FrameNo(tick), now);
+            }
+        }
+        health.tick(now, &mut |notice| {
+            notices += 1;
+            if let Notice::Hall(event) = notice {
+                hall.event(event, now);
+            }
+        });
+        hall.event(Event::Late, now);
+        let _refused = hall.request(Request::Go, now);
+        hall.tick(now);
+    }
+    assert_eq!(Calls::so_far().since(before), Calls { allocations: 0, frees: 0 });
+    assert!(notices > 2, "groups were lost");
+}
