@@ -22,7 +22,7 @@ use asked::trial::Trial;
 use asked::wild::{self, Wild};
 use common::spread::{Spread, verdict};
 use kinocue::engine::Rate;
-use kinocue::gate::{Gate, Verdict};
+use kinocue::gate::{Asked, Gate, Verdict};
 use kinocue::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::Clock as _;
@@ -77,7 +77,7 @@ fn round() -> [f64; 2] {
         ours.push(timed(|| {
             for gate in &mut gates {
                 let mut pose = black_box(pose);
-                let verdict = gate.admit(&mut pose, u64::from(tick));
+                let verdict = gate.admit(&mut pose, u64::from(tick), Asked::Anyhow);
                 assert_eq!(verdict, Verdict::Passed);
                 black_box(&pose);
             }

@@ -13,7 +13,7 @@ mod trial;
 mod wild;
 
 use kinocue::engine::Rate;
-use kinocue::gate::{Gate, Limit, Verdict};
+use kinocue::gate::{Asked, Gate, Limit, Verdict};
 use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType};
 use sound::Sound;
 use trial::{Trial, window};
@@ -66,7 +66,7 @@ fn standing() -> Gate {
 fn sent(gate: &mut Gate, from: u64, asked: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let send = |(index, asked): (u64, f64)| {
         let mut pose = at(asked);
-        gate.admit(&mut pose, index);
+        gate.admit(&mut pose, index, Asked::Anyhow);
         pose[0]
     };
     (from..).zip(asked).map(send).collect()
@@ -80,7 +80,7 @@ fn after_a_step_it_comes_back_softly_and_then_lets_pass_again() {
     assert!(way.windows(2).all(|pair| pair[0] <= pair[1]), "it never turns back");
     assert_eq!(way[599], 0.7);
     assert_eq!(gate.counts().clamps, 1);
-    assert_eq!(gate.admit(&mut at(0.7), 600), Verdict::Passed);
+    assert_eq!(gate.admit(&mut at(0.7), 600, Asked::Anyhow), Verdict::Passed);
     let worst = gate.counts().worst.expect("there was one");
     assert_eq!((worst.axis, worst.asked, worst.allowed, worst.limit), (0, 0.7, 0.5, Limit::Jerk));
 }
@@ -101,7 +101,7 @@ fn three_clamps_within_a_second_are_a_fault() {
     let mut verdicts = Vec::new();
     for index in 0..100 {
         let mut pose = at(if (index / 30) % 2 == 0 { 0.5 } else { 0.6 });
-        verdicts.push(gate.admit(&mut pose, index));
+        verdicts.push(gate.admit(&mut pose, index, Asked::Anyhow));
     }
     let first = verdicts.iter().position(|verdict| *verdict == Verdict::Fault);
     assert_eq!(first, Some(90), "the third step");

@@ -3,7 +3,7 @@
 use super::judge::Judge;
 use super::sound::Sound;
 use super::wild::Wild;
-use kinocue::gate::{Counts, Gate};
+use kinocue::gate::{Asked, Counts, Gate};
 use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType, Slot, Window};
 
 /// What a sequence made of a gate.
@@ -26,7 +26,7 @@ impl Trial {
             ms += time_ms;
             let asked = wild.next(frame, f64::from(ms) * 1e-3, time_ms, &mut judge);
             let mut pose = first(asked);
-            gate.admit(&mut pose, index);
+            gate.admit(&mut pose, index, Asked::Anyhow);
             unchanged &= pose[0].to_bits() == asked.to_bits();
             share = share.max(judge.push(pose[0], time_ms).share());
         }
@@ -39,7 +39,7 @@ impl Trial {
         let mut sent = sound.frames.clone();
         for (index, (position, _)) in (0..).zip(&mut sent) {
             let mut pose = first(*position);
-            gate.admit(&mut pose, index);
+            gate.admit(&mut pose, index, Asked::Anyhow);
             *position = pose[0];
         }
         let unchanged =

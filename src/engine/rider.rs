@@ -6,7 +6,7 @@ use super::Rate;
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
-use crate::gate::{Counts, Gate, Verdict};
+use crate::gate::{Asked, Counts, Gate, Verdict};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
 use crate::time::ShowTime;
@@ -48,7 +48,9 @@ pub(super) struct Rider {
     pub(super) refused: bool,
     is_at_fault: bool,
     pub(super) fader: Fader,
-    /// The level of its vibration.
+    /// Whether its pose is the cue's.
+    on_cue: bool,
+    /// The level of its vibration; 0 until it is on the cue.
     vibration: f64,
     trail: Trail,
     brake: Brake,
@@ -69,6 +71,7 @@ impl Rider {
             refused: false,
             is_at_fault: false,
             fader: Fader::at(level),
+            on_cue: true,
             vibration: level,
             trail: Trail::at_rest(window.park()),
             brake: Brake::new(&window, &Trail::at_rest(window.park()).states()),
@@ -154,6 +157,7 @@ impl Rider {
         at: ShowTime,
         cue: &Pose,
     ) -> Pose {
+        self.on_cue = self.part == Part::With && course.is_on_cue(lane, at);
         match &mut self.part {
             Part::With => course.pose(lane, at, &self.window, cue),
             Part::Braking(since) => {
@@ -178,11 +182,18 @@ impl Rider {
     }
 
     /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the gate lets it pass.
+    ///
+    /// Following its course at a level that stands it needs no way out: course and cue are within the limits to their ends.
     pub(super) fn send(&mut self, index: u64, time: Duration, mut pose: Pose) {
-        self.is_at_fault |= self.gate.admit(&mut pose, index) == Verdict::Fault;
+        let proved = self.part == Part::With && self.fader.is_still();
+        let asked = if proved { Asked::Proved } else { Asked::Anyhow };
+        self.is_at_fault |= self.gate.admit(&mut pose, index, asked) == Verdict::Fault;
         self.trail.push(time, pose);
         let step = VIBRATION_RATE * time.as_secs_f64();
         self.vibration += (self.wanted.vibration - self.vibration).clamp(-step, step);
+        if !self.on_cue {
+            self.vibration = 0.0; // its room was proved for the cue's poses alone
+        }
     }
 
     /// How it is as a course is asked for.

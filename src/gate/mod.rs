@@ -40,6 +40,15 @@ pub enum Verdict {
     Fault,
 }
 
+/// What is known of a pose that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asked {
+    /// It lies on a cue whose limits were proved, or on a move that was planned within them, which go on from there.
+    Proved,
+    /// Nothing.
+    Anyhow,
+}
+
 /// The gate of one lane.
 #[derive(Debug, Clone)]
 pub struct Gate {
@@ -115,7 +124,7 @@ impl Gate {
     /// Puts into `pose`, which frame `index` (counted from 0, of [`Rate::time_ms`]) is to carry, what may be sent, and takes
     /// it as sent. Frames that were left out, few or many, are not missed: see [`Self::rest`].
     #[inline]
-    pub fn admit(&mut self, pose: &mut Pose, index: u64) -> Verdict {
+    pub fn admit(&mut self, pose: &mut Pose, index: u64, asked: Asked) -> Verdict {
         let time_ms = self.times.of(index);
         self.calm.begin(f64::from(time_ms) * 1e-3);
         if self.following && self.calm.take_calm(pose) {
@@ -123,7 +132,7 @@ impl Gate {
             self.counter.tick(time_ms, false, false);
             return Verdict::Passed;
         }
-        self.judge(pose, index, time_ms)
+        self.judge(pose, index, time_ms, asked)
     }
 
     #[expect(clippy::cast_precision_loss, reason = "some seconds")]
@@ -153,11 +162,11 @@ impl Gate {
     /// The same axis by axis, where not all is plain.
     #[cold]
     #[inline(never)]
-    fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32) -> Verdict {
+    fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32, asked: Asked) -> Verdict {
         let frame = &self.frame(index, time_ms);
         let (mut refused, mut held) = (false, false);
         for (axis, position) in pose.iter_mut().enumerate().take(self.axes.len()) {
-            let (sent, was_refused) = self.judge_axis(axis, *position, frame);
+            let (sent, was_refused) = self.judge_axis(axis, *position, frame, asked);
             *position = sent;
             refused |= was_refused;
             held |= self.axes[axis].mode != Mode::Following;
@@ -174,7 +183,7 @@ impl Gate {
     }
 
     /// What one axis is sent, and whether what was asked broke a limit.
-    fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame) -> (f64, bool) {
+    fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame, by: Asked) -> (f64, bool) {
         let state = &mut self.axes[axis];
         let broken = state.mode != Mode::Following && state.look(asked, frame.time_ms);
         let (mode, wish) = state.wish(asked, frame.seconds);
@@ -187,7 +196,8 @@ impl Gate {
             }
             return (self.brake(axis, frame), broken);
         }
-        if held && self.leaves_a_way_out(axis, &next, frame) {
+        // What was proved to its end leads on within the limits by itself; it need not be ready to stop as well.
+        if held && (by == Asked::Proved || self.leaves_a_way_out(axis, &next, frame)) {
             self.axes[axis].take_up(mode);
             return (wish, broken);
         }

@@ -56,7 +56,7 @@ impl Said {
 
     fn name(&self, cause: Cause) -> Option<&str> {
         match cause.whose()? {
-            Whose::Controller(index) => self.names.get(usize::from(index)).map(String::as_str),
+            Whose::Controller(index) => self.names.get(index).map(String::as_str),
             Whose::Group(_) => None,
         }
     }
