@@ -34,7 +34,7 @@ struct Run {
 
 /// Plays a ride of that many seconds.
 pub(crate) fn run(seconds: u32, to: &[SocketAddrV4]) -> Outcome {
-    let (staged, watched) = stage(ride(seconds, 0.0), to);
+    let (staged, watched) = stage(ride(seconds, 0.0, &[]), 1000.0, to);
     let rate = staged.show.rate;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
