@@ -1,6 +1,8 @@
 //! Everything that a show can be told but a stop, as fast as it goes.
 
+use std::iter::Sum;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Scope, ScopedJoinHandle};
 
 use kinocue::engine::Mix;
 use kinocue::rt::{Command, Desk};
@@ -22,8 +24,32 @@ pub(crate) struct Flood {
     pub(crate) settings: u64,
 }
 
+impl Sum for Flood {
+    fn sum<I: Iterator<Item = Self>>(floods: I) -> Self {
+        floods.fold(Self::default(), |sum, one| Self {
+            taken: sum.taken + one.taken,
+            full: sum.full + one.full,
+            settings: sum.settings + one.settings,
+        })
+    }
+}
+
+/// One thread of commands and two of settings, until `done`.
+pub(crate) fn begin<'scope, 'env>(
+    scope: &'scope Scope<'scope, 'env>,
+    commands: Producer<Command>,
+    desk: &'scope Desk,
+    done: &'scope AtomicBool,
+) -> [ScopedJoinHandle<'scope, Flood>; 3] {
+    [
+        scope.spawn(move || command(commands, done)),
+        scope.spawn(move || set(desk, done)),
+        scope.spawn(move || set(desk, done)),
+    ]
+}
+
 /// Keeps the mailbox full of commands that are refused, that change nothing, or that seek, until `done`.
-pub(crate) fn command(mut commands: Producer<Command>, done: &AtomicBool) -> Flood {
+fn command(mut commands: Producer<Command>, done: &AtomicBool) -> Flood {
     let mut flood = Flood::default();
     while !done.load(Ordering::Acquire) {
         let command = match flood.taken {
@@ -46,7 +72,7 @@ fn seek_to(taken: u64) -> ShowTime {
 }
 
 /// Moves every fader and the trim about, until `done`.
-pub(crate) fn set(desk: &Desk, done: &AtomicBool) -> Flood {
+fn set(desk: &Desk, done: &AtomicBool) -> Flood {
     let mut flood = Flood::default();
     while !done.load(Ordering::Acquire) {
         let level = if flood.settings.is_multiple_of(3) { 1.0 } else { 0.7 };

@@ -69,24 +69,13 @@ pub(crate) fn stop(rate_hz: f64, to: &[SocketAddrV4], after: Duration) -> Option
         scope.spawn(move || acks.run(&Monotonic, DrainGrid::new(origin, rate.period()), over));
         let planning = scope.spawn(move || plans.run(done));
         tick_loop.mail.wakes(planning.thread().clone());
-        let floods = [
-            scope.spawn(move || flood::command(commands, done)),
-            scope.spawn(move || flood::set(desk, done)),
-            scope.spawn(move || flood::set(desk, done)),
-        ];
+        let floods = flood::begin(scope, commands, desk, done);
         let request = scope.spawn(move || press(desk, origin + after));
         let ended = tick_loop.run();
         done.store(true, Ordering::Release);
         planning.thread().unpark();
         let asked = request.join().expect("it is pressed");
-        let flood = floods.map(|flood| flood.join().expect("it only pushes")).into_iter().fold(
-            Flood::default(),
-            |sum, one| Flood {
-                taken: sum.taken + one.taken,
-                full: sum.full + one.full,
-                settings: sum.settings + one.settings,
-            },
-        );
+        let flood = floods.into_iter().map(|flood| flood.join().expect("it only pushes")).sum();
         let [first_ms, last_ms] = took(&tick_loop.sink.lanes, asked, rate_hz)?;
         Some(Stop { first_ms, last_ms, ticks: ended.ticks, missed: ended.missed, flood, policy })
     })
