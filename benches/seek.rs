@@ -44,7 +44,7 @@ fn main() {
 fn seeks(seats: u16, round: usize) -> [f64; 3] {
     let to: Vec<SocketAddrV4> =
         (0..seats).map(|seat| SocketAddrV4::new(Ipv4Addr::LOCALHOST, 20_000 + seat)).collect();
-    let (staged, _) = stage(ride(HOURS * 3_600, 0.1), &to, false);
+    let (staged, _) = stage(ride(HOURS * 3_600, 0.1, &[]), 1000.0, &to, false);
     let settled = staged.course.settled();
     let (_, lanes, mut planner, timeline) = staged.split();
     let pose = |at| timeline.sample(at, &mut Hint::default());

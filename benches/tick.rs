@@ -102,7 +102,7 @@ impl Link {
 /// emptied outside the measurement.
 fn round(links: &[Link]) -> Round {
     let addresses: Vec<SocketAddrV4> = links.iter().map(Link::address).collect();
-    let (staged, _) = stage(ride(SECONDS, 0.1), &addresses, false);
+    let (staged, _) = stage(ride(SECONDS, 0.1, &[]), 1000.0, &addresses, false);
     let settled = staged.course.settled();
     let (mut engine, mut lanes, _planner, _timeline) = staged.split();
     let (mut round, mut buf) = (Round::default(), [0; MAX_LEN]);

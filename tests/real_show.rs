@@ -52,12 +52,25 @@ impl Drop for Leader {
 
 impl Leader {
     fn ask(&mut self, request: Request) {
-        self.reins.commands.push(Command::Request(request)).expect("there is room");
+        self.command(Command::Request(request));
     }
 
     fn seek(&mut self, seconds: i64) {
-        let film = ShowTime::from_millis(seconds * 1_000);
-        self.reins.commands.push(Command::Seek(film)).expect("there is room");
+        self.command(Command::Seek(ShowTime::from_millis(seconds * 1_000)));
+    }
+
+    /// What is waited for afterwards has to be new: a machine that was held up makes news of its own.
+    fn command(&mut self, command: Command) {
+        while let Ok(news) = self.reins.news.pop() {
+            self.keep_refusal(news);
+        }
+        self.reins.commands.push(command).expect("there is room");
+    }
+
+    fn keep_refusal(&mut self, news: News) {
+        if let News::Refused(refusal) = news {
+            self.refused.push(refusal);
+        }
     }
 
     fn wait_until<T>(&mut self, what: &str, mut found: impl FnMut(&mut Self) -> Option<T>) -> T {
@@ -77,8 +90,7 @@ impl Leader {
             loop {
                 match leader.reins.news.pop().ok()? {
                     News::Entered { state, .. } if state == wanted => return Some(()),
-                    News::Entered { .. } => {}
-                    News::Refused(refusal) => leader.refused.push(refusal),
+                    news => leader.keep_refusal(news),
                 }
             }
         });
@@ -113,10 +125,10 @@ impl Leader {
         self.seek(4);
         self.wait_for(FOLLOWING);
         self.control.desk.set(0, Mix::FULL);
-        self.wait_for_film(6_100);
+        self.wait_for_film(6_400);
         self.control.desk.set(1, Mix::FULL);
         self.control.desk.set_trim_ms(-20);
-        self.wait_for_film(8_100);
+        self.wait_for_film(8_200);
     }
 
     /// Stops, and says why the show does not go on.

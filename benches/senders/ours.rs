@@ -34,7 +34,7 @@ struct Run {
 
 /// Plays a ride of that many seconds on that clock; `silent` asks for no replies.
 pub(crate) fn run(clock: &impl Clock, seconds: u32, to: &[SocketAddrV4], silent: bool) -> Outcome {
-    let (staged, watched) = stage(ride(seconds, 0.0), to, silent);
+    let (staged, watched) = stage(ride(seconds, 0.0, &[]), 1000.0, to, silent);
     let rate = staged.show.rate;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
