@@ -1,7 +1,7 @@
 //! The real loop over real sockets, in virtual time that never leaves the other threads behind.
 
 use std::cell::{Cell, RefCell};
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -236,9 +236,11 @@ pub(crate) struct Outcome {
 /// Plays to peers that answer everything, while the script's deeds happen before the ticks of those numbers, the first of
 /// which is 1. Where nobody is there to clear what is latched, a stop is the end.
 pub(crate) fn play(script: &[(u64, Deed)], attended: bool) -> Outcome {
-    let peers = [0; CONTROLLERS].map(|_| UdpSocket::bind("127.0.0.1:0").unwrap());
-    let addresses =
-        [0, 1].map(|index: usize| peers[index].local_addr().unwrap().to_string().parse().unwrap());
+    let peers = [0; CONTROLLERS].map(|_| UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port"));
+    let addresses = peers.each_ref().map(|peer| match peer.local_addr().expect("it is bound") {
+        SocketAddr::V4(address) => address,
+        SocketAddr::V6(_) => unreachable!("it was bound to an IPv4 address"),
+    });
     let pace = Pace::default();
     thread::scope(|scope| {
         for peer in &peers {
@@ -246,7 +248,7 @@ pub(crate) fn play(script: &[(u64, Deed)], attended: bool) -> Outcome {
         }
         let outcome = play_to(&addresses, &pace, script, attended);
         for address in addresses {
-            peers[0].send_to(&[], address).unwrap();
+            peers[0].send_to(&[], address).expect("loopback works");
         }
         outcome
     })
