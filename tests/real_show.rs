@@ -117,18 +117,16 @@ impl Leader {
         self.ask(Request::Resume);
         self.wait_for(FOLLOWING);
         self.seek(11);
-        self.wait_for(FOLLOWING);
         self.control.desk.set(1, Mix { on: false, ..Mix::FULL });
+        self.wait_for(FOLLOWING);
         self.control.desk.set(0, Mix { motion: 0.4, ..Mix::FULL });
         self.control.desk.set_trim_ms(60);
         self.wait_for_film(13_000);
         self.seek(4);
         self.wait_for(FOLLOWING);
-        self.control.desk.set(0, Mix::FULL);
-        self.wait_for_film(6_400);
-        self.control.desk.set(1, Mix::FULL);
+        (0..2).for_each(|lane| self.control.desk.set(lane, Mix::FULL));
         self.control.desk.set_trim_ms(-20);
-        self.wait_for_film(8_200);
+        self.wait_for_film(7_600);
     }
 
     /// Stops, and says why the show does not go on.
