@@ -187,6 +187,17 @@ fn what_one_phase_of_the_grid_hides_is_found() {
 }
 
 #[test]
+fn motion_that_one_distance_is_blind_to_shows_at_the_other() {
+    // It repeats every 20 ms, which is the first distance at 100 Hz.
+    let rows: Vec<_> = (0..100).map(|row| (10, if row % 2 == 0 { 0.49 } else { 0.51 })).collect();
+    let proof = on_bench(&cue_text("spline", &rows));
+    let axis = &proof.axes[0];
+    assert!(axis.acceleration.value > 2.0 * axis.acceleration.limit, "{axis:?}");
+    assert!(axis.jerk.value > 2.0 * axis.jerk.limit, "{axis:?}");
+    assert!(axis.step.margin() < 0.0, "{axis:?}");
+}
+
+#[test]
 fn a_lower_level_breaks_less() {
     let text = "# interpolation: linear\ntime_ms,a1\n0,0.2\n1000,0.2\n2000,0.2\n";
     let timeline = timeline(text);
