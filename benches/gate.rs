@@ -147,8 +147,9 @@ fn pass_sound(sequences: u64) {
         "", "up to 0.9", "held", "looked", "up to 1", "held", "looked"
     );
     for (sort, [gentle, full]) in sound::SORTS.iter().zip(found) {
-        let [gentle, full] = [gentle, full]
-            .map(|of| format!("{:>9} {:>6} {:>6.1}%", of.sequences, of.wrong, 100.0 * of.looked / of.ticks));
+        let [gentle, full] = [gentle, full].map(|of| {
+            format!("{:>9} {:>6} {:>6.1}%", of.sequences, of.wrong, 100.0 * of.looked / of.ticks.max(1.0))
+        });
         println!("{sort:<28} {gentle}   {full}");
     }
 }

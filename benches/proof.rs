@@ -19,8 +19,9 @@ use kinocue::timeline::Timeline;
 const ROWS: u32 = 720_000;
 const AXES: usize = 6;
 const ROUNDS: usize = 7;
-/// The goal that the ratios are held against.
+/// The goal that the ratio is held against, and the rate that it is for.
 const GOAL: f64 = 1.0;
+const GOAL_RATE: f64 = 100.0;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -75,8 +76,11 @@ fn compare(path: &Path, what: &str, rate: f64) -> Outcome<()> {
     print_times("  cue::load and Timeline::new", &loads);
     print_times("  digest and proof", &proofs);
     let (low, middle, high) = spread(&ratios);
-    let verdict = if middle <= GOAL { "met" } else { "MISSED" };
-    println!("{:<42} {middle:>8.2} {low:>8.2} {high:>8.2}   goal {GOAL:.1}: {verdict}", "  ratio");
+    let verdict = match rate {
+        GOAL_RATE => format!("goal {GOAL:.1}: {}", if middle <= GOAL { "met" } else { "MISSED" }),
+        _ => String::new(),
+    };
+    println!("{:<42} {middle:>8.2} {low:>8.2} {high:>8.2}   {verdict}", "  ratio");
     Ok(())
 }
 

@@ -198,6 +198,8 @@ pub struct ControllerReport {
     pub send_failed: u64,
     /// Reports of the kernel that its port is closed.
     pub port_closed: u64,
+    /// Times that the last gate held its motion back.
+    pub clamps: u64,
     /// Ack latency, µs.
     pub ack_us: LatencyReport,
     /// What it last said of itself.

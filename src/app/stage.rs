@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::play::Control;
 use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
+use crate::gate::Counts;
 use crate::net::{DrainGrid, Sender};
 use crate::plan::PlanError;
 use crate::rt::{Accounts, AckLoop, Conductor, Ended, Mail, PlanLoop, Spinning, Spun, TickLoop};
@@ -38,6 +39,8 @@ pub(super) struct Run {
     pub(super) granted: RealTime,
     pub(super) spun: Spun,
     pub(super) refusals: Vec<PlanError>,
+    /// What the last gate had to do, lane by lane.
+    pub(super) clamps: Vec<Counts>,
     /// The instant of tick 0.
     pub(super) origin: MonoTime,
     /// The instant at which the accounts were closed.
@@ -90,6 +93,7 @@ impl Stage {
             let mut ticks =
                 TickLoop { clock: &clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave };
             let ended = ticks.run();
+            let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
             sent_all.store(true, Ordering::Release);
             done.store(true, Ordering::Release);
             plan_thread.thread().unpark();
@@ -97,7 +101,7 @@ impl Stage {
             let mut accounts = ack_thread.join().expect("the ack thread does not panic");
             let closed_at = Monotonic.now();
             accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-            Ok(Run { ended, accounts, granted, spun: clock.spun(), refusals, origin, closed_at })
+            Ok(Run { ended, clamps, accounts, granted, spun: clock.spun(), refusals, origin, closed_at })
         })
     }
 }

@@ -6,6 +6,7 @@ use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport
 use super::stage::Run;
 use crate::config::Controller;
 use crate::engine::{Ending, Show};
+use crate::gate::Clamp;
 use crate::health::Groups;
 
 /// What happened to controllers and to groups, in the order of time.
@@ -84,6 +85,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         stray: counts.stray,
         send_failed: counts.send_failed,
         port_closed: counts.port_closed,
+        clamps: run.clamps[index].clamps,
         ack_us: LatencyReport::of(tracker.latency(index)),
         state: StateReport::of(&run.accounts.observer.states()[index], run.closed_at),
     }
@@ -98,6 +100,16 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
             "{name}: its stroke of {stroke} mm was crossed in 3 s at the most (PA0b), so its way to park may have been \
              faster than 50 mm/s"
         )
+    }));
+    notes.extend(controllers.iter().zip(&run.clamps).filter_map(|(one, clamps)| {
+        let Clamp { axis, limit, times, .. } = clamps.worst?;
+        let axis = axis + 1;
+        let count = clamps.clamps;
+        Some(format!(
+            "{}: the last gate held its motion back {count} times, at the worst from {times:.2} times its limit of {limit} \
+             on axis {axis}; check the cue, and tell us if it passes",
+            one.name
+        ))
     }));
     if run.ended.unposted > 0 {
         notes.push(format!(

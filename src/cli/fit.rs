@@ -161,12 +161,14 @@ impl Report {
             let (mm, axis, at) = (self.change_mm, &self.change_axis, fitted.change.at);
             lines.push(format!("largest change of position: {mm:.3} mm ({axis} at {at})"));
         }
-        let changes: String = lines.iter().map(|line| format!("{}: {line}\n", self.cue)).collect();
-        let (before, after) =
-            (figures::proof_table(&fitted.before.axes), figures::proof_table(&fitted.after.axes));
+        let mut text: String = lines.iter().map(|line| format!("{}: {line}\n", self.cue)).collect();
+        let after = figures::proof_table(&fitted.after.axes);
+        text += &if fitted.before.passed() {
+            format!("\n{after}")
+        } else {
+            format!("\nbefore:\n{}\nafter:\n{after}", figures::proof_table(&fitted.before.axes))
+        };
         let Self { output, seat, rate_hz, .. } = self;
-        format!(
-            "{changes}\nbefore:\n{before}\nafter:\n{after}\n{output}: keeps all limits of seat {seat} at {rate_hz} frames a second"
-        )
+        text + &format!("\n{output}: keeps all limits of seat {seat} at {rate_hz} frames a second")
     }
 }

@@ -15,6 +15,7 @@ use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::engine::{Rate, Show};
 use crate::fanout::Manner;
+use crate::health::ACKS_OFF;
 use crate::sys::{signal, terminal};
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
@@ -121,6 +122,9 @@ pub(super) fn play(
     for controller in config.without_effects().filter(|_| uses_effects(&timeline)) {
         let name = &controller.name;
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
+    }
+    if manner.silent {
+        print::tell(&format!("kinocue: {ACKS_OFF}"));
     }
     let names = config.controllers.iter().map(|one| one.name.clone()).collect();
     let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;

@@ -15,7 +15,7 @@ use crate::time::ShowTime;
 pub(super) const HOLD_FRAMES: u8 = 3;
 
 /// How quickly the level of vibration changes, per second.
-const VIBRATION_RATE: f64 = 1.0;
+const VIBRATION_RATE: f64 = 4.0;
 
 /// What a lane does.
 #[derive(Debug, Clone, Copy, PartialEq)]

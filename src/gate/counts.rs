@@ -1,5 +1,7 @@
 //! What a gate had to do: plain data.
 
+use std::fmt;
+
 /// Clamps within a second that make a fault.
 const FAULT: usize = 3;
 /// The second they have to fall into, ms; also how long a single clamp may last before it is one.
@@ -20,6 +22,20 @@ pub enum Limit {
     Jerk,
     /// None yet, but no way to rest within the limits was found from there.
     WayOut,
+}
+
+impl fmt::Display for Limit {
+    /// What it limits.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Position => "position",
+            Self::Velocity => "velocity",
+            Self::Step => "change of velocity from frame to frame",
+            Self::Acceleration => "acceleration",
+            Self::Jerk => "jerk",
+            Self::WayOut => "a way to rest",
+        })
+    }
 }
 
 /// A pose that was not let pass.

@@ -9,7 +9,7 @@ use crate::timeline::Cubic;
 const ONE_STRETCH: i64 = 100_000_000;
 
 /// How much the greatest size may be overstated, by order: what is surely no worse than that is not looked at.
-const TOLERANCE: [f64; 3] = [0.002, 0.01, 0.01];
+const TOLERANCE: [f64; 3] = [0.002, 0.02, 0.02];
 
 /// A stretch of show time in which a limit is broken.
 #[derive(Debug, Clone, Copy, PartialEq)]

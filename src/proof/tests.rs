@@ -158,6 +158,25 @@ fn where_times_alternate_the_proof_of_a_smooth_cue_is_as_close() {
 }
 
 #[test]
+fn a_curve_that_is_held_at_an_end_of_the_stroke_is_proved_as_it_is_held() {
+    // Rises so steeply out of rest that it dips below 0 first, and is in mm, so that the slot holds it at a level too.
+    let rows = "# units: mm\ntime_ms,a1\n0,0\n100,0\n200,0\n300,30\n400,60\n500,60\n600,60\n";
+    let timeline = timeline(rows);
+    assert!(timeline.extremes()[0].min.value < -1.0, "it dips");
+    for level in [1.0, 0.7] {
+        let tried = brute(&timeline, &SeatType::bench3(1), 100.0, level);
+        let proof = prove(&timeline, terms(&timeline, SeatType::bench3(1), 100.0, level));
+        for ((what, proved), tried) in proof.axes[0].worst().iter().zip(tried) {
+            assert!(
+                proved.value >= tried * (1.0 - 1e-6) && proved.value <= 1.05 * tried,
+                "{what:?} {tried} {proved:?}"
+            );
+        }
+        assert_eq!(proof.axes[0].lowest.value, 0.0);
+    }
+}
+
+#[test]
 fn a_cue_within_all_limits_passes_and_its_margins_are_told() {
     let proof = on_bench("time_s,a1\n0,0.2\n1,0.5\n2,0.8\n3,0.5\n");
     assert!(proof.passed(), "{:?}", messages(&proof));
@@ -184,6 +203,17 @@ fn what_one_phase_of_the_grid_hides_is_found() {
     let proof =
         on_bench("# interpolation: linear\ntime_ms,a1\n0,0.5\n1002,0.5\n1005,0.52\n1008,0.5\n2000,0.5\n");
     assert!(proof.axes[0].velocity.value > 240.0, "{:?}", proof.axes[0]);
+}
+
+#[test]
+fn motion_that_one_distance_is_blind_to_shows_at_the_other() {
+    // It repeats every 20 ms, which is the first distance at 100 Hz.
+    let rows: Vec<_> = (0..100).map(|row| (10, if row % 2 == 0 { 0.49 } else { 0.51 })).collect();
+    let proof = on_bench(&cue_text("spline", &rows));
+    let axis = &proof.axes[0];
+    assert!(axis.acceleration.value > 2.0 * axis.acceleration.limit, "{axis:?}");
+    assert!(axis.jerk.value > 2.0 * axis.jerk.limit, "{axis:?}");
+    assert!(axis.step.margin() < 0.0, "{axis:?}");
 }
 
 #[test]
