@@ -6,23 +6,23 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use rtrb::{Consumer, Producer};
+
 use super::prepare::Preparation;
 use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
 use super::sum_up::sum_up;
-use rtrb::{Consumer, Producer};
-
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::{Rate, Show};
 use crate::fanout::{Lane, Manner};
 use crate::health::{Groups, Health};
-use crate::net::{NetError, Ports};
+use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
-use crate::rt::{AckLoop, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Watch, mailboxes};
+use crate::rt::{AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Watch, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -210,12 +210,7 @@ impl Play {
         } else {
             preparation.run(!self.manner.silent)
         };
-        let groups = Groups::of(&self.config.controllers);
-        let policy = self.config.show.loss_policy;
-        let ack_every = self.manner.ack_every(&self.config);
-        let health = Health::new(groups, policy, ack_every, show.rate.period());
-        let (controllers, lanes) = (&self.config.controllers, &self.staged.lanes);
-        acks.watched_by(Watch::new(health, controllers, lanes, sender.clone(), alarms, Arc::clone(live)));
+        acks.watched_by(watch(&self.config, self.manner, &self.staged, &sender, alarms, live));
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planner, timeline, requests, answers, retired };
@@ -233,6 +228,21 @@ impl Play {
         let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
         Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
     }
+}
+
+/// Who judges how the controllers of a play stand.
+fn watch(
+    config: &Config,
+    manner: Manner,
+    staged: &Staged,
+    sender: &Sender,
+    alarms: Producer<Alarm>,
+    live: &Arc<Live>,
+) -> Watch {
+    let groups = Groups::of(&config.controllers);
+    let (policy, ack_every) = (config.show.loss_policy, manner.ack_every(config));
+    let health = Health::new(groups, policy, ack_every, staged.show.rate.period());
+    Watch::new(health, &config.controllers, &staged.lanes, sender.clone(), alarms, Arc::clone(live))
 }
 
 fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {

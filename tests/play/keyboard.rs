@@ -140,17 +140,19 @@ fn level_trim_seeks_and_help_show_on_the_live_lines() {
 }
 
 #[test]
-fn a_stop_stays_until_it_is_cleared() {
+fn a_stop_stays_until_it_is_cleared_and_the_seats_park_once_they_have_been_read_again() {
     let mut terminal = Terminal::playing();
     terminal.press("s");
     terminal.wait_for("stopped: stopped by the operator; next: clear, then park or home");
     terminal.press("p");
     terminal.wait_for("cannot park while stopped: it stays so until it is cleared; clear first");
     terminal.press("c");
-    terminal.wait_for("recovering: cleared by the operator");
-    terminal.press("q");
-    let (run, _) = terminal.finish();
+    terminal.wait_for("recovering: cleared by the operator; next: park, or home");
+    terminal.press("p");
+    terminal.wait_for("parked: the seats have parked");
+    let (run, sim) = terminal.finish();
     assert_eq!(run.report_of(0)["result"], "stopped");
+    assert!(sim.end().rest_in_park());
 }
 
 #[test]
