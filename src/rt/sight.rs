@@ -104,7 +104,11 @@ impl Looker {
             self.seen.error = reply.error;
         }
         let word = |index| reply.data.get(index);
-        match (reply.channel, reply.start) {
+        // An answer with x over 2 does not say its channel; of what is asked here, start and count tell all the same.
+        let of_parameters = reply.channel == PARAMETERS
+            || (reply.code != ReplyCode::Running && (reply.start, reply.num) == MODE);
+        let channel = if of_parameters { PARAMETERS } else { reply.channel };
+        match (channel, reply.start) {
             (PARAMETERS, start) if start == MODE.0 => self.seen.mode = word(0).zip(word(2)),
             (MONITORS, start) if start == VERSIONS.0 => self.seen.versions = word(0).zip(word(1)),
             (MONITORS, PACKETS) => self.seen.packets = word(0),
@@ -146,5 +150,74 @@ impl Looker {
             }
         }
         Some(pose)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::from_to_args;
+    use crate::cue::{Source, read};
+    use crate::fanout::{Manner, lanes};
+    use crate::timeline::Timeline;
+    use crate::wire::{Words, position_words};
+
+    fn looker() -> Looker {
+        let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
+        let config = from_to_args(&["127.0.0.1:1".to_owned()], &[], 1).unwrap();
+        let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
+        let mut looker = Looker::new(&config.controllers[0], &lanes[0]);
+        looker.seen.asked = true;
+        looker
+    }
+
+    /// Answers to all that is asked, as a controller gives them in that state.
+    fn answer(looker: &mut Looker, code: ReplyCode, error: u16) -> Vec<bool> {
+        let is_well = code == ReplyCode::Running;
+        let stands = position_words(Pulses(75_000), Dialect::Smc);
+        let answers: [(u16, u16, &[u16]); 5] = [
+            (PARAMETERS, MODE.0, &[2, 0, 1]),
+            (MONITORS, RESET, &[RESET_DONE]),
+            (MONITORS, VERSIONS.0, &[1, 3]),
+            (MONITORS, PACKETS, &[77]),
+            (MONITORS, DP_POSITIONS[0], &stands),
+        ];
+        let hear = |(channel, start, words): (u16, u16, &[u16])| {
+            let num = u16::try_from(words.len()).unwrap();
+            let data = Words::from(words);
+            let channel = if is_well { channel } else { 0 };
+            let error = if is_well { 0 } else { error };
+            let reply = RegisterReply { access: Access::Read, code, channel, error, start, num, data };
+            looker.hear(reply.emit(&mut [0; MAX_LEN]))
+        };
+        answers.into_iter().map(hear).collect()
+    }
+
+    #[test]
+    fn what_a_controller_tells_is_taken_whole_and_once() {
+        let mut looker = looker();
+        assert_eq!(answer(&mut looker, ReplyCode::Running, 0), [true; 5]);
+        let (sighting, pose) = looker.take().unwrap();
+        let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
+        assert_eq!(sighting, Sighting { identity, error: 0, packets: Some(77), homed: true });
+        assert!((pose[0] - 0.25).abs() < 1e-3, "{pose:?}");
+        assert!(looker.take().is_none());
+    }
+
+    #[test]
+    fn one_with_an_error_is_heard_as_well_though_its_answers_name_no_channel() {
+        let mut looker = looker();
+        assert_eq!(answer(&mut looker, ReplyCode::Fault, 21), [true; 5]);
+        assert_eq!(looker.take().unwrap().0.error, 21);
+    }
+
+    #[test]
+    fn nothing_is_taken_that_nobody_asked_for() {
+        let mut looker = looker();
+        looker.seen.asked = false;
+        assert_eq!(answer(&mut looker, ReplyCode::Running, 0), [false; 5]);
+        assert!(looker.take().is_none());
     }
 }
