@@ -54,6 +54,7 @@ pub mod app;
 pub mod doctor;
 pub mod latency;
 
+pub mod hall;
 pub mod health;
 pub mod net;
 pub mod observe;

@@ -1,0 +1,139 @@
+//! What surfaces may ask of the hall.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::Role;
+use crate::time::ShowTime;
+
+/// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ask {
+    /// Home all controllers, with nobody on the seats.
+    Home,
+    /// Load a cue of the library.
+    Load {
+        /// Its id.
+        cue: String,
+    },
+    /// Load a playlist, or drop the one that is loaded.
+    Playlist {
+        /// Its id.
+        id: Option<String>,
+    },
+    /// Make an entry of the playlist the next to be played, counted from 0.
+    Select {
+        /// Which.
+        entry: usize,
+    },
+    /// Get ready to go.
+    Arm,
+    /// Stand down.
+    Disarm,
+    /// Start what is loaded.
+    Go,
+    /// Hold; the film waits.
+    Pause,
+    /// Go on.
+    Resume,
+    /// Go on elsewhere in the cue.
+    Seek(ShowTime),
+    /// Bring the seats to rest at once. Of all ways to ask, [`super::Handle::stop`] is the quick one.
+    Stop,
+    /// Bring the seats to their park poses.
+    Park,
+    /// Leave what is latched.
+    Clear,
+    /// How much later than the film the motion is, ms, -500 to 500.
+    Trim(i32),
+    /// Change levels and effects.
+    Levels(LevelsChange),
+    /// Set levels and effects as the preset of that name says.
+    Preset(String),
+    /// Take a controller's group in.
+    Enable(String),
+    /// Take a controller's group out: its seat parks.
+    Disable(String),
+    /// Ask all controllers for their registers and judge them.
+    Preflight,
+    /// Move each axis and effect of empty, armed seats slowly in turn, and store a table of acks and latency.
+    Test {
+        /// The rows whose seats move; none for all.
+        rows: Vec<String>,
+    },
+    /// Read the configuration anew.
+    Reload,
+}
+
+/// How much of a cue the seats make.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Levels {
+    /// Of the motion about the neutral pose, 0 to 1.
+    pub motion: f64,
+    /// Of the vibration, 0 to 1.
+    pub vibration: f64,
+    /// Whether each effect may be on.
+    pub effects: BTreeMap<String, bool>,
+    /// Of motion and vibration in each row, 0 to 1, on top of the hall's.
+    pub rows: BTreeMap<String, f64>,
+}
+
+/// A change of levels; what is not named stays as it is.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LevelsChange {
+    /// Of the motion about the neutral pose, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<f64>,
+    /// Of the vibration, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vibration: Option<f64>,
+    /// Whether an effect may be on, by its name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub effects: BTreeMap<String, bool>,
+    /// Of motion and vibration in a row, 0 to 1.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rows: BTreeMap<String, f64>,
+}
+
+impl Ask {
+    /// The word for it on every surface.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Home => "home",
+            Self::Load { .. } => "load",
+            Self::Playlist { .. } => "playlist",
+            Self::Select { .. } => "select",
+            Self::Arm => "arm",
+            Self::Disarm => "disarm",
+            Self::Go => "go",
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Seek(_) => "seek",
+            Self::Stop => "stop",
+            Self::Park => "park",
+            Self::Clear => "clear",
+            Self::Trim(_) => "trim",
+            Self::Levels(_) => "levels",
+            Self::Preset(_) => "preset",
+            Self::Enable(_) => "enable",
+            Self::Disable(_) => "disable",
+            Self::Preflight => "preflight",
+            Self::Test { .. } => "test",
+            Self::Reload => "reload",
+        }
+    }
+
+    /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.
+    #[must_use]
+    pub const fn least_role(&self) -> Role {
+        match self {
+            Self::Stop => Role::View,
+            Self::Home | Self::Clear | Self::Test { .. } | Self::Reload => Role::Engineer,
+            _ => Role::Operate,
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
+//! stop, which waits for neither.
+
+use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
+use std::time::Duration;
+
+use tokio::sync::{oneshot, watch};
+
+use super::{Ask, Code, Problem, Status, Who};
+use crate::rt::Desk;
+
+/// Asks that wait at the most; of a flood the rest is refused.
+const ASKS: usize = 64;
+/// How long an answer may take: a cue of two hours is proved meanwhile.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// What a surface wants, and on whose behalf.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Desired {
+    /// What.
+    pub ask: Ask,
+    /// Who.
+    pub who: Who,
+}
+
+/// An ask on its way to the keeper of the hall.
+#[derive(Debug)]
+pub struct Asked {
+    /// What, and who.
+    pub desired: Desired,
+    reply: oneshot::Sender<Result<Arc<Status>, Problem>>,
+}
+
+impl Asked {
+    /// Answers it: the state that it led to, or why it was not done.
+    pub fn answer(self, answer: Result<Arc<Status>, Problem>) {
+        drop(self.reply.send(answer)); // whoever asked may have gone
+    }
+}
+
+/// The keeper's end: asks come out, in the order in which they were asked.
+#[derive(Debug)]
+pub struct Inbox(mpsc::Receiver<Asked>);
+
+impl Inbox {
+    /// The next ask, waited for so long; none where nobody asked. None as well where all surfaces are gone.
+    #[must_use]
+    pub fn next(&self, wait: Duration) -> Option<Asked> {
+        match self.0.recv_timeout(wait) {
+            Ok(asked) => Some(asked),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => {
+                std::thread::sleep(wait);
+                None
+            }
+        }
+    }
+}
+
+/// Where the keeper puts the newest status.
+#[derive(Debug)]
+pub struct StatusSource(watch::Sender<Arc<Status>>);
+
+impl StatusSource {
+    /// Makes a status known to all who watch.
+    pub fn put(&self, status: Arc<Status>) {
+        self.0.send_replace(status);
+    }
+}
+
+/// A surface's end; one each.
+#[derive(Debug, Clone)]
+pub struct Handle {
+    asks: SyncSender<Asked>,
+    status: watch::Receiver<Arc<Status>>,
+    desk: Arc<Desk>,
+}
+
+/// The ends of a hall: for its surfaces, and for its keeper. `desk` is the tick thread's.
+#[must_use]
+pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
+    let (asks, inbox) = mpsc::sync_channel(ASKS);
+    let (source, status) = watch::channel(Arc::new(first));
+    (Handle { asks, status, desk }, Inbox(inbox), StatusSource(source))
+}
+
+impl Handle {
+    /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
+    pub fn stop(&self) {
+        self.desk.stop();
+    }
+
+    /// The newest status.
+    #[must_use]
+    pub fn status(&self) -> Arc<Status> {
+        Arc::clone(&self.status.borrow())
+    }
+
+    /// To be woken by each new status.
+    #[must_use]
+    pub fn watch(&self) -> watch::Receiver<Arc<Status>> {
+        self.status.clone()
+    }
+
+    /// Asks, and gives the state that it led to. A stop is set on its flag before it is queued for the journal.
+    ///
+    /// # Errors
+    /// [`Problem`] where it was not done.
+    pub async fn ask(&self, who: Who, ask: Ask) -> Result<Arc<Status>, Problem> {
+        if who.role < ask.least_role() {
+            let (word, least) = (ask.word(), ask.least_role());
+            let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
+            return Err(Problem::new(Code::Role, detail, "ask somebody who may"));
+        }
+        if ask == Ask::Stop {
+            self.stop();
+        }
+        let (reply, answer) = oneshot::channel();
+        self.asks.try_send(Asked { desired: Desired { ask, who }, reply }).map_err(|error| match error {
+            TrySendError::Full(_) => {
+                Problem::new(Code::Busy, format!("{ASKS} requests wait already"), "ask again in a second")
+            }
+            TrySendError::Disconnected(_) => gone(),
+        })?;
+        match tokio::time::timeout(PATIENCE, answer).await {
+            Ok(answer) => answer.unwrap_or_else(|_| Err(gone())),
+            Err(_) => Err(Problem::new(
+                Code::Timeout,
+                format!("no answer within {} s", PATIENCE.as_secs()),
+                "look at the status before asking again: it may still be done",
+            )),
+        }
+    }
+}
+
+fn gone() -> Problem {
+    Problem::new(Code::Timeout, "the hall is shutting down", "wait until the service is back")
+}

@@ -1,0 +1,111 @@
+//! Why something asked was not done, for every surface: one stable code each, with what to do.
+
+use std::fmt;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::state::Refusal;
+
+/// The kind of a problem. Its word is stable: programs may rely on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Code {
+    /// The state of the hall does not allow it.
+    State,
+    /// Who asked may not.
+    Role,
+    /// Nobody knows who asked, or their token is wrong.
+    Token,
+    /// A value is not what it may be.
+    Value,
+    /// There is nothing of that name.
+    Unknown,
+    /// The cue, playlist or configuration does not pass.
+    Check,
+    /// It came more than two seconds after it was asked.
+    Late,
+    /// The page or program that asked is not one of this server's.
+    Origin,
+    /// Too much at once.
+    Busy,
+    /// The hall did not answer in time.
+    Timeout,
+    /// A file could not be read or written.
+    File,
+    /// It is not built, or turned off in the configuration.
+    Off,
+}
+
+/// Why something was not done (RFC 9457).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct Problem {
+    /// The status of the HTTP reply.
+    pub status: u16,
+    /// Which kind.
+    pub code: Code,
+    /// What went wrong, with the value and the limit; no full stop.
+    pub detail: String,
+    /// What to do.
+    pub remedy: String,
+    /// Every fault, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<String>,
+}
+
+impl Code {
+    /// The status of the HTTP reply.
+    #[must_use]
+    pub const fn status(self) -> u16 {
+        match self {
+            Self::Value => 400,
+            Self::Token => 401,
+            Self::Role | Self::Origin => 403,
+            Self::Unknown => 404,
+            Self::State | Self::Late => 409,
+            Self::Check => 422,
+            Self::Busy => 429,
+            Self::File => 500,
+            Self::Off => 501,
+            Self::Timeout => 503,
+        }
+    }
+}
+
+impl Problem {
+    /// One of that kind.
+    #[must_use]
+    pub fn new(code: Code, detail: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self {
+            status: code.status(),
+            code,
+            detail: detail.into(),
+            remedy: remedy.into(),
+            faults: Vec::new(),
+        }
+    }
+
+    /// The same, with every fault.
+    #[must_use]
+    pub fn with(mut self, faults: Vec<String>) -> Self {
+        self.faults = faults;
+        self
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        let Refusal { state, asked, why } = refusal;
+        Self::new(Code::State, format!("cannot {asked} while {state}: {}", why.words()), why.remedy())
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}", self.detail, self.remedy)?;
+        self.faults.iter().try_for_each(|fault| write!(f, "\n{fault}"))
+    }
+}
+
+impl std::error::Error for Problem {}

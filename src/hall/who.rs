@@ -1,0 +1,70 @@
+//! Who asks, and what they may ask.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// What somebody may do; each role may do all that those before it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Look.
+    View,
+    /// Run the show.
+    Operate,
+    /// Home, arm, clear, load and change the library.
+    Engineer,
+}
+
+/// Which way somebody came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Surface {
+    /// The control socket of this machine.
+    Socket,
+    /// HTTP over TCP.
+    Http,
+    /// OSC over UDP.
+    Osc,
+    /// Lines of text over TCP.
+    Text,
+    /// The schedule of the playlist, armed by a person.
+    Schedule,
+    /// A signal to the process.
+    Signal,
+}
+
+/// Who asks: for the journal, and for what they may do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Who {
+    /// What they may do.
+    pub role: Role,
+    /// Which way they came.
+    pub surface: Surface,
+    /// Their name, as well as it is known: the user of the socket's peer, the name of a token, an address.
+    pub name: String,
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::View => "view",
+            Self::Operate => "operate",
+            Self::Engineer => "engineer",
+        })
+    }
+}
+
+impl fmt::Display for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let surface = match self.surface {
+            Surface::Socket => "socket",
+            Surface::Http => "http",
+            Surface::Osc => "osc",
+            Surface::Text => "text",
+            Surface::Schedule => "schedule",
+            Surface::Signal => "signal",
+        };
+        write!(f, "{} ({surface}, {})", self.name, self.role)
+    }
+}
