@@ -1,7 +1,7 @@
 //! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
 //! stop, which waits for neither.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
 use std::time::Duration;
 
@@ -60,9 +60,14 @@ impl Inbox {
 
 /// Where the keeper puts the newest status.
 #[derive(Debug)]
-pub struct StatusSource(watch::Sender<Arc<Status>>);
+pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Arc<Desk>>>);
 
 impl StatusSource {
+    /// From now on a stop goes to that desk: the hall was opened anew.
+    pub fn lead(&self, desk: Arc<Desk>) {
+        *self.1.write().unwrap_or_else(PoisonError::into_inner) = desk;
+    }
+
     /// Makes a status known to all who watch.
     pub fn put(&self, status: Arc<Status>) {
         self.0.send_replace(status);
@@ -74,7 +79,7 @@ impl StatusSource {
 pub struct Handle {
     asks: SyncSender<Asked>,
     status: watch::Receiver<Arc<Status>>,
-    desk: Arc<Desk>,
+    desk: Arc<RwLock<Arc<Desk>>>,
 }
 
 /// The ends of a hall: for its surfaces, and for its keeper. `desk` is the tick thread's.
@@ -82,13 +87,14 @@ pub struct Handle {
 pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
     let (asks, inbox) = mpsc::sync_channel(ASKS);
     let (source, status) = watch::channel(Arc::new(first));
-    (Handle { asks, status, desk }, Inbox(inbox), StatusSource(source))
+    let desk = Arc::new(RwLock::new(desk));
+    (Handle { asks, status, desk: Arc::clone(&desk) }, Inbox(inbox), StatusSource(source, desk))
 }
 
 impl Handle {
     /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
     pub fn stop(&self) {
-        self.desk.stop();
+        self.desk.read().unwrap_or_else(PoisonError::into_inner).stop();
     }
 
     /// The newest status.
