@@ -56,8 +56,11 @@ pub mod latency;
 
 pub mod hall;
 pub mod health;
+pub mod journal;
+pub mod library;
 pub mod net;
 pub mod observe;
+pub mod playlist;
 pub mod tracker;
 
 pub mod sys;

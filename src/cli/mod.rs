@@ -21,7 +21,9 @@ mod load;
 mod play;
 mod preflight;
 mod print;
+mod prove;
 mod register;
+mod report;
 mod sim;
 mod targets;
 pub mod times;
@@ -53,7 +55,11 @@ enum Command {
     Home(home::Args),
     Doctor(doctor::Args),
     Latency(latency::Args),
+    Report(report::Args),
     Completions(completions::Args),
+    /// Checks and proves one cue for the library, as a process of the lowest priority.
+    #[command(hide = true)]
+    Prove(prove::Args),
 }
 
 /// Runs the program on the process's arguments and says how it ends.
@@ -91,6 +97,8 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Latency(args) => latency::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Completions(args) => completions::run(&args),
+        Command::Prove(args) => prove::run(&args),
     }
 }

@@ -13,6 +13,10 @@ mod accept;
 mod effect_limits;
 mod fault;
 mod fit;
+mod level;
+mod library;
+mod log;
+mod preset;
 mod read;
 mod section;
 mod target;
@@ -21,8 +25,15 @@ mod tests;
 
 pub use crate::wire::{Dialect, Timing};
 pub use effect_limits::EffectLimit;
+pub(crate) use fault::Faults;
 pub use fault::{ConfigFault, ConfigFaults};
 pub use fit::{Amplitude, HallStroke, Misfit, Swing};
+pub use level::parse_level;
+pub(crate) use level::{level, switches, trim};
+pub use library::Store;
+pub use log::{Hours, Log};
+pub use preset::Preset;
+pub(crate) use section::{Entry, Section, did_you_mean};
 pub use target::{TargetError, from_to_args};
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
@@ -42,6 +53,12 @@ pub struct Config {
     pub effects: Vec<Effect>,
     /// How long, and how much of the time, effects may be on; at most one entry for each name.
     pub effect_limits: Vec<EffectLimit>,
+    /// Levels and effects by name, in the order of the names.
+    pub presets: Vec<Preset>,
+    /// What the library and the playlists are kept in.
+    pub store: Store,
+    /// Where the journal is kept, and how much of it.
+    pub log: Log,
     /// The controllers, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
 }
@@ -206,6 +223,19 @@ impl Config {
     #[must_use]
     pub fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
         (1..=cue_axes).filter(|&axis| !self.controllers.iter().any(|c| c.takes(axis - 1))).collect()
+    }
+
+    /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.
+    #[must_use]
+    pub fn playlists(&self) -> PathBuf {
+        let beside = || self.show.library.with_file_name("playlists");
+        self.store.playlists.clone().unwrap_or_else(beside)
+    }
+
+    /// The preset called `name`.
+    #[must_use]
+    pub fn preset(&self, name: &str) -> Option<&Preset> {
+        self.presets.iter().find(|preset| preset.name == name)
     }
 
     /// The seat type called `name`.

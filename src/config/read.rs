@@ -13,9 +13,12 @@ use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 use super::accept::acceptances;
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
+use super::library::store;
+use super::log::log;
+use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
 use super::{
-    Accept, Config, Controller, Dialect, Effect, FanOut, LossPolicy, MAX_FILE_LEN, Show, Timing,
+    Accept, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store, Timing,
     check_effect_name, check_peer, check_window,
 };
 
@@ -67,14 +70,18 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
+    let [preset_at, library_at, log_at] = ["preset", "library", "log"].map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
     let effects = effects_at.map_or_else(Vec::new, |entry| effects(entry, faults));
     let effect_limits = limits_at.map_or_else(Vec::new, |entry| effect_limits(entry, &effects, faults));
+    let presets = preset_at.map_or_else(Vec::new, |entry| presets(entry, &effects, faults));
+    let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
+    let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
-    Some(Config { show: show?, seats, effects, effect_limits, controllers })
+    Some(Config { show: show?, seats, effects, effect_limits, presets, store: store?, log: log?, controllers })
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {

@@ -20,6 +20,16 @@ fn with(more: &str) -> Result<Config, Vec<String>> {
     parse(&format!("{SEAT}{CONTROLLER}{more}"))
 }
 
+/// A sound configuration with `more` behind all else.
+pub(super) fn hall_with(more: &str) -> Config {
+    with(more).unwrap()
+}
+
+/// What is wrong with a configuration that is sound but for `more`.
+pub(super) fn faults_of(more: &str) -> Vec<String> {
+    with(more).unwrap_err()
+}
+
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/config").join(name)
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Role;
+use crate::config::Preset;
 use crate::time::ShowTime;
 
 /// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
@@ -135,5 +136,12 @@ impl Ask {
             Self::Home | Self::Clear | Self::Test { .. } | Self::Reload => Role::Engineer,
             _ => Role::Operate,
         }
+    }
+}
+
+impl From<&Preset> for LevelsChange {
+    fn from(preset: &Preset) -> Self {
+        let Preset { motion, vibration, effects, .. } = preset;
+        Self { motion: *motion, vibration: *vibration, effects: effects.clone(), rows: BTreeMap::new() }
     }
 }
