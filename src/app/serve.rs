@@ -15,7 +15,7 @@ use super::house::{House, HouseError, Numbers};
 use super::keeper::{Ends, Keeper, Left, Signals};
 use crate::config::Config;
 use crate::hall::{Handle, Status, handle};
-use crate::library::{Library, LibraryError};
+use crate::library::{self, Library, LibraryError};
 use crate::rt::Desk;
 use crate::sys::realtime;
 
@@ -88,7 +88,8 @@ pub fn serve<S, E: From<ServeError>>(
     let mut config = Arc::new(config);
     let signals = signals().map_err(ServeError::System)?;
     let (mark, crashed) = Mark::leave(&places.state)?;
-    let library = Library::open(&config.show.library, &places.config).map_err(ServeError::from)?;
+    let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))
+        .map_err(ServeError::from)?;
     let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new()).map_err(ServeError::from)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let mut ends = Ends { inbox, source, config: places.config.clone(), signals };

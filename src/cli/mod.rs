@@ -23,6 +23,7 @@ mod preflight;
 mod print;
 mod prove;
 mod register;
+mod serve;
 mod report;
 mod sim;
 mod targets;
@@ -54,6 +55,7 @@ enum Command {
     Register(register::Args),
     Home(home::Args),
     Doctor(doctor::Args),
+    Serve(serve::Args),
     Latency(latency::Args),
     Report(report::Args),
     Completions(completions::Args),
@@ -96,6 +98,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Register(args) => register::run(&args),
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Latency(args) => latency::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Completions(args) => completions::run(&args),

@@ -66,6 +66,8 @@ pub struct Config {
 /// How cues are played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Show {
+    /// What the hall is called.
+    pub name: String,
     /// Frames a second to every controller, 1 to 1,000.
     pub rate_hz: f64,
     /// What the Time field of a frame means.
@@ -87,6 +89,7 @@ pub struct Show {
 impl Default for Show {
     fn default() -> Self {
         Self {
+            name: "hall".to_owned(),
             rate_hz: 100.0,
             timing: Timing::Relative,
             bind: SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 8410),

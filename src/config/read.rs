@@ -91,6 +91,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
     let policy =
         [("continue", LossPolicy::Continue), ("pause", LossPolicy::Pause), ("park", LossPolicy::Park)];
     let show = Show {
+        name: section.text("name").unwrap_or(default.name),
         rate_hz: section.number_in("rate_hz", 1.0..=1000.0).unwrap_or(default.rate_hz),
         timing: section.choice("time", &timing).unwrap_or(default.timing),
         bind: section.address("bind").unwrap_or(default.bind),
