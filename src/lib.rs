@@ -60,6 +60,9 @@ pub mod net;
 pub mod observe;
 pub mod tracker;
 
+pub mod osc;
+pub mod text_port;
+
 pub mod sys;
 
 pub mod cli;

@@ -13,17 +13,22 @@ mod accept;
 mod effect_limits;
 mod fault;
 mod fit;
+mod osc;
 mod read;
 mod section;
+mod sources;
 mod target;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use crate::wire::{Dialect, Timing};
 pub use effect_limits::EffectLimit;
 pub use fault::{ConfigFault, ConfigFaults};
 pub use fit::{Amplitude, HallStroke, Misfit, Swing};
+pub use osc::{OscPort, OscWord};
 pub use target::{TargetError, from_to_args};
+pub use text::TextPort;
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
 pub const ALL_OUTPUTS: u16 = 0x0fff;
@@ -44,6 +49,10 @@ pub struct Config {
     pub effect_limits: Vec<EffectLimit>,
     /// The controllers, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
+    /// The port that takes OSC, where there is one.
+    pub osc: Option<OscPort>,
+    /// The port that takes lines of text, where there is one.
+    pub text: Option<TextPort>,
 }
 
 /// How cues are played.

@@ -13,7 +13,9 @@ use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 use super::accept::acceptances;
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
+use super::osc::osc;
 use super::section::{Entry, Section, did_you_mean};
+use super::text::text;
 use super::{
     Accept, Config, Controller, Dialect, Effect, FanOut, LossPolicy, MAX_FILE_LEN, Show, Timing,
     check_effect_name, check_peer, check_window,
@@ -64,6 +66,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
+    let [osc_at, text_at] = ["osc", "text"].map(|key| section.get(key));
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
@@ -74,7 +77,9 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let effect_limits = limits_at.map_or_else(Vec::new, |entry| effect_limits(entry, &effects, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
-    Some(Config { show: show?, seats, effects, effect_limits, controllers })
+    let osc = osc_at.and_then(|entry| osc(entry, faults));
+    let text = text_at.and_then(|entry| text(entry, faults));
+    Some(Config { show: show?, seats, effects, effect_limits, controllers, osc, text })
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {

@@ -85,6 +85,8 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         effects: with_bench_effects(named),
         effect_limits: Vec::new(),
         controllers,
+        osc: None,
+        text: None,
     })
 }
 
