@@ -63,6 +63,9 @@ pub mod observe;
 pub mod playlist;
 pub mod tracker;
 
+pub mod osc;
+pub mod text_port;
+
 pub mod sys;
 
 pub mod cli;

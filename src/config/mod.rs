@@ -17,11 +17,14 @@ mod level;
 mod library;
 mod log;
 mod preset;
+mod osc;
 mod read;
 mod section;
+mod sources;
 mod target;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use crate::wire::{Dialect, Timing};
 pub use effect_limits::EffectLimit;
@@ -34,7 +37,9 @@ pub use library::Store;
 pub use log::{Hours, Log};
 pub use preset::Preset;
 pub(crate) use section::{Entry, Section, did_you_mean};
+pub use osc::{OscPort, OscWord};
 pub use target::{TargetError, from_to_args};
+pub use text::TextPort;
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
 pub const ALL_OUTPUTS: u16 = 0x0fff;
@@ -61,6 +66,10 @@ pub struct Config {
     pub log: Log,
     /// The controllers, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
+    /// The port that takes OSC, where there is one.
+    pub osc: Option<OscPort>,
+    /// The port that takes lines of text, where there is one.
+    pub text: Option<TextPort>,
 }
 
 /// How cues are played.

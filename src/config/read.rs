@@ -16,7 +16,9 @@ use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::library::store;
 use super::log::log;
 use super::preset::presets;
+use super::osc::osc;
 use super::section::{Entry, Section, did_you_mean};
+use super::text::text;
 use super::{
     Accept, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store, Timing,
     check_effect_name, check_peer, check_window,
@@ -70,7 +72,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
-    let [preset_at, library_at, log_at] = ["preset", "library", "log"].map(|key| section.get(key));
+    let [preset_at, library_at, log_at, osc_at, text_at] =
+        ["preset", "library", "log", "osc", "text"].map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
@@ -81,7 +84,20 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
-    Some(Config { show: show?, seats, effects, effect_limits, presets, store: store?, log: log?, controllers })
+    let osc = osc_at.and_then(|entry| osc(entry, faults));
+    let text = text_at.and_then(|entry| text(entry, faults));
+    Some(Config {
+        show: show?,
+        seats,
+        effects,
+        effect_limits,
+        presets,
+        store: store?,
+        log: log?,
+        controllers,
+        osc,
+        text,
+    })
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {

@@ -89,6 +89,8 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         store: Store::default(),
         log: Log::default(),
         controllers,
+        osc: None,
+        text: None,
     })
 }
 

@@ -114,6 +114,14 @@ impl Handle {
     /// # Errors
     /// [`Problem`] where it was not done.
     pub async fn ask(&self, who: Who, ask: Ask) -> Result<Arc<Status>, Problem> {
+        self.post(who, ask)?.answer().await
+    }
+
+    /// The same in two parts, for whoever goes on reading meanwhile: what is posted is queued in the order of the calls.
+    ///
+    /// # Errors
+    /// [`Problem`] where it is not even queued: the role is too low, or too many wait.
+    pub fn post(&self, who: Who, ask: Ask) -> Result<Posted, Problem> {
         if who.role < ask.least_role() {
             let (word, least) = (ask.word(), ask.least_role());
             let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
@@ -129,7 +137,21 @@ impl Handle {
             }
             TrySendError::Disconnected(_) => gone(),
         })?;
-        match tokio::time::timeout(PATIENCE, answer).await {
+        Ok(Posted(answer))
+    }
+}
+
+/// Something asked that waits for its answer. Dropped, it is done all the same.
+#[derive(Debug)]
+pub struct Posted(oneshot::Receiver<Result<Arc<Status>, Problem>>);
+
+impl Posted {
+    /// The state that it led to.
+    ///
+    /// # Errors
+    /// [`Problem`] where it was not done.
+    pub async fn answer(self) -> Result<Arc<Status>, Problem> {
+        match tokio::time::timeout(PATIENCE, self.0).await {
             Ok(answer) => answer.unwrap_or_else(|_| Err(gone())),
             Err(_) => Err(Problem::new(
                 Code::Timeout,

@@ -55,6 +55,25 @@ pub struct Problem {
 }
 
 impl Code {
+    /// The word that programs rely on.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::State => "state",
+            Self::Role => "role",
+            Self::Token => "token",
+            Self::Value => "value",
+            Self::Unknown => "unknown",
+            Self::Check => "check",
+            Self::Late => "late",
+            Self::Origin => "origin",
+            Self::Busy => "busy",
+            Self::Timeout => "timeout",
+            Self::File => "file",
+            Self::Off => "off",
+        }
+    }
+
     /// The status of the HTTP reply.
     #[must_use]
     pub const fn status(self) -> u16 {

@@ -57,6 +57,8 @@ pub struct Status {
     pub controllers: Vec<ControllerStatus>,
     /// The last preflight.
     pub preflight: Option<PreflightStatus>,
+    /// The test of axes and effects that runs, or the last one.
+    pub test: Option<TestStatus>,
     /// What a person should know, gravest first.
     pub warnings: Vec<Warning>,
     /// The newest lines of the journal, newest first, at most 20.
@@ -258,6 +260,40 @@ pub struct PreflightStatus {
     pub answered: usize,
     /// The findings that are no `ok`, gravest first.
     pub findings: Vec<Warning>,
+}
+
+/// A test that moves each axis and switches each effect in turn.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct TestStatus {
+    /// Whether it runs; if not, the rows are its result.
+    pub running: bool,
+    /// What it does at present, or how it ended, in a few words.
+    pub step: String,
+    /// How many axes and effects have been through it.
+    pub done: usize,
+    /// How many it has to go through.
+    pub total: usize,
+    /// What has been through it so far, in the order of the test.
+    pub rows: Vec<TestRow>,
+}
+
+/// What a test found of one axis or effect of one controller.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct TestRow {
+    /// The controller.
+    pub controller: String,
+    /// The axis, `a1` and on, or the name of the effect.
+    pub part: String,
+    /// Frames that asked for a reply meanwhile.
+    pub asked: u64,
+    /// Of these: acked.
+    pub acked: u64,
+    /// Ack latency meanwhile, µs: half of them are no longer; null where none was acked.
+    pub p50_us: Option<f64>,
+    /// 99 of 100 of them are no longer, µs.
+    pub p99_us: Option<f64>,
+    /// Whether the controller took part as it should.
+    pub passed: bool,
 }
 
 /// How grave something is.
