@@ -10,6 +10,7 @@ use crate::motion::{MAX_AXES, SeatType};
 use crate::preflight::Check;
 
 mod accept;
+mod api;
 mod effect_limits;
 mod fault;
 mod fit;
@@ -27,6 +28,7 @@ mod tests;
 mod text;
 
 pub use crate::wire::{Dialect, Timing};
+pub use api::{Api, ApiToken};
 pub use effect_limits::EffectLimit;
 pub(crate) use fault::Faults;
 pub use fault::{ConfigFault, ConfigFaults};
@@ -70,6 +72,8 @@ pub struct Config {
     pub osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
     pub text: Option<TextPort>,
+    /// HTTP over TCP.
+    pub api: Api,
 }
 
 /// How cues are played.

@@ -11,6 +11,7 @@ use toml::de::DeTable;
 use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 
 use super::accept::acceptances;
+use super::api::api;
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::library::store;
@@ -20,8 +21,8 @@ use super::osc::osc;
 use super::section::{Entry, Section, did_you_mean};
 use super::text::text;
 use super::{
-    Accept, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store, Timing,
-    check_effect_name, check_peer, check_window,
+    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store,
+    Timing, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] octets.
@@ -69,6 +70,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
+    let api_at = section.get("api");
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
@@ -84,6 +86,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
+    let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
     Some(Config {
@@ -97,6 +100,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         controllers,
         osc,
         text,
+        api: api?,
     })
 }
 
