@@ -7,12 +7,16 @@ mod board;
 mod errand;
 mod homing;
 mod known;
+mod list;
 mod ready;
+mod record;
 mod show;
 mod status;
+mod sweep;
 mod warnings;
 
 use std::sync::Arc;
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -23,7 +27,7 @@ use crate::config::{self, Config};
 use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
 use crate::library::Library;
 use crate::rt::{Command, Line};
-use crate::state::State;
+use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 use board::Board;
@@ -37,6 +41,8 @@ use status::Rates;
 const LOOK: Duration = Duration::from_millis(10);
 /// From one status to the next.
 const TELL: Duration = Duration::from_millis(100);
+/// Notes that are kept.
+const NOTES: usize = 5;
 /// How long the tick thread has to answer a command; a tick takes a second at most.
 const ANSWER: Duration = Duration::from_secs(2);
 
@@ -93,8 +99,14 @@ pub struct Keeper {
     line: Option<Line>,
     library: Library,
     /// What went wrong lately and no state says, newest last.
-    notes: Vec<String>,
+    notes: VecDeque<String>,
+    list: Option<list::List>,
+    sweep: Option<sweep::Sweep>,
+    record: record::Records,
     reload: Option<Arc<Config>>,
+    /// A show has ended, and why.
+    show_over: bool,
+    ended: Cause,
 }
 
 impl Keeper {
@@ -119,8 +131,13 @@ impl Keeper {
             told: now,
             line: Some(line),
             library,
-            notes: Vec::new(),
+            notes: VecDeque::new(),
+            list: None,
+            sweep: None,
+            record: record::Records::default(),
             reload: None,
+            show_over: false,
+            ended: Cause::Started,
         }
     }
 
@@ -141,7 +158,10 @@ impl Keeper {
     /// Everything that nobody has to ask for.
     fn look_after(&mut self) {
         self.take_news();
+        self.end_show();
+        self.follow_sweep();
         self.end_errand();
+        self.heed_schedule();
         self.settle_homing();
         self.tell_readiness();
         self.heed_signals();
@@ -167,9 +187,33 @@ impl Keeper {
         if to == State::Homing {
             self.begin_homing();
         }
+        if to == State::Parking || to == State::Stopping {
+            self.ended = self.known.cause;
+        }
         if from.may_send_motion() && !to.may_send_motion() {
-            // The engine is done, or rests for good: the next show needs another.
+            self.show_over = true;
+        }
+    }
+
+    /// The engine is done, or rests for good: the next show needs another.
+    fn end_show(&mut self) {
+        if !std::mem::take(&mut self.show_over) {
+            return;
+        }
+        let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
+        self.end_record(how);
+        if self.end_sweep(how) {
             self.rewind();
+        } else {
+            self.on_show_over(self.ended);
+        }
+    }
+
+    /// Notes what no state says, for the warnings.
+    fn note(&mut self, note: String) {
+        self.notes.push_back(note);
+        if self.notes.len() > NOTES {
+            self.notes.pop_front();
         }
     }
 
@@ -213,7 +257,7 @@ impl Keeper {
         if self.ends.signals.reload.swap(false, Ordering::AcqRel)
             && let Err(problem) = self.reload()
         {
-            self.notes.push(problem.to_string());
+            self.note(problem.to_string());
         }
     }
 

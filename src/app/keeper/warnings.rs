@@ -25,7 +25,7 @@ impl Keeper {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
-        warnings.extend(self.notes.iter().rev().take(5).map(|note| Warning {
+        warnings.extend(self.notes.iter().rev().map(|note| Warning {
             id: "note".to_owned(),
             severity: Severity::Warning,
             controller: None,
