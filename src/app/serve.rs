@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::thread::Builder;
 
+use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
@@ -15,8 +16,8 @@ use super::house::{House, HouseError, Numbers};
 use super::keeper::{Ends, Keeper, Left, Signals};
 use crate::config::Config;
 use crate::hall::{Handle, Status, handle};
+use crate::journal::{Journal, Limits};
 use crate::library::{self, Library, LibraryError};
-use crate::rt::Desk;
 use crate::sys::realtime;
 
 /// Where the daemon has its files.
@@ -94,26 +95,27 @@ pub fn serve<S, E: From<ServeError>>(
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let mut ends = Ends { inbox, source, config: places.config.clone(), signals };
     let running = surfaces(handle, library.clone())?;
+    let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     loop {
-        let left = keep(house, ends, library.clone())?;
+        let left = keep(house, ends, library.clone(), journal)?;
         let Some(next) = left.reload else { break };
         // The seats are parked or at rest, so nothing tells of a crash.
         config = next;
         house = House::open(config, false, &left.closed.numbers).map_err(ServeError::from)?;
-        ends = left.ends;
+        (ends, journal) = (left.ends, left.journal);
     }
     drop(running);
     Ok(mark.take_away()?)
 }
 
 /// Runs one hall on this thread, with a keeper beside it.
-fn keep(house: House, ends: Ends, library: Library) -> Result<Left, ServeError> {
+fn keep(house: House, ends: Ends, library: Library, journal: Journal) -> Result<Left, ServeError> {
     let (tell, closed) = channel();
     let mut keeper = None;
     let mut failed = None;
     let run = house.run(|reins, line| {
         let leave = Arc::clone(&reins.leave);
-        let kept = Keeper::new(ends, reins, line, library);
+        let kept = Keeper::new(ends, reins, line, library, journal);
         let thread = Builder::new().name("keeper".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
             kept.run(&closed)

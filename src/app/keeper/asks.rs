@@ -24,8 +24,8 @@ impl Keeper {
             Ask::Arm => self.request(Request::Arm),
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
-                self.begin_record(&who.to_string());
-                self.request(Request::Go).inspect_err(|_| self.drop_record())
+                self.begin_record(&who.to_string(), who.surface);
+                self.request(Request::Go).inspect_err(|_| self.end_record(self.ended))
             }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),

@@ -8,7 +8,8 @@ use super::Keeper;
 use super::errand::Done;
 use super::show::{Cued, read};
 use crate::config::Config;
-use crate::hall::{Asked, Code, EntryStatus, PlaylistStatus, Problem};
+use crate::hall::{Asked, Code, EntryStatus, PlaylistStatus, Problem, Surface};
+use crate::journal::{PlaylistPlace, stamp};
 use crate::library::Library;
 use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, Then, next_start};
 use crate::rt::Command;
@@ -52,6 +53,11 @@ impl List {
         Ok(Self { id: id.to_string(), playlist, cues, current: 0, schedule: Schedule::default() })
     }
 
+    /// Where it is, for the record of a show.
+    pub(super) fn place(&self) -> PlaylistPlace {
+        PlaylistPlace { id: self.id.clone(), entry: self.current }
+    }
+
     fn entry(&self) -> &Entry {
         &self.playlist.entries[self.current]
     }
@@ -75,11 +81,6 @@ impl List {
             next_start: next_start(&self.playlist, now).map(|(_, start)| stamp(&start)),
         }
     }
-}
-
-/// An instant as RFC 3339 has it.
-pub(super) fn stamp(at: &Zoned) -> String {
-    at.strftime("%Y-%m-%dT%H:%M:%S%:z").to_string()
 }
 
 impl Keeper {
@@ -178,7 +179,7 @@ impl Keeper {
         if self.known.state == State::Homing {
             return Err(Problem::new(Code::State, "the seats have to be homed first", "arm, and go"));
         }
-        self.begin_record("schedule");
+        self.begin_record("the playlist", Surface::Schedule);
         self.command(Command::Request(Request::Go))
     }
 

@@ -25,6 +25,7 @@ use std::time::Duration;
 use super::house::{Closed, Reins};
 use crate::config::{self, Config};
 use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::journal::Journal;
 use crate::library::Library;
 use crate::rt::{Command, Line};
 use crate::state::{Cause, State};
@@ -34,6 +35,7 @@ use board::Board;
 use errand::Errand;
 use known::Known;
 use ready::Preflighted;
+use record::Records;
 use show::Cued;
 use status::Rates;
 
@@ -77,6 +79,8 @@ pub struct Left {
     pub closed: Box<Closed>,
     /// The configuration to open the next hall with; none where the program ends.
     pub reload: Option<Arc<Config>>,
+    /// The journal, still open.
+    pub journal: Journal,
 }
 
 /// The keeper of one hall.
@@ -102,7 +106,7 @@ pub struct Keeper {
     notes: VecDeque<String>,
     list: Option<list::List>,
     sweep: Option<sweep::Sweep>,
-    record: record::Records,
+    record: Records,
     reload: Option<Arc<Config>>,
     /// A show has ended, and why.
     show_over: bool,
@@ -112,7 +116,7 @@ pub struct Keeper {
 impl Keeper {
     /// The keeper of a hall that has just opened.
     #[must_use]
-    pub fn new(ends: Ends, reins: Reins, line: Line, library: Library) -> Self {
+    pub fn new(ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
         let now = Monotonic.now();
         let board = Board::new(&reins.config);
         ends.source.lead(Arc::clone(&reins.desk));
@@ -134,7 +138,7 @@ impl Keeper {
             notes: VecDeque::new(),
             list: None,
             sweep: None,
-            record: record::Records::default(),
+            record: Records::new(journal),
             reload: None,
             show_over: false,
             ended: Cause::Started,
@@ -150,7 +154,9 @@ impl Keeper {
             }
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
-                return Left { ends: self.ends, closed, reload: self.reload };
+                self.end_record(self.ended);
+                let journal = self.record.into_journal();
+                return Left { ends: self.ends, closed, reload: self.reload, journal };
             }
         }
     }
@@ -190,6 +196,8 @@ impl Keeper {
         if to == State::Parking || to == State::Stopping {
             self.ended = self.known.cause;
         }
+        let cause = self.cause();
+        self.record.event(format!("{to}: {cause}"));
         if from.may_send_motion() && !to.may_send_motion() {
             self.show_over = true;
         }
@@ -201,7 +209,7 @@ impl Keeper {
             return;
         }
         let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
-        self.end_record(how);
+        self.end_record(self.ended);
         if self.end_sweep(how) {
             self.rewind();
         } else {
@@ -245,6 +253,7 @@ impl Keeper {
 
     /// Answers an ask with the state that it led to.
     fn answer(&mut self, asked: Asked, result: Result<(), Problem>) {
+        self.write_down(&asked.desired, &result);
         let status = self.publish();
         asked.answer(result.map(|()| status));
     }

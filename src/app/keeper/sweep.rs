@@ -10,7 +10,7 @@ use super::errand::Done;
 use super::show::Cued;
 use crate::config::Config;
 use crate::cue::{self, Source};
-use crate::hall::{Asked, Code, Problem, TestRow, TestStatus};
+use crate::hall::{Asked, Code, Problem, Surface, TestRow, TestStatus};
 use crate::motion::MAX_AXES;
 use crate::rt::{Command, Row};
 use crate::state::{Request, State};
@@ -140,7 +140,7 @@ impl Keeper {
         sweep.before = self.cued.replace(cued).map(Box::new);
         self.sweep = Some(sweep);
         let begun = self.stage().and_then(|()| {
-            self.begin_record("test");
+            self.begin_record("a test of the seats", Surface::Socket);
             self.command(Command::Request(Request::Go))
         });
         begun.inspect_err(|_| self.end_sweep("did not begin"))

@@ -25,6 +25,13 @@ impl Keeper {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
+        warnings.extend(self.record.trouble().map(|trouble| Warning {
+            id: "journal".to_owned(),
+            severity: Severity::Warning,
+            controller: None,
+            text: trouble,
+            remedy: String::new(),
+        }));
         warnings.extend(self.notes.iter().rev().map(|note| Warning {
             id: "note".to_owned(),
             severity: Severity::Warning,
