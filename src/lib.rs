@@ -56,8 +56,11 @@ pub mod latency;
 
 pub mod hall;
 pub mod health;
+pub mod log;
+pub mod metrics;
 pub mod net;
 pub mod observe;
+pub mod sd;
 pub mod tracker;
 
 pub mod sys;
