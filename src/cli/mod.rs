@@ -18,6 +18,7 @@ mod home;
 mod info;
 mod latency;
 mod load;
+mod man;
 mod play;
 mod preflight;
 mod print;
@@ -54,6 +55,8 @@ enum Command {
     Doctor(doctor::Args),
     Latency(latency::Args),
     Completions(completions::Args),
+    #[command(hide = true)] // for those who make packages
+    Man(man::Args),
 }
 
 /// Runs the program on the process's arguments and says how it ends.
@@ -92,5 +95,6 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Doctor(args) => doctor::run(&args),
         Command::Latency(args) => latency::run(&args),
         Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     }
 }
