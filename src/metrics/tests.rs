@@ -219,3 +219,29 @@ fn a_name_cannot_break_out_of_its_label() {
         "kinocue_controller_enabled{controller=\"a\\\"} 1\\nkinocue_realtime 0\\\\\",row=\"A\"}"
     ));
 }
+
+/// Every name that begins with `kinocue_` in a text.
+fn names(text: &str) -> Vec<&str> {
+    let end = |c: char| !(c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    let found = text.match_indices("kinocue_").map(|(at, _)| text[at..].split(end).next().unwrap());
+    found.collect()
+}
+
+#[test]
+fn alerts_and_dashboard_ask_for_figures_that_exist() {
+    let page = page(&playing());
+    let exists = |name: &str| {
+        let suffixes = ["", "_total", "_info", "_bucket", "_sum", "_count"];
+        let of = |series: &String| series.split('{').next() == Some(name);
+        suffixes.iter().any(|suffix| name.strip_suffix(suffix).is_some_and(|family| page.families.contains(family)))
+            && page.samples.keys().any(of)
+    };
+    let rules = include_str!("../../systemd/prometheus/kinocue.rules.yml");
+    let dashboard = include_str!("../../systemd/grafana/kinocue.json");
+    serde_json::from_str::<serde_json::Value>(dashboard).unwrap();
+    for (file, text) in [("rules", rules), ("dashboard", dashboard)] {
+        let asked = names(text);
+        assert!(asked.len() > 10, "{file}");
+        assert!(asked.iter().all(|name| exists(name)), "{file}: {:?}", asked.iter().find(|name| !exists(name)));
+    }
+}
