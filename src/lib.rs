@@ -61,6 +61,11 @@ pub mod library;
 pub mod net;
 pub mod observe;
 pub mod playlist;
+pub mod log;
+pub mod metrics;
+pub mod net;
+pub mod observe;
+pub mod sd;
 pub mod tracker;
 
 pub mod osc;
