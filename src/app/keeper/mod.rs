@@ -13,7 +13,10 @@ mod record;
 mod show;
 mod status;
 mod sweep;
+mod voice;
 mod warnings;
+
+pub use voice::Voice;
 
 use std::sync::Arc;
 use std::collections::VecDeque;
@@ -59,6 +62,8 @@ pub struct Ends {
     pub config: PathBuf,
     /// What the system asks of the program.
     pub signals: Signals,
+    /// Whom to tell what happens.
+    pub voice: Voice,
 }
 
 /// What the system asks of the program; set by signals.
@@ -68,6 +73,14 @@ pub struct Signals {
     pub leave: Arc<AtomicBool>,
     /// Read the configuration anew.
     pub reload: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// Whether the program is to end.
+    #[must_use]
+    pub fn is_leaving(&self) -> bool {
+        self.leave.load(Ordering::Acquire)
+    }
 }
 
 /// What is left once the hall has closed.
@@ -197,6 +210,7 @@ impl Keeper {
             self.ended = self.known.cause;
         }
         let cause = self.cause();
+        self.say_state(to, &cause);
         self.record.event(format!("{to}: {cause}"));
         if from.may_send_motion() && !to.may_send_motion() {
             self.show_over = true;
@@ -247,6 +261,7 @@ impl Keeper {
     /// Puts the newest status where all can see it.
     fn publish(&mut self) -> Arc<Status> {
         let status = Arc::new(self.status());
+        self.speak(&status);
         self.ends.source.put(Arc::clone(&status));
         status
     }
@@ -259,7 +274,7 @@ impl Keeper {
     }
 
     fn heed_signals(&mut self) {
-        if self.ends.signals.leave.load(Ordering::Acquire) {
+        if self.ends.signals.is_leaving() {
             // Whatever moves parks first; the tick thread sees to that.
             self.reins.leave.store(true, Ordering::Release);
         }

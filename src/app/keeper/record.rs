@@ -73,6 +73,7 @@ impl Keeper {
             Err(problem) => format!("{}; {}", problem.detail, problem.remedy),
         };
         let state = self.known.state.to_string();
+        self.say_ask(&who, &what, &result, desired.ask.word());
         let line = JournalLine { at: at.clone(), who: who.clone(), what: what.clone(), result: result.clone() };
         self.record.newest.push_front(line);
         self.record.newest.truncate(NEWEST);
