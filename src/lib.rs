@@ -58,13 +58,13 @@ pub mod hall;
 pub mod health;
 pub mod journal;
 pub mod library;
+pub mod log;
+pub mod metrics;
 pub mod net;
 pub mod observe;
 pub mod playlist;
+pub mod sd;
 pub mod tracker;
-
-pub mod osc;
-pub mod text_port;
 
 pub mod sys;
 

@@ -8,15 +8,19 @@ use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::thread::Builder;
 
+use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use super::house::{House, HouseError, Numbers};
-use super::keeper::{Ends, Keeper, Left, Signals};
+use super::house::{House, HouseError, Numbers, Reins};
+use super::keeper::{Ends, Keeper, Left, Signals, Voice};
 use crate::config::Config;
+use crate::engine::Rate;
 use crate::hall::{Handle, Status, handle};
+use crate::journal::{Journal, Limits};
 use crate::library::{self, Library, LibraryError};
-use crate::rt::Desk;
+use crate::log::Log;
+use crate::sd::{self, Feeder};
 use crate::sys::realtime;
 
 /// Where the daemon has its files.
@@ -72,7 +76,7 @@ impl Mark {
     }
 }
 
-/// Runs the daemon until it is told to end. `surfaces` are started once the hall is open, and get the way to it; what it
+/// Runs the daemon until it is told to end. `tell` writes a line for people where there is no journal; `surfaces` are started once the hall is open, and get the way to it; what it
 /// returns lives as long as the daemon.
 ///
 /// # Errors
@@ -83,6 +87,7 @@ impl Mark {
 pub fn serve<S, E: From<ServeError>>(
     config: Config,
     places: &Places,
+    tell: impl FnMut(&str) + Send + 'static,
     surfaces: impl FnOnce(Handle, Library) -> Result<S, E>,
 ) -> Result<(), E> {
     let mut config = Arc::new(config);
@@ -92,28 +97,34 @@ pub fn serve<S, E: From<ServeError>>(
         .map_err(ServeError::from)?;
     let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new()).map_err(ServeError::from)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
-    let mut ends = Ends { inbox, source, config: places.config.clone(), signals };
+    let log = Log::start(tell).map_err(ServeError::System)?;
+    let voice = Voice::new(log.clone());
+    let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice };
     let running = surfaces(handle, library.clone())?;
+    let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     loop {
-        let left = keep(house, ends, library.clone())?;
+        let left = keep(house, ends, library.clone(), journal)?;
         let Some(next) = left.reload else { break };
         // The seats are parked or at rest, so nothing tells of a crash.
         config = next;
         house = House::open(config, false, &left.closed.numbers).map_err(ServeError::from)?;
-        ends = left.ends;
+        (ends, journal) = (left.ends, left.journal);
     }
     drop(running);
+    log.close();
     Ok(mark.take_away()?)
 }
 
 /// Runs one hall on this thread, with a keeper beside it.
-fn keep(house: House, ends: Ends, library: Library) -> Result<Left, ServeError> {
+fn keep(house: House, ends: Ends, library: Library, journal: Journal) -> Result<Left, ServeError> {
     let (tell, closed) = channel();
     let mut keeper = None;
     let mut failed = None;
+    let mut feeder = None;
     let run = house.run(|reins, line| {
         let leave = Arc::clone(&reins.leave);
-        let kept = Keeper::new(ends, reins, line, library);
+        feeder = feed_watchdog(&reins);
+        let kept = Keeper::new(ends, reins, line, library, journal);
         let thread = Builder::new().name("keeper".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
             kept.run(&closed)
@@ -130,8 +141,17 @@ fn keep(house: House, ends: Ends, library: Library) -> Result<Left, ServeError> 
         return Err(ServeError::System(cause));
     }
     drop(tell.send(Box::new(run)));
+    drop(feeder);
     let keeper = keeper.expect("it was started before the first tick");
     Ok(keeper.join().expect("the keeper does not panic"))
+}
+
+/// Feeds the watchdog of the service manager, where it has one, while the tick thread of this hall ticks.
+fn feed_watchdog(reins: &Reins) -> Option<Feeder> {
+    let live = Arc::clone(&reins.live);
+    let period = Rate::from_hz(reins.config.show.rate_hz).period();
+    // Where there is no thread for it, the service manager starts the program anew.
+    sd::watchdog().and_then(|interval| Feeder::start(interval, period, move || live.beats()).ok())
 }
 
 fn signals() -> io::Result<Signals> {

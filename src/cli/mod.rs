@@ -18,6 +18,7 @@ mod home;
 mod info;
 mod latency;
 mod load;
+mod man;
 mod play;
 mod preflight;
 mod print;
@@ -62,6 +63,8 @@ enum Command {
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
     Prove(prove::Args),
+    #[command(hide = true)] // for those who make packages
+    Man(man::Args),
 }
 
 /// Runs the program on the process's arguments and says how it ends.
@@ -103,5 +106,6 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Report(args) => report::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Prove(args) => prove::run(&args),
+        Command::Man(args) => man::run(&args),
     }
 }

@@ -41,7 +41,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let config = config::load(&args.config).or_exit(Exit::Config)?;
     let places = Places { config: args.config.clone(), state: args.state.clone() };
-    serve(config, &places, |_handle, _library| Ok::<_, Failure>(()))?;
+    serve(config, &places, super::print::tell, |_handle, _library| Ok::<_, Failure>(()))?;
     Ok(Exit::Done)
 }
 

@@ -79,7 +79,12 @@ impl<'t> Faults<'t> {
 
     /// The line of octet `at`, counted from 1.
     pub(crate) fn line(&self, at: usize) -> usize {
-        place(self.text.as_bytes(), at).0
+        self.place(at).0
+    }
+
+    /// Line and column of octet `at`, both counted from 1.
+    pub(crate) fn place(&self, at: usize) -> (usize, usize) {
+        place(self.text.as_bytes(), at)
     }
 
     /// Whether none has been noted.

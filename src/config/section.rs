@@ -84,6 +84,18 @@ impl<'t> Entry<'t> {
         switch
     }
 
+    /// One of a few words, as what it stands for.
+    pub(crate) fn choice<T: Copy>(&self, choices: &[(&str, T)], faults: &mut Faults<'_>) -> Option<T> {
+        let text = self.text(faults)?;
+        let chosen = choices.iter().find(|(word, _)| *word == text).map(|&(_, value)| value);
+        if chosen.is_none() {
+            let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
+            let hint = did_you_mean(text, words.iter().copied());
+            self.fault(faults, &format!("{text:?} is none of {}{hint}", words.join(", ")));
+        }
+        chosen
+    }
+
     /// A time of day, `19:00` or `19:00:30`.
     pub(crate) fn time(&self, faults: &mut Faults<'_>) -> Option<Time> {
         let text = self.text(faults)?;
@@ -211,19 +223,7 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
 
     /// One of a few words, as what it stands for.
     pub(crate) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
-        let entry = self.get(key)?;
-        let text = entry.text(self.faults)?;
-        let chosen = choices.iter().find(|(word, _)| *word == text).map(|&(_, value)| value);
-        if chosen.is_none() {
-            let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
-            let message = format!(
-                "{text:?} is none of {}{}",
-                words.join(", "),
-                did_you_mean(text, words.iter().copied())
-            );
-            entry.fault(self.faults, &message);
-        }
-        chosen
+        self.get(key)?.choice(choices, self.faults)
     }
 
     /// Notes every key that nothing asked for.

@@ -320,7 +320,7 @@ pub fn read(path: &Path, input: impl Read, source: &Source) -> Result<Cue, CueFa
 /// Whether a file that begins so is MCAP.
 #[must_use]
 pub fn is_mcap(front: &[u8]) -> bool {
-    front.starts_with(&mcap::MAGIC)
+    front.starts_with(mcap::MAGIC)
 }
 
 /// Reads a cue of our own: the content says whether it is MCAP, and a name in `.mcap` that it should be.

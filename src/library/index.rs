@@ -7,7 +7,7 @@ use std::io::{self, Read as _, Write as _};
 use serde::{Deserialize, Serialize};
 
 use super::Verdict;
-use super::folder::{Folder, Stamp};
+use crate::sys::folder::{Folder, Stamp};
 
 /// Its file; no cue can have that name.
 const FILE: &str = ".index.json";

@@ -7,14 +7,12 @@
 
 mod child;
 mod curve;
-mod folder;
 mod id;
 mod index;
 mod info;
 mod upload;
 
 pub use curve::{AxisCurve, CurveData, MAX_POINTS};
-pub(crate) use folder::Folder;
 pub use id::{CueId, Id, IdError};
 pub use info::{CueInfo, Proved, Verdict};
 pub use upload::Upload;
@@ -32,8 +30,8 @@ use sha2::{Digest as _, Sha256};
 use crate::config::{self, Store};
 use crate::cue::{self, Source, limits};
 use crate::hall::{Code, Problem};
+use crate::sys::folder::{Folder, Stamp};
 use crate::timeline::Timeline;
-use folder::Stamp;
 use index::Index;
 
 /// Curves that are kept; a page asks for the same one again and again.

@@ -7,9 +7,9 @@ use std::sync::atomic::Ordering;
 
 use sha2::{Digest as _, Sha256};
 
-use super::folder::Folder;
 use super::{CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
 use crate::hall::{Code, Problem};
+use crate::sys::folder::Folder;
 
 /// What the names of unfinished files begin with; no id does.
 pub(super) const UNFINISHED: &str = ".upload-";

@@ -3,6 +3,7 @@
 
 pub mod batch;
 pub mod clock;
+pub(crate) mod folder;
 pub mod humble;
 pub mod machine;
 pub mod realtime;

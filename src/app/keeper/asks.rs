@@ -13,14 +13,20 @@ impl Keeper {
     /// Does it, and answers.
     pub(super) fn on_asked(&mut self, asked: Asked) {
         self.take_news();
-        let Desired { ask, .. } = asked.desired.clone();
+        let Desired { ask, who } = asked.desired.clone();
         let result = match ask {
             Ask::Load { cue } => return self.load(&cue, asked),
+            Ask::Playlist { id } => return self.playlist(id.as_deref(), asked),
+            Ask::Select { entry } => return self.select(entry, asked),
+            Ask::Test { rows } => return self.test(&rows, asked),
             Ask::Preflight => return self.preflight(asked),
             Ask::Home => self.request(Request::Home),
             Ask::Arm => self.request(Request::Arm),
             Ask::Disarm => self.request(Request::Disarm),
-            Ask::Go => self.request(Request::Go),
+            Ask::Go => {
+                self.begin_record(&who.to_string(), who.surface);
+                self.request(Request::Go).inspect_err(|_| self.end_record(self.ended))
+            }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
             Ask::Park => self.request(Request::Park),
@@ -37,9 +43,7 @@ impl Keeper {
             Ask::Enable(name) => self.enable(&name, true),
             Ask::Disable(name) => self.enable(&name, false),
             Ask::Reload => self.reload(),
-            Ask::Preset(_) | Ask::Playlist { .. } | Ask::Select { .. } | Ask::Test { .. } => {
-                Err(Problem::new(Code::Off, format!("{} is not built", ask.word()), "do without"))
-            }
+            Ask::Preset(name) => self.preset(&name),
         };
         self.tell_readiness();
         self.answer(asked, result);
@@ -94,7 +98,16 @@ impl Keeper {
         Ok(())
     }
 
-    pub(super) fn levels(&mut self, change: &LevelsChange) -> Result<(), Problem> {
+    fn preset(&mut self, name: &str) -> Result<(), Problem> {
+        let Some(preset) = self.reins.config.preset(name) else {
+            let detail = format!("there is no preset {name}");
+            return Err(Problem::new(Code::Unknown, detail, "the status names the presets"));
+        };
+        let change = LevelsChange::from(preset);
+        self.levels(&change)
+    }
+
+    fn levels(&mut self, change: &LevelsChange) -> Result<(), Problem> {
         let before = self.board.clone();
         self.board.change(change)?;
         self.reset().inspect_err(|_| self.board = before)

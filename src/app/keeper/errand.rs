@@ -3,8 +3,10 @@
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use super::Keeper;
+use super::list::{List, Onward};
 use super::ready::Preflighted;
 use super::show::Cued;
+use super::sweep::Sweep;
 use crate::app::house::Finding;
 use crate::hall::{Asked, Code, Problem};
 use crate::rt::Line;
@@ -14,6 +16,12 @@ use crate::rt::Line;
 pub(super) enum Done {
     /// A cue is read and proved, or why not.
     Cued(Result<Box<Cued>, Problem>),
+    /// A playlist is checked, and the cue of its first entry proved, or why not.
+    Listed(Result<(Box<List>, Box<Cued>), Problem>),
+    /// The cue of an entry is proved, or why not; and what is to happen then.
+    Entry(usize, Onward, Result<Box<Cued>, Problem>),
+    /// A test of the seats is made, or why not.
+    Swept(Result<(Box<Sweep>, Box<Cued>), Problem>),
     /// The controllers were asked for all that preflight judges.
     Preflighted(Line, Box<Preflighted>),
     /// Controllers were homed.
@@ -70,6 +78,11 @@ impl Keeper {
         let asked = self.errand.take().and_then(|errand| errand.asked);
         let result = match done {
             Some(Done::Cued(cued)) => cued.and_then(|cued| self.take_up(*cued)),
+            Some(Done::Listed(listed)) => listed.and_then(|(list, cued)| self.take_up_list(*list, *cued)),
+            Some(Done::Entry(entry, onward, cued)) => {
+                cued.and_then(|cued| self.take_up_entry(entry, onward, *cued))
+            }
+            Some(Done::Swept(swept)) => swept.and_then(|(sweep, cued)| self.take_up_sweep(*sweep, *cued)),
             Some(Done::Preflighted(line, preflighted)) => {
                 self.line = Some(line);
                 self.preflighted = Some(*preflighted);
@@ -82,9 +95,11 @@ impl Keeper {
             }
             None => Err(Problem::new(Code::Check, "it ended before it was done", "look at the journal")),
         };
-        if let Some(asked) = asked {
-            self.tell_readiness();
-            self.answer(asked, result);
+        self.tell_readiness();
+        match (asked, result) {
+            (Some(asked), result) => self.answer(asked, result),
+            (None, Err(problem)) => self.note(problem.to_string()),
+            (None, Ok(())) => {}
         }
     }
 }

@@ -51,7 +51,7 @@ impl Keeper {
                     let _ = self.reins.orders.push(Order::Homed(index));
                 }
                 Err(error) => {
-                    self.notes.push(format!("{}: {error}", self.reins.config.controllers[controller].name));
+                    self.note(format!("{}: {error}", self.reins.config.controllers[controller].name));
                     failed.get_or_insert(controller);
                 }
             }

@@ -7,12 +7,19 @@ mod board;
 mod errand;
 mod homing;
 mod known;
+mod list;
 mod ready;
+mod record;
 mod show;
 mod status;
+mod sweep;
+mod voice;
 mod warnings;
 
+pub use voice::Voice;
+
 use std::sync::Arc;
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -21,15 +28,17 @@ use std::time::Duration;
 use super::house::{Closed, Reins};
 use crate::config::{self, Config};
 use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::journal::Journal;
 use crate::library::Library;
 use crate::rt::{Command, Line};
-use crate::state::State;
+use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 use board::Board;
 use errand::Errand;
 use known::Known;
 use ready::Preflighted;
+use record::Records;
 use show::Cued;
 use status::Rates;
 
@@ -37,6 +46,8 @@ use status::Rates;
 const LOOK: Duration = Duration::from_millis(10);
 /// From one status to the next.
 const TELL: Duration = Duration::from_millis(100);
+/// Notes that are kept.
+const NOTES: usize = 5;
 /// How long the tick thread has to answer a command; a tick takes a second at most.
 const ANSWER: Duration = Duration::from_secs(2);
 
@@ -51,6 +62,8 @@ pub struct Ends {
     pub config: PathBuf,
     /// What the system asks of the program.
     pub signals: Signals,
+    /// Whom to tell what happens.
+    pub voice: Voice,
 }
 
 /// What the system asks of the program; set by signals.
@@ -62,6 +75,14 @@ pub struct Signals {
     pub reload: Arc<AtomicBool>,
 }
 
+impl Signals {
+    /// Whether the program is to end.
+    #[must_use]
+    pub fn is_leaving(&self) -> bool {
+        self.leave.load(Ordering::Acquire)
+    }
+}
+
 /// What is left once the hall has closed.
 #[derive(Debug)]
 pub struct Left {
@@ -71,6 +92,8 @@ pub struct Left {
     pub closed: Box<Closed>,
     /// The configuration to open the next hall with; none where the program ends.
     pub reload: Option<Arc<Config>>,
+    /// The journal, still open.
+    pub journal: Journal,
 }
 
 /// The keeper of one hall.
@@ -93,14 +116,20 @@ pub struct Keeper {
     line: Option<Line>,
     library: Library,
     /// What went wrong lately and no state says, newest last.
-    notes: Vec<String>,
+    notes: VecDeque<String>,
+    list: Option<list::List>,
+    sweep: Option<sweep::Sweep>,
+    record: Records,
     reload: Option<Arc<Config>>,
+    /// A show has ended, and why.
+    show_over: bool,
+    ended: Cause,
 }
 
 impl Keeper {
     /// The keeper of a hall that has just opened.
     #[must_use]
-    pub fn new(ends: Ends, reins: Reins, line: Line, library: Library) -> Self {
+    pub fn new(ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
         let now = Monotonic.now();
         let board = Board::new(&reins.config);
         ends.source.lead(Arc::clone(&reins.desk));
@@ -119,8 +148,13 @@ impl Keeper {
             told: now,
             line: Some(line),
             library,
-            notes: Vec::new(),
+            notes: VecDeque::new(),
+            list: None,
+            sweep: None,
+            record: Records::new(journal),
             reload: None,
+            show_over: false,
+            ended: Cause::Started,
         }
     }
 
@@ -133,7 +167,9 @@ impl Keeper {
             }
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
-                return Left { ends: self.ends, closed, reload: self.reload };
+                self.end_record(self.ended);
+                let journal = self.record.into_journal();
+                return Left { ends: self.ends, closed, reload: self.reload, journal };
             }
         }
     }
@@ -141,7 +177,10 @@ impl Keeper {
     /// Everything that nobody has to ask for.
     fn look_after(&mut self) {
         self.take_news();
+        self.end_show();
+        self.follow_sweep();
         self.end_errand();
+        self.heed_schedule();
         self.settle_homing();
         self.tell_readiness();
         self.heed_signals();
@@ -167,9 +206,36 @@ impl Keeper {
         if to == State::Homing {
             self.begin_homing();
         }
+        if to == State::Parking || to == State::Stopping {
+            self.ended = self.known.cause;
+        }
+        let cause = self.cause();
+        self.say_state(to, &cause);
+        self.record.event(format!("{to}: {cause}"));
         if from.may_send_motion() && !to.may_send_motion() {
-            // The engine is done, or rests for good: the next show needs another.
+            self.show_over = true;
+        }
+    }
+
+    /// The engine is done, or rests for good: the next show needs another.
+    fn end_show(&mut self) {
+        if !std::mem::take(&mut self.show_over) {
+            return;
+        }
+        let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
+        self.end_record(self.ended);
+        if self.end_sweep(how) {
             self.rewind();
+        } else {
+            self.on_show_over(self.ended);
+        }
+    }
+
+    /// Notes what no state says, for the warnings.
+    fn note(&mut self, note: String) {
+        self.notes.push_back(note);
+        if self.notes.len() > NOTES {
+            self.notes.pop_front();
         }
     }
 
@@ -195,25 +261,27 @@ impl Keeper {
     /// Puts the newest status where all can see it.
     fn publish(&mut self) -> Arc<Status> {
         let status = Arc::new(self.status());
+        self.speak(&status);
         self.ends.source.put(Arc::clone(&status));
         status
     }
 
     /// Answers an ask with the state that it led to.
     fn answer(&mut self, asked: Asked, result: Result<(), Problem>) {
+        self.write_down(&asked.desired, &result);
         let status = self.publish();
         asked.answer(result.map(|()| status));
     }
 
     fn heed_signals(&mut self) {
-        if self.ends.signals.leave.load(Ordering::Acquire) {
+        if self.ends.signals.is_leaving() {
             // Whatever moves parks first; the tick thread sees to that.
             self.reins.leave.store(true, Ordering::Release);
         }
         if self.ends.signals.reload.swap(false, Ordering::AcqRel)
             && let Err(problem) = self.reload()
         {
-            self.notes.push(problem.to_string());
+            self.note(problem.to_string());
         }
     }
 

@@ -116,7 +116,7 @@ impl Keeper {
     }
 
     /// Whether another cue may be loaded.
-    fn may_load(&self) -> Result<(), Problem> {
+    pub(super) fn may_load(&self) -> Result<(), Problem> {
         let remedy = match self.known.state {
             State::Armed => "disarm first",
             state if state.may_send_motion() => "park first",
@@ -166,13 +166,13 @@ impl Keeper {
             cued.start = ShowTime::ZERO;
         }
         if let Err(problem) = self.stage() {
-            self.notes.push(problem.to_string());
+            self.note(problem.to_string());
             self.cued = None;
         }
     }
 }
 
-fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<Cued>, Problem> {
+pub(super) fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<Cued>, Problem> {
     let (timeline, sha256) = library.read(id)?;
     Cued::prove(id.to_string(), config, timeline, sha256).map(Box::new)
 }

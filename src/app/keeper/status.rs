@@ -68,10 +68,10 @@ impl Keeper {
             lapses_s: self.known.lapses(now),
             moving,
             show: self.cued.as_ref().map(|cued| cued.status(position(cued))),
-            playlist: None,
+            playlist: self.list.as_ref().map(|list| list.status(&jiff::Zoned::now())),
             trim_ms: self.board.trim_ms,
             levels: self.board.levels.clone(),
-            presets: Vec::new(),
+            presets: self.reins.config.presets.iter().map(|preset| preset.name.clone()).collect(),
             ticks: live.beats(),
             missed_ticks: live.missed(),
             rate_hz: self.reins.config.show.rate_hz,
@@ -86,7 +86,8 @@ impl Keeper {
             controllers: self.controllers(&table, now),
             preflight: self.preflighted.as_ref().map(|it| it.status(now, |lane| self.board.is_on(lane))),
             warnings: self.warnings(&table),
-            journal: Vec::new(),
+            test: self.sweep.as_ref().map(|sweep| sweep.status.clone()),
+            journal: self.record.newest(),
         }
     }
 

@@ -25,7 +25,14 @@ impl Keeper {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
-        warnings.extend(self.notes.iter().rev().take(5).map(|note| Warning {
+        warnings.extend(self.record.trouble().map(|trouble| Warning {
+            id: "journal".to_owned(),
+            severity: Severity::Warning,
+            controller: None,
+            text: trouble,
+            remedy: String::new(),
+        }));
+        warnings.extend(self.notes.iter().rev().map(|note| Warning {
             id: "note".to_owned(),
             severity: Severity::Warning,
             controller: None,

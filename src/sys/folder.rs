@@ -20,7 +20,7 @@ pub(crate) struct Stamp {
 }
 
 impl Stamp {
-    fn of(file: &File) -> io::Result<Self> {
+    pub(crate) fn of(file: &File) -> io::Result<Self> {
         use std::os::unix::fs::MetadataExt as _;
         let metadata = file.metadata()?;
         let mtime = (metadata.mtime(), metadata.mtime_nsec().unsigned_abs());
@@ -94,6 +94,36 @@ impl Folder {
         let fd = rustix::fs::openat(&self.fd, name, flags, mode)?;
         rustix::fs::flock(&fd, FlockOperation::NonBlockingLockExclusive)?;
         Ok(File::from(fd))
+    }
+
+    /// Opens a regular file, made where there is none, to write at its end.
+    pub(crate) fn append(&self, name: &str) -> io::Result<File> {
+        let flags = OFlags::RDWR
+            | OFlags::APPEND
+            | OFlags::CREATE
+            | OFlags::NOFOLLOW
+            | OFlags::NONBLOCK
+            | OFlags::CLOEXEC;
+        let mode = Mode::RUSR | Mode::WUSR | Mode::RGRP;
+        let fd = rustix::fs::openat(&self.fd, name, flags, mode)?;
+        if FileType::from_raw_mode(rustix::fs::fstat(&fd)?.st_mode) != FileType::RegularFile {
+            return Err(io::Error::other(format!("{name} is no regular file")));
+        }
+        Ok(File::from(fd))
+    }
+
+    /// Marks the folder as being written to, for as long as this is open; false where somebody else has.
+    pub(crate) fn claim(&self) -> bool {
+        rustix::fs::flock(&self.fd, FlockOperation::NonBlockingLockExclusive).is_ok()
+    }
+
+    /// Whether somebody has claimed the folder.
+    pub(crate) fn is_claimed(&self) -> bool {
+        let shared = rustix::fs::flock(&self.fd, FlockOperation::NonBlockingLockShared);
+        if shared.is_ok() {
+            let _ = rustix::fs::flock(&self.fd, FlockOperation::Unlock);
+        }
+        shared == Err(Errno::WOULDBLOCK)
     }
 
     /// Removes a file that nobody has locked.
