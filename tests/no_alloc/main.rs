@@ -13,7 +13,7 @@ use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
 use kinocue::health::{Groups, Health, Notice};
 use kinocue::motion::MAX_AXES;
-use kinocue::rt::{Alarm, Command, News};
+use kinocue::rt::{Alarm, News};
 use kinocue::state::{Event, Machine, Request, Ride, State, Why};
 use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::FrameNo;
@@ -109,7 +109,7 @@ fn entered(news: &News) -> Option<State> {
 
 fn refusal(news: &News) -> Option<Why> {
     match news {
-        News::Entered { .. } => None,
+        News::Entered { .. } | News::Taken | News::NotLoaded(_) => None,
         News::Refused(refusal) => Some(refusal.why),
     }
 }
