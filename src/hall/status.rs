@@ -93,6 +93,7 @@ impl Status {
             controllers: Vec::new(),
             preflight: None,
             warnings: Vec::new(),
+            test: None,
             journal: Vec::new(),
         }
     }

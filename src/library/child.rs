@@ -77,8 +77,7 @@ fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
             return Err(io::Error::other("it printed more than any verdict is long"));
         }
     }
-    let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw).expect("a process has an id above 0");
-    let ended = pidfd_open(pid, PidfdFlags::empty())?;
+    let ended = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
     wait_for(&PollFd::new(&ended, PollFlags::IN), deadline)?;
     Ok(output)
 }

@@ -19,7 +19,7 @@ use crate::config::Config;
 use crate::engine::{Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::health::{Groups, Health};
-use crate::net::{DrainGrid, NetError, Ports};
+use crate::net::{DrainGrid, NetError};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
@@ -163,7 +163,8 @@ impl House {
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, rate.period());
-            let ack_thread = Builder::new().name("acks".to_owned()).spawn_scoped(scope, || {
+            let over = &over;
+            let ack_thread = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
                 let _ = realtime::normal_priority();
                 acks.run(&Monotonic, drains, || over.load(Ordering::Acquire))
             });

@@ -47,7 +47,7 @@ impl List {
                 .with(faults));
         }
         let about = |entry: &Entry| {
-            library.get(&entry.cue).map_or((None, 0.0), |info| (info.title, info.length_s))
+            library.get(&entry.cue).map_or((None, 0.0), |info| (info.title, info.length_s.unwrap_or(0.0)))
         };
         let cues = playlist.entries.iter().map(about).collect();
         Ok(Self { id: id.to_string(), playlist, cues, current: 0, schedule: Schedule::default() })

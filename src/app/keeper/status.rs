@@ -92,7 +92,7 @@ impl Keeper {
     }
 
     /// Why the hall is in its state, with the name of whom that is about.
-    fn cause(&self) -> String {
+    pub(super) fn cause(&self) -> String {
         let cause = self.known.cause;
         let config = &self.reins.config;
         match cause.whose() {

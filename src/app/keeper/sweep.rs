@@ -143,7 +143,9 @@ impl Keeper {
             self.begin_record("a test of the seats", Surface::Socket);
             self.command(Command::Request(Request::Go))
         });
-        begun.inspect_err(|_| self.end_sweep("did not begin"))
+        begun.inspect_err(|_| {
+            self.end_sweep("did not begin");
+        })
     }
 
     /// Follows a test that is under way.

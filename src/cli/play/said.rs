@@ -37,6 +37,7 @@ impl Said {
         let (state, cause, next) = match *news {
             News::Entered { state, cause, next, .. } => (state, cause, next),
             News::Refused(refusal) => return refusal.to_string(),
+            News::Taken | News::NotLoaded(_) => return String::new(),
         };
         let mut text = match (state, cause) {
             (State::Playing(_), Cause::Asked(Request::Go)) => {
