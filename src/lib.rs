@@ -54,6 +54,7 @@ pub mod app;
 pub mod doctor;
 pub mod latency;
 
+pub mod api;
 pub mod hall;
 pub mod health;
 pub mod journal;

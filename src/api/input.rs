@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 
 use super::problem::bad_value;
 use crate::hall::{Code, Problem};
+use crate::library;
 
 /// The longest body outside of uploads, octets.
 pub(super) const MAX_BODY: usize = 64 << 10;
@@ -30,8 +31,8 @@ pub(super) struct Nothing;
 /// A name in the path: of a controller, a preset.
 pub(super) struct Name(pub(super) String);
 
-/// An id in the path: of a cue, a day.
-pub(super) struct Id(pub(super) String);
+/// An id in the path: of a cue.
+pub(super) struct Id(pub(super) library::Id);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Json<T> {
     type Rejection = Problem;
@@ -77,27 +78,20 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let id = in_path(parts, state).await?;
-        check_id(&id)?;
-        Ok(Self(id))
+        id(&in_path(parts, state).await?).map(Self)
     }
 }
 
-async fn in_path<S: Send + Sync>(parts: &mut Parts, state: &S) -> Result<String, Problem> {
+pub(super) async fn in_path<S: Send + Sync>(parts: &mut Parts, state: &S) -> Result<String, Problem> {
     let Path(text) = Path::<String>::from_request_parts(parts, state)
         .await
         .map_err(|_| bad_value("the path is no UTF-8", "write it as it stands in the status"))?;
     Ok(text)
 }
 
-/// Whether something can be the id of a cue or a playlist: `[a-z0-9_-]{1,64}`, and so never a path.
-pub(super) fn check_id(id: &str) -> Result<(), Problem> {
-    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
-    if (1..=MAX_NAME).contains(&id.len()) && id.chars().all(fits) {
-        return Ok(());
-    }
-    let remedy = format!("an id has 1 to {MAX_NAME} characters of a to z, 0 to 9, _ and -");
-    Err(bad_value(format!("{id:?} is no id"), remedy))
+/// A text as the id of a cue or a playlist, which is never a path.
+pub(super) fn id(text: &str) -> Result<library::Id, Problem> {
+    text.parse().map_err(|error: library::IdError| bad_value(error.to_string(), "name it as the lists do"))
 }
 
 /// The body, of at most [`MAX_BODY`] octets.
@@ -185,13 +179,5 @@ mod tests {
         let mut headers = HeaderMap::new();
         headers.insert(CONTENT_LENGTH, HeaderValue::from(MAX_BODY + 1));
         assert_eq!(check_length(&headers, MAX_BODY as u64).unwrap_err().status, 413);
-    }
-
-    #[test]
-    fn an_id_is_never_a_path() {
-        assert!(check_id("storm_2-a").is_ok() && check_id(&"a".repeat(64)).is_ok());
-        for bad in ["", "..", "a/b", "A", "a.csv", "ä", "a b", &"a".repeat(65)] {
-            assert!(check_id(bad).is_err(), "{bad}");
-        }
     }
 }
