@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod ask;
 mod check;
+mod client;
 mod completions;
 mod convert;
 mod decode;
@@ -53,6 +54,8 @@ enum Command {
     Home(home::Args),
     Doctor(doctor::Args),
     Latency(latency::Args),
+    #[command(flatten)]
+    Client(client::Command),
     Completions(completions::Args),
 }
 
@@ -91,6 +94,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Latency(args) => latency::run(&args),
+        Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),
     }
 }
