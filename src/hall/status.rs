@@ -1,10 +1,13 @@
 //! What the hall says of itself. The keeper makes one of these ten times a second and after every change; every surface shows
 //! this and nothing else.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::Levels;
+use crate::state::{Cause, Next, State};
 
 /// The whole state of the hall.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -60,6 +63,40 @@ pub struct Status {
     pub warnings: Vec<Warning>,
     /// The newest lines of the journal, newest first, at most 20.
     pub journal: Vec<JournalLine>,
+}
+
+impl Status {
+    /// That of a hall of which nothing is known yet.
+    #[must_use]
+    pub fn starting(hall: &str) -> Self {
+        Self {
+            hall: hall.to_owned(),
+            version: env!("CARGO_PKG_VERSION"),
+            uptime_s: 0.0,
+            state: State::Boot.word(),
+            cause: Cause::Started.to_string(),
+            next: Next::AwaitAnswers.to_string(),
+            since_s: 0.0,
+            lapses_s: None,
+            moving: false,
+            show: None,
+            playlist: None,
+            trim_ms: 0,
+            levels: Levels { motion: 1.0, vibration: 1.0, effects: BTreeMap::new(), rows: BTreeMap::new() },
+            presets: Vec::new(),
+            ticks: 0,
+            missed_ticks: 0,
+            rate_hz: 0.0,
+            lateness: Percentiles::default(),
+            ack_latency: Percentiles::default(),
+            realtime: RealTimeStatus::default(),
+            controllers: Vec::new(),
+            preflight: None,
+            warnings: Vec::new(),
+            test: None,
+            journal: Vec::new(),
+        }
+    }
 }
 
 /// What is loaded, and where in it the hall is.

@@ -114,7 +114,7 @@ fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
     let is_mcap = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     let media = if is_mcap { "application/vnd.mcap" } else { "text/csv" };
     let request = http::request(Method::PUT, &format!("/api/v1/cues/{}", in_path(&id)), Some(media), body)?;
-    let reply = http::block_on(http::exchange(server.socket(), request, PATIENCE))?;
+    let reply = http::block_on(http::exchange(&server.socket(), request, PATIENCE))?;
     server.show(&reply)?;
     reply::done(&reply)?;
     print::tell(&format!("kinocue: {id} is in the library; next: kinocue load {id}"));

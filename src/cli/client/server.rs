@@ -1,6 +1,6 @@
 //! Where the daemon is, and the one way in which all commands ask it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use http_body_util::Full;
@@ -13,6 +13,10 @@ use super::reply;
 use super::view::Status;
 use crate::cli::{Exit, Failure, print};
 
+/// The environment variable that names the socket. Not clap's to read, for which it would count as an argument.
+const SOCKET_VARIABLE: &str = "KINOCUE_SOCKET";
+/// Where the service has its socket.
+const SOCKET: &str = "/run/kinocue/control.sock";
 /// How long an answer may take: the daemon itself gives up after a minute.
 const PATIENCE: Duration = Duration::from_secs(65);
 
@@ -20,9 +24,9 @@ const PATIENCE: Duration = Duration::from_secs(65);
 // Where the daemon is, and how its replies are shown.
 #[derive(Debug, Clone, clap::Args)]
 pub(in crate::cli) struct ServerArgs {
-    /// The control socket of the daemon.
-    #[arg(long, value_name = "PATH", env = "KINOCUE_SOCKET", default_value = "/run/kinocue/control.sock")]
-    pub(super) socket: PathBuf,
+    /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
     /// Print the JSON of the reply as it came.
     #[arg(long)]
     pub(super) json: bool,
@@ -30,14 +34,15 @@ pub(in crate::cli) struct ServerArgs {
 
 impl ServerArgs {
     /// Where the daemon listens.
-    pub(super) fn socket(&self) -> &Path {
-        &self.socket
+    pub(super) fn socket(&self) -> PathBuf {
+        let named = || std::env::var_os(SOCKET_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
+        self.socket.clone().or_else(named).unwrap_or_else(|| PathBuf::from(SOCKET))
     }
 
     /// Looks something up.
     pub(super) fn get(&self, path: &str) -> Result<Reply, Failure> {
         let request = http::request(Method::GET, path, None, Full::<Bytes>::default())?;
-        http::block_on(http::exchange(self.socket(), request, PATIENCE))
+        http::block_on(http::exchange(&self.socket(), request, PATIENCE))
     }
 
     /// The status of the hall.
@@ -74,7 +79,7 @@ impl ServerArgs {
     async fn change(&self, method: Method, path: &str, body: &Value) -> Result<Status, Failure> {
         let body = Full::new(Bytes::from(body.to_string()));
         let request = http::request(method, path, Some("application/json"), body)?;
-        let reply = http::exchange(self.socket(), request, PATIENCE).await?;
+        let reply = http::exchange(&self.socket(), request, PATIENCE).await?;
         self.show(&reply)?;
         reply::status(&reply)
     }

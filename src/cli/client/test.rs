@@ -110,7 +110,7 @@ fn follow(server: &ServerArgs, begun: Status) -> Result<Outcome, Failure> {
 }
 
 async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<Outcome, Failure> {
-    let mut events = Events::open(server.socket()).await?;
+    let mut events = Events::open(&server.socket()).await?;
     loop {
         let gone = |why| anyhow!("the daemon is gone: {why}; look at the seats, and at `kinocue status`");
         let data = events.next().await.map_err(gone).or_exit(Exit::Unavailable)?;

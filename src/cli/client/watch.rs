@@ -42,7 +42,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 
 async fn follow(server: &ServerArgs, shown: &mut Shown) -> Result<Exit, Failure> {
     // A daemon that is not there at all is a fault; one that goes is waited for.
-    let mut events = Events::open(server.socket()).await?;
+    let mut events = Events::open(&server.socket()).await?;
     loop {
         let why = loop {
             match events.next().await {
@@ -54,7 +54,7 @@ async fn follow(server: &ServerArgs, shown: &mut Shown) -> Result<Exit, Failure>
         shown.gone(&format!("the daemon at {} is gone: {why}; waiting for it", server.socket().display()));
         events = loop {
             sleep(AGAIN).await;
-            match Events::open(server.socket()).await {
+            match Events::open(&server.socket()).await {
                 Ok(events) => break events,
                 Err(failure) if failure.exit == Exit::NotAllowed => return Err(failure),
                 Err(_) => {}
