@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod ask;
 mod check;
+mod client;
 mod completions;
 mod convert;
 mod decode;
@@ -59,6 +60,8 @@ enum Command {
     Serve(serve::Args),
     Latency(latency::Args),
     Report(report::Args),
+    #[command(flatten)]
+    Client(client::Command),
     Completions(completions::Args),
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
@@ -104,6 +107,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Serve(args) => serve::run(&args),
         Command::Latency(args) => latency::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),
         Command::Prove(args) => prove::run(&args),
         Command::Man(args) => man::run(&args),
