@@ -1,6 +1,7 @@
 //! The cue library with the real process that checks what is uploaded.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -147,7 +148,8 @@ fn bomb() -> Vec<u8> {
         .create(&mut file)
         .unwrap();
     let channel = writer.add_channel(0, "/cue/axes", "json", &Default::default()).unwrap();
-    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
     writer.write_to_known_channel(&header, &vec![b' '; 60 << 20]).unwrap();
     writer.finish().unwrap();
     drop(writer);
@@ -157,45 +159,54 @@ fn bomb() -> Vec<u8> {
 #[test]
 fn a_bomb_is_refused_within_its_bounds() {
     let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
+    fixture.upload("ride", GOOD.as_bytes()).unwrap();
     let octets = bomb();
     assert!(octets.len() < 1 << 20, "{} octets", octets.len());
     let problem = fixture.upload("bomb", &octets).unwrap_err();
     assert_eq!(problem.code, Code::Check);
-    assert!(problem.detail.contains("48 MiB of memory"), "{problem}");
-    assert!(fixture.files().is_empty());
+    assert!(problem.detail.contains("signal 6; it may take 48 MiB of memory"), "{problem}");
+    assert_eq!(fixture.files(), ["ride.csv"]);
     let roomy = Fixture::new();
     let problem = roomy.upload("bomb", &octets).unwrap_err();
     assert!(problem.faults[0].contains("65536"), "with room it is a message that is too long: {problem}");
 }
 
-#[test]
-fn a_check_that_hangs_is_ended() {
+/// An upload whose check is a script.
+fn upload_with(script: &str, time: Duration) -> Problem {
     let fixture = Fixture::new();
-    let hangs = fixture.dir.path().join("hangs");
-    fs::write(&hangs, "#!/bin/sh\nexec sleep 60\n").unwrap();
-    fs::set_permissions(&hangs, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-    let bounds = Bounds { time: Duration::from_millis(50), ..Bounds::default() };
-    let hall = Hall { config: fixture.dir.path().join("hall.toml"), program: hangs, bounds };
+    let program = fixture.dir.path().join("check");
+    fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    let bounds = Bounds { time, ..Bounds::default() };
+    let hall = Hall { config: fixture.dir.path().join("hall.toml"), program, bounds };
     let library = Library::open(&fixture.cues(), hall).unwrap();
     let mut upload = library.begin(&"ride".parse().unwrap()).unwrap();
     upload.write(GOOD.as_bytes()).unwrap();
     let problem = upload.finish().unwrap_err();
-    assert!(problem.detail.contains("took more than"), "{problem}");
     assert!(fixture.files().is_empty());
+    problem
 }
 
 #[test]
-fn a_check_that_prints_without_end_is_ended() {
-    let fixture = Fixture::new();
-    let hall = Hall {
-        config: fixture.dir.path().join("hall.toml"),
-        program: "/usr/bin/yes".into(),
-        bounds: Bounds::default(),
-    };
-    let library = Library::open(&fixture.cues(), hall).unwrap();
-    let mut upload = library.begin(&"ride".parse().unwrap()).unwrap();
-    upload.write(GOOD.as_bytes()).unwrap();
-    assert!(upload.finish().unwrap_err().detail.contains("more than any verdict"));
+fn a_check_that_hangs_or_prints_without_end_is_ended() {
+    let problem = upload_with("exec sleep 60", Duration::from_millis(50));
+    assert!(problem.detail.contains("took more than"), "{problem}");
+    let problem = upload_with("exec >&-; exec sleep 60", Duration::from_millis(50));
+    assert!(problem.detail.contains("took more than"), "{problem}");
+    let problem = upload_with("exec yes", Duration::from_secs(60));
+    assert!(problem.detail.contains("more than any verdict"), "{problem}");
+}
+
+#[test]
+fn a_check_that_fails_takes_nothing_in() {
+    for script in ["exit 0", "kill -9 $$", "echo '{\"passed\":true}'"] {
+        let problem = upload_with(script, Duration::from_secs(60));
+        assert!(problem.detail.contains("the check of the cue ended with"), "{problem}");
+    }
+    let foreign = r#"echo '{"passed":true,"faults":[],"more":0,"sha256":"00","effects":[],"mcap":false}'"#;
+    assert!(
+        upload_with(foreign, Duration::from_secs(60)).detail.contains("changed while it was being checked")
+    );
 }
 
 #[test]

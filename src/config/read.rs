@@ -81,7 +81,16 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
-    Some(Config { show: show?, seats, effects, effect_limits, presets, store: store?, log: log?, controllers })
+    Some(Config {
+        show: show?,
+        seats,
+        effects,
+        effect_limits,
+        presets,
+        store: store?,
+        log: log?,
+        controllers,
+    })
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {

@@ -92,7 +92,8 @@ impl Piece {
         let (start, end) = (part(start), part(end));
         let within = self.cubic.still().filter(|u| (start..=end).contains(u));
         let values = within.chain([start, end]).map(|u| self.cubic.at(u));
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
     }
 }
 
