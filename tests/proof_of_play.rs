@@ -17,8 +17,9 @@ struct Run {
 }
 
 fn report(args: &[&str]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_kinocue")).arg("report").args(args).output().unwrap();
-    let text = |octets| String::from_utf8(octets).unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_kinocue")).arg("report").args(args).output().expect("kinocue runs");
+    let text = |octets| String::from_utf8(octets).expect("UTF-8");
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
@@ -60,7 +61,7 @@ fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> Sho
 
 /// A day with a show that was played, one that a person stopped, and one that a crash ended.
 fn journal(dir: &Path) {
-    let now = "2026-11-21T08:00:00Z".parse::<Timestamp>().unwrap().to_zoned(TimeZone::UTC);
+    let now = "2026-11-21T08:00:00Z".parse::<Timestamp>().expect("RFC 3339").to_zoned(TimeZone::UTC);
     let mut journal = Journal::open(dir, LIMITS, &now);
     let (seven, eight) = ("2026-11-21T19:00:00.000+01:00", "2026-11-21T20:00:00.000+01:00");
     journal.note(&Action {
