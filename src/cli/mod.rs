@@ -29,6 +29,7 @@ mod report;
 mod sim;
 mod targets;
 pub mod times;
+mod token;
 
 pub use exit::{Exit, Failure, OrExit};
 
@@ -59,6 +60,7 @@ enum Command {
     Serve(serve::Args),
     Latency(latency::Args),
     Report(report::Args),
+    Token(token::Args),
     Completions(completions::Args),
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
@@ -104,6 +106,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Serve(args) => serve::run(&args),
         Command::Latency(args) => latency::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Token(args) => token::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Prove(args) => prove::run(&args),
         Command::Man(args) => man::run(&args),
