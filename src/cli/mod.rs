@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod ask;
 mod check;
+mod client;
 mod completions;
 mod convert;
 mod decode;
@@ -61,6 +62,8 @@ enum Command {
     Latency(latency::Args),
     Report(report::Args),
     Token(token::Args),
+    #[command(flatten)]
+    Client(client::Command),
     Completions(completions::Args),
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
@@ -107,6 +110,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Latency(args) => latency::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Token(args) => token::run(&args),
+        Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),
         Command::Prove(args) => prove::run(&args),
         Command::Man(args) => man::run(&args),
