@@ -29,7 +29,7 @@ pub(in crate::cli) struct ServerArgs {
     socket: Option<PathBuf>,
     /// Print the JSON of the reply as it came.
     #[arg(long)]
-    pub(super) json: bool,
+    pub(in crate::cli) json: bool,
 }
 
 impl ServerArgs {

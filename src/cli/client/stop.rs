@@ -76,7 +76,7 @@ fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
         failure.error = failure.error.context("NOT STOPPED by kinocue; use the hard-wired emergency stop");
         failure
     })?;
-    let (line, socket) = (status.line(), server.socket().display());
-    print::tell(&format!("kinocue: {line}; by {socket}; {NO_EMERGENCY}"));
+    let (line, socket) = (status.line(), server.socket());
+    print::tell(&format!("kinocue: {line}; by {}; {NO_EMERGENCY}", socket.display()));
     Ok(Exit::Done)
 }
