@@ -109,7 +109,11 @@ mod tests {
     #[test]
     fn a_token_goes_to_its_owner_and_its_hash_into_the_configuration() {
         let token = Token::of("tablet", Role::Operate, &[0xff; OCTETS]);
-        assert_eq!(token.token, format!("{}8", "_".repeat(42)), "no characters that a header or a shell would mind");
+        assert_eq!(
+            token.token,
+            format!("{}8", "_".repeat(42)),
+            "no characters that a header or a shell would mind"
+        );
         assert!(token.config.contains("role = \"operate\"\nsha256 = \""), "{}", token.config);
         assert!(token.config.contains(&token.sha256) && !token.config.contains(&token.token));
     }
