@@ -15,10 +15,12 @@ use crate::time::Clock as _;
 
 mod journal;
 mod limit;
+mod news;
 mod text;
 
 use journal::Journal;
 use limit::Limiter;
+pub use news::news;
 pub use text::escaped;
 
 /// Lines that wait to be written at the most.

@@ -47,7 +47,8 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
     }
 }
 
-fn playing() -> Status {
+/// A hall in the middle of a show.
+pub(crate) fn playing() -> Status {
     let warning = |controller: &str| Warning {
         id: "controller-lost".to_owned(),
         severity: Severity::Error,
