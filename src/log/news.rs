@@ -88,7 +88,8 @@ fn missed(before: &Status, after: &Status) -> Option<Line> {
 fn held(before: &Status, after: &Status) -> Option<Line> {
     let clamps = |status: &Status| status.controllers.iter().map(|one| one.clamps).sum::<u64>();
     let held = clamps(after).checked_sub(clamps(before)).filter(|held| *held > 0)?;
-    let message = format!("the last gate held motion back {held} times: what is played is not what was proved");
+    let message =
+        format!("the last gate held motion back {held} times: what is played is not what was proved");
     Some(Line::new(Priority::Error, "limits", message).with("times", held.to_string()))
 }
 

@@ -25,7 +25,11 @@ pub async fn follow(mut statuses: watch::Receiver<Arc<Status>>, log: Log) {
         if !told_ready && is_ready(&after) {
             told_ready = true;
             if let Err(error) = ready(&text) {
-                log.say(Line::new(Priority::Error, "service-manager", format!("cannot tell that it is ready: {error}")));
+                log.say(Line::new(
+                    Priority::Error,
+                    "service-manager",
+                    format!("cannot tell that it is ready: {error}"),
+                ));
             }
         }
         if line.is(&text, Monotonic.now()) {
@@ -48,8 +52,10 @@ fn is_ready(status: &Status) -> bool {
 fn words(status: &Status) -> String {
     let Status { state, cause, next, .. } = status;
     let enabled = status.controllers.iter().filter(|one| one.enabled);
-    let silent: Vec<_> =
-        enabled.filter(|one| matches!(one.standing, "lost" | "unknown")).map(|one| one.name.as_str()).collect();
+    let silent: Vec<_> = enabled
+        .filter(|one| matches!(one.standing, "lost" | "unknown"))
+        .map(|one| one.name.as_str())
+        .collect();
     let silent = match silent.as_slice() {
         [] => String::new(),
         [one] => format!("; {one} does not answer"),
@@ -101,6 +107,11 @@ mod tests {
         log.close();
         drop(log);
         let lines: Vec<String> = lines.iter().collect();
-        assert_eq!(lines, ["notice: paused: somebody asked; next: nothing (state-paused, state paused, cue storm, position 12.500)"]);
+        assert_eq!(
+            lines,
+            [
+                "notice: paused: somebody asked; next: nothing (state-paused, state paused, cue storm, position 12.500)"
+            ]
+        );
     }
 }
