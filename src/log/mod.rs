@@ -127,7 +127,8 @@ impl Log {
         }
     }
 
-    fn writing(write: impl FnMut(&Line) -> bool + Send + 'static) -> io::Result<Self> {
+    /// The same with any writer; it tells whether a line got through.
+    pub(crate) fn writing(write: impl FnMut(&Line) -> bool + Send + 'static) -> io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let writer = Arc::clone(&shared);
         thread::Builder::new().name("log".to_owned()).spawn(move || writer.write(write))?;
