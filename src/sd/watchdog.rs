@@ -155,7 +155,10 @@ mod tests {
         let (fed, feeds) = mpsc::channel();
         let beats = move || Some(ticks.fetch_add(1, Ordering::Relaxed));
         let interval = Duration::from_millis(4);
-        let feeder = Feeder::feeding(interval, interval, beats, move || drop(fed.send(()))).unwrap();
+        let feeder = Feeder::feeding(interval, interval, beats, move || {
+            let _ = fed.send(());
+        })
+        .unwrap();
         for _ in 0..3 {
             feeds.recv().unwrap();
         }
