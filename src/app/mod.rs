@@ -1,10 +1,13 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
+pub mod house;
+pub mod keeper;
 mod play;
 mod prepare;
 mod report;
+pub mod serve;
 mod stage;
-mod staged;
+pub mod staged;
 mod sum_up;
 
 pub use play::{Control, Play, PlayError, Played, Reins};

@@ -57,6 +57,7 @@ pub(crate) fn playing() -> Status {
         remedy: "look at its power".to_owned(),
     };
     Status {
+        test: None,
         hall: "1".to_owned(),
         version: "9.9.9",
         uptime_s: 60.5,
