@@ -15,12 +15,10 @@ use crate::time::Clock as _;
 
 mod journal;
 mod limit;
-mod news;
 mod text;
 
 use journal::Journal;
 use limit::Limiter;
-pub use news::news;
 pub use text::escaped;
 
 /// Lines that wait to be written at the most.
@@ -127,8 +125,7 @@ impl Log {
         }
     }
 
-    /// The same with any writer; it tells whether a line got through.
-    pub(crate) fn writing(write: impl FnMut(&Line) -> bool + Send + 'static) -> io::Result<Self> {
+    fn writing(write: impl FnMut(&Line) -> bool + Send + 'static) -> io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let writer = Arc::clone(&shared);
         thread::Builder::new().name("log".to_owned()).spawn(move || writer.write(write))?;

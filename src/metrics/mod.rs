@@ -14,7 +14,7 @@ use crate::hall::{self, Status};
 mod controllers;
 mod shows;
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;
 
 /// The type of what [`render`] gives.
 pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";

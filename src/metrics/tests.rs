@@ -48,7 +48,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
 }
 
 /// A hall in the middle of a show.
-pub(crate) fn playing() -> Status {
+fn playing() -> Status {
     let warning = |controller: &str| Warning {
         id: "controller-lost".to_owned(),
         severity: Severity::Error,

@@ -10,10 +10,8 @@ use sd_notify::{NotifyState, notify};
 use crate::log::escaped;
 use crate::time::MonoTime;
 
-mod follow;
 mod watchdog;
 
-pub use follow::follow;
 pub use watchdog::{Feeder, Hunger};
 
 /// How often the line in `systemctl status` changes at the most.
@@ -21,36 +19,47 @@ const STATUS_EVERY: Duration = Duration::from_secs(1);
 /// The longest such line, octets; systemd takes no more than 4,096 in all.
 const STATUS_LEN: usize = 1_024;
 
-/// The hall is ready: every controller was asked, and the surfaces are open. Also the end of [`reloading`].
-///
-/// # Errors
-/// That of the socket; the service manager will take the start for a failed one.
-pub fn ready(text: &str) -> io::Result<()> {
-    notify(&[NotifyState::Ready, NotifyState::Status(&line(text))])
+/// Tells the service manager how the hall is. Of one thread, which owns it.
+#[derive(Debug, Default)]
+pub struct Notifier {
+    line: StatusLine,
 }
 
-/// What the hall does, in a line.
-///
-/// # Errors
-/// That of the socket.
-pub fn status(text: &str) -> io::Result<()> {
-    notify(&[NotifyState::Status(&line(text))])
-}
+impl Notifier {
+    /// The hall is ready: controllers were asked once, and the surfaces are open. Also the end of [`Self::reloading`].
+    ///
+    /// # Errors
+    /// That of the socket; the service manager will take the start for a failed one.
+    pub fn ready(&mut self, text: &str, now: MonoTime) -> io::Result<()> {
+        self.line.is(text, now);
+        notify(&[NotifyState::Ready, NotifyState::Status(&line(text))])
+    }
 
-/// The configuration is read anew; [`ready`] ends it, whatever came of it.
-///
-/// # Errors
-/// That of the socket or the clock.
-pub fn reloading() -> io::Result<()> {
-    notify(&[NotifyState::Reloading, NotifyState::monotonic_usec_now()?])
-}
+    /// What the hall does, in a line. Told once a second at the most, and only where it differs from what was told before;
+    /// to be called again with every new status, so that what came too early is told then.
+    pub fn status(&mut self, text: &str, now: MonoTime) {
+        if self.line.is(text, now) {
+            // Whoever looks sees the line before this one; the next second tries again.
+            let _ = notify(&[NotifyState::Status(&line(text))]);
+        }
+    }
 
-/// The hall parks its seats and ends.
-///
-/// # Errors
-/// That of the socket.
-pub fn stopping() -> io::Result<()> {
-    notify(&[NotifyState::Stopping])
+    /// The configuration is read anew; [`Self::ready`] ends it, whatever came of it.
+    ///
+    /// # Errors
+    /// That of the socket or the clock.
+    pub fn reloading(&self) -> io::Result<()> {
+        notify(&[NotifyState::Reloading, NotifyState::monotonic_usec_now()?])
+    }
+
+    /// The hall parks its seats and ends.
+    ///
+    /// # Errors
+    /// That of the socket.
+    pub fn stopping(&mut self, text: &str, now: MonoTime) -> io::Result<()> {
+        self.line.is(text, now);
+        notify(&[NotifyState::Stopping, NotifyState::Status(&line(text))])
+    }
 }
 
 /// How long the service manager waits for a sign of life, if it waits for any (`WATCHDOG_USEC`, meant for this process).
@@ -59,20 +68,14 @@ pub fn watchdog() -> Option<Duration> {
     sd_notify::watchdog_enabled().filter(|interval| !interval.is_zero())
 }
 
-/// Whether this process was started by a service manager that wants to be told.
-#[must_use]
-pub fn supervised() -> bool {
-    std::env::var_os("NOTIFY_SOCKET").is_some()
-}
-
-/// When a line is told: at once, then once a second at the most, and only where it differs from the one before.
+/// When a line is told.
 #[derive(Debug, Default)]
 struct StatusLine {
     told: Option<(MonoTime, String)>,
 }
 
 impl StatusLine {
-    /// Whether it is to be told now; taken for told then. What came too early is told by asking again.
+    /// Whether it is to be told now; taken for told then.
     fn is(&mut self, text: &str, now: MonoTime) -> bool {
         let tell = match &self.told {
             Some((at, last)) => last != text && now.since(*at) >= STATUS_EVERY,
