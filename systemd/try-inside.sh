@@ -84,8 +84,10 @@ check "state of the unit" "$(prop ActiveState) $(prop NRestarts)" "active 0"
 echo "== stop in mid-show"
 kinocue park > /dev/null 2>&1
 until_ 30 state_is parked > /dev/null || bad "park" "$(prop StatusText)"
-if kinocue load ride > /dev/null && kinocue preflight --config /etc/kinocue/kinocue.toml > /dev/null; then :; fi
-kinocue arm > /dev/null && kinocue go > /dev/null
+for words in "load ride" preflight arm go; do
+  # shellcheck disable=SC2086
+  kinocue $words > /dev/null || bad "$words" "exit code $?"
+done
 if until_ 20 state_is playing > /dev/null; then
   say "status text" "$(prop StatusText)"
   sleep 1
