@@ -63,8 +63,10 @@ pub mod log;
 pub mod metrics;
 pub mod net;
 pub mod observe;
+pub mod osc;
 pub mod playlist;
 pub mod sd;
+pub mod text_port;
 pub mod tracker;
 
 pub mod sys;

@@ -9,6 +9,7 @@ pub mod serve;
 mod stage;
 pub mod staged;
 mod sum_up;
+pub mod surfaces;
 
 pub use play::{Control, Play, PlayError, Played, Reins};
 pub use report::{

@@ -14,9 +14,11 @@ use signal_hook::flag;
 
 use super::house::{House, HouseError, Numbers, Reins};
 use super::keeper::{Ends, Keeper, Left, Signals, Voice};
+use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::config::Config;
 use crate::engine::Rate;
-use crate::hall::{Handle, Status, handle};
+use crate::api::Pages;
+use crate::hall::{Status, handle};
 use crate::journal::{Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
@@ -30,6 +32,8 @@ pub struct Places {
     pub config: PathBuf,
     /// The folder of what it keeps from one start to the next.
     pub state: PathBuf,
+    /// The sockets of this machine.
+    pub sockets: Sockets,
 }
 
 /// Why the daemon does not run. Nothing has moved then.
@@ -39,6 +43,9 @@ pub enum ServeError {
     /// The hall cannot be opened.
     #[error(transparent)]
     House(#[from] HouseError),
+    /// A surface does not open.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
     /// The library cannot be opened.
     #[error(transparent)]
     Library(#[from] LibraryError),
@@ -76,31 +83,29 @@ impl Mark {
     }
 }
 
-/// Runs the daemon until it is told to end. `tell` writes a line for people where there is no journal; `surfaces` are started once the hall is open, and get the way to it; what it
-/// returns lives as long as the daemon.
+/// Runs the daemon until it is told to end. `tell` writes a line for people where there is no journal; `pages` is the console.
 ///
 /// # Errors
 /// [`ServeError`]; nothing has moved then, or all of it is parked or at rest.
 ///
 /// # Panics
 /// Where one of its threads panicked.
-pub fn serve<S, E: From<ServeError>>(
+pub fn serve(
     config: Config,
     places: &Places,
+    pages: Pages,
     tell: impl FnMut(&str) + Send + 'static,
-    surfaces: impl FnOnce(Handle, Library) -> Result<S, E>,
-) -> Result<(), E> {
+) -> Result<(), ServeError> {
     let mut config = Arc::new(config);
     let signals = signals().map_err(ServeError::System)?;
     let (mark, crashed) = Mark::leave(&places.state)?;
-    let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))
-        .map_err(ServeError::from)?;
-    let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new()).map_err(ServeError::from)?;
+    let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
+    let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new())?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let log = Log::start(tell).map_err(ServeError::System)?;
     let voice = Voice::new(log.clone());
     let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice };
-    let running = surfaces(handle, library.clone())?;
+    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     let mut feeder = None;
     loop {
@@ -108,12 +113,12 @@ pub fn serve<S, E: From<ServeError>>(
         let Some(next) = left.reload else { break };
         // The seats are parked or at rest, so nothing tells of a crash.
         config = next;
-        house = House::open(config, false, &left.closed.numbers).map_err(ServeError::from)?;
+        house = House::open(Arc::clone(&config), false, &left.closed.numbers)?;
         (ends, journal) = (left.ends, left.journal);
     }
-    drop(running);
+    surfaces.close();
     log.close();
-    Ok(mark.take_away()?)
+    mark.take_away()
 }
 
 /// Runs one hall on this thread, with a keeper beside it.

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, print};
 use crate::app::house::HouseError;
 use crate::app::serve::{Places, ServeError, serve};
+use crate::app::surfaces::Sockets;
 use crate::config;
 use crate::net::NetError;
 
@@ -40,8 +41,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let config = config::load(&args.config).or_exit(Exit::Config)?;
-    let places = Places { config: args.config.clone(), state: args.state.clone() };
-    serve(config, &places, super::print::tell, |_handle, _library| Ok::<_, Failure>(()))?;
+    let beside = || args.socket.with_file_name("stop.sock");
+    let sockets =
+        Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
+    let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
+    serve(config, &places, |_| None, print::tell)?;
     Ok(Exit::Done)
 }
 

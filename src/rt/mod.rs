@@ -150,6 +150,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
                     News::Taken
                 }
             };
+            // What it led to goes before the answer, so that whoever hears the answer knows it.
+            if let Some(entered) = conductor.news() {
+                mail.tell(entered);
+            }
             mail.tell(news);
         }
         if self.leave.load(Ordering::Relaxed) {

@@ -60,7 +60,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     }
     // The JSON is that of the result.
-    let quiet = ServerArgs { json: false, ..server.clone() };
+    let mut quiet = server.clone();
+    quiet.json = false;
     let begun = quiet.post("/api/v1/test", &json!({ "rows": rows }))?;
     quiet.tell(&begun);
     let result = follow(&quiet, begun)?;
