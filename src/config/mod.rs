@@ -10,6 +10,7 @@ use crate::motion::{MAX_AXES, SeatType};
 use crate::preflight::Check;
 
 mod accept;
+mod api;
 mod effect_limits;
 mod fault;
 mod fit;
@@ -17,13 +18,17 @@ mod level;
 mod library;
 mod log;
 mod preset;
+mod osc;
 mod read;
 mod section;
+mod sources;
 mod target;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use crate::wire::{Dialect, Timing};
+pub use api::{Api, ApiToken};
 pub use effect_limits::EffectLimit;
 pub(crate) use fault::Faults;
 pub use fault::{ConfigFault, ConfigFaults};
@@ -34,7 +39,9 @@ pub use library::Store;
 pub use log::{Hours, Log};
 pub use preset::Preset;
 pub(crate) use section::{Entry, Section, did_you_mean};
+pub use osc::{OscPort, OscWord};
 pub use target::{TargetError, from_to_args};
+pub use text::TextPort;
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
 pub const ALL_OUTPUTS: u16 = 0x0fff;
@@ -61,11 +68,19 @@ pub struct Config {
     pub log: Log,
     /// The controllers, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
+    /// The port that takes OSC, where there is one.
+    pub osc: Option<OscPort>,
+    /// The port that takes lines of text, where there is one.
+    pub text: Option<TextPort>,
+    /// HTTP over TCP.
+    pub api: Api,
 }
 
 /// How cues are played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Show {
+    /// What the hall is called.
+    pub name: String,
     /// Frames a second to every controller, 1 to 1,000.
     pub rate_hz: f64,
     /// What the Time field of a frame means.
@@ -87,6 +102,7 @@ pub struct Show {
 impl Default for Show {
     fn default() -> Self {
         Self {
+            name: "hall".to_owned(),
             rate_hz: 100.0,
             timing: Timing::Relative,
             bind: SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 8410),

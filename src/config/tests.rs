@@ -16,7 +16,7 @@ fn parse(text: &str) -> Result<Config, Vec<String>> {
 }
 
 /// A sound configuration with `more` at the end of its one controller.
-fn with(more: &str) -> Result<Config, Vec<String>> {
+pub(super) fn with(more: &str) -> Result<Config, Vec<String>> {
     parse(&format!("{SEAT}{CONTROLLER}{more}"))
 }
 

@@ -268,6 +268,12 @@ impl Library {
         Ok(curve)
     }
 
+    /// The longest file that is taken in, octets.
+    #[must_use]
+    pub fn max_octets(&self) -> u64 {
+        self.inner.hall.bounds.max_octets
+    }
+
     /// Begins to take a cue in; it replaces the one with that id when it is finished and passes. Two at a time.
     ///
     /// # Errors

@@ -67,7 +67,7 @@ fn an_upload_that_is_given_up_or_too_long_leaves_nothing() {
     drop(upload);
     let mut upload = library.begin(&id("a")).unwrap();
     let problem = upload.write(&[b'#'; 1001]).unwrap_err();
-    assert_eq!(problem.code, Code::Value);
+    assert_eq!(problem.code, Code::Size);
     drop(upload);
     assert!(left(dir.path()).is_empty());
 }

@@ -70,7 +70,7 @@ impl Upload {
         if self.size > most {
             let detail = format!("the cue is longer than {} MiB", most >> 20);
             let remedy = "make it smaller, as MCAP perhaps, or raise max_cue_mib in [library]";
-            return Err(Problem::new(Code::Value, detail, remedy));
+            return Err(Problem::new(Code::Size, detail, remedy));
         }
         self.hash.update(octets);
         self.file.write_all(octets).map_err(|error| unwritten(&error))
