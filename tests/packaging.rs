@@ -79,7 +79,8 @@ fn every_path_of_the_unit_is_one_that_the_package_installs() {
 fn installing_and_upgrading_start_nothing() {
     for script in ["postinst", "postrm"] {
         let text = text(&format!("systemd/debian/{script}"));
-        let commands = text.lines().map(str::trim).filter(|line| !line.starts_with("echo") && !line.starts_with('"'));
+        let commands =
+            text.lines().map(str::trim).filter(|line| !line.starts_with("echo") && !line.starts_with('"'));
         for line in commands.filter(|line| line.contains("systemctl")) {
             assert!(line.contains("daemon-reload") || line.contains("is-active"), "{script}: {line}");
         }
@@ -103,7 +104,8 @@ fn the_simulated_hall_reaches_nothing_but_this_machine() {
         let address: SocketAddr = address.parse().unwrap();
         assert!(address.ip().is_loopback(), "{address}");
     }
-    let rows: std::collections::BTreeSet<_> = controllers.iter().map(|one| one["row"].as_str().unwrap()).collect();
+    let rows: std::collections::BTreeSet<_> =
+        controllers.iter().map(|one| one["row"].as_str().unwrap()).collect();
     assert_eq!(rows.len(), 2);
 }
 
@@ -146,7 +148,8 @@ fn every_command_has_its_manual_page() {
     let folder = tempfile::tempdir().unwrap();
     let output = kinocue(&["man", folder.path().to_str().unwrap()]);
     assert!(output.status.success(), "{}", said(&output));
-    let page = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let page =
+        |name: &str| fs::read_to_string(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     let all = page("kinocue.1");
     for command in ["play", "sim", "check", "preflight", "doctor"] {
         assert!(all.contains(&format!("kinocue\\-{command}(1)")), "{command} is in kinocue(1)");

@@ -107,8 +107,9 @@ pub fn serve(
     let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice, memory: Memory::default() };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
+    let mut feeder = None;
     loop {
-        let left = keep(house, ends, library.clone(), journal)?;
+        let left = keep(house, ends, library.clone(), journal, &mut feeder)?;
         let Some(next) = left.reload else { break };
         // The seats are parked or at rest, so nothing tells of a crash.
         config = next;
@@ -121,14 +122,20 @@ pub fn serve(
 }
 
 /// Runs one hall on this thread, with a keeper beside it.
-fn keep(house: House, ends: Ends, library: Library, journal: Journal) -> Result<Left, ServeError> {
+fn keep(
+    house: House,
+    ends: Ends,
+    library: Library,
+    journal: Journal,
+    feeder: &mut Option<Feeder>,
+) -> Result<Left, ServeError> {
     let (tell, closed) = channel();
     let mut keeper = None;
     let mut failed = None;
-    let mut feeder = None;
     let run = house.run(|reins, line| {
         let leave = Arc::clone(&reins.leave);
-        feeder = feed_watchdog(&reins);
+        // The one before it has fed until now, so that nobody takes the time between two halls for a hang.
+        *feeder = feed_watchdog(&reins);
         let kept = Keeper::new(ends, reins, line, library, journal);
         let thread = Builder::new().name("keeper".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
@@ -146,7 +153,6 @@ fn keep(house: House, ends: Ends, library: Library, journal: Journal) -> Result<
         return Err(ServeError::System(cause));
     }
     drop(tell.send(Box::new(run)));
-    drop(feeder);
     let keeper = keeper.expect("it was started before the first tick");
     Ok(keeper.join().expect("the keeper does not panic"))
 }
@@ -156,7 +162,7 @@ fn feed_watchdog(reins: &Reins) -> Option<Feeder> {
     let live = Arc::clone(&reins.live);
     let period = Rate::from_hz(reins.config.show.rate_hz).period();
     // Where there is no thread for it, the service manager starts the program anew.
-    sd::watchdog().and_then(|interval| Feeder::start(interval, period, move || live.beats()).ok())
+    sd::watchdog().and_then(|interval| Feeder::start(interval, period, move || live.pulse()).ok())
 }
 
 fn signals() -> io::Result<Signals> {

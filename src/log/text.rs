@@ -39,7 +39,9 @@ mod tests {
 
     #[test]
     fn plain_text_stays_as_it_is() {
-        for text in ["", "parked: all seats at rest", "Sitz ä, 座席", "tabs are controls? no: a space is none"] {
+        for text in
+            ["", "parked: all seats at rest", "Sitz ä, 座席", "tabs are controls? no: a space is none"]
+        {
             assert!(matches!(escaped(text, 80), Cow::Borrowed(same) if same == text));
         }
     }

@@ -16,16 +16,16 @@ fn standing(all: &[ControllerStatus]) -> Vec<Family> {
         Family {
             name: "controller_standing",
             help: "1, with how it stands",
-            values: Values::Gauges(
-                all.iter().map(|one| (and(one, "standing", one.standing), 1.0)).collect(),
-            ),
+            values: Values::Gauges(all.iter().map(|one| (and(one, "standing", one.standing), 1.0)).collect()),
         },
         gauges(all, "controller_emergency_stop", "1 while an emergency stop is in effect", |one| {
             Some(flag(one.emergency_stop))
         }),
         gauges(all, "controller_error", "Its error number, 0 for none", |one| one.error.map(f64::from)),
         gauges(all, "controller_silence_seconds", "Since it was last heard", |one| one.heard_s),
-        gauges(all, "controller_ack_ratio", "Acks over frames that asked, in the last second", |one| one.ack_rate),
+        gauges(all, "controller_ack_ratio", "Acks over frames that asked, in the last second", |one| {
+            one.ack_rate
+        }),
         latencies(all),
     ]
 }

@@ -38,6 +38,9 @@ fn families(status: &Status) -> Vec<Family> {
     families
 }
 
+/// Counters can name one thing that they counted; ours do not.
+const NO_EXEMPLAR: Option<&Exemplar<NoLabelSet, u64>> = None;
+
 /// Names of labels, and their values.
 type Labels = Vec<(&'static str, String)>;
 
@@ -92,11 +95,13 @@ impl Family {
         };
         let mut metric = encoder.encode_descriptor(name, help, None, kind)?;
         match values {
-            Values::Gauges(all) => {
-                all.iter().try_for_each(|(labels, value)| metric.encode_family(labels)?.encode_gauge(value))
-            }
-            Values::Counters(all) => all.iter().try_for_each(|(labels, value)| {
-                metric.encode_family(labels)?.encode_counter(value, None::<&Exemplar<NoLabelSet, u64>>)
+            Values::Gauges(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
+                [] => metric.encode_gauge(value),
+                _ => metric.encode_family(labels)?.encode_gauge(value),
+            }),
+            Values::Counters(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
+                [] => metric.encode_counter(value, NO_EXEMPLAR),
+                _ => metric.encode_family(labels)?.encode_counter(value, NO_EXEMPLAR),
             }),
             Values::Info(labels) => metric.encode_info(labels),
             Values::Histogram { sum, buckets } => {

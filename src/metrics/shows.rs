@@ -42,7 +42,11 @@ fn state(status: &Status) -> Vec<Family> {
             values: Values::Info(label("version", status.version)),
         },
         Family::gauge("uptime_seconds", "Since the program started", status.uptime_s),
-        Family { name: "state", help: "1 for the state of the hall", values: Values::Gauges(states.collect()) },
+        Family {
+            name: "state",
+            help: "1 for the state of the hall",
+            values: Values::Gauges(states.collect()),
+        },
         Family::gauge("state_age_seconds", "Since the hall is in its state", status.since_s),
         Family::gauge("moving", "1 while motion frames leave", flag(status.moving)),
         Family::gauge(
@@ -50,12 +54,12 @@ fn state(status: &Status) -> Vec<Family> {
             "Where the film is in the loaded cue",
             show.map(|show| show.position_s),
         ),
+        Family::gauge("show_length_seconds", "The length of the loaded cue", show.map(|show| show.length_s)),
         Family::gauge(
-            "show_length_seconds",
-            "The length of the loaded cue",
-            show.map(|show| show.length_s),
+            "trim_seconds",
+            "How much later than the film the motion is",
+            f64::from(status.trim_ms) / 1e3,
         ),
-        Family::gauge("trim_seconds", "How much later than the film the motion is", f64::from(status.trim_ms) / 1e3),
         Family::gauge(
             "preflight_passed",
             "1 where the last preflight found nothing that fails",
@@ -127,7 +131,11 @@ fn machine(status: &Status) -> Vec<Family> {
             help: "What the system granted the tick thread",
             values: Values::Info(info),
         },
-        Family::gauge("realtime", "1 where the tick thread is real-time and memory is locked", flag(realtime)),
+        Family::gauge(
+            "realtime",
+            "1 where the tick thread is real-time and memory is locked",
+            flag(realtime),
+        ),
     ]
 }
 

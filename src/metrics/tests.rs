@@ -47,6 +47,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
     }
 }
 
+/// A hall in the middle of a show.
 fn playing() -> Status {
     let warning = |controller: &str| Warning {
         id: "controller-lost".to_owned(),
@@ -90,7 +91,12 @@ fn playing() -> Status {
         rate_hz: 100.0,
         lateness: times(),
         ack_latency: times(),
-        realtime: RealTimeStatus { policy: "fifo".to_owned(), priority: 50, memory_locked: true, refusals: vec![] },
+        realtime: RealTimeStatus {
+            policy: "fifo".to_owned(),
+            priority: 50,
+            memory_locked: true,
+            refusals: vec![],
+        },
         controllers: vec![controller("A1", Some("A")), controller("B1", None)],
         preflight: Some(PreflightStatus { passed: true, age_s: 300.0, answered: 2, findings: vec![] }),
         warnings: vec![warning("A1"), warning("B1")],
@@ -148,9 +154,11 @@ fn the_checker_of_these_tests_finds_what_is_wrong() {
 #[test]
 fn the_state_is_the_one_of_all_states_that_is_1() {
     let page = page(&playing());
-    let states: Vec<_> = page.samples.iter().filter(|(series, _)| series.starts_with("kinocue_state{")).collect();
+    let states: Vec<_> =
+        page.samples.iter().filter(|(series, _)| series.starts_with("kinocue_state{")).collect();
     assert_eq!(states.len(), 13);
-    let on: Vec<_> = states.iter().filter(|(_, value)| **value == 1.0).map(|(series, _)| series.as_str()).collect();
+    let on: Vec<_> =
+        states.iter().filter(|(_, value)| **value == 1.0).map(|(series, _)| series.as_str()).collect();
     assert_eq!(on, ["kinocue_state{state=\"playing\"}"]);
 }
 
@@ -234,7 +242,9 @@ fn alerts_and_dashboard_ask_for_figures_that_exist() {
     let exists = |name: &str| {
         let suffixes = ["", "_total", "_info", "_bucket", "_sum", "_count"];
         let of = |series: &String| series.split('{').next() == Some(name);
-        suffixes.iter().any(|suffix| name.strip_suffix(suffix).is_some_and(|family| page.families.contains(family)))
+        suffixes
+            .iter()
+            .any(|suffix| name.strip_suffix(suffix).is_some_and(|family| page.families.contains(family)))
             && page.samples.keys().any(of)
     };
     let rules = include_str!("../../systemd/prometheus/kinocue.rules.yml");
@@ -243,6 +253,10 @@ fn alerts_and_dashboard_ask_for_figures_that_exist() {
     for (file, text) in [("rules", rules), ("dashboard", dashboard)] {
         let asked = names(text);
         assert!(asked.len() > 10, "{file}");
-        assert!(asked.iter().all(|name| exists(name)), "{file}: {:?}", asked.iter().find(|name| !exists(name)));
+        assert!(
+            asked.iter().all(|name| exists(name)),
+            "{file}: {:?}",
+            asked.iter().find(|name| !exists(name))
+        );
     }
 }

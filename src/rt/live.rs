@@ -97,6 +97,7 @@ pub struct Live {
     ticks: AtomicU64,
     missed: AtomicU64,
     beats: AtomicU64,
+    closed: AtomicBool,
     moving: AtomicBool,
     table: Mutex<Vec<Row>>,
 }
@@ -139,6 +140,17 @@ impl Live {
     #[must_use]
     pub fn beats(&self) -> u64 {
         self.beats.load(Ordering::Relaxed)
+    }
+
+    /// [`Self::beats`] while the tick thread is to tick; none once its loop is over.
+    #[must_use]
+    pub fn pulse(&self) -> Option<u64> {
+        (!self.closed.load(Ordering::Relaxed)).then(|| self.beats())
+    }
+
+    /// Notes that the tick loop is over.
+    pub fn close(&self) {
+        self.closed.store(true, Ordering::Relaxed);
     }
 
     /// Notes a tick.
@@ -222,6 +234,16 @@ mod tests {
             live.enter(phase);
             assert_eq!(live.phase(), phase);
         }
+    }
+
+    #[test]
+    fn a_pulse_is_expected_from_the_start_until_the_loop_is_over() {
+        let live = Live::default();
+        assert_eq!(live.pulse(), Some(0), "a tick thread that does not begin to tick hangs as well");
+        live.beat();
+        assert_eq!(live.pulse(), Some(1));
+        live.close();
+        assert_eq!(live.pulse(), None);
     }
 
     #[test]

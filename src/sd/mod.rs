@@ -68,12 +68,6 @@ pub fn watchdog() -> Option<Duration> {
     sd_notify::watchdog_enabled().filter(|interval| !interval.is_zero())
 }
 
-/// Whether this process was started by a service manager that wants to be told.
-#[must_use]
-pub fn supervised() -> bool {
-    std::env::var_os("NOTIFY_SOCKET").is_some()
-}
-
 /// When a line is told.
 #[derive(Debug, Default)]
 struct StatusLine {

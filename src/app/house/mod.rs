@@ -23,8 +23,8 @@ use crate::net::{DrainGrid, NetError};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    Accounts, AckLoop, Command, Conductor, Desk, Ended, Line, Live, MailEnds, News, Order, PlanLoop, Planning,
-    Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    Accounts, AckLoop, Command, Conductor, Desk, Ended, Line, Live, MailEnds, News, Order, PlanLoop,
+    Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -204,6 +204,7 @@ impl House {
             };
             lead(reins, line);
             let ended = ticks.run();
+            live.close();
             over.store(true, Ordering::Release);
             done.store(true, Ordering::Release);
             planner.thread().unpark();
