@@ -134,7 +134,11 @@ fn a_show_that_goes_on_is_running_and_one_without_an_end_was_interrupted() {
     drop(Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T18:30:00Z")));
     let folder = crate::sys::folder::Folder::open(dir.path()).unwrap();
     assert!(folder.claim());
-    assert_eq!(result(dir.path()), [ShowResult::Interrupted], "a program that started later does not play it");
+    assert_eq!(
+        result(dir.path()),
+        [ShowResult::Interrupted],
+        "a program that started later does not play it"
+    );
     drop(folder);
     let mut journal = Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T19:00:00Z"));
     journal.begin(&record("2026-11-21T20:00:00.000+01:00"));
