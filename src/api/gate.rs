@@ -8,7 +8,7 @@ use std::task::Poll;
 
 use axum::extract::{Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
 };
 use axum::http::{HeaderName, HeaderValue, Method};
 use axum::middleware::Next;
@@ -19,7 +19,8 @@ use super::once::Reply;
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::shared::Shared;
-use crate::hall::{Problem, Who};
+use crate::hall::{Code, Problem, Who};
+use crate::log::{Line, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
@@ -43,7 +44,10 @@ pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, ne
 async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let who = match admit(shared, &request) {
         Ok(who) => who,
-        Err(problem) => return render(problem.into_response(), None),
+        Err(problem) => {
+            note(shared, &request, &problem);
+            return render(problem.into_response(), None);
+        }
     };
     let Some(who) = who else {
         return render(caught(next.run(request)).await, None);
@@ -87,6 +91,16 @@ fn is_public(path: &str) -> bool {
         "/healthz" | "/readyz" | super::service::DOCUMENT => true,
         "/metrics" => false,
         _ => !path.starts_with("/api"),
+    }
+}
+
+/// Says who was turned away at the door: nobody guesses tokens unseen. Who just comes without one is not worth a line.
+fn note(shared: &Shared, request: &Request, problem: &Problem) {
+    let guessed = request.headers().contains_key(AUTHORIZATION);
+    if guessed && matches!(problem.code, Code::Token | Code::Busy) || problem.code == Code::Origin {
+        let from = request.extensions().get::<Peer>().map_or_else(String::new, ToString::to_string);
+        let line = Line::new(Priority::Warning, "turned-away", format!("turned away {from}: {}", problem.detail));
+        shared.log.say(line.with("code", problem.code.word()).with("from", from));
     }
 }
 

@@ -20,6 +20,7 @@ use tokio::sync::{Semaphore, mpsc, watch};
 use crate::config;
 use crate::hall::{Handle, Problem};
 use crate::library::Library;
+use crate::log::Log;
 use crate::playlist::Shelf;
 
 mod access;
@@ -52,6 +53,8 @@ use access::Access;
 use shared::{Pulse, STREAMS, Shared};
 use socket::SocketFile;
 
+/// What its threads are called. A panic on one of them ends the request that it was for, and nothing else.
+pub const THREAD: &str = "api";
 /// Threads that wait for disks.
 const BLOCKING: usize = 8;
 /// How long what is under way may go on when the server ends.
@@ -77,6 +80,8 @@ pub struct Setup {
     pub journal: PathBuf,
     /// The console.
     pub pages: Pages,
+    /// Where it is said who was turned away.
+    pub log: Log,
 }
 
 /// Why the API is not served.
@@ -155,7 +160,7 @@ impl Drop for Running {
 /// # Errors
 /// [`ApiError`] where a socket or a port cannot be had; nothing is served then.
 pub fn start(setup: Setup) -> Result<Running, ApiError> {
-    let Setup { config, socket, handle, library, playlists, journal, pages } = setup;
+    let Setup { config, socket, handle, library, playlists, journal, pages, log } = setup;
     let (local, file) = socket::unix(&socket)?;
     let tcp = config.listen.iter().map(|&address| port(address)).collect::<Result<Vec<_>, _>>()?;
     let addresses: Vec<_> =
@@ -174,6 +179,7 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         shelf: playlists,
         journal,
         pages,
+        log: log.clone(),
         pulse: Pulse::default(),
         written: Mutex::new(None),
     };
@@ -181,11 +187,12 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
     let router = routes::guarded(router, Arc::clone(&shared));
     let runtime = runtime::Builder::new_current_thread()
         .enable_all()
+        .thread_name(THREAD)
         .max_blocking_threads(BLOCKING)
         .build()
         .map_err(ApiError::System)?;
-    let sockets = Sockets { local, _file: file, tcp };
-    let thread = Builder::new().name("api".to_owned()).spawn(move || run(runtime, sockets, shared, router));
+    let sockets = Sockets { local, _file: file, tcp, log };
+    let thread = Builder::new().name(THREAD.to_owned()).spawn(move || run(runtime, sockets, shared, router));
     Ok(Running { addresses, closing, thread: Some(thread.map_err(ApiError::System)?) })
 }
 
@@ -195,14 +202,15 @@ struct Sockets {
     /// Goes when the server ends.
     _file: SocketFile,
     tcp: Vec<TcpListener>,
+    log: Log,
 }
 
 /// Serves until the server ends.
 fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Router) {
-    let Sockets { local, _file, tcp } = sockets;
+    let Sockets { local, _file, tcp, log } = sockets;
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
-    let hall = serve::Hall { router, closing: closing.clone(), alive };
+    let hall = serve::Hall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(shared));
         let slots = serve::tcp_slots();

@@ -14,6 +14,7 @@ use super::once::Once;
 use super::tries::Tries;
 use crate::hall::{Handle, Status};
 use crate::library::Library;
+use crate::log::Log;
 use crate::playlist::Shelf;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -47,6 +48,8 @@ pub(super) struct Shared {
     pub(super) journal: PathBuf,
     /// The console.
     pub(super) pages: Pages,
+    /// Where it is said who was turned away.
+    pub(super) log: Log,
     /// Whether the tick thread ticks.
     pub(super) pulse: Pulse,
     /// The newest status that was written, and its JSON.

@@ -192,7 +192,7 @@ impl Library {
             return Ok(info);
         }
         let cue = self.cue(id)?;
-        let verdict = child::examine(&inner.hall, &inner.hall.bounds, &cue.folder.path(&cue.name))?;
+        let verdict = child::examine(&inner.hall, &cue.folder.path(&cue.name))?;
         if cue.folder.stamp(&cue.name).ok().flatten() != Some(cue.stamp) {
             let detail = format!("the cue {id} changed while it was being checked");
             return Err(Problem::new(Code::File, detail, "try again when it is all there"));

@@ -67,9 +67,8 @@ fn who_reads_nothing_is_cut_off_and_the_others_go_on() {
         quick.next();
     }
     let mut rest = Vec::new();
-    let ended = slow.read_to_end(&mut rest);
-    assert!(ended.is_ok() || rest.len() < 4_000_000, "{ended:?}");
-    assert!(rest.len() < 4_000_000, "what was on its way, and no more: {}", rest.len());
+    slow.take(4_000_000).read_to_end(&mut rest).unwrap();
+    assert!(rest.len() < 4_000_000, "what was on its way, and then the end");
     quick.next();
 }
 

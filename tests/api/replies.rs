@@ -1,9 +1,11 @@
 //! What each request does, and what it is answered.
 
+use std::io::Write as _;
+
 use kinocue::hall::{Ask, LevelsChange, Role, Surface};
 use kinocue::time::ShowTime;
 
-use crate::client::{Request, problem};
+use crate::client::{Reply, Request, problem};
 use crate::hall::{Hall, with_controller};
 
 fn put(path: &str, body: &str) -> Request {
@@ -152,6 +154,18 @@ fn the_service_says_whether_it_is_well_and_ready_and_gives_its_figures() {
     let figures = hall.socket().get("/metrics");
     assert!(figures.header("content-type").unwrap().starts_with("application/openmetrics-text"));
     assert!(figures.text().contains("kinocue_state{"), "{}", figures.text());
+}
+
+#[test]
+fn a_connection_is_good_for_one_request_after_another() {
+    let hall = Hall::open();
+    let mut connection = hall.socket().connect();
+    let first = b"POST /api/v1/show/pause HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    connection.write_all(first).unwrap();
+    connection.write_all(&Request::new("POST", "/api/v1/show/park").octets(&hall.socket())).unwrap();
+    let both = String::from_utf8(Reply::read(&mut *connection).body).unwrap();
+    assert!(both.contains("asked: pause") && both.contains("asked: park"), "{both}");
+    assert_eq!(hall.asks(), [Ask::Pause, Ask::Park]);
 }
 
 #[test]
