@@ -15,10 +15,10 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use tokio::runtime::{self, Runtime};
-use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::sync::{mpsc, watch};
 
 use crate::config;
-use crate::hall::{Handle, Problem};
+use crate::hall::Handle;
 use crate::library::Library;
 use crate::log::Log;
 use crate::playlist::Shelf;
@@ -50,7 +50,7 @@ mod tries;
 pub use stop::{StopSocket, stop_socket};
 
 use access::Access;
-use shared::{Pulse, STREAMS, Shared};
+use shared::{Pulse, Shared};
 use socket::SocketFile;
 
 /// What its threads are called. A panic on one of them ends the request that it was for, and nothing else.
@@ -172,7 +172,8 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         access: Access::new(&config, &addresses),
         tries: Default::default(),
         once: Default::default(),
-        streams: Arc::new(Semaphore::new(STREAMS)),
+        streams: shared::streams(),
+        errands: shared::errands(),
         closing: closed.clone(),
         document: document.to_json().expect("a description is text").into(),
         library,
@@ -232,11 +233,4 @@ fn port(address: SocketAddr) -> Result<TcpListener, ApiError> {
     let listener = TcpListener::bind(address).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     Ok(listener)
-}
-
-/// Does what waits for a disk, on a thread for that.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
-) -> Result<T, Problem> {
-    tokio::task::spawn_blocking(work).await.unwrap_or_else(|_| Err(problem::panicked()))
 }

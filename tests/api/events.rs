@@ -75,7 +75,7 @@ fn who_reads_nothing_is_cut_off_and_the_others_go_on() {
 #[test]
 fn there_is_room_for_so_many_and_a_place_is_free_again_when_one_goes() {
     let hall = Hall::open();
-    let mut watching: Vec<_> = (0..32).map(|_| Events::open(&hall.socket())).collect();
+    let mut watching: Vec<_> = (0..16).map(|_| Events::open(&hall.socket())).collect();
     watching.iter_mut().for_each(|events| {
         events.next();
     });

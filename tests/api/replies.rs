@@ -132,8 +132,12 @@ fn what_is_not_as_it_may_be_is_refused_and_reaches_nobody() {
 fn a_stop_is_a_stop_whatever_comes_with_it() {
     let hall = Hall::open();
     let stop = Request::new("POST", "/api/v1/show/stop").header("Content-Type", "text/plain").body("{broken");
-    assert_eq!(stop.sent_ago(60_000).send(&hall.socket()).state(), "stopping");
-    assert!(hall.desk.take_stop());
+    let odd = stop.clone().header("Idempotency-Key", "a b").header("X-Kinocue-Sent", "soon");
+    let asked = Request::new("POST", "/api/v1/show/stop?now");
+    for request in [stop.sent_ago(60_000), odd, asked] {
+        assert_eq!(request.send(&hall.socket()).state(), "stopping", "{request:?}");
+        assert!(hall.desk.take_stop());
+    }
 }
 
 #[test]
