@@ -72,3 +72,4 @@ pub mod tracker;
 pub mod sys;
 
 pub mod cli;
+pub mod console;

@@ -1,6 +1,7 @@
 //! The cue library with the real process that checks what is uploaded.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -25,7 +26,7 @@ impl Fixture {
     }
 
     fn bounded(bounds: Bounds) -> Self {
-        let dir = tempfile::tempdir().unwrap();
+        let dir = tempfile::tempdir().expect("a folder");
         let config = dir.path().join("hall.toml");
         fs::write(
             &config,
@@ -33,14 +34,15 @@ impl Fixture {
              max_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n[effects]\nair = 1\n[preset.kids]\nmotion = 0.6\n\
              [[controller]]\nname = \"A1\"\nseat = \"bench3\"\naddress = \"127.0.0.1:7408\"\n",
         )
-        .unwrap();
+        .expect("the folder is ours");
         let program = PathBuf::from(env!("CARGO_BIN_EXE_kinocue"));
-        let library = Library::open(&dir.path().join("cues"), Hall { config, program, bounds }).unwrap();
+        let library = Library::open(&dir.path().join("cues"), Hall { config, program, bounds });
+        let library = library.expect("the folder is ours");
         Self { dir, library }
     }
 
     fn upload(&self, id: &str, octets: &[u8]) -> Result<CueInfo, Problem> {
-        let mut upload = self.library.begin(&id.parse().unwrap())?;
+        let mut upload = self.library.begin(&id.parse().expect("an id"))?;
         for part in octets.chunks(1000) {
             upload.write(part)?;
         }
@@ -53,8 +55,10 @@ impl Fixture {
 
     /// What lies in the library, but for what it keeps of its own.
     fn files(&self) -> Vec<String> {
-        let names = fs::read_dir(self.cues()).unwrap().map(|entry| entry.unwrap().file_name());
-        let mut names: Vec<_> = names.map(|name| name.into_string().unwrap()).collect();
+        let names = fs::read_dir(self.cues())
+            .expect("it is ours")
+            .map(|entry| entry.expect("it is ours").file_name());
+        let mut names: Vec<_> = names.map(|name| name.into_string().expect("UTF-8")).collect();
         names.retain(|name| name != ".index.json");
         names.sort();
         names
@@ -62,9 +66,10 @@ impl Fixture {
 }
 
 fn mcap(cue: &str) -> Vec<u8> {
-    let cue = kinocue::cue::read(Path::new("x.csv"), cue.as_bytes(), &Default::default()).unwrap();
+    let cue =
+        kinocue::cue::read(Path::new("x.csv"), cue.as_bytes(), &Default::default()).expect("a good cue");
     let mut file = std::io::Cursor::new(Vec::new());
-    kinocue::cue::write_mcap(&cue, &mut file).unwrap();
+    kinocue::cue::write_mcap(&cue, &mut file).expect("it fits in memory");
     file.into_inner()
 }
 
@@ -76,7 +81,7 @@ fn a_cue_that_passes_is_taken_in_with_all_that_is_known_of_it() {
     assert_eq!((info.effects.as_slice(), info.size), (["air".to_owned()].as_slice(), GOOD.len() as u64));
     assert_eq!(info.proof, Proved::Passed);
     assert_eq!(fixture.files(), ["ride.csv"]);
-    assert_eq!(fixture.library.list(), [info.clone()]);
+    assert_eq!(fixture.library.list(), std::slice::from_ref(&info));
     let (timeline, sha256) = fixture.library.read(&"ride".parse().unwrap()).unwrap();
     assert_eq!((Some(sha256), timeline.axes()), (info.sha256, 3));
 }
@@ -145,11 +150,12 @@ fn bomb() -> Vec<u8> {
         .compression(Some(mcap::Compression::Zstd))
         .chunk_size(Some(128 << 20))
         .create(&mut file)
-        .unwrap();
-    let channel = writer.add_channel(0, "/cue/axes", "json", &Default::default()).unwrap();
-    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
-    writer.write_to_known_channel(&header, &vec![b' '; 60 << 20]).unwrap();
-    writer.finish().unwrap();
+        .expect("it fits in memory");
+    let channel = writer.add_channel(0, "/cue/axes", "json", &Default::default()).expect("it fits in memory");
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    writer.write_to_known_channel(&header, &vec![b' '; 60 << 20]).expect("it fits in memory");
+    writer.finish().expect("it fits in memory");
     drop(writer);
     file.into_inner()
 }
@@ -157,45 +163,54 @@ fn bomb() -> Vec<u8> {
 #[test]
 fn a_bomb_is_refused_within_its_bounds() {
     let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
+    fixture.upload("ride", GOOD.as_bytes()).unwrap();
     let octets = bomb();
     assert!(octets.len() < 1 << 20, "{} octets", octets.len());
     let problem = fixture.upload("bomb", &octets).unwrap_err();
     assert_eq!(problem.code, Code::Check);
-    assert!(problem.detail.contains("48 MiB of memory"), "{problem}");
-    assert!(fixture.files().is_empty());
+    assert!(problem.detail.contains("signal 6; it may take 48 MiB of memory"), "{problem}");
+    assert_eq!(fixture.files(), ["ride.csv"]);
     let roomy = Fixture::new();
     let problem = roomy.upload("bomb", &octets).unwrap_err();
     assert!(problem.faults[0].contains("65536"), "with room it is a message that is too long: {problem}");
 }
 
-#[test]
-fn a_check_that_hangs_is_ended() {
+/// An upload whose check is a script.
+fn upload_with(script: &str, time: Duration) -> Problem {
     let fixture = Fixture::new();
-    let hangs = fixture.dir.path().join("hangs");
-    fs::write(&hangs, "#!/bin/sh\nexec sleep 60\n").unwrap();
-    fs::set_permissions(&hangs, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-    let bounds = Bounds { time: Duration::from_millis(50), ..Bounds::default() };
-    let hall = Hall { config: fixture.dir.path().join("hall.toml"), program: hangs, bounds };
-    let library = Library::open(&fixture.cues(), hall).unwrap();
-    let mut upload = library.begin(&"ride".parse().unwrap()).unwrap();
-    upload.write(GOOD.as_bytes()).unwrap();
-    let problem = upload.finish().unwrap_err();
-    assert!(problem.detail.contains("took more than"), "{problem}");
+    let program = fixture.dir.path().join("check");
+    fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("it is ours");
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    let bounds = Bounds { time, ..Bounds::default() };
+    let hall = Hall { config: fixture.dir.path().join("hall.toml"), program, bounds };
+    let library = Library::open(&fixture.cues(), hall).expect("the folder is ours");
+    let mut upload = library.begin(&"ride".parse().expect("an id")).expect("it is the first");
+    upload.write(GOOD.as_bytes()).expect("it is ours");
+    let problem = upload.finish().expect_err("it is refused");
     assert!(fixture.files().is_empty());
+    problem
 }
 
 #[test]
-fn a_check_that_prints_without_end_is_ended() {
-    let fixture = Fixture::new();
-    let hall = Hall {
-        config: fixture.dir.path().join("hall.toml"),
-        program: "/usr/bin/yes".into(),
-        bounds: Bounds::default(),
-    };
-    let library = Library::open(&fixture.cues(), hall).unwrap();
-    let mut upload = library.begin(&"ride".parse().unwrap()).unwrap();
-    upload.write(GOOD.as_bytes()).unwrap();
-    assert!(upload.finish().unwrap_err().detail.contains("more than any verdict"));
+fn a_check_that_hangs_or_prints_without_end_is_ended() {
+    let problem = upload_with("exec sleep 60", Duration::from_millis(50));
+    assert!(problem.detail.contains("took more than"), "{problem}");
+    let problem = upload_with("exec >&-; exec sleep 60", Duration::from_millis(50));
+    assert!(problem.detail.contains("took more than"), "{problem}");
+    let problem = upload_with("exec yes", Duration::from_secs(60));
+    assert!(problem.detail.contains("more than any verdict"), "{problem}");
+}
+
+#[test]
+fn a_check_that_fails_takes_nothing_in() {
+    for script in ["exit 0", "kill -9 $$", "echo '{\"passed\":true}'"] {
+        let problem = upload_with(script, Duration::from_secs(60));
+        assert!(problem.detail.contains("the check of the cue ended with"), "{problem}");
+    }
+    let foreign = r#"echo '{"passed":true,"faults":[],"more":0,"sha256":"00","effects":[],"mcap":false}'"#;
+    assert!(
+        upload_with(foreign, Duration::from_secs(60)).detail.contains("changed while it was being checked")
+    );
 }
 
 #[test]

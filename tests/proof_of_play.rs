@@ -17,8 +17,9 @@ struct Run {
 }
 
 fn report(args: &[&str]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_kinocue")).arg("report").args(args).output().unwrap();
-    let text = |octets| String::from_utf8(octets).unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_kinocue")).arg("report").args(args).output().expect("kinocue runs");
+    let text = |octets| String::from_utf8(octets).expect("UTF-8");
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
@@ -60,7 +61,7 @@ fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> Sho
 
 /// A day with a show that was played, one that a person stopped, and one that a crash ended.
 fn journal(dir: &Path) {
-    let now = "2026-11-21T08:00:00Z".parse::<Timestamp>().unwrap().to_zoned(TimeZone::UTC);
+    let now = "2026-11-21T08:00:00Z".parse::<Timestamp>().expect("RFC 3339").to_zoned(TimeZone::UTC);
     let mut journal = Journal::open(dir, LIMITS, &now);
     let (seven, eight) = ("2026-11-21T19:00:00.000+01:00", "2026-11-21T20:00:00.000+01:00");
     journal.note(&Action {
@@ -87,7 +88,9 @@ fn a_day_is_a_table_with_a_line_for_all_together() {
     journal(dir.path());
     let run = report(&["--day", "2026-11-21", "--dir", dir.path().to_str().unwrap()]);
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
-    for part in ["2026-11-21 19:00:00", "storm", "completed", "00:10:00", "60 %", "3/4", "99.97 %", "interrupted"] {
+    for part in
+        ["2026-11-21 19:00:00", "storm", "completed", "00:10:00", "60 %", "3/4", "99.97 %", "interrupted"]
+    {
         assert!(run.stdout.contains(part), "{part}: {}", run.stdout);
     }
     assert!(run.stdout.contains("ride: A2 was lost at 00:12.000"), "{}", run.stdout);
@@ -95,7 +98,10 @@ fn a_day_is_a_table_with_a_line_for_all_together() {
                   acked, 0 refused, 2 lost";
     assert_eq!(run.stdout.lines().last(), Some(totals));
     let run = report(&["--from", "2026-11-01", "--to", "2026-11-20", "--dir", dir.path().to_str().unwrap()]);
-    assert_eq!((run.code, run.stdout.as_str()), (Some(0), "nothing was played from 2026-11-01 to 2026-11-20\n"));
+    assert_eq!(
+        (run.code, run.stdout.as_str()),
+        (Some(0), "nothing was played from 2026-11-01 to 2026-11-20\n")
+    );
 }
 
 #[test]
@@ -103,7 +109,11 @@ fn what_was_asked_is_shown_without_what_a_terminal_obeys() {
     let dir = tempfile::tempdir().unwrap();
     journal(dir.path());
     let run = report(&["--day", "2026-11-21", "--actions", "--dir", dir.path().to_str().unwrap()]);
-    assert!(run.stdout.contains("ann (socket, engineer)") && run.stdout.contains("armed?[31m"), "{}", run.stdout);
+    assert!(
+        run.stdout.contains("ann (socket, engineer)") && run.stdout.contains("armed?[31m"),
+        "{}",
+        run.stdout
+    );
     assert!(!run.stdout.contains('\u{1b}'));
 }
 
@@ -121,8 +131,14 @@ fn csv_reads_back_whatever_a_title_holds() {
         rows[row][column].to_owned()
     };
     assert_eq!(cell(0, "title"), "'=Storm, \"II\"");
-    assert_eq!((cell(0, "took_s"), cell(0, "acked"), cell(0, "lateness_p99_us")), ("600".into(), "3999".into(), "9.5".into()));
-    assert_eq!((cell(1, "result"), cell(2, "result"), cell(2, "end")), ("stopped".into(), "interrupted".into(), String::new()));
+    assert_eq!(
+        (cell(0, "took_s"), cell(0, "acked"), cell(0, "lateness_p99_us")),
+        ("600".into(), "3999".into(), "9.5".into())
+    );
+    assert_eq!(
+        (cell(1, "result"), cell(2, "result"), cell(2, "end")),
+        ("stopped".into(), "interrupted".into(), String::new())
+    );
 }
 
 #[test]
@@ -152,7 +168,9 @@ fn wrong_use_and_a_missing_journal_have_their_exit_codes() {
     assert_eq!(code(&["--config", &format!("{path}/none.toml")]), Some(66));
     assert_eq!(report(&["--dir", path]).stdout.split(' ').next(), Some("nothing"));
     let config = dir.path().join("hall.toml");
-    let hall = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/config/hall.toml")).unwrap();
+    let hall =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/config/hall.toml"))
+            .unwrap();
     std::fs::write(&config, format!("[log]\ndir = \"{path}/logs\"\n{hall}")).unwrap();
     std::fs::create_dir(dir.path().join("logs")).unwrap();
     journal(&dir.path().join("logs"));

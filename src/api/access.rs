@@ -197,7 +197,10 @@ mod tests {
     fn a_token_says_who_asks_and_what_they_may() {
         let tries = Tries::default();
         let tablet = who("Bearer correct-horse", &tries).unwrap();
-        assert_eq!((tablet.role, tablet.name.as_str(), tablet.surface), (Role::Operate, "tablet", Surface::Http));
+        assert_eq!(
+            (tablet.role, tablet.name.as_str(), tablet.surface),
+            (Role::Operate, "tablet", Surface::Http)
+        );
         let long = format!("Bearer {}", "a".repeat(10_000));
         for wrong in ["Bearer wrong", "Basic correct-horse", "correct-horse", long.as_str()] {
             assert_eq!(who(wrong, &tries), Err(Code::Token), "{wrong}");

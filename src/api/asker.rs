@@ -97,7 +97,8 @@ impl Asker {
         let most = i128::from(u64::try_from(FRESH.as_millis()).unwrap_or(u64::MAX));
         if age_ms < -most {
             let detail = format!("{} was sent {} ms from now: the clocks differ", ask.word(), -age_ms);
-            let remedy = "set the clock of the machine that asks, or reckon with X-Kinocue-Time of the replies";
+            let remedy =
+                "set the clock of the machine that asks, or reckon with X-Kinocue-Time of the replies";
             return Err(Problem::new(Code::Late, detail, remedy));
         }
         if age_ms > most {

@@ -53,7 +53,10 @@ pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<V
     get, path = "/api/v1/cues/{id}", tag = "library", params(("id" = String, Path, description = "Its id")),
     responses((status = 200, body = CueInfo))
 )]
-pub(super) async fn one(State(shared): State<Arc<Shared>>, Id(id): Id) -> Result<JsonReply<CueInfo>, Problem> {
+pub(super) async fn one(
+    State(shared): State<Arc<Shared>>,
+    Id(id): Id,
+) -> Result<JsonReply<CueInfo>, Problem> {
     blocking(move || {
         shared.library.get(&id).ok_or_else(|| {
             let detail = format!("there is no cue {id} in the library");
@@ -100,7 +103,8 @@ pub(super) async fn upload(
     check_length(request.headers(), shared.library.max_octets())?;
     let (to, pieces) = mpsc::channel(PIECES);
     let library = shared.library.clone();
-    let fed = async { timeout(WHOLE, feed(request.into_body(), to)).await.unwrap_or_else(|_| Err(slow(WHOLE))) };
+    let fed =
+        async { timeout(WHOLE, feed(request.into_body(), to)).await.unwrap_or_else(|_| Err(slow(WHOLE))) };
     let (fed, taken) = tokio::join!(fed, blocking(move || take_in(&library, &id, pieces)));
     fed?;
     taken.map(JsonReply)
@@ -155,7 +159,11 @@ fn no_form(request: &Request) -> Result<(), Problem> {
         None => Ok(()),
         Some(form) => {
             let detail = format!("{form} is what forms are sent as");
-            Err(Problem::new(Code::Media, detail, "send the file as application/octet-stream, as curl -T does"))
+            Err(Problem::new(
+                Code::Media,
+                detail,
+                "send the file as application/octet-stream, as curl -T does",
+            ))
         }
     }
 }

@@ -69,14 +69,15 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
     }
     let in_the_open = is_public(path);
     if !in_the_open && !takes_query(path) && request.uri().query().is_some() {
-        return Err(bad_value("there is a query, and nothing here takes one", "leave out what is behind the ?"));
+        return Err(bad_value(
+            "there is a query, and nothing here takes one",
+            "leave out what is behind the ?",
+        ));
     }
     Ok(match peer {
         Peer::Socket(name) => Some(peer::local(name)),
         Peer::Tcp(_) if in_the_open => None,
-        Peer::Tcp(address) => {
-            Some(shared.access.who(headers, *address, &shared.tries, Monotonic.now())?)
-        }
+        Peer::Tcp(address) => Some(shared.access.who(headers, *address, &shared.tries, Monotonic.now())?),
     })
 }
 

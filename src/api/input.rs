@@ -68,7 +68,10 @@ impl<S: Send + Sync> FromRequestParts<S> for Name {
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let name = in_path(parts, state).await?;
         if name.is_empty() || name.chars().count() > MAX_NAME || name.chars().any(char::is_control) {
-            return Err(bad_value(format!("{name:?} is no name"), format!("a name has 1 to {MAX_NAME} characters")));
+            return Err(bad_value(
+                format!("{name:?} is no name"),
+                format!("a name has 1 to {MAX_NAME} characters"),
+            ));
         }
         Ok(Self(name))
     }
@@ -133,7 +136,10 @@ fn json_only(headers: &HeaderMap) -> Result<(), Problem> {
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
     serde_json::from_slice(body).map_err(|error| {
-        bad_value(format!("the body is not what is wanted here: {error}"), "see /api/v1/openapi.json for what is")
+        bad_value(
+            format!("the body is not what is wanted here: {error}"),
+            "see /api/v1/openapi.json for what is",
+        )
     })
 }
 
@@ -166,7 +172,8 @@ mod tests {
 
     #[test]
     fn where_no_body_is_wanted_an_empty_one_passes() {
-        let nothing = |body| run(Nothing::from_request(request("application/json", body), &())).map_err(|p| p.code);
+        let nothing =
+            |body| run(Nothing::from_request(request("application/json", body), &())).map_err(|p| p.code);
         assert!(nothing("").is_ok() && nothing("{}").is_ok());
         assert_eq!(nothing("{\"position_s\":1}").err(), Some(Code::Value));
         assert_eq!(nothing("[]").err(), Some(Code::Value));

@@ -54,6 +54,9 @@ pub(super) async fn choose(asker: Asker, Json(choice): Json<Choice>) -> Result<S
     post, path = "/api/v1/playlist/select", tag = "playlist", request_body = Select,
     responses((status = 200, body = Status))
 )]
-pub(super) async fn select(asker: Asker, Json(Select { entry }): Json<Select>) -> Result<StatusReply, Problem> {
+pub(super) async fn select(
+    asker: Asker,
+    Json(Select { entry }): Json<Select>,
+) -> Result<StatusReply, Problem> {
     asker.ask(Ask::Select { entry }).await
 }

@@ -151,7 +151,10 @@ mod tests {
     #[test]
     fn who_has_no_token_is_told_which_kind_is_wanted_and_nothing_of_the_hall() {
         let response = render(Problem::new(Code::Token, "a", "b").into_response(), None);
-        assert_eq!((response.status().as_u16(), &response.headers()[WWW_AUTHENTICATE]), (401, &"Bearer".parse().unwrap()));
+        assert_eq!(
+            (response.status().as_u16(), &response.headers()[WWW_AUTHENTICATE]),
+            (401, &"Bearer".parse().unwrap())
+        );
     }
 
     #[test]

@@ -82,8 +82,14 @@ fn describe(path: &mut PathItem) {
     let changes = [&mut path.post, &mut path.put].into_iter().flatten();
     changes.for_each(|operation| {
         let headers = [
-            header("X-Kinocue-Sent", "When it was asked, unix milliseconds; too old, and what would move is refused."),
-            header("Idempotency-Key", "Of two POSTs with the same one the second does nothing, and gets the same reply."),
+            header(
+                "X-Kinocue-Sent",
+                "When it was asked, unix milliseconds; too old, and what would move is refused.",
+            ),
+            header(
+                "Idempotency-Key",
+                "Of two POSTs with the same one the second does nothing, and gets the same reply.",
+            ),
         ];
         operation.parameters.get_or_insert_default().extend(headers.map(RefOr::T));
     });

@@ -71,7 +71,11 @@ pub(super) async fn document(State(shared): State<Arc<Shared>>) -> Response {
 }
 
 /// What no route takes: the page and what belongs to it, or nothing.
-pub(super) async fn page(State(shared): State<Arc<Shared>>, method: Method, uri: Uri) -> Result<Response, Problem> {
+pub(super) async fn page(
+    State(shared): State<Arc<Shared>>,
+    method: Method,
+    uri: Uri,
+) -> Result<Response, Problem> {
     let page = (shared.pages)(uri.path()).filter(|_| method == Method::GET || method == Method::HEAD);
     let (content_type, octets) = page.ok_or_else(|| nothing_there(uri.path()))?;
     Ok(([(CONTENT_TYPE, HeaderValue::from_static(content_type))], octets).into_response())

@@ -112,7 +112,8 @@ mod tests {
     #[test]
     fn every_level_outside_its_range_is_named() {
         let rows = [("A".to_owned(), 1.5), ("B".to_owned(), 1.0)].into();
-        let change = LevelsChange { motion: Some(-0.1), vibration: Some(0.0), rows, ..LevelsChange::default() };
+        let change =
+            LevelsChange { motion: Some(-0.1), vibration: Some(0.0), rows, ..LevelsChange::default() };
         let problem = check_levels(&change).unwrap_err();
         assert_eq!(problem.faults, ["motion: -0.1 is outside 0..=1", "row A: 1.5 is outside 0..=1"]);
     }

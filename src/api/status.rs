@@ -38,7 +38,11 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> StatusReply {
 pub(super) async fn events(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
     let Ok(place) = Arc::clone(&shared.streams).try_acquire_owned() else {
         let detail = format!("{STREAMS} are watching already");
-        return Err(Problem::new(Code::Busy, detail, "close a page elsewhere, or ask for the status now and then"));
+        return Err(Problem::new(
+            Code::Busy,
+            detail,
+            "close a page elsewhere, or ask for the status now and then",
+        ));
     };
     // One event waits at the most, beside what the connection holds.
     let (to, events) = mpsc::channel(1);

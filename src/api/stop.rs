@@ -97,7 +97,9 @@ impl StopDesk {
         if self.pause_until.is_none() {
             ready.push(PollFd::new(&self.listener, PollFlags::IN));
         }
-        ready.extend(self.peers.iter().map(|caller| PollFd::from_borrowed_fd(caller.stream.as_fd(), PollFlags::IN)));
+        ready.extend(
+            self.peers.iter().map(|caller| PollFd::from_borrowed_fd(caller.stream.as_fd(), PollFlags::IN)),
+        );
         if poll(&mut ready, timeout.as_ref()).is_err() {
             return None; // interrupted by a signal
         }
@@ -158,7 +160,8 @@ impl Caller {
     }
 
     fn user(&self) -> String {
-        socket_peercred(&self.stream).map_or_else(|_| "unknown".to_owned(), |peer| peer::user(peer.uid.as_raw()))
+        socket_peercred(&self.stream)
+            .map_or_else(|_| "unknown".to_owned(), |peer| peer::user(peer.uid.as_raw()))
     }
 }
 
@@ -216,7 +219,9 @@ mod tests {
     #[test]
     fn nothing_else_is_a_stop() {
         let hall = hall();
-        for text in ["", "\n", "go\n", "stop now\n", "stopstop\n", "GET / HTTP/1.1\r\n\r\n", &"stop".repeat(100)] {
+        for text in
+            ["", "\n", "go\n", "stop now\n", "stopstop\n", "GET / HTTP/1.1\r\n\r\n", &"stop".repeat(100)]
+        {
             assert_eq!(say(&hall.path, text), "send the line: stop\n", "{text:?}");
         }
         assert!(!hall.desk.take_stop());

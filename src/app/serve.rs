@@ -13,7 +13,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use super::house::{House, HouseError, Numbers, Reins};
-use super::keeper::{Ends, Keeper, Left, Signals, Voice};
+use super::keeper::{Ends, Keeper, Left, Memory, Signals, Voice};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::config::Config;
 use crate::engine::Rate;
@@ -104,7 +104,7 @@ pub fn serve(
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let log = Log::start(tell).map_err(ServeError::System)?;
     let voice = Voice::new(log.clone());
-    let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice };
+    let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice, memory: Memory::default() };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     let mut feeder = None;

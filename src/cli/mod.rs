@@ -25,11 +25,12 @@ mod preflight;
 mod print;
 mod prove;
 mod register;
-mod serve;
 mod report;
+mod serve;
 mod sim;
 mod targets;
 pub mod times;
+mod token;
 
 pub use exit::{Exit, Failure, OrExit};
 
@@ -60,6 +61,7 @@ enum Command {
     Serve(serve::Args),
     Latency(latency::Args),
     Report(report::Args),
+    Token(token::Args),
     #[command(flatten)]
     Client(client::Command),
     Completions(completions::Args),
@@ -107,6 +109,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Serve(args) => serve::run(&args),
         Command::Latency(args) => latency::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Token(args) => token::run(&args),
         Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),
         Command::Prove(args) => prove::run(&args),

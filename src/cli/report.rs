@@ -65,7 +65,10 @@ fn parse_day(text: &str) -> Result<Day, String> {
     match text {
         "today" => Ok(Day::Today),
         "yesterday" => Ok(Day::Yesterday),
-        date => date.parse().map(Day::On).map_err(|_| "write today, yesterday, or a date as 2026-11-21".to_owned()),
+        date => date
+            .parse()
+            .map(Day::On)
+            .map_err(|_| "write today, yesterday, or a date as 2026-11-21".to_owned()),
     }
 }
 
@@ -82,7 +85,8 @@ impl Day {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (from, to) = days(args, local_now().date())?;
     let dir = folder(args)?;
-    let report = journal::report(&dir, from, to).map_err(|error| Failure { exit: exit(&error), error: error.into() })?;
+    let report = journal::report(&dir, from, to)
+        .map_err(|error| Failure { exit: exit(&error), error: error.into() })?;
     if args.json {
         print::json(&report)?;
     } else if args.csv {
@@ -109,7 +113,10 @@ fn days(args: &Args, today: Date) -> Result<(Date, Date), Failure> {
 
 fn folder(args: &Args) -> Result<PathBuf, Failure> {
     let of_config = |path: &Path| load::config(path).map(|config| config.log.dir);
-    let named = args.dir.clone().map_or_else(|| args.config.as_deref().map(of_config).transpose(), |dir| Ok(Some(dir)));
+    let named = args
+        .dir
+        .clone()
+        .map_or_else(|| args.config.as_deref().map(of_config).transpose(), |dir| Ok(Some(dir)));
     Ok(named?.unwrap_or_else(|| Log::default().dir))
 }
 

@@ -6,7 +6,7 @@ use super::{Exit, Failure, OrExit as _, print};
 use crate::app::house::HouseError;
 use crate::app::serve::{Places, ServeError, serve};
 use crate::app::surfaces::Sockets;
-use crate::config;
+use crate::{config, console};
 use crate::net::NetError;
 
 /// Runs a hall: keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sockets =
         Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
     let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
-    serve(config, &places, |_| None, print::tell)?;
+    serve(config, &places, console::page, print::tell)?;
     Ok(Exit::Done)
 }
 

@@ -49,7 +49,10 @@ pub(super) fn api(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Api> {
     if api.hosts.is_empty()
         && let Some(any) = api.listen.iter().find(|address| address.ip().is_unspecified())
     {
-        entry.fault(faults, &format!("listen has {any}, any address of this machine; list its names in hosts"));
+        entry.fault(
+            faults,
+            &format!("listen has {any}, any address of this machine; list its names in hosts"),
+        );
     }
     Some(api)
 }
@@ -188,14 +191,20 @@ mod tests {
         ));
         let api = api.unwrap().api;
         assert_eq!(api.listen.len(), 2);
-        assert_eq!((api.hosts[0].as_str(), api.origins[0].as_str()), ("hall-1:8480", "https://hall-1.example"));
+        assert_eq!(
+            (api.hosts[0].as_str(), api.origins[0].as_str()),
+            ("hall-1:8480", "https://hall-1.example")
+        );
         assert_eq!((api.open_role, api.tokens[0].role), (Some(Role::View), Role::Operate));
         assert_eq!(api.tokens[0].sha256[..4], [0x00, 0xff, 0x00, 0xff]);
     }
 
     #[test]
     fn what_would_open_the_door_wider_than_meant_is_refused() {
-        assert!(fault("[api]\nlisten = [\"8480\"]").contains("hall.toml:14:11: listen: \"8480\" is not an address"));
+        assert!(
+            fault("[api]\nlisten = [\"8480\"]")
+                .contains("hall.toml:14:11: listen: \"8480\" is not an address")
+        );
         assert!(fault("[api]\nlisten = [\"0.0.0.0:8480\"]").contains("any address of this machine"));
         assert!(fault("[api]\nhosts = [\"http://hall\"]").contains("is no host"));
         assert!(fault("[api]\norigins = [\"http://hall/page\"]").contains("is no origin"));

@@ -23,7 +23,10 @@ pub struct Preset {
 /// Reads the presets; every effect that they name has to be one of the site's.
 pub(super) fn presets(entry: Entry<'_>, effects: &[Effect], faults: &mut Faults<'_>) -> Vec<Preset> {
     let Some(table) = entry.table(faults) else { return Vec::new() };
-    table.iter().filter_map(|(name, value)| preset(Entry::new(name.get_ref(), value), effects, faults)).collect()
+    table
+        .iter()
+        .filter_map(|(name, value)| preset(Entry::new(name.get_ref(), value), effects, faults))
+        .collect()
 }
 
 fn preset(entry: Entry<'_>, effects: &[Effect], faults: &mut Faults<'_>) -> Option<Preset> {

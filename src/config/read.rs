@@ -16,8 +16,8 @@ use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::library::store;
 use super::log::log;
-use super::preset::presets;
 use super::osc::osc;
+use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
 use super::text::text;
 use super::{

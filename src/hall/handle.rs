@@ -1,8 +1,8 @@
 //! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
 //! stop, which waits for neither.
 
-use std::sync::{Arc, PoisonError, RwLock};
 use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use tokio::sync::{oneshot, watch};

@@ -107,8 +107,12 @@ impl Member {
         }
     }
 
+    /// A sign of life, told again at every look, is one only once.
     pub(super) fn on_life(&mut self, at: MonoTime) {
-        self.heard = self.heard.max(at);
+        if at <= self.heard {
+            return;
+        }
+        self.heard = at;
         self.waiting = None;
         self.unheard = 0;
     }

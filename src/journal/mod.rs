@@ -90,7 +90,8 @@ impl Journal {
         let of_thread = Arc::clone(&standing);
         let write = move || entries.iter().for_each(|entry| of_thread.write(&mut writer, &entry));
         let thread = thread::Builder::new().name("journal".to_owned()).spawn(write);
-        let thread = thread.map_err(|error| standing.note(format!("the journal has no thread: {error}"))).ok();
+        let thread =
+            thread.map_err(|error| standing.note(format!("the journal has no thread: {error}"))).ok();
         let journal = Self { to: Some(to), thread, standing, day: now.date() };
         let version = env!("CARGO_PKG_VERSION").to_owned();
         journal.put(&Line::Start { at: stamp(now), version }, true);
@@ -132,7 +133,8 @@ impl Journal {
     fn put(&self, line: &Line, sync: bool) {
         let Ok(mut text) = serde_json::to_vec(line) else { return self.standing.lose("it has no words") };
         text.push(b'\n');
-        let entry = Entry { day: day_of(line.at()).unwrap_or(self.day), at: line.at().to_owned(), text, sync };
+        let entry =
+            Entry { day: day_of(line.at()).unwrap_or(self.day), at: line.at().to_owned(), text, sync };
         match self.to.as_ref().map(|to| to.try_send(entry)) {
             Some(Ok(())) => {}
             Some(Err(TrySendError::Full(_))) => self.standing.lose("the disk is too slow"),
@@ -176,7 +178,9 @@ impl Standing {
 
     fn lose(&self, why: &str) {
         self.lost.fetch_add(1, Ordering::Relaxed);
-        self.note(format!("the journal cannot be written: {why}; make room, or name another folder in [log]"));
+        self.note(format!(
+            "the journal cannot be written: {why}; make room, or name another folder in [log]"
+        ));
     }
 
     /// Notes trouble, once until it is over.

@@ -22,7 +22,13 @@ fn day(text: &str) -> Date {
 
 fn action(at: &str, what: &str) -> Action {
     let [at, what] = [at, what].map(str::to_owned);
-    Action { at, who: "root (socket, engineer)".to_owned(), what, result: "done".to_owned(), state: "armed".to_owned() }
+    Action {
+        at,
+        who: "root (socket, engineer)".to_owned(),
+        what,
+        result: "done".to_owned(),
+        state: "armed".to_owned(),
+    }
 }
 
 fn record(start: &str) -> ShowRecord {

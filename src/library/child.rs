@@ -1,7 +1,6 @@
 //! The process that checks cues: what comes from outside is taken apart there, at the lowest priority and within limits, and
 //! never in the process that moves seats.
 
-use std::ffi::OsString;
 use std::io::{self, Read as _};
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::Path;
@@ -23,8 +22,9 @@ const MAX_OUTPUT: u64 = 1 << 20;
 const BAD_CONFIGURATION: i32 = 78;
 
 /// Has a cue file checked for a hall. Blocks until it is.
-pub(super) fn examine(hall: &Hall, bounds: &Bounds, cue: &Path) -> Result<Verdict, Problem> {
-    let mut child = spawn(hall, bounds, cue).map_err(|error| {
+pub(super) fn examine(hall: &Hall, cue: &Path) -> Result<Verdict, Problem> {
+    let bounds = &hall.bounds;
+    let mut child = spawn(hall, cue).map_err(|error| {
         let detail = format!("cannot start the check of the cue: {error}");
         Problem::new(Code::File, detail, "look at the service's limits on processes and memory")
     })?;
@@ -42,16 +42,14 @@ pub(super) fn examine(hall: &Hall, bounds: &Bounds, cue: &Path) -> Result<Verdic
 }
 
 /// Not a copy of this process, which would slow its real-time thread down: the child lowers itself.
-fn spawn(hall: &Hall, bounds: &Bounds, cue: &Path) -> io::Result<Child> {
-    let with = |name: &str, value: &dyn AsRef<std::ffi::OsStr>| -> [OsString; 2] {
-        [name.into(), value.as_ref().to_owned()]
-    };
+fn spawn(hall: &Hall, cue: &Path) -> io::Result<Child> {
     Command::new(&hall.program)
         .arg0("kinocue")
         .args(["prove", "--json"])
-        .args(with("--config", &hall.config))
-        .args(with("--memory-mib", &bounds.memory_mib.to_string()))
-        .args(with("--seconds", &bounds.time.as_secs().to_string()))
+        .arg("--config")
+        .arg(&hall.config)
+        .args(["--memory-mib", &hall.bounds.memory_mib.to_string()])
+        .args(["--seconds", &hall.bounds.time.as_secs().to_string()])
         .arg("--")
         .arg(cue)
         .env_clear()

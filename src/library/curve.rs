@@ -65,9 +65,11 @@ fn axis_curve(timeline: &Timeline, axis: usize, to_stroke: f64, points: usize) -
             from: times[row].as_secs_f64(),
             until: times[row + 1].as_secs_f64(),
         };
-        for stretch in stretch(piece.from, span, points)..=stretch(piece.until, span, points) {
-            let (low, high) = piece.ends(count(stretch) * span, count(stretch + 1) * span);
-            ends[stretch] = (ends[stretch].0.min(low), ends[stretch].1.max(high));
+        let (first, last) = (stretch(piece.from, span, points), stretch(piece.until, span, points));
+        for (index, ends) in ends[first..=last].iter_mut().enumerate() {
+            let start = count(first + index) * span;
+            let (low, high) = piece.ends(start, start + span);
+            *ends = (ends.0.min(low), ends.1.max(high));
         }
     }
     let part = |value: f64| (value * to_stroke).clamp(0.0, 1.0);
@@ -92,7 +94,8 @@ impl Piece {
         let (start, end) = (part(start), part(end));
         let within = self.cubic.still().filter(|u| (start..=end).contains(u));
         let values = within.chain([start, end]).map(|u| self.cubic.at(u));
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+        values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
     }
 }
 

@@ -192,7 +192,7 @@ impl Library {
             return Ok(info);
         }
         let cue = self.cue(id)?;
-        let verdict = child::examine(&inner.hall, &inner.hall.bounds, &cue.folder.path(&cue.name))?;
+        let verdict = child::examine(&inner.hall, &cue.folder.path(&cue.name))?;
         if cue.folder.stamp(&cue.name).ok().flatten() != Some(cue.stamp) {
             let detail = format!("the cue {id} changed while it was being checked");
             return Err(Problem::new(Code::File, detail, "try again when it is all there"));
@@ -249,16 +249,16 @@ impl Library {
         }
         let cue = self.cue(id)?;
         let mut curves = lock(&self.inner.curves);
-        let same = |drawn: &&Drawn| {
-            drawn.name == cue.name && drawn.stamp == cue.stamp && drawn.points == points
-        };
+        let same =
+            |drawn: &&Drawn| drawn.name == cue.name && drawn.stamp == cue.stamp && drawn.points == points;
         if let Some(drawn) = curves.iter().find(same) {
             return Ok(Arc::clone(&drawn.curve));
         }
         let (timeline, _) = self.timeline(id, &cue)?;
         let hall = curve::needs_hall(timeline.unit()).then(|| config::load(&self.inner.hall.config));
         let hall = hall.transpose().map_err(|faults| {
-            let remedy = "mend the configuration; the strokes of the seats are needed for a cue in mm or pulses";
+            let remedy =
+                "mend the configuration; the strokes of the seats are needed for a cue in mm or pulses";
             Problem::new(Code::Check, faults.to_string(), remedy)
         })?;
         let curve = Arc::new(curve::draw(&timeline, hall.as_ref(), points));
@@ -314,7 +314,11 @@ fn unknown(id: &CueId) -> Problem {
 }
 
 fn file_problem(what: &str, error: &io::Error) -> Problem {
-    Problem::new(Code::File, format!("cannot {what}: {error}"), "look at the folder of the library and its disk")
+    Problem::new(
+        Code::File,
+        format!("cannot {what}: {error}"),
+        "look at the folder of the library and its disk",
+    )
 }
 
 /// Octets as hexadecimal digits.

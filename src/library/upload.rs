@@ -88,7 +88,7 @@ impl Upload {
         let print = inner.hall.fingerprint();
         let verdict = {
             let _turn = lock(&inner.proving);
-            child::examine(&inner.hall, &inner.hall.bounds, &place.folder.path(&place.name))?
+            child::examine(&inner.hall, &place.folder.path(&place.name))?
         };
         if verdict.sha256 != hex(&hash.finalize()) {
             let detail = "the file changed while it was being checked";

@@ -47,7 +47,8 @@ impl Playlist {
 
 /// Why a cue cannot be played, if it cannot.
 fn examine(library: &Library, cue: &CueId) -> Result<(), String> {
-    let info = library.examine(cue).map_err(|problem| format!("cue: {}; {}", problem.detail, problem.remedy))?;
+    let info =
+        library.examine(cue).map_err(|problem| format!("cue: {}; {}", problem.detail, problem.remedy))?;
     match info.proof {
         Proved::Passed => Ok(()),
         Proved::Failed { faults } => {

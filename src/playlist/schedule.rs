@@ -45,7 +45,8 @@ pub fn next_start(playlist: &Playlist, now: &Zoned) -> Option<(usize, Zoned)> {
     let today = now.date();
     let starts = timed(playlist).filter_map(|(index, at)| {
         // Today's may be past, and a date may have none: the last of the calendar.
-        let mut days = (0_i32..=7).filter_map(|ahead| start_on(at, today.checked_add(ahead.days()).ok()?, now.time_zone()));
+        let mut days = (0_i32..=7)
+            .filter_map(|ahead| start_on(at, today.checked_add(ahead.days()).ok()?, now.time_zone()));
         days.find(|start| *start > now).map(|start| (index, start))
     });
     starts.min_by(|(_, a), (_, b)| a.timestamp().cmp(&b.timestamp()))

@@ -82,7 +82,8 @@ impl Shelf {
         };
         Playlist::parse(&path, &text).map_err(|faults| {
             let lines = faults.to_string().lines().map(str::to_owned).collect();
-            Problem::new(Code::Check, format!("the playlist {id} has faults"), "mend what is named").with(lines)
+            Problem::new(Code::Check, format!("the playlist {id} has faults"), "mend what is named")
+                .with(lines)
         })
     }
 

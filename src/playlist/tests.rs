@@ -97,7 +97,9 @@ fn times_of_day_are_spelt_in_full() {
         let faults = faults_of(&format!("cue = \"c\"\nat = \"{bad}\""));
         assert!(faults[0].contains("is no time of day"), "{bad}: {faults:?}");
     }
-    assert!(faults_of("cue = \"c\"\nat = 19:00:00")[0].contains("a string is wanted here, not a date or time"));
+    assert!(
+        faults_of("cue = \"c\"\nat = 19:00:00")[0].contains("a string is wanted here, not a date or time")
+    );
 }
 
 #[test]
@@ -106,7 +108,8 @@ fn an_empty_list_an_unknown_zone_and_two_starts_at_once_are_refused() {
     assert!(parse("title = \"x\"\nentry = []\n").unwrap_err()[0].contains("0 entries"));
     let zone = parse("title = \"x\"\ntimezone = \"Mars/Olympus\"\n[[entry]]\ncue = \"c\"\n").unwrap_err();
     assert!(zone[0].contains("is no time zone"), "{zone:?}");
-    let twice = faults_of("cue = \"c\"\nat = \"19:00\"\n[[entry]]\ncue = \"d\"\nat = \"19:00:00\"\ndays = [\"sun\"]");
+    let twice =
+        faults_of("cue = \"c\"\nat = \"19:00\"\n[[entry]]\ncue = \"d\"\nat = \"19:00:00\"\ndays = [\"sun\"]");
     assert!(twice[0].ends_with("starts at 19:00:00 on sun, as the one on line 2 does"), "{twice:?}");
 }
 
@@ -127,7 +130,11 @@ fn an_entry_sets_its_preset_and_over_that_its_own() {
 #[test]
 fn what_only_library_and_hall_can_tell_is_found_when_it_is_loaded() {
     let dir = tempfile::tempdir().unwrap();
-    let hall = Hall { config: dir.path().join("hall.toml"), program: "/nonexistent".into(), bounds: Bounds::default() };
+    let hall = Hall {
+        config: dir.path().join("hall.toml"),
+        program: "/nonexistent".into(),
+        bounds: Bounds::default(),
+    };
     let library = Library::open(dir.path(), hall).unwrap();
     let config = from_to_args(&["127.0.0.1:1".to_owned()], &[], 1).unwrap();
     let day = list(&["preset = \"kids\"", "effects = { watr = false }"]);
@@ -135,7 +142,10 @@ fn what_only_library_and_hall_can_tell_is_found_when_it_is_loaded() {
     let [preset, cue, effect] = &faults[..] else { panic!("a cue is looked at once: {faults:#?}") };
     assert!(preset.starts_with("day.toml:4:10: preset: there is no [preset.kids]"), "{preset}");
     assert!(cue.starts_with("day.toml:3:7: cue: there is no cue c in the library"), "{cue}");
-    assert!(effect.ends_with("watr: is not in [effects] of the configuration; did you mean water?"), "{effect}");
+    assert!(
+        effect.ends_with("watr: is not in [effects] of the configuration; did you mean water?"),
+        "{effect}"
+    );
 }
 
 #[test]
@@ -158,7 +168,8 @@ fn a_shelf_lists_all_playlists_and_names_the_faults_of_bad_ones() {
 
 #[test]
 fn the_next_start_is_the_first_to_come() {
-    let day = list(&["at = \"19:00\"", "at = \"21:30\"\ndays = [\"sat\"]", "", "at = \"10:00\"\ndays = [\"mon\"]"]);
+    let day =
+        list(&["at = \"19:00\"", "at = \"21:30\"\ndays = [\"sat\"]", "", "at = \"10:00\"\ndays = [\"mon\"]"]);
     let next = |now: &str| {
         let (entry, start) = next_start(&day, &at(now)).unwrap();
         (entry, start.timestamp().to_string())

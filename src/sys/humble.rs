@@ -28,8 +28,7 @@ pub fn lower(bounds: Bounds) -> io::Result<()> {
     let _ = fs::write("/proc/self/oom_score_adj", "1000");
     set_parent_process_death_signal(Some(Signal::KILL))?;
     let Bounds { memory, cpu_s } = bounds;
-    let limits =
-        [(Resource::As, memory), (Resource::Cpu, cpu_s), (Resource::Fsize, 0), (Resource::Core, 0)];
+    let limits = [(Resource::As, memory), (Resource::Cpu, cpu_s), (Resource::Fsize, 0), (Resource::Core, 0)];
     for (resource, most) in limits {
         // What whoever started it allows at most cannot be raised, and need not.
         let most = rustix::process::getrlimit(resource).maximum.map_or(most, |given| given.min(most));

@@ -64,6 +64,15 @@ pub struct Ends {
     pub signals: Signals,
     /// Whom to tell what happens.
     pub voice: Voice,
+    /// What was set in the hall before; for a first one, nothing.
+    pub memory: Memory,
+}
+
+/// What goes over from a hall to the one that is opened with another configuration.
+#[derive(Debug, Default)]
+pub struct Memory {
+    board: Option<Board>,
+    cue: Option<String>,
 }
 
 /// What the system asks of the program; set by signals.
@@ -129,11 +138,15 @@ pub struct Keeper {
 impl Keeper {
     /// The keeper of a hall that has just opened.
     #[must_use]
-    pub fn new(ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
+    pub fn new(mut ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
         let now = Monotonic.now();
-        let board = Board::new(&reins.config);
+        let memory = std::mem::take(&mut ends.memory);
+        let mut board = Board::new(&reins.config);
+        if let Some(before) = &memory.board {
+            board.carry_over(before);
+        }
         ends.source.lead(Arc::clone(&reins.desk));
-        Self {
+        let mut keeper = Self {
             ends,
             began: now,
             known: Known::new(now),
@@ -155,7 +168,11 @@ impl Keeper {
             reload: None,
             show_over: false,
             ended: Cause::Started,
+        };
+        if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
+            keeper.fetch(cue, None);
         }
+        keeper
     }
 
     /// Keeps the hall until `closed` says what it came to.
@@ -168,6 +185,8 @@ impl Keeper {
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
                 self.end_record(self.ended);
+                let cue = self.cued.map(|cued| cued.id);
+                self.ends.memory = Memory { board: Some(self.board), cue };
                 let journal = self.record.into_journal();
                 return Left { ends: self.ends, closed, reload: self.reload, journal };
             }

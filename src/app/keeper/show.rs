@@ -111,8 +111,13 @@ impl Keeper {
                 return self.answer(asked, Err(problem));
             }
         };
+        self.fetch(id, Some(asked));
+    }
+
+    /// Has a cue read and proved.
+    pub(super) fn fetch(&mut self, id: CueId, asked: Option<Asked>) {
         let (library, config) = (self.library.clone(), self.reins.config.clone());
-        self.send("loading", Some(asked), move || Done::Cued(read(&library, &config, &id)));
+        self.send("loading", asked, move || Done::Cued(read(&library, &config, &id)));
     }
 
     /// Whether another cue may be loaded.

@@ -166,7 +166,12 @@ impl Keeper {
             });
             for (lane, controller) in tested {
                 let (Some(now), Some(then)) = (table.get(lane), before.get(lane)) else { continue };
-                sweep.status.rows.push(row_of(&controller.name, &part.name, then, now));
+                let row = row_of(&controller.name, &part.name, then, now);
+                let TestRow { asked, acked, .. } = row;
+                let p99 = row.p99_us.map_or_else(|| "-".to_owned(), |us| format!("{us} µs"));
+                let line = format!("{} {}: {acked} of {asked} acked, p99 {p99}", controller.name, part.name);
+                self.record.event(line);
+                sweep.status.rows.push(row);
             }
             sweep.status.done = done + 1;
         }

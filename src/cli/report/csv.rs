@@ -16,7 +16,8 @@ pub(super) fn shows(report: &Report) -> String {
 pub(super) fn actions(report: &Report) -> String {
     let head = ["at", "who", "what", "result", "state"].map(str::to_owned);
     let rows = report.actions.iter();
-    let rows = rows.map(|one| [&one.at, &one.who, &one.what, &one.result, &one.state].map(|text| plain(text)));
+    let rows =
+        rows.map(|one| [&one.at, &one.who, &one.what, &one.result, &one.state].map(|text| plain(text)));
     [head].into_iter().chain(rows).map(|cells| record(&cells)).collect()
 }
 

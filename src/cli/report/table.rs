@@ -22,7 +22,11 @@ pub(super) fn shows(report: &Report) -> String {
     report.shows.iter().for_each(|one| {
         table.add_row(show(one));
     });
-    table.column_iter_mut().skip(3).take(10).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    table
+        .column_iter_mut()
+        .skip(3)
+        .take(10)
+        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
     let events: String = report.shows.iter().map(events).collect();
     let blank = if events.is_empty() { "" } else { "\n" };
     format!("{}\n{blank}{events}\n{}\n", table.trim_fmt(), totals(&report.totals, &days))
@@ -77,12 +81,25 @@ fn show(show: &Shown) -> Vec<String> {
 /// What happened in a show, under its start.
 fn events(show: &Shown) -> String {
     let events = show.record.outcome.iter().flat_map(|outcome| &outcome.events);
-    events.map(|event| format!("{} {}: {}\n", short(&show.record.start), safe(&show.record.cue), safe(event))).collect()
+    events
+        .map(|event| format!("{} {}: {}\n", short(&show.record.start), safe(&show.record.cue), safe(event)))
+        .collect()
 }
 
 fn totals(totals: &Totals, days: &str) -> String {
-    let Totals { shows, completed, stopped, faults, interrupted, running, took_s, sent, acked, refused, lost } =
-        totals;
+    let Totals {
+        shows,
+        completed,
+        stopped,
+        faults,
+        interrupted,
+        running,
+        took_s,
+        sent,
+        acked,
+        refused,
+        lost,
+    } = totals;
     let noun = if *shows == 1 { "show" } else { "shows" };
     let parts = [
         (*completed, "completed"),
@@ -114,7 +131,11 @@ fn micros(value: Option<f64>) -> String {
 }
 
 /// `HH:MM:SS`.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a saturating cast is what is wanted")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a saturating cast is what is wanted"
+)]
 fn span(seconds: f64) -> String {
     let s = seconds.round() as u64;
     format!("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)

@@ -1,0 +1,80 @@
+//! The web console: one page and what belongs to it, built into the program. It needs no network but the server's own, no
+//! build step, and nothing that `Content-Security-Policy: default-src 'self'` forbids. What it shows comes from
+//! `/api/v1/events`, what is pressed goes to `/api/v1`; the modules in `page/js` say which does what. Control plane.
+
+#[cfg(test)]
+mod tests;
+
+/// A file of the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asset {
+    /// Its `Content-Type`.
+    pub content_type: &'static str,
+    /// Its octets.
+    pub body: &'static [u8],
+}
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const JS: &str = "text/javascript; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+const TEXT: &str = "text/plain; charset=utf-8";
+
+/// A file under the path that it has in its folder.
+macro_rules! files {
+    ($folder:literal: $($path:literal $content_type:ident),+ $(,)?) => {
+        &[$((concat!("/", $path), Asset { content_type: $content_type, body: include_bytes!(concat!($folder, $path)) })),+]
+    };
+}
+
+/// What we wrote.
+const PAGE: &[(&str, Asset)] = files!("page/":
+    "index.html" HTML,
+    "icon.svg" SVG,
+    "style.css" CSS,
+    "controls.css" CSS,
+    "panels.css" CSS,
+    "js/api.js" JS,
+    "js/clock.js" JS,
+    "js/controller.js" JS,
+    "js/curves.js" JS,
+    "js/dom.js" JS,
+    "js/film.js" JS,
+    "js/headline.js" JS,
+    "js/histogram.js" JS,
+    "js/levels.js" JS,
+    "js/main.js" JS,
+    "js/map.js" JS,
+    "js/marks.js" JS,
+    "js/playlist.js" JS,
+    "js/press.js" JS,
+    "js/reports.js" JS,
+    "js/state.js" JS,
+    "js/stop.js" JS,
+    "js/stream.js" JS,
+    "js/token.js" JS,
+    "js/transport.js" JS,
+    "js/trim.js" JS,
+    "js/warnings.js" JS,
+    "js/words.js" JS,
+);
+
+/// What others wrote, with its licence (`vendor/README.md`).
+const VENDOR: &[(&str, Asset)] = files!("":
+    "vendor/uPlot.iife.min.js" JS,
+    "vendor/uPlot.min.css" CSS,
+    "vendor/LICENSE" TEXT,
+);
+
+/// What is at a path, which begins with a slash; `/` is the page itself. None where there is nothing.
+#[must_use]
+pub fn asset(path: &str) -> Option<Asset> {
+    let path = if path == "/" { "/index.html" } else { path };
+    PAGE.iter().chain(VENDOR).find(|(at, _)| *at == path).map(|(_, asset)| *asset)
+}
+
+/// The content type and the octets of what is at a path, as a server hands them out.
+#[must_use]
+pub fn page(path: &str) -> Option<(&'static str, &'static [u8])> {
+    asset(path).map(|asset| (asset.content_type, asset.body))
+}

@@ -1,0 +1,91 @@
+// Requests to the server: with token, key against repeats, and the time at which they were sent.
+
+import { sentAt, hear } from './clock.js';
+import { token, askForToken } from './token.js';
+
+const PATIENCE_MS = 65_000; // the hall may take 60 s over a cue of two hours
+const ROOT = '/api/v1/';
+
+/** Why something was not done, as the server or the browser says. */
+export class Problem extends Error {
+  constructor({ status = 0, code = 'unreachable', detail, remedy, faults = [] }) {
+    super(detail);
+    Object.assign(this, { status, code, detail, remedy, faults });
+  }
+
+  /** In one line. */
+  get words() {
+    const faults = this.faults.length > 0 ? ` (${this.faults.join('; ')})` : '';
+    return `${this.detail}${faults}${this.remedy ? `; ${this.remedy}` : ''}`;
+  }
+}
+
+/** The headers that every request has. */
+export function headers(more = {}) {
+  const bearer = token();
+  return bearer ? { ...more, Authorization: `Bearer ${bearer}` } : more;
+}
+
+/** A key that no other request has. Made of random octets, since `randomUUID` is there on secure origins alone. */
+export function key() {
+  const octets = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(octets, (octet) => octet.toString(16).padStart(2, '0')).join('');
+}
+
+/** Reads. */
+export const get = (path, patience = PATIENCE_MS) => request('GET', path, undefined, {}, patience);
+
+/** Asks for a change; the reply is the status that it led to. */
+export function change(method, path, body = {}, { repeatOf = key(), patience = PATIENCE_MS } = {}) {
+  const more = {
+    'Content-Type': 'application/json',
+    'Idempotency-Key': repeatOf,
+    'X-Kinocue-Sent': String(sentAt()),
+  };
+  return request(method, path, JSON.stringify(body), more, patience);
+}
+
+async function request(method, path, body, more, patience) {
+  const before = performance.now();
+  let response;
+  let text;
+  try {
+    response = await fetch(ROOT + path, {
+      method,
+      body,
+      headers: headers(more),
+      cache: 'no-store',
+      credentials: 'omit',
+      redirect: 'error',
+      signal: AbortSignal.timeout(patience),
+    });
+    hear(response.headers, before);
+    text = await response.text();
+  } catch (error) {
+    throw unreachable(error, patience);
+  }
+  if (response.status === 401) askForToken();
+  const reply = parsed(text);
+  if (response.ok) return reply;
+  throw new Problem({
+    status: response.status,
+    detail: `the server said ${response.status}`,
+    remedy: 'look at its log',
+    ...reply,
+  });
+}
+
+function unreachable(error, patience) {
+  if (error.name === 'TimeoutError') {
+    return new Problem({ detail: `no reply within ${patience / 1000} s`, remedy: 'look at the seats and at the server' });
+  }
+  return new Problem({ detail: 'the server cannot be reached', remedy: 'look at the network and at the server' });
+}
+
+function parsed(text) {
+  try {
+    return JSON.parse(text) ?? {};
+  } catch {
+    return {};
+  }
+}

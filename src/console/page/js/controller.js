@@ -1,0 +1,100 @@
+// One controller in full: figures, inputs, errors, and taking it out or in.
+
+import { byId, make, setProperty, setText } from './dom.js';
+import { change } from './api.js';
+import { ask, onPress, onTwoPresses } from './press.js';
+import { hall } from './state.js';
+import { STANDINGS, mark } from './marks.js';
+import { ackRate, bits, micros, sentence, whole } from './words.js';
+
+const FIGURES = {
+  'Last heard': ({ heard_s: s }) => (s === null ? 'never' : s < 1 ? 'just now' : `${s.toFixed(0)} s ago`),
+  'Acks, last second': ({ ack_rate: rate }) => ackRate(rate),
+  'Ack latency, half within': ({ ack_p50_us: us }) => micros(us),
+  '99 of 100 within': ({ ack_p99_us: us }) => micros(us),
+  'Frames sent': ({ sent }) => whole(sent),
+  'Asked for a reply': ({ asked }) => whole(asked),
+  'Acked': ({ acked }) => whole(acked),
+  'Refused': ({ refused }) => whole(refused),
+  'Lost': ({ lost }) => whole(lost),
+  'Not sent': ({ send_failed: failed }) => whole(failed),
+  'Held back by the limits': ({ clamps }) => whole(clamps),
+  'Knows its position': ({ homed }) => (homed === null ? 'never told' : homed ? 'yes' : 'no: home it'),
+  'Emergency stop': ({ emergency_stop: stop }) => (stop ? 'IN EFFECT' : 'no'),
+  'Error': ({ error }) => (error === null ? 'never told' : error === 0 ? 'none' : `number ${error}`),
+  'Drive errors': ({ servo_errors: errors }) => drives(errors),
+  'Inputs on': ({ inputs }) => bits(inputs, 'X'),
+  'Outputs on': ({ outputs }) => bits(outputs, 'Y'),
+  'Positions': ({ positions_mm: mm }) => (mm === null ? 'unknown' : `${mm.map((each) => each.toFixed(1)).join(', ')} mm`),
+};
+
+let name = null;
+let parts = null;
+
+/** The controller that is looked at; null for none. */
+export const selected = () => name;
+
+/** Looks at a controller, or at none. */
+export function select(which) {
+  name = which;
+  parts = null;
+  showController(hall());
+}
+
+/** Shows the controller that is looked at. */
+export function showController(status) {
+  const place = byId('controller');
+  const controller = status?.controllers.find((each) => each.name === name);
+  setProperty(place, 'hidden', !controller);
+  if (!controller) return;
+  if (parts === null) {
+    parts = build(controller);
+    place.replaceChildren(...parts.all);
+  }
+  const standing = STANDINGS[controller.standing] ?? STANDINGS.unknown;
+  setProperty(parts.standing, 'className', `standing look-${standing.look}`);
+  if (parts.shape !== standing.mark) {
+    parts.shape = standing.mark;
+    parts.picture.replaceChildren(mark(standing.mark));
+  }
+  setText(parts.word, controller.standing);
+  setText(parts.why, sentence(controller.why));
+  for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
+  setProperty(parts.out, 'hidden', !controller.enabled);
+  setProperty(parts.in, 'hidden', controller.enabled);
+}
+
+function build({ name: which, row, seat, address, group }) {
+  const picture = make('span');
+  const word = make('strong');
+  const standing = make('p', { className: 'standing' }, picture, word);
+  const why = make('p', { className: 'why' });
+  const figures = {};
+  const list = make('dl', { className: 'controller-figures' });
+  for (const label of Object.keys(FIGURES)) {
+    figures[label] = make('dd');
+    list.append(make('div', {}, make('dt', {}, label), figures[label]));
+  }
+  const companions = hall().controllers.filter((each) => each.group === group && each.name !== which).map((each) => each.name);
+  const together = companions.length > 0 ? ` with ${companions.join(', ')}` : '';
+  const out = make('button', { type: 'button', id: 'controller-disable', className: 'strong' }, `Take ${which} out${together}`);
+  const back = make('button', { type: 'button', id: 'controller-enable', className: 'strong' }, `Take ${which} in${together}`);
+  const close = make('button', { type: 'button' }, 'Close');
+  onPress(out, (button) => ask(button, `take ${which} out`, () => change('POST', `controllers/${encodeURIComponent(which)}/disable`)));
+  onTwoPresses(back, {
+    asks: 'It may move: press again',
+    label: () => back,
+    action: (button) => ask(button, `take ${which} in`, () => change('POST', `controllers/${encodeURIComponent(which)}/enable`)),
+  });
+  onPress(close, () => select(null));
+  const title = make('h3', {}, `${which}${row ? `, row ${row}` : ''}`);
+  const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
+  const buttons = make('div', { className: 'row' }, out, back, close);
+  return { all: [title, where, standing, why, buttons, list], standing, picture, word, why, figures, out, in: back, shape: '' };
+}
+
+function drives(errors) {
+  if (errors === null) return 'never told';
+  const bad = errors.map((error, drive) => [drive + 1, error]).filter(([, error]) => error !== 0);
+  return bad.length === 0 ? 'none' : bad.map(([drive, error]) => `drive ${drive}: ${error}`).join(', ');
+}

@@ -1,0 +1,65 @@
+// Where the film is: the position in large figures, and a bar on which a place to seek to is chosen. Choosing moves nothing:
+// the seek is a press of its own.
+
+import { byId, setAttribute, setProperty, setText } from './dom.js';
+import { change } from './api.js';
+import { ask, onPress, say } from './press.js';
+import { hall } from './state.js';
+import { clock } from './words.js';
+
+const MAY_SEEK = ['armed', 'joining', 'playing', 'freewheeling', 'paused'];
+let chosen = null;
+
+/** Makes the bar work. */
+export function startFilm() {
+  const bar = byId('seek');
+  bar.addEventListener('input', () => choose(Number(bar.value)));
+  for (const step of [byId('seek-back'), byId('seek-on')]) {
+    onPress(step, () => choose((chosen ?? 0) + Number(step.dataset.step)));
+  }
+  onPress(byId('seek-leave'), leave);
+  onPress(byId('seek-go'), async (button) => {
+    const at = chosen;
+    if (await ask(button, `seek to ${clock(at)}`, () => change('POST', 'show/seek', { position_s: at }))) leave();
+  });
+}
+
+function choose(position) {
+  const show = hall()?.show;
+  if (!show) return;
+  chosen = Math.min(Math.max(position, 0), show.length_s);
+  showFilm(hall());
+}
+
+function leave() {
+  chosen = null;
+  if (hall()) showFilm(hall());
+}
+
+/** Shows position, length and what is loaded. */
+export function showFilm(status) {
+  if (!status) return;
+  const show = status.show;
+  setText(byId('film-title'), show ? show.title ?? show.cue : 'Nothing is loaded');
+  setText(byId('position'), show ? clock(show.position_s) : '–');
+  setText(byId('length'), show ? ` / ${clock(show.length_s, 0)}` : '');
+  const maySeek = show !== null && MAY_SEEK.includes(status.state);
+  if (!maySeek && chosen !== null) {
+    chosen = null;
+    say(byId('seek'), '');
+  }
+  showBar(show, maySeek);
+  setProperty(byId('seek-ask'), 'hidden', chosen === null);
+  if (chosen !== null) setText(byId('seek-go'), `Seek to ${clock(chosen)}`);
+}
+
+function showBar(show, maySeek) {
+  const bar = byId('seek');
+  const length = show ? show.length_s : 1;
+  const at = chosen ?? (show ? Math.max(show.position_s, 0) : 0);
+  setProperty(bar, 'disabled', !maySeek);
+  setProperty(bar, 'max', String(length));
+  setProperty(bar, 'value', String(Math.round(at * 10) / 10));
+  setAttribute(bar, 'aria-valuetext', clock(at));
+  bar.style.setProperty('--part', String(show ? Math.min(Math.max(show.position_s / length, 0), 1) : 0));
+}

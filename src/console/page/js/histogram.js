@@ -1,0 +1,76 @@
+// Histograms of lateness and ack latency. The counts are drawn by their logarithm: the few late ones are what matters.
+
+import { byId, draw, make, onChange, setAttribute, setText } from './dom.js';
+import { micros, whole } from './words.js';
+
+const WIDTH = 480;
+const HEIGHT = 150;
+const FOOT = 24;
+
+const drawLateness = onChange((histogram) => drawInto(byId('lateness'), histogram));
+const drawLatency = onChange((histogram) => drawInto(byId('latency'), histogram));
+
+/** Shows both, with their figures. */
+export function showHistograms(status) {
+  if (!status) return;
+  showFigures(byId('lateness-figures'), status.lateness);
+  showFigures(byId('latency-figures'), status.ack_latency);
+  drawLateness(status.lateness.histogram);
+  drawLatency(status.ack_latency.histogram);
+  const missed = status.missed_ticks === 0 ? 'none missed' : `${whole(status.missed_ticks)} missed`;
+  const { policy, priority } = status.realtime;
+  setText(byId('ticks'), `${whole(status.ticks)} ticks at ${status.rate_hz} Hz, ${missed}. Scheduling: ${policy} ${priority}.`);
+  setText(byId('frames'), framesOf(status.controllers));
+}
+
+function framesOf(controllers) {
+  const sum = (figure) => whole(controllers.reduce((all, each) => all + each[figure], 0));
+  return `${sum('sent')} frames sent, ${sum('asked')} asked, ${sum('acked')} acked, ${sum('refused')} refused, ${sum('lost')} lost.`;
+}
+
+function showFigures(place, { p50_us: p50, p99_us: p99, p999_us: p999, max_us: max }) {
+  const figures = [['half', p50], ['99 %', p99], ['99.9 %', p999], ['worst', max]];
+  if (place.children.length === 0) {
+    place.append(...figures.map(([title]) => make('span', { className: 'figure-pair' }, make('span', { className: 'quiet' }, title), make('b'))));
+  }
+  for (const [index, [, us]] of figures.entries()) setText(place.children[index].lastChild, micros(us));
+}
+
+function drawInto(place, { bounds_us: bounds, counts }) {
+  const first = counts.findIndex((count) => count > 0);
+  if (first < 0) {
+    place.replaceChildren(make('p', { className: 'quiet' }, 'Nothing was counted yet.'));
+    setAttribute(place, 'aria-label', 'Nothing was counted yet');
+    return;
+  }
+  const from = Math.max(first - 1, 0);
+  const to = Math.min(counts.findLastIndex((count) => count > 0) + 1, counts.length - 1);
+  const buckets = counts.slice(from, to + 1).map((count, index) => ({ count, upTo: bounds[from + index] }));
+  const most = Math.max(...counts);
+  const step = WIDTH / buckets.length;
+  const every = Math.ceil(buckets.length / 7);
+  const parts = buckets.flatMap(({ count, upTo }, index) => bar(count, upTo, index, { step, most, labelled: index % every === 0 }));
+  const picture = draw('svg', { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: 'bars' }, ...parts);
+  place.replaceChildren(picture, make('p', { className: 'quiet scale' }, 'Up to this long; the height is the logarithm of how many.'));
+  setAttribute(place, 'aria-label', spoken(buckets));
+}
+
+function bar(count, upTo, index, { step, most, labelled }) {
+  const room = HEIGHT - FOOT - 14;
+  const height = count === 0 ? 0 : (room * Math.log1p(count)) / Math.log1p(most);
+  const x = index * step;
+  const parts = [draw('rect', {
+    x: x + step * 0.08, y: HEIGHT - FOOT - height, width: step * 0.84, height, class: upTo === undefined ? 'bar over' : 'bar',
+  })];
+  if (labelled || upTo === undefined) {
+    const label = draw('text', { x: x + step / 2, y: HEIGHT - 7, class: 'bar-label' });
+    label.textContent = upTo === undefined ? 'more' : micros(upTo);
+    parts.push(label);
+  }
+  return parts;
+}
+
+function spoken(buckets) {
+  const words = buckets.filter(({ count }) => count > 0).map(({ count, upTo }) => `${whole(count)} up to ${upTo === undefined ? 'more' : micros(upTo)}`);
+  return words.join(', ');
+}

@@ -1,0 +1,37 @@
+// The page: every part is started once, then shown the status as it comes. STOP starts by itself, as a script of its own.
+
+import { showTransport, startTransport } from './transport.js';
+import { showHeadline, startHeadline } from './headline.js';
+import { showController } from './controller.js';
+import { showCurves, startCurves } from './curves.js';
+import { showFilm, startFilm } from './film.js';
+import { showHistograms } from './histogram.js';
+import { showLevels } from './levels.js';
+import { showMap, startMap } from './map.js';
+import { readLists, showPlaylist, startPlaylist } from './playlist.js';
+import { showReports, startReports } from './reports.js';
+import { showTrim, startTrim } from './trim.js';
+import { showWarnings } from './warnings.js';
+import { startStream } from './stream.js';
+import { startToken } from './token.js';
+import { watch } from './state.js';
+
+const STARTS = [
+  startTransport, startToken, startHeadline, startFilm, startMap, startTrim, startPlaylist, startReports, startCurves,
+];
+const SHOWS = [
+  showHeadline, showTransport, showFilm, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
+  showHistograms, showReports, showCurves,
+];
+
+for (const start of STARTS) start();
+for (const show of SHOWS) watch(show);
+
+// The lists are read when the server is first heard, and again when it is back: it may be another one then.
+let known = false;
+watch((_, link) => {
+  if (link === 'live' && !known) readLists();
+  known = link === 'live';
+});
+
+startStream();

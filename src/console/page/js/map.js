@@ -1,0 +1,100 @@
+// The hall as a map: a line for each row, a field for each controller, coloured and marked by how it stands.
+
+import { byId, choice, make, setAttribute, setProperty, setText } from './dom.js';
+import { BANDS, STANDINGS, ackBand, latencyBand, mark } from './marks.js';
+import { ackRate, micros } from './words.js';
+import { hall } from './state.js';
+import { selected, select } from './controller.js';
+
+const NO_ROW = 'no row';
+let by = 'standing';
+let drawn = '';
+let fields = new Map();
+
+/** Makes the choice of colours work. */
+export function startMap() {
+  choice(byId('map-by'), (data) => {
+    by = data.by;
+    showLegend();
+    if (hall()) showMap(hall());
+  });
+  showLegend();
+}
+
+/** Shows every controller. */
+export function showMap(status) {
+  if (!status) return;
+  const places = status.controllers.map(({ name, row, group }) => `${row}/${name}/${group}`).join('|');
+  if (places !== drawn) {
+    drawn = places;
+    layOut(status.controllers);
+  }
+  for (const controller of status.controllers) showField(fields.get(controller.name), controller);
+}
+
+function layOut(controllers) {
+  fields = new Map();
+  const rows = new Map();
+  for (const controller of controllers) {
+    const row = controller.row ?? NO_ROW;
+    if (!rows.has(row)) rows.set(row, []);
+    rows.get(row).push(makeField(controller));
+  }
+  const lines = [...rows].map(([row, seats]) => {
+    const title = row === NO_ROW ? '' : row;
+    const line = make('div', { className: 'seats', role: 'group', 'aria-label': row === NO_ROW ? 'Seats without a row' : `Row ${row}` });
+    line.append(...seats);
+    return make('div', { className: 'map-row' }, make('span', { className: 'row-name', 'aria-hidden': 'true' }, title), line);
+  });
+  byId('map').replaceChildren(...lines);
+}
+
+function makeField({ name }) {
+  const picture = make('span', { className: 'picture' });
+  const letters = make('span', { className: 'letters' });
+  const figure = make('span', { className: 'field-figure' });
+  const button = make('button', { type: 'button', className: 'field' },
+    make('span', { className: 'field-head' }, picture, letters),
+    make('span', { className: 'field-name' }, name), figure);
+  button.addEventListener('click', () => select(selected() === name ? null : name));
+  fields.set(name, { button, picture, letters, figure, shape: '' });
+  return button;
+}
+
+function showField(field, controller) {
+  const look = lookOf(controller);
+  setProperty(field.button, 'className', `field look-${look.look}${controller.enabled ? '' : ' disabled-seat'}`);
+  setAttribute(field.button, 'aria-pressed', String(selected() === controller.name));
+  if (field.shape !== look.mark) {
+    field.shape = look.mark;
+    field.picture.replaceChildren(mark(look.mark));
+  }
+  setText(field.letters, look.letters);
+  setText(field.figure, by === 'latency' ? micros(controller.ack_p99_us) : ackRate(controller.ack_rate));
+  setAttribute(field.button, 'aria-label', spoken(controller));
+  setProperty(field.button, 'title', controller.why);
+}
+
+function lookOf(controller) {
+  const standing = STANDINGS[controller.standing] ?? STANDINGS.unknown;
+  // A controller that takes no part has no figures worth a colour.
+  if (by === 'standing' || ['excluded', 'unknown', 'lost', 'stopped', 'error'].includes(controller.standing)) return standing;
+  return by === 'acks' ? ackBand(controller.ack_rate) : latencyBand(controller.ack_p99_us);
+}
+
+function spoken({ name, row, standing, ack_rate: acks, ack_p99_us: p99 }) {
+  const place = row ? `, row ${row}` : '';
+  return `${name}${place}: ${standing}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+}
+
+function showLegend() {
+  const entry = (look, text) => make('li', { className: `look-${look.look}` }, mark(look.mark), make('b', {}, look.letters), ` ${text}`);
+  const bands = {
+    acks: ['99.5 % acked and more', 'from 95 %', 'less', 'nothing asked'],
+    latency: ['99 of 100 within 2 ms', 'within 10 ms', 'longer', 'nothing acked'],
+  }[by];
+  const entries = bands
+    ? Object.values(BANDS).map((look, index) => entry(look, bands[index]))
+    : Object.entries(STANDINGS).map(([name, look]) => entry(look, `${name}: ${look.means}`));
+  byId('legend').replaceChildren(...entries);
+}

@@ -1,0 +1,54 @@
+// What is shown by colour is shown by a mark and a letter too: the standings of controllers, and how good a figure is.
+
+import { draw } from './dom.js';
+
+/** Every standing: its class of colour, its mark, its letters and what it means. */
+export const STANDINGS = {
+  ok: { look: 'good', mark: 'disc', letters: 'OK', means: 'answers' },
+  unwatched: { look: 'calm', mark: 'ring', letters: 'UW', means: 'not watched: acks are off' },
+  degraded: { look: 'weak', mark: 'half', letters: 'DG', means: 'answers late or not always' },
+  rejoining: { look: 'calm', mark: 'turn', letters: 'RJ', means: 'comes back' },
+  lost: { look: 'bad', mark: 'cross', letters: 'LO', means: 'does not answer' },
+  error: { look: 'bad', mark: 'peak', letters: 'ER', means: 'has an error' },
+  stopped: { look: 'held', mark: 'block', letters: 'ST', means: 'emergency stop' },
+  excluded: { look: 'away', mark: 'dash', letters: 'EX', means: 'taken out' },
+  unknown: { look: 'away', mark: 'what', letters: '??', means: 'never heard' },
+};
+
+/** The bands of a figure. */
+export const BANDS = {
+  good: { look: 'good', mark: 'disc', letters: 'A' },
+  weak: { look: 'weak', mark: 'half', letters: 'B' },
+  bad: { look: 'bad', mark: 'cross', letters: 'C' },
+  none: { look: 'away', mark: 'what', letters: '–' },
+};
+
+const SHAPES = {
+  disc: () => [draw('circle', { cx: 12, cy: 12, r: 9, class: 'fill' })],
+  ring: () => [draw('circle', { cx: 12, cy: 12, r: 7.5, class: 'line' })],
+  half: () => [draw('circle', { cx: 12, cy: 12, r: 8, class: 'line' }), draw('path', { d: 'M12 4a8 8 0 0 1 0 16z', class: 'fill' })],
+  turn: () => [draw('path', { d: 'M5 12a7 7 0 1 1 3 5.7M8 13v5h5', class: 'line' })],
+  cross: () => [draw('path', { d: 'M5 5 19 19M19 5 5 19', class: 'line' })],
+  peak: () => [draw('path', { d: 'M12 3 22 21H2z', class: 'fill' }), draw('path', { d: 'M12 9v6M12 17.4v1.6', class: 'hole' })],
+  block: () => [draw('rect', { x: 4, y: 4, width: 16, height: 16, class: 'fill' })],
+  dash: () => [draw('path', { d: 'M4 12h16', class: 'line' })],
+  what: () => [draw('path', { d: 'M8 9a4 4 0 1 1 5.5 3.7c-1 .5-1.5 1-1.5 2.3M12 18v1.5', class: 'line' })],
+  info: () => [draw('circle', { cx: 12, cy: 12, r: 9, class: 'line' }), draw('path', { d: 'M12 11v6M12 6.6v1', class: 'line' })],
+};
+
+/** A mark as a picture; hidden from screen readers, which are told the word. */
+export const mark = (name) => draw('svg', { viewBox: '0 0 24 24', class: 'mark', 'aria-hidden': 'true' }, ...SHAPES[name]());
+
+/** Acks over frames: from 99.5 % on good, from 95 % on weak. */
+export function ackBand(rate) {
+  if (rate === null) return BANDS.none;
+  if (rate >= 0.995) return BANDS.good;
+  return rate >= 0.95 ? BANDS.weak : BANDS.bad;
+}
+
+/** The latency that 99 of 100 acks keep: up to 2 ms good, up to 10 ms weak. */
+export function latencyBand(us) {
+  if (us === null) return BANDS.none;
+  if (us <= 2000) return BANDS.good;
+  return us <= 10_000 ? BANDS.weak : BANDS.bad;
+}

@@ -1,0 +1,90 @@
+// The playlist with its entries and its next start; what the library holds, to be loaded.
+
+import { byId, make, onChange, setProperty, setText } from './dom.js';
+import { change, get } from './api.js';
+import { ask, onPress, say } from './press.js';
+import { onToken } from './token.js';
+import { clock, percent, timeOfDay } from './words.js';
+
+let cues = [];
+
+/** Reads the lists and makes the buttons work. */
+export function startPlaylist() {
+  onPress(byId('playlist-load'), (button) => {
+    const id = byId('playlists').value;
+    if (id) ask(button, `playlist ${id}`, () => change('PUT', 'playlist', { id }));
+  });
+  onPress(byId('playlist-drop'), (button) => ask(button, 'drop the playlist', () => change('PUT', 'playlist', { id: null })));
+  onPress(byId('cue-load'), (button) => {
+    const cue = byId('cues').value;
+    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue }));
+  });
+  onPress(byId('lists-again'), readLists);
+  byId('cues').addEventListener('change', showCueNote);
+  onToken(readLists);
+}
+
+/** Reads what playlists and cues there are. */
+export async function readLists() {
+  try {
+    const [playlists, library] = await Promise.all([get('playlists'), get('cues')]);
+    cues = library;
+    fill(byId('playlists'), playlists);
+    fill(byId('cues'), cues);
+    showCueNote();
+  } catch (error) {
+    say(byId('cues'), `The lists cannot be read: ${error.words ?? error.message}`, true);
+  }
+}
+
+function fill(list, entries) {
+  const before = list.value;
+  const options = entries.map((entry) => {
+    const length = entry.length_s ? ` (${clock(entry.length_s, 0)})` : '';
+    const failed = entry.faults?.length > 0 || faultsOf(entry).length > 0 ? ' – has faults' : '';
+    return make('option', { value: entry.id }, `${entry.title ?? entry.id}${length}${failed}`);
+  });
+  list.replaceChildren(...options);
+  if (entries.some((entry) => entry.id === before)) list.value = before;
+  if (entries.length === 0) list.append(make('option', { value: '' }, 'none'));
+}
+
+/** The faults that a proof against the hall's limits found. */
+const faultsOf = (cue) => cue.proof?.faults ?? cue.proof?.failed?.faults ?? [];
+
+function showCueNote() {
+  const cue = cues.find((each) => each.id === byId('cues').value);
+  setText(byId('cue-note'), cue ? faultsOf(cue).join('; ') : '');
+}
+
+/** Shows the playlist. */
+export function showPlaylist(status) {
+  if (!status) return;
+  const { playlist } = status;
+  const next = playlist?.next_start ? `Next start by itself at ${timeOfDay(playlist.next_start)}, while armed` : 'Nothing starts by itself';
+  setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}.` : 'No playlist is loaded.');
+  setProperty(byId('playlist-drop'), 'disabled', !playlist);
+  showEntries(playlist ? { entries: playlist.entries, current: playlist.current } : { entries: [], current: -1 });
+}
+
+const showEntries = onChange(({ entries, current }) => {
+  byId('entries').replaceChildren(...entries.map((entry, index) => entryLine(entry, index, index === current)));
+});
+
+function entryLine(entry, index, isCurrent) {
+  const title = entry.title ?? entry.cue;
+  const facts = [
+    clock(entry.length_s, 0),
+    entry.at && `at ${entry.at}`,
+    entry.level !== null && `level ${percent(entry.level)}`,
+    entry.trim_ms !== null && `trim ${entry.trim_ms} ms`,
+    entry.then === 'go' ? 'then goes on by itself' : 'then waits for GO',
+  ].filter(Boolean);
+  const words = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
+  if (isCurrent) {
+    return make('li', { className: 'entry current', 'aria-current': 'true' }, words, make('span', { className: 'now' }, 'loaded'));
+  }
+  const button = make('button', { type: 'button', 'aria-label': `Make ${title} the next` }, 'Select');
+  onPress(button, () => ask(button, `select ${title}`, () => change('POST', 'playlist/select', { entry: index })));
+  return make('li', { className: 'entry' }, words, button);
+}

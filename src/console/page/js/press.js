@@ -1,0 +1,76 @@
+// How buttons are pressed: what they ask is sent once, and what came of it is said beside them.
+
+import { byId, setAttribute, setText } from './dom.js';
+import { Problem } from './api.js';
+import { sentence } from './words.js';
+
+const SURE_WITHIN_MS = 3000;
+const BOUNCE_MS = 250;
+
+/** Says something in the live region that belongs to an element; `failed` in the manner of a problem. */
+export function say(near, text, failed = false) {
+  const place = near.closest('[data-reply]');
+  const reply = byId(place ? place.dataset.reply : 'show-reply');
+  reply.classList.toggle('failed', failed);
+  setText(reply, text);
+}
+
+/** Asks, and says what came of it beside the element that was pressed. Gives whether it was done. */
+export async function ask(near, what, request) {
+  setAttribute(near, 'aria-busy', 'true');
+  say(near, `${sentence(what)} …`);
+  try {
+    const status = await request();
+    say(near, `${sentence(what)}: done${status?.state ? `, ${status.state}` : ''}`);
+    return true;
+  } catch (error) {
+    const problem = error instanceof Problem ? error.words : `the page failed: ${error.message}`;
+    say(near, `${sentence(what)}: not done. ${sentence(problem)}`, true);
+    return false;
+  } finally {
+    near.removeAttribute('aria-busy');
+  }
+}
+
+/** A button whose request is under way does not send another. */
+export function onPress(button, action) {
+  button.addEventListener('click', () => {
+    if (button.disabled || button.hasAttribute('aria-busy')) return;
+    action(button);
+  });
+}
+
+/**
+ * A button that moves seats: the first press asks, the second one within three seconds does it. The second press of a double
+ * tap is no second thought and is left out; so is a key that is held down.
+ */
+export function onTwoPresses(button, { asks, label, action }) {
+  let since = null;
+  let timer = null;
+  const relax = () => {
+    clearTimeout(timer);
+    since = null;
+    button.classList.remove('sure');
+    setText(label(), button.dataset.word);
+  };
+  button.dataset.word = label().textContent;
+  button.addEventListener('keydown', (event) => event.repeat && event.preventDefault());
+  button.addEventListener('blur', relax);
+  onPress(button, () => {
+    const now = performance.now();
+    if (since === null) {
+      since = now;
+      button.classList.add('sure');
+      setText(label(), asks);
+      say(button, `${button.dataset.word}: press again within three seconds`);
+      timer = setTimeout(() => {
+        relax();
+        say(button, '');
+      }, SURE_WITHIN_MS);
+    } else if (now - since >= BOUNCE_MS) {
+      relax();
+      action(button);
+    }
+  });
+  return relax;
+}

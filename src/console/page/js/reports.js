@@ -1,0 +1,55 @@
+// Tables: the last preflight, and the newest lines of the journal.
+
+import { byId, make, onChange, setProperty, setText } from './dom.js';
+import { change } from './api.js';
+import { ask, onPress } from './press.js';
+import { SEVERITIES } from './warnings.js';
+import { mark } from './marks.js';
+import { lasting, sentence, timeOfDay } from './words.js';
+
+/** Makes preflight run. */
+export function startReports() {
+  onPress(byId('preflight-run'), (button) => ask(button, 'preflight', () => change('POST', 'preflight')));
+}
+
+/** Shows both tables. */
+export function showReports(status) {
+  if (!status) return;
+  showPreflight(status);
+  showJournal(status.journal);
+}
+
+function showPreflight({ preflight, controllers }) {
+  const verdict = byId('preflight-verdict');
+  setProperty(byId('preflight'), 'hidden', !preflight || preflight.findings.length === 0);
+  if (!preflight) {
+    setProperty(verdict, 'className', 'verdict');
+    setText(verdict, 'It was not run yet.');
+    return;
+  }
+  setProperty(verdict, 'className', `verdict ${preflight.passed ? 'look-good' : 'look-bad'}`);
+  const outcome = preflight.passed ? 'PASSED' : 'NOT PASSED';
+  const answered = `${preflight.answered} of ${controllers.length} controllers answered`;
+  setText(verdict, `${outcome}: ${answered}, ${lasting(preflight.age_s)} ago`);
+  showFindings(preflight.findings);
+}
+
+const showFindings = onChange((findings) => {
+  const lines = findings.map(({ severity, controller, text, remedy }) => {
+    const look = SEVERITIES[severity] ?? SEVERITIES.warning;
+    const grave = make('span', { className: `grave look-${look.look}` }, mark(look.mark), look.word);
+    return row([grave, controller ?? 'hall', sentence(text), sentence(remedy)]);
+  });
+  byId('preflight').tBodies[0].replaceChildren(...lines);
+});
+
+const showJournal = onChange((journal) => {
+  const lines = journal.map(({ at, who, what, result }) => {
+    const line = row([timeOfDay(at), who, what, result]);
+    line.classList.toggle('refused', result !== 'done');
+    return line;
+  });
+  byId('journal').tBodies[0].replaceChildren(...lines);
+});
+
+const row = (cells) => make('tr', {}, ...cells.map((cell) => make('td', {}, cell)));

@@ -1,0 +1,74 @@
+// STOP: acts when the finger comes down, by the Escape key from anywhere on the page, also while nothing is heard from the
+// server. It is never asked twice whether it is meant. A script of its own, so that a fault elsewhere in the page leaves it be.
+
+import { byId, setProperty, setText } from './dom.js';
+import { change, key } from './api.js';
+import { hall, linkState, watch } from './state.js';
+
+const TRIES = 4;
+const PATIENCE_MS = 1000;
+const BETWEEN_MS = 150;
+const HARD_WIRED = 'In danger press the hard-wired emergency stop.';
+
+let sending = false;
+
+function start() {
+  const button = byId('stop');
+  button.addEventListener('pointerdown', (event) => event.button === 0 && stop());
+  // A click without a pointer is the Enter or space key, or a screen reader.
+  button.addEventListener('click', (event) => event.detail === 0 && stop());
+  document.addEventListener('keydown', onKey, { capture: true });
+  watch(forget);
+}
+
+function onKey(event) {
+  if (event.key !== 'Escape') return;
+  event.preventDefault();
+  if (!event.repeat) stop();
+}
+
+/** Tries a few times with the same key, so that the server does it once however often it hears of it. */
+async function stop() {
+  byId('stop').classList.add('pressed');
+  if (sending) return;
+  sending = true;
+  tell('STOP is sent …', 'sent');
+  const repeatOf = key();
+  let problem = null;
+  for (let attempt = 0; attempt < TRIES; attempt += 1) {
+    try {
+      const status = await change('POST', 'show/stop', {}, { repeatOf, patience: PATIENCE_MS });
+      problem = null;
+      tell(`STOP was received: the hall is ${status.state ?? 'stopping'}. ${sentenceOf(status.next)}`, 'received');
+      break;
+    } catch (error) {
+      problem = error;
+      tell(`STOP is not delivered yet: ${error.message}. Trying again … ${HARD_WIRED}`, 'failed');
+      if (error.status !== 0 && error.status < 500) break; // they heard and refused: again would be the same
+      await new Promise((resolve) => setTimeout(resolve, BETWEEN_MS));
+    }
+  }
+  if (problem) tell(`STOP COULD NOT BE DELIVERED: ${problem.words ?? problem.message}. ${HARD_WIRED}`, 'failed');
+  byId('stop').classList.remove('pressed');
+  sending = false;
+}
+
+const sentenceOf = (next) => (next ? `Next: ${next}.` : '');
+
+function tell(text, kind) {
+  const place = byId('stop-reply');
+  setText(place, text);
+  setProperty(place, 'className', `stop-reply ${kind}`);
+  setProperty(place, 'hidden', false);
+}
+
+/** That a stop was received is old news once the hall is no longer stopped; that it was not stays until the next word. */
+function forget() {
+  const place = byId('stop-reply');
+  if (sending || place.hidden || linkState() !== 'live') return;
+  const state = hall().state;
+  const old = place.classList.contains('received') && state !== 'stopping' && state !== 'stopped';
+  if (old || (place.classList.contains('failed') && state === 'stopped')) setProperty(place, 'hidden', true);
+}
+
+start();

@@ -1,0 +1,97 @@
+// The show's buttons: which may be pressed in which state, and what they ask.
+
+import { byId, setAttribute, setProperty, setText } from './dom.js';
+import { change } from './api.js';
+import { ask, onPress, onTwoPresses, say } from './press.js';
+import { hall } from './state.js';
+
+const BETWEEN_GOS_MS = 1000;
+/** A button that has just changed its meaning is dead for so long: a double tap must not do the opposite. */
+const SETTLE_MS = 700;
+
+const MAY = {
+  arm: ['parked'],
+  disarm: ['armed', 'homing'],
+  go: ['armed'],
+  pause: ['joining', 'playing', 'freewheeling'],
+  resume: ['paused'],
+  park: ['recovering', 'armed', 'joining', 'playing', 'freewheeling', 'paused'],
+  clear: ['stopped', 'fault'],
+  home: ['recovering', 'parked'],
+};
+
+const may = (what, state) => MAY[what].includes(state);
+const post = (what) => change('POST', `show/${what}`);
+
+let lastGo = -Infinity;
+let armIs = 'arm';
+let armSince = -Infinity;
+let relaxGo = () => {};
+
+/** Makes the buttons work. */
+export function startTransport() {
+  for (const what of ['pause', 'resume', 'park', 'clear']) {
+    onPress(byId(what), (button) => ask(button, what, () => post(what)));
+  }
+  onPress(byId('arm'), (button) => {
+    if (performance.now() - armSince < SETTLE_MS) return;
+    const what = armIs;
+    ask(button, what, () => post(what));
+  });
+  onTwoPresses(byId('home'), {
+    asks: 'HOME: NOBODY ON SEATS?',
+    label: () => byId('home'),
+    action: (button) => ask(button, 'home', () => post('home')),
+  });
+  relaxGo = onTwoPresses(byId('go'), { asks: 'SURE?', label: () => byId('go-word'), action: go });
+}
+
+function go(button) {
+  if (performance.now() - lastGo < BETWEEN_GOS_MS) {
+    say(button, 'Go: not done. The last one was less than a second ago', true);
+    return;
+  }
+  if (!may('go', hall()?.state)) return;
+  lastGo = performance.now();
+  ask(button, 'go', () => post('go'));
+}
+
+/** Shows what may be pressed now. */
+export function showTransport(status, link) {
+  const state = link === 'live' ? status.state : null;
+  for (const what of ['pause', 'resume', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
+  showArm(state);
+  showGo(state, status);
+  for (const what of ['clear', 'home']) {
+    const button = byId(what);
+    // What a press would need is in the next action; these two show only where they are one.
+    setProperty(button, 'hidden', !may(what, status?.state));
+    setProperty(button, 'disabled', !may(what, state));
+  }
+}
+
+function showArm(state) {
+  const button = byId('arm');
+  const now = may('disarm', state) ? 'disarm' : 'arm';
+  if (now !== armIs) {
+    armIs = now;
+    armSince = performance.now();
+    setText(button, now.toUpperCase());
+    setAttribute(button, 'data-is', now);
+  }
+  setProperty(button, 'disabled', !may(now, state));
+}
+
+function showGo(state, status) {
+  const live = may('go', state);
+  if (!live) relaxGo();
+  setText(byId('go-note'), goNote(state, status));
+}
+
+function goNote(state, status) {
+  if (state === null) return 'no word from the server';
+  if (may('go', state)) return 'press twice';
+  if (may('pause', state)) return 'the show runs';
+  if (!status.show) return 'load a cue first';
+  return state === 'parked' ? 'arm first' : `not while ${state}`;
+}

@@ -1,0 +1,45 @@
+// Trim: how much later than the film the motion is.
+
+import { byId, setText } from './dom.js';
+import { change } from './api.js';
+import { ask } from './press.js';
+import { hall } from './state.js';
+
+const MOST_MS = 500;
+const SETTLE_MS = 400;
+
+// Presses that come faster than replies add up: each goes on from the one before.
+let wanted = null;
+let asked = 0;
+
+/** Makes the buttons work. */
+export function startTrim() {
+  for (const button of document.querySelectorAll('[data-trim]')) {
+    button.addEventListener('click', () => press(button, Number(button.dataset.trim)));
+  }
+}
+
+async function press(button, step) {
+  const from = wanted ?? hall()?.trim_ms ?? 0;
+  wanted = step === 0 ? 0 : Math.min(Math.max(from + step, -MOST_MS), MOST_MS);
+  const mine = (asked += 1);
+  const to = wanted;
+  show(to);
+  await ask(button, `trim ${signed(to)}`, () => change('PUT', 'trim', { offset_s: to / 1000 }));
+  setTimeout(() => {
+    if (mine === asked) wanted = null;
+  }, SETTLE_MS);
+}
+
+/** Shows the trim of the hall. */
+export function showTrim(status) {
+  if (status && wanted === null) show(status.trim_ms);
+}
+
+function show(ms) {
+  setText(byId('trim'), signed(ms));
+  const words = ms === 0 ? 'motion with the film' : `motion ${Math.abs(ms)} ms ${ms > 0 ? 'later' : 'earlier'} than the film`;
+  setText(byId('trim-words'), words);
+}
+
+const signed = (ms) => `${ms > 0 ? '+' : ms < 0 ? '−' : ''}${Math.abs(ms)} ms`;

@@ -1,0 +1,122 @@
+//! The files of the page belong together, ask nobody else for anything, and keep the rules that the server sends with them.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest as _, Sha256};
+
+use super::{Asset, CSS, HTML, JS, PAGE, VENDOR, asset, page};
+
+fn text(asset: &Asset) -> &'static str {
+    std::str::from_utf8(asset.body).unwrap()
+}
+
+/// What stands between two marks, each time.
+fn between<'t>(text: &'t str, before: &str, after: &str) -> Vec<&'t str> {
+    text.split(before).skip(1).filter_map(|rest| rest.split_once(after).map(|(found, _)| found)).collect()
+}
+
+fn ours(content_type: &str) -> impl Iterator<Item = (&'static str, &'static str)> {
+    PAGE.iter().filter(move |(_, asset)| asset.content_type == content_type).map(|(path, asset)| (*path, text(asset)))
+}
+
+#[test]
+fn the_page_is_at_the_root_and_nothing_is_beside_it() {
+    assert_eq!(asset("/").unwrap().content_type, HTML);
+    assert_eq!(asset("/"), asset("/index.html"));
+    assert_eq!(page("/js/main.js").unwrap().0, JS);
+    for nothing in ["", "/js", "/js/", "/../mod.rs", "/tests.rs", "/vendor/README.md", "//", "/INDEX.HTML", "/style.css?x"] {
+        assert_eq!(asset(nothing), None, "{nothing}");
+    }
+}
+
+#[test]
+fn every_file_of_the_folders_is_built_in() {
+    let built_in: BTreeSet<String> = PAGE.iter().map(|(path, _)| format!("page{path}")).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/console");
+    let mut there = BTreeSet::new();
+    let mut folders: Vec<PathBuf> = vec![root.join("page")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                there.insert(path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned());
+            }
+        }
+    }
+    assert_eq!(built_in, there);
+}
+
+#[test]
+fn everything_that_a_file_refers_to_is_there() {
+    for (path, html) in ours(HTML) {
+        for link in between(html, "href=\"", "\"").into_iter().chain(between(html, "src=\"", "\"")) {
+            assert!(asset(link).is_some(), "{path} refers to {link}");
+        }
+    }
+    for (path, js) in ours(JS) {
+        for import in between(js, " from './", "'") {
+            assert!(asset(&format!("/js/{import}")).is_some(), "{path} imports {import}");
+        }
+    }
+}
+
+#[test]
+fn every_element_that_a_script_asks_for_is_on_the_page() {
+    let html = text(&asset("/").unwrap());
+    let ids: BTreeSet<&str> = between(html, " id=\"", "\"").into_iter().collect();
+    for (path, js) in ours(JS) {
+        for id in between(js, "byId('", "'") {
+            assert!(ids.contains(id), "{path} asks for {id}");
+        }
+    }
+    for id in between(html, "data-reply=\"", "\"").into_iter().chain(between(html, "aria-labelledby=\"", "\"")) {
+        assert!(ids.contains(id), "there is no {id}");
+    }
+}
+
+#[test]
+fn nothing_refers_to_another_origin() {
+    for (path, asset) in PAGE {
+        // The one address that a picture has to name is never asked.
+        let text = text(asset).replace("http://www.w3.org/2000/svg", "");
+        for word in ["http:", "https:", "ws:", "wss:", "src=\"//", "href=\"//", "url(", "@import"] {
+            assert!(!text.contains(word), "{path} holds {word}");
+        }
+    }
+    for (path, asset) in VENDOR.iter().filter(|(_, asset)| asset.content_type == CSS) {
+        assert!(!text(asset).contains("url("), "{path}");
+    }
+}
+
+#[test]
+fn nothing_is_inline_and_no_data_becomes_markup() {
+    for (path, html) in ours(HTML) {
+        assert!(!html.contains("<style") && !html.contains("style=\"") && !html.contains(" on"), "{path}");
+        assert!(between(html, "<script", ">").iter().all(|script| script.contains(" src=\"/")), "{path}");
+    }
+    for (path, js) in ours(JS) {
+        for word in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function", "cssText"] {
+            assert!(!js.contains(word), "{path} holds {word}");
+        }
+    }
+}
+
+#[test]
+fn the_modules_stay_small() {
+    for (path, asset) in PAGE {
+        assert!(text(asset).lines().count() < 300, "{path}");
+    }
+}
+
+#[test]
+fn what_others_wrote_is_as_they_published_it() {
+    let sums = include_str!("vendor/README.md");
+    for (path, asset) in VENDOR {
+        let sum: String = Sha256::digest(asset.body).iter().map(|octet| format!("{octet:02x}")).collect();
+        let name = path.strip_prefix("/vendor/").unwrap();
+        assert!(sums.contains(&format!("| `{name}` | {sum} |")), "{name}: {sum}");
+    }
+}
