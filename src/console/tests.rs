@@ -82,7 +82,7 @@ fn nothing_refers_to_another_origin() {
     for (path, asset) in PAGE {
         // The one address that a picture has to name is never asked.
         let text = text(asset).replace("http://www.w3.org/2000/svg", "");
-        for word in ["http:", "https:", "ws:", "wss:", "src=\"//", "href=\"//", "url(", "@import"] {
+        for word in ["://", "src=\"//", "href=\"//", "url(", "@import"] {
             assert!(!text.contains(word), "{path} holds {word}");
         }
     }
@@ -94,7 +94,9 @@ fn nothing_refers_to_another_origin() {
 #[test]
 fn nothing_is_inline_and_no_data_becomes_markup() {
     for (path, html) in ours(HTML) {
-        assert!(!html.contains("<style") && !html.contains("style=\"") && !html.contains(" on"), "{path}");
+        assert!(!html.contains("<style") && !html.contains("style=\""), "{path}");
+        let handler = |after: &&str| after.trim_start_matches(|c: char| c.is_ascii_lowercase()).starts_with('=');
+        assert_eq!(html.split(" on").skip(1).find(handler), None, "{path}");
         assert!(between(html, "<script", ">").iter().all(|script| script.contains(" src=\"/")), "{path}");
     }
     for (path, js) in ours(JS) {

@@ -36,9 +36,17 @@ export const selected = () => name;
 
 /** Looks at a controller, or at none. */
 export function select(which) {
+  const before = name;
   name = which;
   parts = null;
   showController(hall());
+  const place = byId('controller');
+  if (!place.hidden) {
+    place.scrollIntoView({ block: 'nearest' });
+    place.focus({ preventScroll: true });
+  } else if (before !== null) {
+    document.querySelector(`[data-controller="${CSS.escape(before)}"]`)?.focus();
+  }
 }
 
 /** Shows the controller that is looked at. */

@@ -56,6 +56,7 @@ function makeField({ name }) {
   const button = make('button', { type: 'button', className: 'field' },
     make('span', { className: 'field-head' }, picture, letters),
     make('span', { className: 'field-name' }, name), figure);
+  button.dataset.controller = name;
   button.addEventListener('click', () => select(selected() === name ? null : name));
   fields.set(name, { button, picture, letters, figure, shape: '' });
   return button;
