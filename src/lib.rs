@@ -54,10 +54,19 @@ pub mod app;
 pub mod doctor;
 pub mod latency;
 
+pub mod api;
 pub mod hall;
 pub mod health;
+pub mod journal;
+pub mod library;
+pub mod log;
+pub mod metrics;
 pub mod net;
 pub mod observe;
+pub mod osc;
+pub mod playlist;
+pub mod sd;
+pub mod text_port;
 pub mod tracker;
 
 pub mod sys;

@@ -36,7 +36,7 @@ fn ride_with_effects() -> Virtual {
 fn refusal(news: &News) -> Option<Refusal> {
     match news {
         News::Refused(refusal) => Some(*refusal),
-        News::Entered { .. } => None,
+        News::Entered { .. } | News::Taken | News::NotLoaded(_) => None,
     }
 }
 

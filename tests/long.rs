@@ -13,7 +13,7 @@ use kinocue::engine::{Ending, Rate, Show, TickGrid};
 use kinocue::fanout::{Lane, Manner};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Sent, TickLoop, TickReport, mailboxes,
+    Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Planning, Sent, Task, TickLoop, TickReport, mailboxes,
 };
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
@@ -60,9 +60,9 @@ impl Run {
         let (engine, lanes, planner, timeline) = staged.split();
         let lanes: Vec<Lane> = lanes.into_iter().map(|lane| lane.starting_at(self.first)).collect();
         let live = Arc::new(Live::default());
-        let (mail, MailEnds { sent, ticks, requests, answers, retired, .. }) =
+        let (mail, MailEnds { sent, ticks, tasks, answers, .. }) =
             mailboxes(1, rate, Arc::clone(&live));
-        let plans = PlanLoop { planner, timeline, requests, answers, retired };
+        let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let stop = AtomicBool::new(false);
         let books = Books { sent, ticks, tracker: Tracker::starting_at(&[self.first], 1) };
         let clock = Jumps {
@@ -158,7 +158,12 @@ struct Jumps<'a> {
 impl Jumps<'_> {
     fn serve_planner(&self) {
         let mut plans = self.plans.borrow_mut();
-        let (asked, back) = (plans.requests.slots() as u64, plans.retired.slots() as u64);
+        let waiting = plans.tasks.slots();
+        let tasks = plans.tasks.read_chunk(waiting).expect("so many wait");
+        let (first, second) = tasks.as_slices();
+        let count = |is: fn(&Task) -> bool| first.iter().chain(second).filter(|task| is(task)).count() as u64;
+        let asked = count(|task| matches!(task, Task::Plan(_)));
+        let back = count(|task| matches!(task, Task::Retire(_)));
         if asked + back == 0 {
             return;
         }

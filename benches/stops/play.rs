@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use kinocue::engine::TickGrid;
 use kinocue::net::{DrainGrid, Ports};
-use kinocue::rt::{AckLoop, Conductor, Desk, Live, MailEnds, PlanLoop, TickLoop, mailboxes};
+use kinocue::rt::{AckLoop, Conductor, Desk, Live, MailEnds, PlanLoop, Planning, TickLoop, mailboxes};
 use kinocue::sys::clock::Monotonic;
 use kinocue::sys::realtime;
 use kinocue::time::{Clock as _, MonoTime};
@@ -45,11 +45,11 @@ pub(crate) fn stop(rate_hz: f64, to: &[SocketAddrV4], after: Duration) -> Option
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
     let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
-    let MailEnds { sent, ticks, requests, answers, retired, commands, alarms: _alarms, news: _news } = ends;
+    let MailEnds { sent, ticks, tasks, answers, commands, alarms: _alarms, news: _news } = ends;
     let acks = AckLoop::new(receiver, watched, 1, sent, ticks);
     let desk = &staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
-    let mut plans = PlanLoop { planner, timeline, requests, answers, retired };
+    let mut plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
     let (done, never) = (&AtomicBool::new(false), AtomicBool::new(false));
     let policy = realtime::request().policy.to_string();
     let origin = Monotonic.now() + RUN_UP;

@@ -1,11 +1,15 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
+pub mod house;
+pub mod keeper;
 mod play;
 mod prepare;
 mod report;
+pub mod serve;
 mod stage;
-mod staged;
+pub mod staged;
 mod sum_up;
+pub mod surfaces;
 
 pub use play::{Control, Play, PlayError, Played, Reins};
 pub use report::{

@@ -22,7 +22,7 @@ use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
-use crate::rt::{AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Watch, mailboxes};
+use crate::rt::{AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Planning, Watch, mailboxes};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -189,7 +189,7 @@ impl Play {
         let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
         let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
         let show = self.staged.show.clone();
-        let MailEnds { sent, ticks, requests, answers, retired, commands, alarms, news } = self.ends;
+        let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = self.ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
@@ -213,7 +213,7 @@ impl Play {
         acks.watched_by(watch(&self.config, self.manner, &self.staged, &sender, alarms, live));
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
-        let plans = PlanLoop { planner, timeline, requests, answers, retired };
+        let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let spin = Duration::from_micros(u64::from(self.config.show.spin_us));
         let stage = Stage {
             silent: self.manner.silent,

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use crate::config::Config;
-use crate::engine::{Engine, Headroom, Mix, Show};
+use crate::engine::{Engine, Headroom, Mix, Rate, Show};
 use crate::fanout::{Lane, Manner, lanes};
 use crate::motion::Window;
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
-use crate::rt::Desk;
+use crate::rt::{Desk, Loaded, Planning};
 use crate::timeline::{Hint, Timeline};
 
 /// A show with its lanes and its first course; nothing is open yet, and nothing moves.
@@ -25,6 +25,17 @@ pub struct Staged {
     pub course: Box<Course>,
     /// How much faster than the film the cue may run.
     pub headroom: Headroom,
+    /// What operators want of each seat as it begins.
+    pub mixes: Box<[Mix]>,
+}
+
+/// How much faster than the film a cue may run on the seats of a hall.
+#[must_use]
+pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
+    let lanes = lanes(config, timeline, Manner { level: 1.0, silent: false });
+    let windows: Vec<Window> = lanes.into_iter().map(|lane| lane.window).collect();
+    let pose = |at| timeline.sample(at, &mut Hint::default());
+    Headroom::measure(&windows, &Curve { pose: &pose, end: timeline.duration() }, rate)
 }
 
 impl Staged {
@@ -33,34 +44,62 @@ impl Staged {
     /// # Errors
     /// [`PlanError::NoJoin`] where no move leads onto the cue.
     pub fn new(config: &Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlanError> {
-        let lanes = lanes(config, &timeline, manner);
+        let headroom = headroom(config, &timeline, show.rate);
+        let level = Mix { motion: manner.level, vibration: manner.level, ..Mix::FULL };
+        let mixes = vec![level; config.controllers.len()];
+        Self::mixed(config, &Arc::new(timeline), headroom, show, &mixes, manner.silent)
+    }
+
+    /// The same for a cue whose headroom is known, with what operators want of each seat: one that is out stays in park.
+    ///
+    /// # Errors
+    /// As [`Staged::new`].
+    pub fn mixed(
+        config: &Config,
+        timeline: &Arc<Timeline>,
+        headroom: Headroom,
+        show: Show,
+        mixes: &[Mix],
+        silent: bool,
+    ) -> Result<Self, PlanError> {
+        let mut lanes = lanes(config, timeline, Manner { level: 1.0, silent });
+        for (lane, mix) in lanes.iter_mut().zip(mixes) {
+            lane.window.set_level(mix.motion);
+        }
         let windows: Vec<Window> = lanes.iter().map(|lane| lane.window.clone()).collect();
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };
-        let headroom = Headroom::measure(&windows, &curve, show.rate);
-        let scene = Box::new(Scene::parked(&windows));
+        let mut scene = Box::new(Scene::parked(&windows));
+        for (lane, mix) in scene.lanes.iter_mut().zip(mixes) {
+            lane.out = !mix.on;
+        }
         let request = Request { from: From::Rest, to: To::Cue, start: show.start, serial: 1, scene };
         let mut planner = Planner::new(windows, show.rate.hz());
         let course = Box::new(planner.plan(&request, &curve)?);
-        Ok(Self { show, timeline: Arc::new(timeline), lanes, planner, course, headroom })
+        let timeline = Arc::clone(timeline);
+        Ok(Self { show, timeline, lanes, planner, course, headroom, mixes: mixes.into() })
     }
 
     /// A desk that is set as the show begins.
     #[must_use]
     pub fn desk(&self) -> Desk {
-        let level = |lane: &Lane| lane.window.level();
-        Desk::new(self.lanes.iter().map(|lane| Mix {
-            motion: level(lane),
-            vibration: level(lane),
-            ..Mix::FULL
-        }))
+        Desk::new(self.mixes.iter().copied())
     }
 
     /// The engine for the tick loop, the lanes for the fan-out, and the planner for its thread.
     #[must_use]
     pub fn split(self) -> (Engine, Vec<Lane>, Planner, Arc<Timeline>) {
         let windows = self.lanes.iter().map(|lane| lane.window.clone()).collect();
-        let engine = Engine::new(self.show, Arc::clone(&self.timeline), self.headroom, windows, self.course);
+        let engine = Engine::new(self.show, Arc::clone(&self.timeline), self.headroom, windows, self.course)
+            .mixed(&self.mixes);
         (engine, self.lanes, self.planner, self.timeline)
+    }
+
+    /// The show as a hall takes it up: it waits until it is let go.
+    #[must_use]
+    pub fn loaded(self) -> Box<Loaded> {
+        let (engine, lanes, planner, timeline) = self.split();
+        let planning = Some(Box::new(Planning { planner, timeline }));
+        Box::new(Loaded { engine: engine.waiting(), lanes, planning })
     }
 }

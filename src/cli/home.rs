@@ -7,6 +7,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::ask::{agreed, somebody};
+use super::client;
 use super::targets::{TargetArgs, Targets, Troubles, state};
 use super::{Exit, Failure, print};
 use crate::config::Controller;
@@ -15,11 +16,14 @@ use crate::device::{Outcome, Patience, Request, Talk, table};
 
 /// Homes seats: has their controllers find zero (DPF0) and waits until each is there.
 ///
+/// Without --to and --config the daemon homes all seats of its hall; see `kinocue watch` for how far they are.
+///
 /// The seats move by themselves, over their whole stroke, at a speed that the controllers set. Ctrl-C ends the command,
 /// not the movement: to stop that is the emergency stop's, which is hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
+  kinocue home --seats-empty                            the daemon's own hall
   kinocue home --config hall.toml
   kinocue home A1 A2 --config hall.toml
   kinocue home --config hall.toml --row A --seats-empty
@@ -39,9 +43,8 @@ pub(super) struct Args {
     /// How long each may take, seconds, 1 to 3600.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     timeout: u64,
-    /// Print one JSON object at the end.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    server: client::ServerArgs,
 }
 
 #[derive(Serialize)]
@@ -60,6 +63,10 @@ struct ControllerReport<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    if !args.targets.are_named() {
+        args.targets.refuse_choice(&args.names)?;
+        return client::home(&args.server, args.seats_empty);
+    }
     let targets = args.targets.resolve(&args.names)?;
     if !args.seats_empty {
         somebody("Are the seats empty?", "--seats-empty")?;
@@ -81,7 +88,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             results[*lane] = result.map_err(|error| error.to_string());
         }
     }
-    if args.json {
+    if args.server.json {
         print::json(&Report::new(&targets, &results))?;
     }
     Ok(troubles.exit())

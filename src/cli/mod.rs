@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod ask;
 mod check;
+mod client;
 mod completions;
 mod convert;
 mod decode;
@@ -18,13 +19,18 @@ mod home;
 mod info;
 mod latency;
 mod load;
+mod man;
 mod play;
 mod preflight;
 mod print;
+mod prove;
 mod register;
+mod report;
+mod serve;
 mod sim;
 mod targets;
 pub mod times;
+mod token;
 
 pub use exit::{Exit, Failure, OrExit};
 
@@ -52,8 +58,18 @@ enum Command {
     Register(register::Args),
     Home(home::Args),
     Doctor(doctor::Args),
+    Serve(serve::Args),
     Latency(latency::Args),
+    Report(report::Args),
+    Token(token::Args),
+    #[command(flatten)]
+    Client(client::Command),
     Completions(completions::Args),
+    /// Checks and proves one cue for the library, as a process of the lowest priority.
+    #[command(hide = true)]
+    Prove(prove::Args),
+    #[command(hide = true)] // for those who make packages
+    Man(man::Args),
 }
 
 /// Runs the program on the process's arguments and says how it ends.
@@ -90,7 +106,13 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Register(args) => register::run(&args),
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Latency(args) => latency::run(&args),
+        Command::Report(args) => report::run(&args),
+        Command::Token(args) => token::run(&args),
+        Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),
+        Command::Prove(args) => prove::run(&args),
+        Command::Man(args) => man::run(&args),
     }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::client;
 use super::load::{self, SourceArgs, parse_rate};
 use super::targets::{TargetArgs, Targets};
 use super::{Exit, Failure, OrExit as _, print};
@@ -26,10 +27,11 @@ use report::Report;
 /// Checks every controller before anyone sits down: who answers, how fast, and whether its settings are right and safe.
 ///
 /// Reads only; nothing moves and nothing is changed. Controllers are asked side by side: 64 of them take seconds, also
-/// where some are dead. Ends with 0 only where nothing fails.
+/// where some are dead. Ends with 0 only where nothing fails. Without --to and --config the daemon checks its own hall.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
+  kinocue preflight                          the daemon's own hall
   kinocue preflight --config hall.toml
   kinocue preflight --config hall.toml --cue cues/voyage.csv --rate 250
   kinocue preflight A1 A2 --config hall.toml
@@ -43,7 +45,7 @@ A site that lives with a finding names it in its configuration, under [show] or 
 Exit codes:
   0   nothing fails
   1   something fails
-  69  no controller answers
+  69  no controller answers, or no daemon
   75  another program holds the frame port
   78  the configuration is bad")]
 pub(super) struct Args {
@@ -60,9 +62,8 @@ pub(super) struct Args {
     /// Frames a second [default: those of the configuration; 100 without].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
-    /// Print one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    server: client::ServerArgs,
     /// Say what the checks are, or what one is, and why it matters; asks no controller.
     #[arg(long, value_name = "CHECK", num_args = 0..=1, exclusive = true)]
     explain: Option<Option<String>>,
@@ -71,6 +72,10 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if let Some(which) = &args.explain {
         return explain(which.as_deref());
+    }
+    if !args.targets.are_named() {
+        args.targets.refuse_choice(&args.names)?;
+        return client::preflight(&args.server);
     }
     let cue =
         args.cue.as_ref().map(|path| load::cue(path, &args.source.source())).transpose()?.map(Timeline::new);
@@ -95,7 +100,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         .collect();
     let findings = judge(&subjects, &terms, &targets.show.accept_findings);
     let report = Report::new(&subjects, findings, Monotonic.now().since(begun));
-    tell(&report, args.json)
+    tell(&report, args.server.json)
 }
 
 fn explain(which: Option<&str>) -> Result<Exit, Failure> {

@@ -18,7 +18,7 @@ use crate::wire::ReplyCode;
 pub(super) struct TargetArgs {
     /// A controller: HOST:PORT, and behind commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
     /// mbox; repeatable.
-    #[arg(long, value_name = "ADDR", required_unless_present = "config", conflicts_with = "config")]
+    #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,
     /// The controllers of a configuration: all of them, unless --row or names choose.
     #[arg(long, value_name = "FILE")]
@@ -54,6 +54,18 @@ impl TargetArgs {
         };
         show.bind = self.bind.unwrap_or(show.bind);
         Ok(Targets { controllers: self.choose(controllers, names)?, show })
+    }
+
+    /// Whether anybody is meant: without, `home` and `preflight` ask the daemon for its own.
+    pub(super) fn are_named(&self) -> bool {
+        self.config.is_some() || !self.to.is_empty()
+    }
+
+    /// Wrong use where some are chosen of a hall that is the daemon's: that does all or none.
+    pub(super) fn refuse_choice(&self, names: &[String]) -> Result<(), Failure> {
+        let Some(name) = names.first() else { return Ok(()) };
+        let why = anyhow!("the daemon does this for its whole hall; name {name} with --to or --config, or leave it out");
+        Err(why).or_exit(Exit::Usage)
     }
 
     /// Whether a configuration names them.

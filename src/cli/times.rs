@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+pub use crate::config::parse_level;
 use crate::time::ShowTime;
 
 const SECOND: u128 = 1_000_000_000;
@@ -50,23 +51,6 @@ pub fn parse_duration(text: &str) -> Result<Duration, String> {
     let nanos = billionths.checked_mul(unit).map(|nanos| nanos / SECOND);
     let nanos = nanos.and_then(|nanos| u64::try_from(nanos).ok()).ok_or_else(|| refuse("too long"))?;
     Ok(Duration::from_nanos(nanos))
-}
-
-/// An intensity, 0 to 1: `60%`, or `-6dB` for 10^(-6/20).
-///
-/// # Errors
-/// What is wrong with the text, for a person.
-pub fn parse_level(text: &str) -> Result<f64, String> {
-    let refuse = || "not a level; write 0% to 100%, or 0dB and below, as -6dB".to_owned();
-    let level = if let Some(percent) = text.strip_suffix('%') {
-        percent.trim_end().parse::<f64>().map_err(|_| refuse())? / 100.0
-    } else if let Some(decibel) = text.strip_suffix("dB") {
-        let decibel: f64 = decibel.trim_end().parse().map_err(|_| refuse())?;
-        10_f64.powf(decibel / 20.0)
-    } else {
-        return Err(refuse());
-    };
-    if (0.0..=1.0).contains(&level) { Ok(level) } else { Err(refuse()) }
 }
 
 /// An offset against the film, -500 to 500 ms in whole milliseconds: `40`, `-120ms`.

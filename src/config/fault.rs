@@ -45,7 +45,7 @@ fn lines(faults: &[ConfigFault]) -> String {
 }
 
 /// The faults found so far in a text, by their place in it.
-pub(super) struct Faults<'t> {
+pub(crate) struct Faults<'t> {
     text: &'t str,
     found: Vec<(usize, String)>,
     /// Lines that are no TOML: what was made of them says nothing.
@@ -53,42 +53,47 @@ pub(super) struct Faults<'t> {
 }
 
 impl<'t> Faults<'t> {
-    pub(super) fn of(text: &'t str) -> Self {
+    pub(crate) fn of(text: &'t str) -> Self {
         Self { text, found: Vec::new(), broken: Vec::new() }
     }
 
     /// Notes a fault at octet `at` of the text.
-    pub(super) fn note(&mut self, at: usize, message: impl Into<String>) {
+    pub(crate) fn note(&mut self, at: usize, message: impl Into<String>) {
         if !self.broken.contains(&self.line(at)) {
             self.found.push((at, message.into()));
         }
     }
 
     /// Notes that something is not there, unless a line that is no TOML may have held it.
-    pub(super) fn note_missing(&mut self, at: usize, message: impl Into<String>) {
+    pub(crate) fn note_missing(&mut self, at: usize, message: impl Into<String>) {
         if self.broken.is_empty() {
             self.note(at, message);
         }
     }
 
     /// Notes that the text is no TOML at octet `at`; further faults of that line are not noted.
-    pub(super) fn note_syntax(&mut self, at: usize, message: impl Into<String>) {
+    pub(crate) fn note_syntax(&mut self, at: usize, message: impl Into<String>) {
         self.note(at, message);
         self.broken.push(self.line(at));
     }
 
     /// The line of octet `at`, counted from 1.
-    pub(super) fn line(&self, at: usize) -> usize {
-        place(self.text.as_bytes(), at).0
+    pub(crate) fn line(&self, at: usize) -> usize {
+        self.place(at).0
+    }
+
+    /// Line and column of octet `at`, both counted from 1.
+    pub(crate) fn place(&self, at: usize) -> (usize, usize) {
+        place(self.text.as_bytes(), at)
     }
 
     /// Whether none has been noted.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
     /// All of them, in the order of the text.
-    pub(super) fn into_list(mut self, path: &std::path::Path) -> Vec<ConfigFault> {
+    pub(crate) fn into_list(mut self, path: &std::path::Path) -> Vec<ConfigFault> {
         self.found.sort_by_key(|&(at, _)| at);
         let text = self.text.as_bytes();
         let at_place = |(at, message)| {
@@ -100,7 +105,7 @@ impl<'t> Faults<'t> {
 }
 
 /// Line and column of octet `at`, as an editor counts them: from 1, the column in characters.
-pub(super) fn place(text: &[u8], at: usize) -> (usize, usize) {
+pub(crate) fn place(text: &[u8], at: usize) -> (usize, usize) {
     let before = &text[..at.min(text.len())];
     let line_start = before.iter().rposition(|&octet| octet == b'\n').map_or(0, |end| end + 1);
     let line = 1 + before.iter().filter(|&&octet| octet == b'\n').count();

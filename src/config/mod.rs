@@ -10,20 +10,38 @@ use crate::motion::{MAX_AXES, SeatType};
 use crate::preflight::Check;
 
 mod accept;
+mod api;
 mod effect_limits;
 mod fault;
 mod fit;
+mod level;
+mod library;
+mod log;
+mod osc;
+mod preset;
 mod read;
 mod section;
+mod sources;
 mod target;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub use crate::wire::{Dialect, Timing};
+pub use api::{Api, ApiToken};
 pub use effect_limits::EffectLimit;
+pub(crate) use fault::Faults;
 pub use fault::{ConfigFault, ConfigFaults};
 pub use fit::{Amplitude, HallStroke, Misfit, Swing};
+pub use level::parse_level;
+pub(crate) use level::{level, switches, trim};
+pub use library::Store;
+pub use log::{Hours, Log};
+pub use osc::{OscPort, OscWord};
+pub use preset::Preset;
+pub(crate) use section::{Entry, Section, did_you_mean};
 pub use target::{TargetError, from_to_args};
+pub use text::TextPort;
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
 pub const ALL_OUTPUTS: u16 = 0x0fff;
@@ -42,13 +60,27 @@ pub struct Config {
     pub effects: Vec<Effect>,
     /// How long, and how much of the time, effects may be on; at most one entry for each name.
     pub effect_limits: Vec<EffectLimit>,
+    /// Levels and effects by name, in the order of the names.
+    pub presets: Vec<Preset>,
+    /// What the library and the playlists are kept in.
+    pub store: Store,
+    /// Where the journal is kept, and how much of it.
+    pub log: Log,
     /// The controllers, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
+    /// The port that takes OSC, where there is one.
+    pub osc: Option<OscPort>,
+    /// The port that takes lines of text, where there is one.
+    pub text: Option<TextPort>,
+    /// HTTP over TCP.
+    pub api: Api,
 }
 
 /// How cues are played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Show {
+    /// What the hall is called.
+    pub name: String,
     /// Frames a second to every controller, 1 to 1,000.
     pub rate_hz: f64,
     /// What the Time field of a frame means.
@@ -70,6 +102,7 @@ pub struct Show {
 impl Default for Show {
     fn default() -> Self {
         Self {
+            name: "hall".to_owned(),
             rate_hz: 100.0,
             timing: Timing::Relative,
             bind: SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 8410),
@@ -206,6 +239,19 @@ impl Config {
     #[must_use]
     pub fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
         (1..=cue_axes).filter(|&axis| !self.controllers.iter().any(|c| c.takes(axis - 1))).collect()
+    }
+
+    /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.
+    #[must_use]
+    pub fn playlists(&self) -> PathBuf {
+        let beside = || self.show.library.with_file_name("playlists");
+        self.store.playlists.clone().unwrap_or_else(beside)
+    }
+
+    /// The preset called `name`.
+    #[must_use]
+    pub fn preset(&self, name: &str) -> Option<&Preset> {
+        self.presets.iter().find(|preset| preset.name == name)
     }
 
     /// The seat type called `name`.

@@ -11,12 +11,18 @@ use toml::de::DeTable;
 use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 
 use super::accept::acceptances;
+use super::api::api;
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
+use super::library::store;
+use super::log::log;
+use super::osc::osc;
+use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
+use super::text::text;
 use super::{
-    Accept, Config, Controller, Dialect, Effect, FanOut, LossPolicy, MAX_FILE_LEN, Show, Timing,
-    check_effect_name, check_peer, check_window,
+    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store,
+    Timing, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] octets.
@@ -64,17 +70,38 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
+    let api_at = section.get("api");
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
+    let [preset_at, library_at, log_at, osc_at, text_at] =
+        ["preset", "library", "log", "osc", "text"].map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
     let effects = effects_at.map_or_else(Vec::new, |entry| effects(entry, faults));
     let effect_limits = limits_at.map_or_else(Vec::new, |entry| effect_limits(entry, &effects, faults));
+    let presets = preset_at.map_or_else(Vec::new, |entry| presets(entry, &effects, faults));
+    let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
+    let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
-    Some(Config { show: show?, seats, effects, effect_limits, controllers })
+    let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
+    let osc = osc_at.and_then(|entry| osc(entry, faults));
+    let text = text_at.and_then(|entry| text(entry, faults));
+    Some(Config {
+        show: show?,
+        seats,
+        effects,
+        effect_limits,
+        presets,
+        store: store?,
+        log: log?,
+        controllers,
+        osc,
+        text,
+        api: api?,
+    })
 }
 
 fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
@@ -84,6 +111,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
     let policy =
         [("continue", LossPolicy::Continue), ("pause", LossPolicy::Pause), ("park", LossPolicy::Park)];
     let show = Show {
+        name: section.text("name").unwrap_or(default.name),
         rate_hz: section.number_in("rate_hz", 1.0..=1000.0).unwrap_or(default.rate_hz),
         timing: section.choice("time", &timing).unwrap_or(default.timing),
         bind: section.address("bind").unwrap_or(default.bind),

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::net::SocketAddrV4;
 use std::ops::RangeInclusive;
 
+use jiff::civil::Time;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -13,29 +14,30 @@ use super::fault::Faults;
 const ALIKE: f64 = 0.75;
 
 /// The kinds of whole number that settings have.
-pub(super) trait Whole: TryFrom<i64> + PartialOrd + Display {}
+pub(crate) trait Whole: TryFrom<i64> + PartialOrd + Display {}
 
+impl Whole for i32 {}
 impl Whole for u8 {}
 impl Whole for u32 {}
 impl Whole for usize {}
 
 /// A value and its place.
 #[derive(Clone, Copy)]
-pub(super) struct Entry<'t> {
+pub(crate) struct Entry<'t> {
     /// What faults call it: its key.
-    pub(super) key: &'t str,
+    pub(crate) key: &'t str,
     /// Its first octet in the text.
-    pub(super) at: usize,
-    pub(super) value: &'t DeValue<'t>,
+    pub(crate) at: usize,
+    pub(crate) value: &'t DeValue<'t>,
 }
 
 impl<'t> Entry<'t> {
-    pub(super) fn new(key: &'t str, value: &'t Spanned<DeValue<'t>>) -> Self {
+    pub(crate) fn new(key: &'t str, value: &'t Spanned<DeValue<'t>>) -> Self {
         Self { key, at: value.span().start, value: value.get_ref() }
     }
 
     /// Notes what is wrong with it.
-    pub(super) fn fault(&self, faults: &mut Faults<'_>, message: &str) {
+    pub(crate) fn fault(&self, faults: &mut Faults<'_>, message: &str) {
         faults.note(self.at, format!("{}: {message}", self.key));
     }
 
@@ -43,7 +45,7 @@ impl<'t> Entry<'t> {
         self.fault(faults, &format!("{wanted} is wanted here, not {}", kind(self.value)));
     }
 
-    pub(super) fn table(&self, faults: &mut Faults<'_>) -> Option<&'t DeTable<'t>> {
+    pub(crate) fn table(&self, faults: &mut Faults<'_>) -> Option<&'t DeTable<'t>> {
         let table = self.value.as_table();
         if table.is_none() {
             self.wrong_type(faults, "a table");
@@ -52,7 +54,7 @@ impl<'t> Entry<'t> {
     }
 
     /// The values of an array, each under the array's own key.
-    pub(super) fn array(&self, faults: &mut Faults<'_>) -> Option<Vec<Self>> {
+    pub(crate) fn array(&self, faults: &mut Faults<'_>) -> Option<Vec<Self>> {
         let Some(array) = self.value.as_array() else {
             self.wrong_type(faults, "an array");
             return None;
@@ -60,7 +62,7 @@ impl<'t> Entry<'t> {
         Some(array.iter().map(|value| Entry::new(self.key, value)).collect())
     }
 
-    pub(super) fn text(&self, faults: &mut Faults<'_>) -> Option<&'t str> {
+    pub(crate) fn text(&self, faults: &mut Faults<'_>) -> Option<&'t str> {
         let text = self.value.as_str();
         match text {
             None => self.wrong_type(faults, "a string"),
@@ -73,8 +75,41 @@ impl<'t> Entry<'t> {
         text
     }
 
+    /// True or false.
+    pub(crate) fn switch(&self, faults: &mut Faults<'_>) -> Option<bool> {
+        let switch = self.value.as_bool();
+        if switch.is_none() {
+            self.wrong_type(faults, "true or false");
+        }
+        switch
+    }
+
+    /// One of a few words, as what it stands for.
+    pub(crate) fn choice<T: Copy>(&self, choices: &[(&str, T)], faults: &mut Faults<'_>) -> Option<T> {
+        let text = self.text(faults)?;
+        let chosen = choices.iter().find(|(word, _)| *word == text).map(|&(_, value)| value);
+        if chosen.is_none() {
+            let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
+            let hint = did_you_mean(text, words.iter().copied());
+            self.fault(faults, &format!("{text:?} is none of {}{hint}", words.join(", ")));
+        }
+        chosen
+    }
+
+    /// A time of day, `19:00` or `19:00:30`.
+    pub(crate) fn time(&self, faults: &mut Faults<'_>) -> Option<Time> {
+        let text = self.text(faults)?;
+        let digits = |part: &str| part.len() == 2 && part.bytes().all(|octet| octet.is_ascii_digit());
+        let spelt = text.split(':').all(digits) && matches!(text.len(), 5 | 8);
+        let time = text.parse().ok().filter(|_| spelt);
+        if time.is_none() {
+            self.fault(faults, &format!("{text:?} is no time of day, as \"19:00\" or \"19:00:30\""));
+        }
+        time
+    }
+
     /// A finite number, whole or not.
-    pub(super) fn number(&self, faults: &mut Faults<'_>) -> Option<f64> {
+    pub(crate) fn number(&self, faults: &mut Faults<'_>) -> Option<f64> {
         let number = match self.value {
             DeValue::Integer(digits) if digits.radix() == 10 => digits.as_str().parse().ok(),
             DeValue::Integer(_) => {
@@ -93,7 +128,7 @@ impl<'t> Entry<'t> {
         finite
     }
 
-    pub(super) fn number_in(&self, range: RangeInclusive<f64>, faults: &mut Faults<'_>) -> Option<f64> {
+    pub(crate) fn number_in(&self, range: RangeInclusive<f64>, faults: &mut Faults<'_>) -> Option<f64> {
         let number = self.number(faults)?;
         if !range.contains(&number) {
             let (least, most) = (range.start(), range.end());
@@ -103,7 +138,7 @@ impl<'t> Entry<'t> {
         Some(number)
     }
 
-    pub(super) fn whole_in<T: Whole>(&self, range: RangeInclusive<T>, faults: &mut Faults<'_>) -> Option<T> {
+    pub(crate) fn whole_in<T: Whole>(&self, range: RangeInclusive<T>, faults: &mut Faults<'_>) -> Option<T> {
         if !self.value.is_integer() {
             self.wrong_type(faults, "a whole number");
             return None;
@@ -119,17 +154,17 @@ impl<'t> Entry<'t> {
 }
 
 /// One table that is being read.
-pub(super) struct Section<'t, 'f, 'x> {
+pub(crate) struct Section<'t, 'f, 'x> {
     name: String,
     at: usize,
     table: &'t DeTable<'t>,
     asked: Vec<&'static str>,
-    pub(super) faults: &'f mut Faults<'x>,
+    pub(crate) faults: &'f mut Faults<'x>,
 }
 
 impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
     /// Starts on the table called `name`, whose header is at octet `at`.
-    pub(super) fn new(
+    pub(crate) fn new(
         name: impl Into<String>,
         at: usize,
         table: &'t DeTable<'t>,
@@ -139,31 +174,31 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
     }
 
     /// Notes each key of `keys` that the table has not.
-    pub(super) fn require(&mut self, keys: &[&str]) {
+    pub(crate) fn require(&mut self, keys: &[&str]) {
         for key in keys.iter().filter(|key| !self.table.contains_key(**key)) {
             self.faults.note_missing(self.at, format!("{} has no {key}, which is needed", self.name));
         }
     }
 
     /// The value of `key`, which the section then knows.
-    pub(super) fn get(&mut self, key: &'static str) -> Option<Entry<'t>> {
+    pub(crate) fn get(&mut self, key: &'static str) -> Option<Entry<'t>> {
         self.asked.push(key);
         self.table.get(key).map(|value| Entry::new(key, value))
     }
 
-    pub(super) fn text(&mut self, key: &'static str) -> Option<String> {
+    pub(crate) fn text(&mut self, key: &'static str) -> Option<String> {
         self.get(key)?.text(self.faults).map(str::to_owned)
     }
 
-    pub(super) fn number_in(&mut self, key: &'static str, range: RangeInclusive<f64>) -> Option<f64> {
+    pub(crate) fn number_in(&mut self, key: &'static str, range: RangeInclusive<f64>) -> Option<f64> {
         self.get(key)?.number_in(range, self.faults)
     }
 
-    pub(super) fn whole_in<T: Whole>(&mut self, key: &'static str, range: RangeInclusive<T>) -> Option<T> {
+    pub(crate) fn whole_in<T: Whole>(&mut self, key: &'static str, range: RangeInclusive<T>) -> Option<T> {
         self.get(key)?.whole_in(range, self.faults)
     }
 
-    pub(super) fn above_zero(&mut self, key: &'static str) -> Option<f64> {
+    pub(crate) fn above_zero(&mut self, key: &'static str) -> Option<f64> {
         let entry = self.get(key)?;
         let number = entry.number(self.faults)?;
         if number <= 0.0 {
@@ -173,7 +208,7 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
         Some(number)
     }
 
-    pub(super) fn address(&mut self, key: &'static str) -> Option<SocketAddrV4> {
+    pub(crate) fn address(&mut self, key: &'static str) -> Option<SocketAddrV4> {
         let entry = self.get(key)?;
         let text = entry.text(self.faults)?;
         let address = text.parse().ok();
@@ -187,24 +222,12 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
     }
 
     /// One of a few words, as what it stands for.
-    pub(super) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
-        let entry = self.get(key)?;
-        let text = entry.text(self.faults)?;
-        let chosen = choices.iter().find(|(word, _)| *word == text).map(|&(_, value)| value);
-        if chosen.is_none() {
-            let words: Vec<_> = choices.iter().map(|(word, _)| *word).collect();
-            let message = format!(
-                "{text:?} is none of {}{}",
-                words.join(", "),
-                did_you_mean(text, words.iter().copied())
-            );
-            entry.fault(self.faults, &message);
-        }
-        chosen
+    pub(crate) fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
+        self.get(key)?.choice(choices, self.faults)
     }
 
     /// Notes every key that nothing asked for.
-    pub(super) fn finish(self) {
+    pub(crate) fn finish(self) {
         for key in self.table.keys().filter(|key| !self.asked.contains(&key.get_ref().as_ref())) {
             let word: &str = key.get_ref();
             let hint = did_you_mean(word, self.asked.iter().copied());
@@ -214,7 +237,7 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
 }
 
 /// `; did you mean x?` for the word most like `word`, or nothing.
-pub(super) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
+pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
     let likeness = |candidate: &str| strsim::jaro_winkler(word, candidate);
     let best = known.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
     best.filter(|best| likeness(best) >= ALIKE)

@@ -7,7 +7,8 @@ use crate::motion::{MAX_AXES, SeatType};
 
 use super::section::did_you_mean;
 use super::{
-    Accept, Config, Controller, Dialect, Effect, FanOut, Show, check_effect_name, check_peer, check_window,
+    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, Show, Store, check_effect_name,
+    check_peer, check_window,
 };
 
 /// What the outputs of a controller on this machine mean unless told otherwise: Y01 to Y06.
@@ -84,7 +85,13 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         seats,
         effects: with_bench_effects(named),
         effect_limits: Vec::new(),
+        presets: Vec::new(),
+        store: Store::default(),
+        log: Log::default(),
         controllers,
+        osc: None,
+        text: None,
+        api: Api::default(),
     })
 }
 

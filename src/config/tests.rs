@@ -16,8 +16,18 @@ fn parse(text: &str) -> Result<Config, Vec<String>> {
 }
 
 /// A sound configuration with `more` at the end of its one controller.
-fn with(more: &str) -> Result<Config, Vec<String>> {
+pub(super) fn with(more: &str) -> Result<Config, Vec<String>> {
     parse(&format!("{SEAT}{CONTROLLER}{more}"))
+}
+
+/// A sound configuration with `more` behind all else.
+pub(super) fn hall_with(more: &str) -> Config {
+    with(more).unwrap()
+}
+
+/// What is wrong with a configuration that is sound but for `more`.
+pub(super) fn faults_of(more: &str) -> Vec<String> {
+    with(more).unwrap_err()
 }
 
 fn data(name: &str) -> PathBuf {

@@ -317,6 +317,12 @@ pub fn read(path: &Path, input: impl Read, source: &Source) -> Result<Cue, CueFa
     Ok(cue)
 }
 
+/// Whether a file that begins so is MCAP.
+#[must_use]
+pub fn is_mcap(front: &[u8]) -> bool {
+    front.starts_with(mcap::MAGIC)
+}
+
 /// Reads a cue of our own: the content says whether it is MCAP, and a name in `.mcap` that it should be.
 fn read_native(path: &Path, mut input: impl Read) -> Result<Cue, CueFaults> {
     let mut front = Vec::new();

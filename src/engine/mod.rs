@@ -13,6 +13,7 @@ mod stamps;
 mod switch;
 mod trail;
 mod turn;
+mod wait;
 
 pub use grid::{Rate, Tick, TickGrid};
 pub use headroom::Headroom;
@@ -111,6 +112,8 @@ pub enum Rest {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
+    /// Loaded, and nobody has let it go: no frame goes out.
+    Waiting,
     /// Repeats the park pose once, so that no motion hangs on how a controller times its first absolute frame.
     Settling,
     /// On a course that leads onto the cue.
@@ -176,14 +179,13 @@ impl Engine {
         windows: Vec<Window>,
         course: Box<Course>,
     ) -> Self {
-        let settles = show.timing == Timing::Absolute && show.rate.period() > millis(FIRST_ABSOLUTE_MS);
         let levels = windows.iter().map(Window::level);
         Self {
             greatest_level: levels.fold(headroom.greatest_level(), f64::max),
             scenes: Scenes::like(&Scene::parked(&windows)),
             riders: windows.into_iter().map(|window| Rider::parked(window, show.rate)).collect(),
             hint: Hint::default(),
-            phase: if settles { Phase::Settling } else { Phase::Riding },
+            phase: first_phase(&show),
             ending: Ending::Completed,
             switch: None,
             spare: None,
@@ -319,6 +321,9 @@ impl Engine {
             self.phase = Phase::Done;
             return Step::Over;
         }
+        if self.phase == Phase::Waiting {
+            return Step::Quiet;
+        }
         let time_ms = self.show.rate.time_ms(self.frames);
         self.frames += 1;
         let show = self.playhead;
@@ -346,7 +351,7 @@ impl Engine {
                 return;
             }
             Phase::Closing(left) => return self.close(left),
-            Phase::Done => return,
+            Phase::Waiting | Phase::Done => return,
             Phase::Resting(Rest::Late) => self.playhead += time,
             // The film waits from the very request on.
             Phase::Braking(_) | Phase::Resting(_) => {}
@@ -384,6 +389,12 @@ impl Engine {
             self.stamps.break_off(); // whoever plays next starts its sum after a relative frame
         }
     }
+}
+
+/// What the first frame does.
+fn first_phase(show: &Show) -> Phase {
+    let settles = show.timing == Timing::Absolute && show.rate.period() > millis(FIRST_ABSOLUTE_MS);
+    if settles { Phase::Settling } else { Phase::Riding }
 }
 
 const fn millis(ms: u32) -> Duration {

@@ -1,5 +1,6 @@
 //! What the engine is told to do. None of it waits: each is taken up by the tick it is told before.
 
+use super::wait::is_at;
 use super::{Ending, Engine, Mix, Part, Phase, Rest};
 use crate::motion::Pose;
 use crate::time::ShowTime;
@@ -13,7 +14,7 @@ impl Engine {
     /// Before the first frame it is the end at once: nothing has been set in motion, and the lanes may still be on a
     /// slow way to park, or where nobody knows.
     pub fn park(&mut self) {
-        if self.frames == 0 {
+        if self.frames == 0 && self.rest().is_none() {
             self.phase = Phase::Done;
             self.ending = Ending::Stopped;
         } else if !self.is_homeward() {
@@ -34,7 +35,11 @@ impl Engine {
         }
         (self.homeward, self.resuming, self.seeking) = (false, false, None);
         self.ending = Ending::Stopped;
-        self.come_down(Rest::Stopped);
+        if self.phase == Phase::Waiting {
+            self.rest_untold();
+        } else {
+            self.come_down(Rest::Stopped);
+        }
     }
 
     /// Brings the lanes to rest at once, without the planner, and holds them there; the film waits.
@@ -97,6 +102,9 @@ impl Engine {
 
     /// Brings one lane to rest; after three hold frames nothing goes to it.
     pub fn leave(&mut self, lane: usize) {
+        if self.sends_nothing() {
+            return self.cut(lane);
+        }
         self.brake(lane);
         self.riders[lane].leave();
     }
@@ -115,6 +123,9 @@ impl Engine {
             // Its controller's sum of Times has been broken off.
             self.stamps.break_off();
         } else if self.phase == Phase::Resting(Rest::Stopped) && self.switch.is_none() {
+            rider.come_back(pose);
+        } else if matches!(self.phase, Phase::Waiting | Phase::Done) && !is_at(&rider.window, &pose, rider.pose()) {
+            // Somebody moved it, or it was homed.
             rider.come_back(pose);
         }
     }

@@ -31,6 +31,11 @@ impl Holds {
         (self.ticks, self.time_ms) = (0, 0);
     }
 
+    /// A rest of which no frame tells.
+    pub(super) const fn skip(&mut self) {
+        (self.ticks, self.time_ms) = (HOLD_FRAMES as u32, 0);
+    }
+
     /// Whether a stop has been told often enough.
     pub(super) const fn are_over(&self) -> bool {
         self.ticks >= HOLD_FRAMES as u32

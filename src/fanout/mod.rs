@@ -117,6 +117,11 @@ impl Lane {
         Self { next_frame, ..self }
     }
 
+    /// Goes on counting where another left off: a frame number never comes twice.
+    pub const fn go_on_from(&mut self, before: &Self) {
+        self.next_frame = before.next_frame;
+    }
+
     /// The number of the frame written last; one less than the first where there was none.
     #[must_use]
     pub const fn last_frame(&self) -> FrameNo {

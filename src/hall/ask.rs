@@ -1,11 +1,13 @@
 //! What surfaces may ask of the hall.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Role;
+use crate::config::Preset;
 use crate::time::ShowTime;
 
 /// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
@@ -127,6 +129,22 @@ impl Ask {
         }
     }
 
+    /// Whether it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
+    /// another by then.
+    #[must_use]
+    pub const fn goes_stale(&self) -> bool {
+        matches!(
+            self,
+            Self::Home
+                | Self::Arm
+                | Self::Go
+                | Self::Resume
+                | Self::Seek(_)
+                | Self::Clear
+                | Self::Test { .. }
+        )
+    }
+
     /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.
     #[must_use]
     pub const fn least_role(&self) -> Role {
@@ -135,5 +153,46 @@ impl Ask {
             Self::Home | Self::Clear | Self::Test { .. } | Self::Reload => Role::Engineer,
             _ => Role::Operate,
         }
+    }
+}
+
+impl From<&Preset> for LevelsChange {
+    fn from(preset: &Preset) -> Self {
+        let Preset { motion, vibration, effects, .. } = preset;
+        Self { motion: *motion, vibration: *vibration, effects: effects.clone(), rows: BTreeMap::new() }
+    }
+}
+
+impl fmt::Display for Ask {
+    /// What was asked, as the journal has it: its word, and what it names.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())?;
+        match self {
+            Self::Load { cue } => write!(f, " {cue}"),
+            Self::Playlist { id: Some(id) } => write!(f, " {id}"),
+            Self::Playlist { id: None } => f.write_str(" none"),
+            Self::Select { entry } => write!(f, " entry {entry}"),
+            Self::Seek(film) => write!(f, " {film}"),
+            Self::Trim(ms) => write!(f, " {ms} ms"),
+            Self::Levels(change) => change.fmt(f),
+            Self::Preset(name) | Self::Enable(name) | Self::Disable(name) => write!(f, " {name}"),
+            Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
+            Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for LevelsChange {
+    /// Each change behind a blank.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let levels = [("motion", self.motion), ("vibration", self.vibration)];
+        for (name, level) in levels.into_iter().filter_map(|(name, level)| Some((name, level?))) {
+            write!(f, " {name} {:.0} %", level * 100.0)?;
+        }
+        for (row, level) in &self.rows {
+            write!(f, " row {row} {:.0} %", level * 100.0)?;
+        }
+        self.effects.iter().try_for_each(|(name, on)| write!(f, " {name} {}", if *on { "on" } else { "off" }))
     }
 }

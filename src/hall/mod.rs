@@ -9,10 +9,10 @@ mod status;
 mod who;
 
 pub use ask::{Ask, Levels, LevelsChange};
-pub use handle::{Asked, Desired, Handle, Inbox, StatusSource, handle};
+pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle};
 pub use problem::{Code, Problem};
 pub use status::{
     ControllerStatus, EntryStatus, Histogram, JournalLine, Percentiles, PlaylistStatus, PreflightStatus,
-    RealTimeStatus, Severity, ShowStatus, Status, Warning,
+    RealTimeStatus, Severity, ShowStatus, Status, TestRow, TestStatus, Warning,
 };
 pub use who::{Role, Surface, Who};

@@ -1,10 +1,13 @@
 //! What the hall says of itself. The keeper makes one of these ten times a second and after every change; every surface shows
 //! this and nothing else.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::Levels;
+use crate::state::{Cause, Next, State};
 
 /// The whole state of the hall.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -54,10 +57,46 @@ pub struct Status {
     pub controllers: Vec<ControllerStatus>,
     /// The last preflight.
     pub preflight: Option<PreflightStatus>,
+    /// The test of axes and effects that runs, or the last one.
+    pub test: Option<TestStatus>,
     /// What a person should know, gravest first.
     pub warnings: Vec<Warning>,
     /// The newest lines of the journal, newest first, at most 20.
     pub journal: Vec<JournalLine>,
+}
+
+impl Status {
+    /// That of a hall of which nothing is known yet.
+    #[must_use]
+    pub fn starting(hall: &str) -> Self {
+        Self {
+            hall: hall.to_owned(),
+            version: env!("CARGO_PKG_VERSION"),
+            uptime_s: 0.0,
+            state: State::Boot.word(),
+            cause: Cause::Started.to_string(),
+            next: Next::AwaitAnswers.to_string(),
+            since_s: 0.0,
+            lapses_s: None,
+            moving: false,
+            show: None,
+            playlist: None,
+            trim_ms: 0,
+            levels: Levels { motion: 1.0, vibration: 1.0, effects: BTreeMap::new(), rows: BTreeMap::new() },
+            presets: Vec::new(),
+            ticks: 0,
+            missed_ticks: 0,
+            rate_hz: 0.0,
+            lateness: Percentiles::default(),
+            ack_latency: Percentiles::default(),
+            realtime: RealTimeStatus::default(),
+            controllers: Vec::new(),
+            preflight: None,
+            warnings: Vec::new(),
+            test: None,
+            journal: Vec::new(),
+        }
+    }
 }
 
 /// What is loaded, and where in it the hall is.
@@ -111,7 +150,7 @@ pub struct EntryStatus {
     pub trim_ms: Option<i32>,
     /// What follows its end: `hold` (a person goes on) or `go`.
     pub then: &'static str,
-    /// The time of day at which it starts, HH:MM[:SS]; null where a person starts it.
+    /// The time of day at which it starts, HH:MM or HH:MM:SS; null where a person starts it.
     pub at: Option<String>,
 }
 
@@ -222,6 +261,40 @@ pub struct PreflightStatus {
     pub answered: usize,
     /// The findings that are no `ok`, gravest first.
     pub findings: Vec<Warning>,
+}
+
+/// A test that moves each axis and switches each effect in turn.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct TestStatus {
+    /// Whether it runs; if not, the rows are its result.
+    pub running: bool,
+    /// What it does at present, or how it ended, in a few words.
+    pub step: String,
+    /// How many axes and effects have been through it.
+    pub done: usize,
+    /// How many it has to go through.
+    pub total: usize,
+    /// What has been through it so far, in the order of the test.
+    pub rows: Vec<TestRow>,
+}
+
+/// What a test found of one axis or effect of one controller.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct TestRow {
+    /// The controller.
+    pub controller: String,
+    /// The axis, `a1` and on, or the name of the effect.
+    pub part: String,
+    /// Frames that asked for a reply meanwhile.
+    pub asked: u64,
+    /// Of these: acked.
+    pub acked: u64,
+    /// Ack latency meanwhile, µs: half of them are no longer; null where none was acked.
+    pub p50_us: Option<f64>,
+    /// 99 of 100 of them are no longer, µs.
+    pub p99_us: Option<f64>,
+    /// Whether the controller took part as it should.
+    pub passed: bool,
 }
 
 /// How grave something is.

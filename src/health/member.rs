@@ -12,6 +12,8 @@ use crate::wire::FrameNo;
 /// A controller is lost when it was not heard for this long, and for ten frames that asked.
 const SILENCE: Duration = Duration::from_millis(250);
 const UNHEARD: u32 = 10;
+/// Two beats without an answer, and the wait for a third, are as long as silence may be.
+const BEAT_WEIGHT: u32 = UNHEARD.div_ceil(2);
 /// How long a sighting speaks for a controller whose group waits for the others.
 const SEEN_FOR: Duration = Duration::from_secs(1);
 /// Frames further apart belong to two streams, and what was unanswered of the first says nothing of the second.
@@ -105,8 +107,12 @@ impl Member {
         }
     }
 
+    /// A sign of life, told again at every look, is one only once.
     pub(super) fn on_life(&mut self, at: MonoTime) {
-        self.heard = self.heard.max(at);
+        if at <= self.heard {
+            return;
+        }
+        self.heard = at;
         self.waiting = None;
         self.unheard = 0;
     }
@@ -114,6 +120,18 @@ impl Member {
     pub(super) fn on_read_sent(&mut self, datagrams: u32) {
         self.traffic.sent += u64::from(datagrams);
         self.reading = true;
+    }
+
+    /// So many datagrams went out that ask for nothing of this.
+    pub(super) const fn on_other_sent(&mut self, datagrams: u64) {
+        self.traffic.sent += datagrams;
+    }
+
+    /// A beat was sent at `at`: with no frames going out, an answer to it is the sign of life that is waited for.
+    pub(super) fn on_beat_sent(&mut self, at: MonoTime) {
+        self.traffic.sent += 1;
+        self.unheard = self.unheard.saturating_add(BEAT_WEIGHT);
+        self.waiting.get_or_insert(at);
     }
 
     /// A sighting that nobody asked for since the controller was lost is none.

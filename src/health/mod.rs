@@ -126,6 +126,16 @@ impl Health {
         self.members[controller].on_read_sent(datagrams);
     }
 
+    /// So many other datagrams went out to a controller: its packet counter will have grown by as many.
+    pub fn on_other_sent(&mut self, controller: usize, datagrams: u64) {
+        self.members[controller].on_other_sent(datagrams);
+    }
+
+    /// A beat went out: any answer of the controller is a sign of life ([`Health::on_status`]), and it is lost without one.
+    pub fn on_beat_sent(&mut self, controller: usize, at: MonoTime) {
+        self.members[controller].on_beat_sent(at);
+    }
+
     /// What was read; of no account where no read was sent since the group was lost.
     pub fn on_sighting(&mut self, controller: usize, sighting: &Sighting, at: MonoTime) {
         self.members[controller].on_sighting(sighting, at);

@@ -304,6 +304,40 @@ fn a_status_report_is_a_sign_of_life() {
 }
 
 #[test]
+fn a_report_of_long_ago_told_again_at_every_look_is_none() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    let reported_at = hall.now;
+    hall.run(100);
+    hall.silence(&[2]);
+    for _ in 0..30 {
+        hall.health.on_status(2, reported_at);
+        hall.tick();
+    }
+    assert_eq!(hall.health.standing(1), Standing::Lost);
+}
+
+#[test]
+fn with_no_frames_on_their_way_a_controller_is_lost_that_answers_no_beat() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    let beats = |hall: &mut Hall, answered: bool| {
+        for _ in 0..4 {
+            for controller in 0..4 {
+                hall.health.on_beat_sent(controller, hall.now);
+                if answered || controller != 2 {
+                    hall.health.on_status(controller, hall.now + Duration::from_millis(1));
+                }
+            }
+            hall.now = hall.now + Duration::from_millis(250);
+            hall.look();
+        }
+    };
+    beats(&mut hall, true);
+    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    beats(&mut hall, false);
+    assert_eq!(hall.standings(), [Standing::Ok, Standing::Lost, Standing::Ok]);
+}
+
+#[test]
 fn one_controller_lost_is_its_whole_seat_lost_and_nobody_elses() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.run(100);

@@ -15,6 +15,8 @@ use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
 use crate::wire::{FrameNo, MotionReply, PerAxis};
 
+/// How often replies are looked for while a hall sends no frames.
+const IDLE: Duration = Duration::from_millis(5);
 /// How often the times so far are told to whoever looks.
 const TELL: Duration = Duration::from_millis(100);
 
@@ -88,6 +90,21 @@ impl AckLoop {
         Self { receiver, accounts, sent, ticks, watch: None, last_sent: MonoTime::default(), live: None }
     }
 
+    /// The same where frames were sent before: `firsts` are the numbers of the next.
+    #[must_use]
+    pub fn going_on(
+        receiver: Receiver,
+        watched: Vec<Watched>,
+        firsts: &[FrameNo],
+        ack_every: u32,
+        sent: Consumer<Sent>,
+        ticks: Consumer<TickReport>,
+    ) -> Self {
+        let mut acks = Self::new(receiver, watched, ack_every, sent, ticks);
+        acks.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
+        acks
+    }
+
     /// Tells `live` the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);
@@ -112,16 +129,25 @@ impl AckLoop {
             if over && clock.now().since(self.last_sent) > ACK_TIMEOUT {
                 break;
             }
-            clock.sleep_until(drains.next_after(clock.now()));
+            let next = drains.next_after(clock.now());
+            clock.sleep_until(if self.is_idle() { next.max(clock.now() + IDLE) } else { next });
         }
         self.tell_times();
         self.into_accounts()
     }
 
-    fn tell_times(&self) {
+    /// Whether a hall has nothing on its way: then there is no hurry.
+    fn is_idle(&self) -> bool {
+        self.watch.as_ref().is_some_and(Watch::is_idle)
+    }
+
+    fn tell_times(&mut self) {
         if let Some(live) = &self.live {
             let Accounts { books, lateness, .. } = &self.accounts;
             live.on_times(lateness, books.tracker().latency_of_all());
+        }
+        if let (Some(watch), true) = (&mut self.watch, self.live.is_some()) {
+            watch.tell_table(self.accounts.books.tracker(), &self.accounts.observer);
         }
     }
 
@@ -146,14 +172,18 @@ impl AckLoop {
                     books.on_reply(reply, &mut records);
                 }
                 Err(_) if observer.hear(controller, octets, at) => {}
-                Err(_) if watch.as_mut().is_some_and(|watch| watch.hear(controller, octets, at)) => {}
+                Err(_) if watch.as_mut().is_some_and(|watch| hear(watch, observer, controller, octets, at)) => {}
                 Err(_) if other(controller, octets) => {}
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
         books.settle(began, &mut Records { sent, last_sent, watch });
         for controller in 0..receiver.lanes() {
-            books.tracker_mut().on_port_closed(controller, receiver.port_closed(controller));
+            let closed = receiver.port_closed(controller);
+            books.tracker_mut().on_port_closed(controller, closed);
+            if let Some(watch) = watch {
+                watch.on_closed(controller, closed);
+            }
         }
         while let Ok(report) = ticks.pop() {
             lateness.saturating_record(report.late_ns);
@@ -179,6 +209,22 @@ impl AckLoop {
     pub fn on_sent(&mut self, sent: Sent) {
         record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
     }
+}
+
+/// Has the watch hear what is no reply to a frame; says whether it was an answer to something asked.
+fn hear(
+    watch: &mut Watch,
+    observer: &mut Observer,
+    controller: usize,
+    octets: &[u8],
+    at: MonoTime,
+) -> bool {
+    // One answer may be waited for by several.
+    let beat = watch.hear_beat(controller, octets, at);
+    if let Some(positions) = beat {
+        observer.on_positions(controller, positions, at);
+    }
+    watch.hear(controller, octets, at) || beat.is_some()
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.

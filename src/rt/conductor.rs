@@ -1,10 +1,10 @@
 //! Between the state machine of the hall and the engine of the play: what is asked and what happens goes to the machine,
 //! what the machine says is done by the engine, and what the engine then does is told to the machine. Tick thread.
 
-use super::mail::{Alarm, Command, News};
+use super::mail::{Alarm, News};
 use crate::engine::{Ending, Engine, Rest};
 use crate::state::{Event, Finding, Machine, Next, Readiness, Refusal, Request, Ride, State, Trouble};
-use crate::time::MonoTime;
+use crate::time::{MonoTime, ShowTime};
 
 /// The machine, and what was last done for it.
 #[derive(Debug)]
@@ -16,13 +16,27 @@ pub struct Conductor {
     known: Option<(State, MonoTime, Next)>,
     /// Whether a person is there to clear what is latched; else the play ends with it.
     attended: bool,
+    /// Whether the hall lives on when its show is over.
+    stays: bool,
 }
 
 impl Conductor {
     /// One of a hall in that state.
     #[must_use]
     pub const fn new(machine: Machine, attended: bool) -> Self {
-        Self { told: machine.state(), machine, known: None, attended }
+        Self { told: machine.state(), machine, known: None, attended, stays: false }
+    }
+
+    /// One of a hall that lives on when its show is over.
+    #[must_use]
+    pub const fn of_a_hall(now: MonoTime) -> Self {
+        Self { stays: true, ..Self::new(Machine::new(now), true) }
+    }
+
+    /// Whether the hall lives on when its show is over.
+    #[must_use]
+    pub const fn stays(&self) -> bool {
+        self.stays
     }
 
     /// One of a play in the foreground: whoever started it has armed the hall and let it go. Its seats are brought to park
@@ -45,20 +59,31 @@ impl Conductor {
         &self.machine
     }
 
-    /// Takes a command.
+    /// Takes a request.
     ///
     /// # Errors
     /// [`Refusal`] where the state does not allow it; nothing has changed then.
-    pub fn command(&mut self, command: Command, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
-        match command {
-            Command::Request(request) => self.machine.request(request, now)?,
-            Command::Seek(film) => {
-                self.machine.request(Request::Seek, now)?;
-                engine.seek(film);
-            }
-        }
+    pub fn request(&mut self, request: Request, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
+        self.machine.request(request, now)?;
         self.steer(engine);
         Ok(())
+    }
+
+    /// Goes on at that time of the film.
+    ///
+    /// # Errors
+    /// As [`Conductor::request`].
+    pub fn seek(&mut self, film: ShowTime, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
+        self.machine.request(Request::Seek, now)?;
+        engine.seek(film);
+        self.steer(engine);
+        Ok(())
+    }
+
+    /// Takes what the control plane has found out.
+    pub fn event(&mut self, event: Event, engine: &mut Engine, now: MonoTime) {
+        self.machine.event(event, now);
+        self.steer(engine);
     }
 
     /// Takes what was seen of a controller.
@@ -103,7 +128,10 @@ impl Conductor {
             return;
         }
         match state {
-            State::Playing(_) => engine.resume(),
+            State::Playing(_) => {
+                engine.go();
+                engine.resume();
+            }
             State::Paused => engine.pause(),
             State::Stopping | State::Stopped | State::Fault => engine.stop(),
             State::Parking => engine.park(),

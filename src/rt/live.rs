@@ -1,11 +1,12 @@
 //! What anyone may look at while a play runs: atomics that the playing threads store, and nobody waits for. Only the times
 //! are behind a lock, which the ack thread and whoever looks share, never the tick thread.
 
-use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::TickReport;
+use super::table::Row;
 use crate::state::{Ride, State};
 use crate::time::ShowTime;
 use crate::tracker::{Histogram, histogram};
@@ -95,6 +96,10 @@ pub struct Live {
     show_ns: AtomicI64,
     ticks: AtomicU64,
     missed: AtomicU64,
+    beats: AtomicU64,
+    closed: AtomicBool,
+    moving: AtomicBool,
+    table: Mutex<Vec<Row>>,
 }
 
 impl Live {
@@ -129,6 +134,28 @@ impl Live {
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed.load(Ordering::Relaxed)
+    }
+
+    /// Ticks so far in whatever state, sending or not: while the tick thread lives, this grows.
+    #[must_use]
+    pub fn beats(&self) -> u64 {
+        self.beats.load(Ordering::Relaxed)
+    }
+
+    /// [`Self::beats`] while the tick thread is to tick; none once its loop is over.
+    #[must_use]
+    pub fn pulse(&self) -> Option<u64> {
+        (!self.closed.load(Ordering::Relaxed)).then(|| self.beats())
+    }
+
+    /// Notes that the tick loop is over.
+    pub fn close(&self) {
+        self.closed.store(true, Ordering::Relaxed);
+    }
+
+    /// Notes a tick.
+    pub(super) fn beat(&self) {
+        self.beats.fetch_add(1, Ordering::Relaxed);
     }
 
     /// A copy of the times as the ack thread last told them; empty where nobody asked it to.
@@ -166,7 +193,25 @@ impl Live {
 
     /// Notes where the hall stands.
     pub(super) fn on_state(&self, state: State) {
+        self.moving.store(state.may_send_motion(), Ordering::Release);
         self.enter(Phase::of(state));
+    }
+
+    /// Whether motion frames leave.
+    #[must_use]
+    pub fn is_moving(&self) -> bool {
+        self.moving.load(Ordering::Acquire)
+    }
+
+    /// How the controllers stood when the ack thread last told; empty before it did.
+    #[must_use]
+    pub fn table(&self) -> Vec<Row> {
+        self.table.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Notes how the controllers stand. Ack thread.
+    pub(super) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
+        note(&mut self.table.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Notes a tick that sent.
@@ -189,6 +234,16 @@ mod tests {
             live.enter(phase);
             assert_eq!(live.phase(), phase);
         }
+    }
+
+    #[test]
+    fn a_pulse_is_expected_from_the_start_until_the_loop_is_over() {
+        let live = Live::default();
+        assert_eq!(live.pulse(), Some(0), "a tick thread that does not begin to tick hangs as well");
+        live.beat();
+        assert_eq!(live.pulse(), Some(1));
+        live.close();
+        assert_eq!(live.pulse(), None);
     }
 
     #[test]

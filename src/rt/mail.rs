@@ -6,11 +6,13 @@ use std::thread::Thread;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::live::Live;
-use crate::engine::Rate;
+use crate::engine::{Engine, Rate};
+use crate::fanout::Lane;
 use crate::motion::Pose;
-use crate::plan::{Course, Request as PlanRequest, Scene};
+use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
 use crate::state::{Cause, Event, Next, Refusal, Request, State};
 use crate::time::{MonoTime, ShowTime};
+use crate::timeline::Timeline;
 use crate::wire::FrameNo;
 
 /// Seconds of ticks that the mailboxes to the ack thread hold.
@@ -71,12 +73,49 @@ pub enum Answer {
 }
 
 /// What a person asks for, once; what lasts stands on the [`super::Desk`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug)]
 pub enum Command {
     /// Anything but to seek.
     Request(Request),
     /// Go on at that time of the film.
     Seek(ShowTime),
+    /// Something that the control plane has found out: the hall is ready, the seats are home.
+    Event(Event),
+    /// The show that is next. Not taken while the seats move.
+    Load(Box<Loaded>),
+}
+
+/// A show that is ready to be let go.
+#[derive(Debug)]
+pub struct Loaded {
+    /// What the lanes do; it waits.
+    pub engine: Engine,
+    /// How they are sent to, in the order of the controllers.
+    pub lanes: Vec<Lane>,
+    /// What the planner plans with from then on; none once it has it.
+    pub planning: Option<Box<Planning>>,
+}
+
+/// What the planner plans with.
+#[derive(Debug)]
+pub struct Planning {
+    /// Who plans.
+    pub planner: Planner,
+    /// The cue that is planned for.
+    pub timeline: Arc<Timeline>,
+}
+
+/// What the planner is told.
+#[derive(Debug)]
+pub enum Task {
+    /// Plan that.
+    Plan(PlanRequest),
+    /// Plan with this from now on.
+    Load(Box<Planning>),
+    /// Free a show that is over, or was not taken.
+    Free(Box<Loaded>),
+    /// Free a course that is no longer followed.
+    Retire(Box<Course>),
 }
 
 /// What the ack thread sees of the controllers.
@@ -106,8 +145,12 @@ pub enum News {
         /// Since when.
         at: MonoTime,
     },
+    /// A command was taken. Every command is followed by this or by a refusal, in the order of the commands.
+    Taken,
     /// A command was not taken.
     Refused(Refusal),
+    /// A show was not loaded, because the seats move.
+    NotLoaded(State),
 }
 
 /// The tick thread's ends.
@@ -115,9 +158,8 @@ pub enum News {
 pub struct Mail {
     sent: Producer<Sent>,
     ticks: Producer<TickReport>,
-    requests: Producer<PlanRequest>,
+    tasks: Producer<Task>,
     answers: Consumer<Answer>,
-    retired: Producer<Box<Course>>,
     commands: Consumer<Command>,
     alarms: Consumer<Alarm>,
     news: Producer<News>,
@@ -133,12 +175,10 @@ pub struct MailEnds {
     pub sent: Consumer<Sent>,
     /// To the ack thread: ticks.
     pub ticks: Consumer<TickReport>,
-    /// To the planner: requests.
-    pub requests: Consumer<PlanRequest>,
+    /// To the planner: what to plan, and what to free.
+    pub tasks: Consumer<Task>,
     /// From the planner: answers.
     pub answers: Producer<Answer>,
-    /// To the planner: courses to free.
-    pub retired: Consumer<Box<Course>>,
     /// From whoever leads the show: commands.
     pub commands: Producer<Command>,
     /// From the ack thread: what it sees of the controllers.
@@ -155,9 +195,8 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     // Each frame may be followed by word of its failure.
     let (sent, sent_end) = RingBuffer::new((2 * lanes * held).max(1024));
     let (reports, reports_end) = RingBuffer::new(held.max(64));
-    let (requests, requests_end) = RingBuffer::new(PLANS);
+    let (tasks, tasks_end) = RingBuffer::new(2 * PLANS);
     let (answers_end, answers) = RingBuffer::new(PLANS);
-    let (retired, retired_end) = RingBuffer::new(PLANS);
     let (commands_end, commands) = RingBuffer::new(COMMANDS);
     // Some for each lane at once, and some more.
     let (alarms_end, alarms) = RingBuffer::new(4 * lanes + COMMANDS);
@@ -165,9 +204,8 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     let mail = Mail {
         sent,
         ticks: reports,
-        requests,
+        tasks,
         answers,
-        retired,
         commands,
         alarms,
         news,
@@ -178,9 +216,8 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     let ends = MailEnds {
         sent: sent_end,
         ticks: reports_end,
-        requests: requests_end,
+        tasks: tasks_end,
         answers: answers_end,
-        retired: retired_end,
         commands: commands_end,
         alarms: alarms_end,
         news: news_end,
@@ -213,6 +250,11 @@ impl Mail {
         self.answers.pop().ok()
     }
 
+    /// Notes a tick.
+    pub(super) fn beat(&self) {
+        self.live.beat();
+    }
+
     /// Shows how far the play is.
     pub(super) fn look(&self, state: State) {
         self.live.on_state(state);
@@ -231,15 +273,15 @@ impl Mail {
         let _ = self.news.push(news);
     }
 
-    pub(super) fn ask(&mut self, request: PlanRequest) {
-        self.unposted += u64::from(self.requests.push(request).is_err());
+    /// Has the planner do it. It has as many places as courses that can be under way, so there is room.
+    pub(super) fn task(&mut self, task: Task) {
+        self.unposted += u64::from(self.tasks.push(task).is_err());
         self.wake();
     }
 
-    pub(super) fn retire(&mut self, course: Box<Course>) {
-        // As many places as courses that can be under way: there is room.
-        self.unposted += u64::from(self.retired.push(course).is_err());
-        self.wake();
+    /// Whether the planner can be given a whole show: to load one, and to free the one before.
+    pub(super) fn has_room_for_a_show(&self) -> bool {
+        self.tasks.slots() >= 2
     }
 
     /// One system call where the planner sleeps, none where it works; it never waits.

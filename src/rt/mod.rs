@@ -6,20 +6,29 @@
 mod acks;
 mod conductor;
 mod desk;
+mod idle;
+mod line;
 mod live;
 mod mail;
 mod planning;
 mod sight;
 mod spin;
+mod standby;
+mod table;
 mod watch;
 
 pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
+pub use line::{Line, line};
 pub use live::{Live, Phase, Times};
-pub use mail::{Alarm, Answer, Command, Mail, MailEnds, News, Sent, TickReport, mailboxes};
+pub use mail::{
+    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, Planning, Sent, Task, TickReport, mailboxes,
+};
 pub use planning::PlanLoop;
 pub use spin::{Spinning, Spun};
+pub use standby::{Order, Standby};
+pub use table::{AckTimes, Row};
 pub use watch::Watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,6 +36,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::engine::{Beat, Ending, Engine, Step, Tick, TickGrid};
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
+use crate::state::{Refusal, State};
 use crate::time::{Clock, MonoTime, nanos};
 use crate::wire::MAX_LEN;
 
@@ -103,7 +113,9 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             }
             self.conductor.watch(&mut self.engine, now);
             self.hand_on();
-            if step == Step::Over {
+            self.mail.beat();
+            // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
+            if step == Step::Over && (!self.conductor.stays() || self.leave.load(Ordering::Relaxed)) {
                 break;
             }
         }
@@ -114,7 +126,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
     /// them.
     fn take_mail(&mut self, now: MonoTime) {
-        let Self { conductor, engine, mail, desk, .. } = self;
+        let Self { conductor, engine, lanes, mail, desk, .. } = self;
         if desk.take_stop() {
             conductor.stop(engine, now);
         }
@@ -129,9 +141,20 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         for _ in 0..COMMANDS_PER_TICK {
             let Some(command) = mail.command() else { break };
-            if let Err(refusal) = conductor.command(command, engine, now) {
-                mail.tell(News::Refused(refusal));
+            let news = match command {
+                Command::Load(show) => load(show, conductor.machine().state(), engine, lanes, mail),
+                Command::Request(request) => told(conductor.request(request, engine, now)),
+                Command::Seek(film) => told(conductor.seek(film, engine, now)),
+                Command::Event(event) => {
+                    conductor.event(event, engine, now);
+                    News::Taken
+                }
+            };
+            // What it led to goes before the answer, so that whoever hears the answer knows it.
+            if let Some(entered) = conductor.news() {
+                mail.tell(entered);
             }
+            mail.tell(news);
         }
         if self.leave.load(Ordering::Relaxed) {
             conductor.leave(engine, now);
@@ -170,14 +193,42 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             self.mail.tell(news);
         }
         if let Some(request) = self.engine.take_request() {
-            self.mail.ask(request);
+            self.mail.task(Task::Plan(request));
         }
         while let Some(lane) = self.engine.take_joined() {
             let lane = u16::try_from(lane).expect("fewer controllers than ports");
             self.mail.post(Sent::Joined { lane });
         }
         while let Some(course) = self.engine.take_retired() {
-            self.mail.retire(course);
+            self.mail.task(Task::Retire(course));
         }
     }
+}
+
+/// Exchanges the show that is loaded for the next; the planner gets what it plans with, and frees the old one.
+fn load(
+    mut show: Box<Loaded>,
+    state: State,
+    engine: &mut Engine,
+    lanes: &mut Vec<Lane>,
+    mail: &mut Mail,
+) -> News {
+    let taken = !state.may_send_motion() && mail.has_room_for_a_show();
+    if taken {
+        show.engine.take_over(engine, matches!(state, State::Parked | State::Armed));
+        for (lane, old) in show.lanes.iter_mut().zip(&*lanes) {
+            lane.go_on_from(old);
+        }
+        std::mem::swap(engine, &mut show.engine);
+        std::mem::swap(lanes, &mut show.lanes);
+        if let Some(planning) = show.planning.take() {
+            mail.task(Task::Load(planning));
+        }
+    }
+    mail.task(Task::Free(show));
+    if taken { News::Taken } else { News::NotLoaded(state) }
+}
+
+fn told(result: Result<(), Refusal>) -> News {
+    result.map_or_else(News::Refused, |()| News::Taken)
 }

@@ -1,27 +1,25 @@
 //! The planner's thread: sleeps until asked, plans, and frees what the tick thread is done with.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rtrb::{Consumer, Producer};
 
-use super::Answer;
-use crate::plan::{Course, Curve, PlanError, Planner, Request};
-use crate::timeline::{Hint, Timeline};
+use super::{Answer, Planning, Task};
+use crate::plan::{Curve, PlanError, Request};
+use crate::timeline::Hint;
+
+/// Refusals that are kept for the report.
+const REFUSALS: usize = 100;
 
 /// The planner with its ends of the mailboxes.
 #[derive(Debug)]
 pub struct PlanLoop {
-    /// Who plans.
-    pub planner: Planner,
-    /// The cue that is planned for.
-    pub timeline: Arc<Timeline>,
+    /// What it plans with.
+    pub planning: Box<Planning>,
     /// What is asked.
-    pub requests: Consumer<Request>,
+    pub tasks: Consumer<Task>,
     /// What is answered.
     pub answers: Producer<Answer>,
-    /// What is to be freed.
-    pub retired: Consumer<Box<Course>>,
 }
 
 impl PlanLoop {
@@ -37,20 +35,30 @@ impl PlanLoop {
 
     /// Serves what is waiting.
     pub fn serve(&mut self, refusals: &mut Vec<PlanError>) {
-        while self.retired.pop().is_ok() {}
-        while let Ok(request) = self.requests.pop() {
-            let timeline = &self.timeline;
-            let pose = |at| timeline.sample(at, &mut Hint::default());
-            let curve = Curve { pose: &pose, end: timeline.duration() };
-            let answer = match self.planner.plan(&request, &curve) {
-                Ok(course) => Answer::Course(Box::new(course), request.scene),
-                Err(error) => {
-                    refusals.push(error);
-                    Answer::Refused(request.serial, request.scene)
-                }
-            };
-            // One request is under way at a time, so there is room; a course nobody takes is only freed.
-            drop(self.answers.push(answer));
+        while let Ok(task) = self.tasks.pop() {
+            match task {
+                Task::Plan(request) => self.plan(request, refusals),
+                Task::Load(planning) => self.planning = planning,
+                Task::Free(show) => drop(show),
+                Task::Retire(course) => drop(course),
+            }
         }
+    }
+
+    fn plan(&mut self, request: Request, refusals: &mut Vec<PlanError>) {
+        let Planning { planner, timeline } = &mut *self.planning;
+        let pose = |at| timeline.sample(at, &mut Hint::default());
+        let curve = Curve { pose: &pose, end: timeline.duration() };
+        let answer = match planner.plan(&request, &curve) {
+            Ok(course) => Answer::Course(Box::new(course), request.scene),
+            Err(error) => {
+                if refusals.len() < REFUSALS {
+                    refusals.push(error);
+                }
+                Answer::Refused(request.serial, request.scene)
+            }
+        };
+        // One request is under way at a time, so there is room; a course nobody takes is only freed.
+        drop(self.answers.push(answer));
     }
 }

@@ -8,16 +8,18 @@ use rtrb::Producer;
 use super::live::{Live, Phase};
 use super::mail::{Alarm, Sent};
 use super::sight::Looker;
+use super::standby::{Seen, Standby};
+use super::table::{Row, Turns};
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Change, Health, Notice, Standing};
-use crate::motion::Pose;
+use crate::motion::{Pose, Pulses};
 use crate::net::Sender;
 use crate::observe::Observer;
 use crate::state::Event;
 use crate::time::MonoTime;
-use crate::tracker::{Fate, Reply};
-use crate::wire::{Dialect, ReplyCode};
+use crate::tracker::{Fate, Reply, Tracker};
+use crate::wire::{Dialect, PerAxis, ReplyCode};
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
@@ -42,6 +44,9 @@ pub struct Watch {
     /// When it last judged.
     looked: MonoTime,
     silent: bool,
+    /// What a hall has beside a play.
+    standby: Option<Standby>,
+    turns: Turns,
 }
 
 impl Watch {
@@ -71,7 +76,17 @@ impl Watch {
             alarms,
             live,
             silent,
+            standby: None,
+            turns: Turns::default(),
         }
+    }
+
+    /// The same for a hall that lives on between shows: at first it finds out where all seats stand.
+    #[must_use]
+    pub fn of_a_hall(mut self, standby: Standby) -> Self {
+        (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
+        self.standby = Some(standby);
+        self
     }
 
     /// How the groups stood otherwise than before, the first 1,000 times; and the controllers that were given up in the end.
@@ -126,13 +141,67 @@ impl Watch {
 
     /// Hears a datagram that is no reply to a frame; says whether it was an answer to a look.
     pub(super) fn hear(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
+        let awaited = self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at));
         let looker = &mut self.lookers[controller];
         let is_answer = looker.hear(octets);
         if let Some((sighting, pose)) = looker.take() {
             self.poses[controller] = pose;
             self.health.on_sighting(controller, &sighting, at);
+            if let Some(standby) = &mut self.standby {
+                standby.on_seen(controller, Seen { homed: sighting.homed, at_park: looker.is_parked(&pose) });
+            }
         }
-        is_answer
+        is_answer || awaited
+    }
+
+    /// Whether it is that of a hall that sends no frames.
+    pub(super) fn is_idle(&self) -> bool {
+        self.standby.is_some() && !self.live.is_moving()
+    }
+
+    /// Notes how often a controller's port was found closed so far.
+    pub(super) fn on_closed(&self, controller: usize, times: u64) {
+        if let Some(standby) = &self.standby {
+            standby.on_closed(controller, times);
+        }
+    }
+
+    /// Hears an answer to a beat: a sign of life, and where the first axes of the seat stand; none where it is none.
+    pub(super) fn hear_beat(
+        &mut self,
+        controller: usize,
+        octets: &[u8],
+        at: MonoTime,
+    ) -> Option<PerAxis<Pulses>> {
+        let positions = self.standby.as_ref()?.beat_of(controller, octets)?;
+        self.health.on_status(controller, at);
+        Some(positions)
+    }
+
+    /// Tells whoever looks how the controllers stand.
+    pub(super) fn tell_table(&mut self, tracker: &Tracker, observer: &Observer) {
+        let Self { health, standby, turns, looked, live, .. } = self;
+        live.on_table(|rows| {
+            let row = |controller: usize, before: Option<&Row>| {
+                let group = health.groups().group_of(controller);
+                Row {
+                    counts: tracker.counts(controller),
+                    ack_ns: before.and_then(|row| row.ack_ns),
+                    standing: health.standing(group),
+                    why: health.why(group),
+                    state: observer.states()[controller],
+                    homed: standby.as_ref().and_then(|standby| standby.homed(controller)),
+                    at: *looked,
+                }
+            };
+            let all = 0..health.groups().controllers();
+            if rows.len() == all.len() {
+                all.for_each(|controller| rows[controller] = row(controller, Some(&rows[controller])));
+            } else {
+                *rows = all.map(|controller| row(controller, None)).collect();
+            }
+            turns.look_up(rows, tracker);
+        });
     }
 
     /// Judges all at `now`, an instant up to which all was told.
@@ -146,6 +215,7 @@ impl Watch {
             }
         }
         self.look_anew();
+        self.stand_by(now);
         let notices = &mut self.notices;
         self.health.tick(now, &mut |notice| notices.push(notice));
         for index in 0..self.notices.len() {
@@ -202,6 +272,24 @@ impl Watch {
         }
         self.anew = true;
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
+    }
+
+    fn stand_by(&mut self, now: MonoTime) {
+        let Self { standby, health, sender, live, .. } = self;
+        let Some(standby) = standby else { return };
+        standby.serve(health, sender, live.is_moving(), now);
+        if live.is_moving() {
+            return;
+        }
+        // A group that was found at park is where the others are.
+        for group in 0..health.groups().len() {
+            if health.standing(group) == Standing::Rejoining && standby.is_at_park(health.groups().members(group)) {
+                health.on_joined(group);
+            }
+        }
+        if let Some(finding) = standby.take_finding(health) {
+            self.alarm(Alarm::Event(Event::Identified(finding)));
+        }
     }
 
     fn end_look_anew(&mut self) {

@@ -1,5 +1,7 @@
 //! What the state machine is told and what it says: plain values, all of them `Copy`.
 
+use std::time::Duration;
+
 use super::cause::{Cause, Trouble};
 
 /// Where a hall stands (DESIGN: boot, parked, homing, armed, playing and so on).
@@ -57,6 +59,19 @@ impl State {
         Self::Stopped,
         Self::Fault,
     ];
+
+    /// How long it lasts at the most; none where it does not end by itself.
+    #[must_use]
+    pub const fn lasts(self) -> Option<Duration> {
+        Some(match self {
+            Self::Armed => super::ARMED_FOR,
+            Self::Paused => super::PAUSED_FOR,
+            Self::Homing => super::HOMING_FOR,
+            Self::Stopping => super::STOPPING_FOR,
+            Self::Parking => super::PARKING_FOR,
+            _ => return None,
+        })
+    }
 
     /// Whether motion frames may leave.
     #[must_use]

@@ -169,15 +169,7 @@ impl Machine {
     /// When the state ends by itself; none where it does not. For a hall that is armed or paused, worth showing.
     #[must_use]
     pub fn lapses(&self) -> Option<MonoTime> {
-        let span = match self.state {
-            State::Armed => ARMED_FOR,
-            State::Paused => PAUSED_FOR,
-            State::Homing => HOMING_FOR,
-            State::Stopping => STOPPING_FOR,
-            State::Parking => PARKING_FOR,
-            _ => return None,
-        };
-        Some(self.since + span)
+        Some(self.since + self.state.lasts()?)
     }
 
     /// Ends a state whose time is over. To be told every tick; a clock that goes back ends nothing.

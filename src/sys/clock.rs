@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use jiff::tz::TimeZone;
+use jiff::{Timestamp, Zoned};
 use rustix::io::Errno;
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, Timespec, clock_gettime};
@@ -31,6 +33,13 @@ impl Clock for Monotonic {
 #[must_use]
 pub fn wall_now_ns() -> u64 {
     read(ClockId::Realtime)
+}
+
+/// The wall clock in the machine's time zone, for people: schedules, journals, reports. It may step at any time.
+#[must_use]
+pub fn local_now() -> Zoned {
+    let now = Timestamp::from_nanosecond(i128::from(wall_now_ns())).unwrap_or(Timestamp::UNIX_EPOCH);
+    now.to_zoned(TimeZone::system())
 }
 
 /// Processor time that the calling thread has used so far, in user code and in the kernel.

@@ -3,6 +3,8 @@
 
 pub mod batch;
 pub mod clock;
+pub(crate) mod folder;
+pub mod humble;
 pub mod machine;
 pub mod realtime;
 pub mod signal;

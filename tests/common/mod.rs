@@ -19,7 +19,7 @@ use kinocue::gate::Counts;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, TickLoop, mailboxes,
+    Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, Planning, TickLoop, mailboxes,
 };
 use kinocue::state::Request;
 use kinocue::time::{Clock, MonoTime, ShowTime};
@@ -114,9 +114,10 @@ impl Virtual {
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
-        let MailEnds { sent: _sent, ticks: _ticks, requests, answers, retired, commands, alarms, news } =
+        let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } =
             ends;
-        let plans = PlanLoop { planner, timeline: Arc::clone(&timeline), requests, answers, retired };
+        let planning = Box::new(Planning { planner, timeline: Arc::clone(&timeline) });
+        let plans = PlanLoop { planning, tasks, answers };
         let leave = AtomicBool::new(false);
         let hands = Hands {
             desk: &desk,
@@ -191,7 +192,7 @@ impl<'a> Stage<'a> {
     }
 
     fn serve_planner(&self) {
-        if self.plans.borrow().requests.is_empty() {
+        if self.plans.borrow().tasks.is_empty() {
             self.planner_waits.set(self.planner_delay.get());
         } else if self.planner_waits.get() > 0 {
             self.planner_waits.set(self.planner_waits.get() - 1);

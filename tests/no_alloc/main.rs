@@ -13,7 +13,7 @@ use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
 use kinocue::health::{Groups, Health, Notice};
 use kinocue::motion::MAX_AXES;
-use kinocue::rt::{Alarm, Command, News};
+use kinocue::rt::{Alarm, News};
 use kinocue::state::{Event, Machine, Request, Ride, State, Why};
 use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::FrameNo;
@@ -50,17 +50,17 @@ fn nor_do_they_where_the_rest_of_each_wait_is_spun() {
 
 /// Everything that the tick thread can be told, each with time to do it.
 fn everything() -> Vec<(u64, Deed)> {
-    let ask = |request| Deed::Ask(Command::Request(request));
+    let ask = Deed::Ask;
     let mut found = [0.0; MAX_AXES];
     found[..3].copy_from_slice(&[0.2, 0.5, 0.3]);
     vec![
         (1_700, ask(Request::Pause)),
-        (2_100, Deed::Ask(Command::Seek(ShowTime::from_millis(1_000)))),
+        (2_100, Deed::Seek(ShowTime::from_millis(1_000))),
         (2_200, ask(Request::Resume)),
         (2_300, ask(Request::Pause)), // in the middle of the join
         (2_700, ask(Request::Resume)),
-        (4_500, Deed::Ask(Command::Seek(ShowTime::from_millis(500)))),
-        (4_600, Deed::Ask(Command::Seek(ShowTime::from_millis(200)))),
+        (4_500, Deed::Seek(ShowTime::from_millis(500))),
+        (4_600, Deed::Seek(ShowTime::from_millis(200))),
         (6_400, Deed::Mix(0, Mix { motion: 0.4, vibration: 0.5, ..Mix::FULL })),
         (6_500, Deed::Trim(60)),
         (6_600, Deed::Mix(1, Mix { on: false, ..Mix::FULL })),
@@ -73,6 +73,7 @@ fn everything() -> Vec<(u64, Deed)> {
         (17_000, Deed::Oversleep(80)),
         (17_010, Deed::Stop),
         (17_500, ask(Request::Resume)), // refused: a stop is latched
+        (17_550, Deed::Load),
         (17_600, ask(Request::Clear)),
         (17_700, Deed::See(Alarm::Event(Event::PositionsRead))),
         (17_800, ask(Request::Park)),
@@ -102,13 +103,13 @@ fn commands_alarms_levels_and_a_stop_neither_allocate_nor_free_on_the_tick_threa
 fn entered(news: &News) -> Option<State> {
     match news {
         News::Entered { state, .. } => Some(*state),
-        News::Refused(_) => None,
+        News::Taken | News::NotLoaded(_) | News::Refused(_) => None,
     }
 }
 
 fn refusal(news: &News) -> Option<Why> {
     match news {
-        News::Entered { .. } => None,
+        News::Entered { .. } | News::Taken | News::NotLoaded(_) => None,
         News::Refused(refusal) => Some(refusal.why),
     }
 }

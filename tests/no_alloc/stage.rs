@@ -16,9 +16,10 @@ use kinocue::fanout::{Lane, Manner};
 use kinocue::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::observe::Watched;
 use kinocue::rt::{
-    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop,
+    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News, PlanLoop, Planning,
     Spinning, TickLoop, mailboxes,
 };
+use kinocue::state::Request;
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
@@ -38,7 +39,11 @@ pub(crate) enum Deed {
     /// The tick thread sleeps that many periods too long.
     Oversleep(u32),
     /// Somebody asks for something.
-    Ask(Command),
+    Ask(Request),
+    /// Somebody wants to go on elsewhere in the film.
+    Seek(ShowTime),
+    /// The show is exchanged for another one.
+    Load,
     /// Something is seen of a controller.
     See(Alarm),
     /// Somebody sets what a lane makes of the cue.
@@ -110,6 +115,8 @@ struct Jumps<'a> {
     desk: &'a Desk,
     commands: RefCell<Producer<Command>>,
     alarms: RefCell<Producer<Alarm>>,
+    /// The show to exchange the first for.
+    next: Cell<Option<Box<Loaded>>>,
     live: Arc<Live>,
     now: Cell<MonoTime>,
     /// Show time at the tick before.
@@ -119,10 +126,16 @@ struct Jumps<'a> {
 }
 
 impl Jumps<'_> {
+    fn command(&self, command: Command) {
+        self.commands.borrow_mut().push(command).expect("there is room");
+    }
+
     fn happen(&self, deed: Deed) {
         match deed {
             Deed::Oversleep(periods) => self.now.set(self.now.get() + PERIOD * periods),
-            Deed::Ask(command) => self.commands.borrow_mut().push(command).expect("there is room"),
+            Deed::Ask(request) => self.command(Command::Request(request)),
+            Deed::Seek(film) => self.command(Command::Seek(film)),
+            Deed::Load => self.command(Command::Load(self.next.take().expect("there is one"))),
             Deed::See(alarm) => self.alarms.borrow_mut().push(alarm).expect("there is room"),
             Deed::Mix(lane, mix) => self.desk.set(lane, mix),
             Deed::Trim(ms) => self.desk.set_trim_ms(ms),
@@ -263,6 +276,7 @@ fn play_to(
     attended: bool,
     spin: Duration,
 ) -> Outcome {
+    let (next, _) = staged(addresses);
     let (staged, watched) = staged(addresses);
     let rate = staged.show.rate;
     let desk = &staged.desk();
@@ -271,8 +285,8 @@ fn play_to(
     let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
     let live = Arc::new(Live::default());
     let (mut mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
-    let MailEnds { sent, ticks, requests, answers, retired, commands, alarms, mut news } = ends;
-    let mut plans = PlanLoop { planner, timeline, requests, answers, retired };
+    let MailEnds { sent, ticks, tasks, answers, commands, alarms, mut news } = ends;
+    let mut plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
     // The kernel stamps replies with the real time; ahead of it, no frame is ever given up in a slow test.
     let origin = Monotonic.now() + Duration::from_secs(3_600);
 
@@ -290,6 +304,7 @@ fn play_to(
             desk,
             commands: RefCell::new(commands),
             alarms: RefCell::new(alarms),
+            next: Cell::new(Some(next.loaded())),
             live,
             now: Cell::new(origin),
             show: Cell::default(),

@@ -118,7 +118,7 @@ impl Teller {
             if let News::Entered { state, next, .. } = news {
                 self.now = Some((state, next));
             }
-            lines.push(self.said.news(&news));
+            lines.extend(self.said.news(&news));
         }
         lines
     }

@@ -32,11 +32,13 @@ impl Said {
         format!("bringing {seats} {noun} to park (up to {:.1} s)", time.as_secs_f64())
     }
 
-    /// What has happened: the state with its cause and the next action, or why a request was not taken.
-    pub(super) fn news(&self, news: &News) -> String {
+    /// What has happened: the state with its cause and the next action, or why a request was not taken; none where there is
+    /// nothing to say.
+    pub(super) fn news(&self, news: &News) -> Option<String> {
         let (state, cause, next) = match *news {
             News::Entered { state, cause, next, .. } => (state, cause, next),
-            News::Refused(refusal) => return refusal.to_string(),
+            News::Refused(refusal) => return Some(refusal.to_string()),
+            News::Taken | News::NotLoaded(_) => return None,
         };
         let mut text = match (state, cause) {
             (State::Playing(_), Cause::Asked(Request::Go)) => {
@@ -51,7 +53,7 @@ impl Said {
         if state != State::Parked {
             let _ = write!(text, "; {}", self.next(next));
         }
-        text
+        Some(text)
     }
 
     fn name(&self, cause: Cause) -> Option<&str> {
@@ -125,29 +127,29 @@ mod tests {
         let said = said();
         let go = entered(State::Playing(Ride::Joining), Cause::Asked(Request::Go), Next::Watch);
         assert_eq!(
-            said.news(&go),
+            said.news(&go).unwrap(),
             "joining (1.25 s): started by the operator; next: nothing; pause, park or stop as needed"
         );
         let pressed = entered(State::Stopped, Cause::EmergencyStop(1), Next::Release);
         assert_eq!(
-            said.news(&pressed),
+            said.news(&pressed).unwrap(),
             "stopped: emergency stop (A2); next: release the emergency stop, then clear"
         );
         let broken = Trouble::Controller { controller: 0, error: 7 };
         let fault = entered(State::Fault, Cause::Trouble(broken), Next::PutRight);
         assert_eq!(
-            said.news(&fault),
+            said.news(&fault).unwrap(),
             "fault: a controller has an error (A1); next: put the error right at the controller, then clear"
         );
         let parked = entered(State::Parked, Cause::ArrivedAtPark, Next::Arm);
-        assert_eq!(said.news(&parked), "parked: the seats have parked", "the play is over");
+        assert_eq!(said.news(&parked).unwrap(), "parked: the seats have parked", "the play is over");
     }
 
     #[test]
     fn a_refusal_says_what_stands_against_it_and_what_to_do_first() {
         let refusal = Refusal { state: State::Recovering, asked: Request::Park, why: Why::PositionsNotRead };
         assert_eq!(
-            said().news(&News::Refused(refusal)),
+            said().news(&News::Refused(refusal)).unwrap(),
             "cannot park while recovering: where the seats stand has not been read since they stopped; wait until the \
              controllers have answered"
         );

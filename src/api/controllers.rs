@@ -1,0 +1,54 @@
+//! `/api/v1/controllers`: the controllers of the hall, and taking one in or out.
+
+use std::sync::Arc;
+
+use axum::Json as JsonReply;
+use axum::extract::State;
+
+use super::asker::{Asker, StatusReply};
+use super::input::{Name, Nothing};
+use super::shared::Shared;
+use crate::hall::{Ask, Code, ControllerStatus, Problem, Status};
+
+/// All controllers, in the order of the configuration.
+#[utoipa::path(
+    get, path = "/api/v1/controllers", tag = "controllers", responses((status = 200, body = [ControllerStatus]))
+)]
+pub(super) async fn all(State(shared): State<Arc<Shared>>) -> JsonReply<Vec<ControllerStatus>> {
+    JsonReply(shared.handle.status().controllers.clone())
+}
+
+/// One controller.
+#[utoipa::path(
+    get, path = "/api/v1/controllers/{name}", tag = "controllers",
+    params(("name" = String, Path, description = "Its name")), responses((status = 200, body = ControllerStatus))
+)]
+pub(super) async fn one(
+    State(shared): State<Arc<Shared>>,
+    Name(name): Name,
+) -> Result<JsonReply<ControllerStatus>, Problem> {
+    let status = shared.handle.status();
+    let found = status.controllers.iter().find(|controller| controller.name == name);
+    found.cloned().map(JsonReply).ok_or_else(|| {
+        let detail = format!("there is no controller {name:?}");
+        Problem::new(Code::Unknown, detail, "name one of the configuration; the status lists them")
+    })
+}
+
+/// Takes the group of a controller in: its seat joins what plays.
+#[utoipa::path(
+    post, path = "/api/v1/controllers/{name}/enable", tag = "controllers",
+    params(("name" = String, Path, description = "Its name")), responses((status = 200, body = Status))
+)]
+pub(super) async fn enable(asker: Asker, Name(name): Name, _: Nothing) -> Result<StatusReply, Problem> {
+    asker.ask(Ask::Enable(name)).await
+}
+
+/// Takes the group of a controller out: its seat parks.
+#[utoipa::path(
+    post, path = "/api/v1/controllers/{name}/disable", tag = "controllers",
+    params(("name" = String, Path, description = "Its name")), responses((status = 200, body = Status))
+)]
+pub(super) async fn disable(asker: Asker, Name(name): Name, _: Nothing) -> Result<StatusReply, Problem> {
+    asker.ask(Ask::Disable(name)).await
+}

@@ -1,0 +1,155 @@
+//! The gate that every request passes: is it meant for us, who asks, may they look, did it come before. Refusals leave it as
+//! problems, and every reply with the headers that keep pages of others out.
+
+use std::panic::AssertUnwindSafe;
+use std::pin::pin;
+use std::sync::Arc;
+use std::task::Poll;
+
+use axum::extract::{Request, State};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+};
+use axum::http::{HeaderName, HeaderValue, Method};
+use axum::middleware::Next;
+use axum::response::{IntoResponse as _, Response};
+
+use super::access::one;
+use super::once::Reply;
+use super::peer::{self, Peer};
+use super::problem::{bad_value, panicked, render};
+use super::shared::Shared;
+use crate::hall::{Problem, Who};
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::time::Clock as _;
+
+/// Of two requests with the same one the second does nothing.
+const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
+/// Our wall clock in every reply, unix milliseconds, so that a page can tell how far its own is off.
+const TIME: HeaderName = HeaderName::from_static("x-kinocue-time");
+/// Nothing but what this server itself serves, and in nobody's frame.
+const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
+/// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile.
+pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
+    let of_gate = Arc::clone(&shared);
+    let response = match tokio::spawn(async move { pass(&of_gate, request, next).await }).await {
+        Ok(response) => response,
+        Err(_) => render(panicked().into_response(), None),
+    };
+    with_headers(response)
+}
+
+async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
+    let who = match admit(shared, &request) {
+        Ok(who) => who,
+        Err(problem) => return render(problem.into_response(), None),
+    };
+    let Some(who) = who else {
+        return render(caught(next.run(request)).await, None);
+    };
+    let asker = format!("{who}");
+    request.extensions_mut().insert(who);
+    let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));
+    let response = match key {
+        Ok(Some(key)) if request.method() == Method::POST => once(shared, &asker, &key, request, next).await,
+        Ok(_) => caught(next.run(request)).await,
+        Err(problem) => problem.into_response(),
+    };
+    render(response, Some(&shared.handle.status()))
+}
+
+/// Who asks; none where it does not matter.
+fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
+    let (headers, path) = (request.headers(), request.uri().path());
+    shared.access.check_origin(headers)?;
+    let peer = request.extensions().get::<Peer>().expect("every connection has another end");
+    if let Peer::Tcp(_) = peer {
+        shared.access.check_host(headers, request.uri())?;
+    }
+    let in_the_open = is_public(path);
+    if !in_the_open && !takes_query(path) && request.uri().query().is_some() {
+        return Err(bad_value(
+            "there is a query, and nothing here takes one",
+            "leave out what is behind the ?",
+        ));
+    }
+    Ok(match peer {
+        Peer::Socket(name) => Some(peer::local(name)),
+        Peer::Tcp(_) if in_the_open => None,
+        Peer::Tcp(address) => Some(shared.access.who(headers, *address, &shared.tries, Monotonic.now())?),
+    })
+}
+
+/// What is no secret and changes nothing: the page and what belongs to it, the description of the API, whether it is well.
+fn is_public(path: &str) -> bool {
+    match path {
+        "/healthz" | "/readyz" | super::service::DOCUMENT => true,
+        "/metrics" => false,
+        _ => !path.starts_with("/api"),
+    }
+}
+
+fn takes_query(path: &str) -> bool {
+    path.strip_prefix("/api/v1/cues/").is_some_and(|rest| rest.ends_with("/curve"))
+}
+
+/// Does it, or gives the reply to the first request with that key.
+async fn once(shared: &Shared, asker: &str, key: &str, request: Request, next: Next) -> Response {
+    let what = format!("{} {}", request.method(), request.uri().path());
+    let first = match shared.once.first(asker, key, &what, Monotonic.now()) {
+        Ok(first) => first,
+        Err(problem) => return problem.into_response(),
+    };
+    let reply = first.get_or_init(|| async {
+        Reply::of(render(caught(next.run(request)).await, Some(&shared.handle.status()))).await
+    });
+    let reply = reply.await;
+    if reply.is_busy() {
+        shared.once.release(&first);
+    }
+    reply.response()
+}
+
+/// The response, or a problem where the handler panicked.
+async fn caught(handler: impl Future<Output = Response>) -> Response {
+    let mut handler = pin!(handler);
+    std::future::poll_fn(|cx| {
+        let poll = std::panic::catch_unwind(AssertUnwindSafe(|| handler.as_mut().poll(cx)));
+        poll.unwrap_or_else(|_| Poll::Ready(panicked().into_response()))
+    })
+    .await
+}
+
+fn with_headers(mut response: Response) -> Response {
+    let headers = response.headers_mut();
+    headers.insert(X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
+    headers.insert(REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    headers.insert(CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    headers.insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    headers.insert(TIME, HeaderValue::from(wall_now_ns() / 1_000_000));
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_public_is_listed_and_all_else_is_not() {
+        for path in ["/", "/console.js", "/healthz", "/readyz", "/api/v1/openapi.json"] {
+            assert!(is_public(path), "{path}");
+        }
+        for path in ["/api", "/api/v1/status", "/api/v1/openapi.json/", "/metrics", "/api/v1/cues"] {
+            assert!(!is_public(path), "{path}");
+        }
+    }
+
+    #[test]
+    fn a_handler_that_panics_leaves_a_problem() {
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        let response = runtime.block_on(caught(async { panic!("on purpose") }));
+        assert_eq!(render(response, None).status().as_u16(), 500);
+    }
+}

@@ -1,0 +1,234 @@
+//! The HTTP API: requests in, asks of the hall out, and back as JSON. One thread of its own with a runtime; nothing of it
+//! reaches the tick thread but through [`Handle`]. The stop socket has a thread without a runtime besides.
+//!
+//! - **Who**: whoever may open the control socket is engineer, named as the kernel names them. Over TCP, which is off unless
+//!   the configuration says otherwise, a token says who asks; names of hosts and origins of pages are exact.
+//! - **What**: each change is a POST or PUT, and replies with the state that it led to. GET changes nothing.
+//! - **When**: what came twice is done once, and what would move a seat is refused when it comes late.
+//! - **How much**: connections, heads, bodies, waits and what is remembered are bounded; the rest is refused or cut off.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use tokio::runtime::{self, Runtime};
+use tokio::sync::{Semaphore, mpsc, watch};
+
+use crate::config;
+use crate::hall::{Handle, Problem};
+use crate::library::Library;
+use crate::playlist::Shelf;
+
+mod access;
+mod asker;
+mod controllers;
+mod cues;
+mod gate;
+mod guarded;
+mod input;
+mod once;
+mod peer;
+mod playlist;
+mod problem;
+mod reports;
+mod routes;
+mod serve;
+mod service;
+mod settings;
+mod shared;
+mod show;
+mod slots;
+mod socket;
+mod status;
+mod stop;
+mod tries;
+
+pub use stop::{StopSocket, stop_socket};
+
+use access::Access;
+use shared::{Pulse, STREAMS, Shared};
+use socket::SocketFile;
+
+/// Threads that wait for disks.
+const BLOCKING: usize = 8;
+/// How long what is under way may go on when the server ends.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+
+/// The console: the content type and the octets of what is at a path, `/` for its page; none where there is nothing.
+pub type Pages = fn(path: &str) -> Option<(&'static str, &'static [u8])>;
+
+/// What the API serves, and where.
+#[derive(Debug)]
+pub struct Setup {
+    /// What the configuration says of it.
+    pub config: config::Api,
+    /// The control socket; its folder has to be there.
+    pub socket: PathBuf,
+    /// The way to the hall.
+    pub handle: Handle,
+    /// The cues.
+    pub library: Library,
+    /// The playlists.
+    pub playlists: Shelf,
+    /// The folder of the journal.
+    pub journal: PathBuf,
+    /// The console.
+    pub pages: Pages,
+}
+
+/// Why the API is not served.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ApiError {
+    /// The folder of a socket cannot be opened.
+    #[error("cannot open {}, the folder of the socket; make it, or name another socket", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A socket cannot be made.
+    #[error("cannot listen on {}", path.display())]
+    Socket {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Something else is where the socket belongs.
+    #[error("{} is there and is no socket; move it away, or name another socket", path.display())]
+    NoSocket {
+        /// What is there.
+        path: PathBuf,
+    },
+    /// A program serves that socket.
+    #[error("{} is served by a program that runs; end it, or name another socket", path.display())]
+    Served {
+        /// The socket.
+        path: PathBuf,
+    },
+    /// A TCP port cannot be had.
+    #[error("cannot listen on {address}; is another program there?")]
+    Port {
+        /// Which.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The system gives no thread or no timer.
+    #[error("the system refused what the API needs")]
+    System(#[source] io::Error),
+}
+
+/// The API, served until this is dropped.
+#[derive(Debug)]
+pub struct Running {
+    addresses: Vec<SocketAddr>,
+    closing: watch::Sender<bool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Running {
+    /// Where it listens over TCP, with the ports that the system chose.
+    #[must_use]
+    pub fn addresses(&self) -> &[SocketAddr] {
+        &self.addresses
+    }
+}
+
+impl Drop for Running {
+    /// Ends it: no more connections are taken, and those that are there end what they are at, within a few seconds.
+    fn drop(&mut self) {
+        self.closing.send_replace(true);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // a panic in it has been told
+        }
+    }
+}
+
+/// Serves the API on a thread of its own. When this returns, all sockets take connections.
+///
+/// # Errors
+/// [`ApiError`] where a socket or a port cannot be had; nothing is served then.
+pub fn start(setup: Setup) -> Result<Running, ApiError> {
+    let Setup { config, socket, handle, library, playlists, journal, pages } = setup;
+    let (local, file) = socket::unix(&socket)?;
+    let tcp = config.listen.iter().map(|&address| port(address)).collect::<Result<Vec<_>, _>>()?;
+    let addresses: Vec<_> =
+        tcp.iter().map(TcpListener::local_addr).collect::<Result<_, _>>().map_err(ApiError::System)?;
+    let (closing, closed) = watch::channel(false);
+    let (router, document) = routes::routes();
+    let shared = Shared {
+        handle,
+        access: Access::new(&config, &addresses),
+        tries: Default::default(),
+        once: Default::default(),
+        streams: Arc::new(Semaphore::new(STREAMS)),
+        closing: closed.clone(),
+        document: document.to_json().expect("a description is text").into(),
+        library,
+        shelf: playlists,
+        journal,
+        pages,
+        pulse: Pulse::default(),
+        written: Mutex::new(None),
+    };
+    let shared = Arc::new(shared);
+    let router = routes::guarded(router, Arc::clone(&shared));
+    let runtime = runtime::Builder::new_current_thread()
+        .enable_all()
+        .max_blocking_threads(BLOCKING)
+        .build()
+        .map_err(ApiError::System)?;
+    let sockets = Sockets { local, _file: file, tcp };
+    let thread = Builder::new().name("api".to_owned()).spawn(move || run(runtime, sockets, shared, router));
+    Ok(Running { addresses, closing, thread: Some(thread.map_err(ApiError::System)?) })
+}
+
+/// What is listened on.
+struct Sockets {
+    local: std::os::unix::net::UnixListener,
+    /// Goes when the server ends.
+    _file: SocketFile,
+    tcp: Vec<TcpListener>,
+}
+
+/// Serves until the server ends.
+fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Router) {
+    let Sockets { local, _file, tcp } = sockets;
+    let mut closing = shared.closing.clone();
+    let (alive, mut all_gone) = mpsc::channel(1);
+    let hall = serve::Hall { router, closing: closing.clone(), alive };
+    runtime.block_on(async move {
+        tokio::spawn(Pulse::follow(shared));
+        let slots = serve::tcp_slots();
+        for listener in tcp {
+            let listener = tokio::net::TcpListener::from_std(listener);
+            let listener = listener.expect("the runtime has just been made, and takes sockets");
+            tokio::spawn(serve::tcp(listener, slots.clone(), hall.clone()));
+        }
+        let local = tokio::net::UnixListener::from_std(local);
+        tokio::spawn(serve::local(local.expect("the runtime takes sockets"), hall));
+        let _ = closing.wait_for(|&closing| closing).await; // whoever would say so has gone: an end as well
+        let _ = tokio::time::timeout(LAST_WORDS, all_gone.recv()).await;
+    });
+    runtime.shutdown_timeout(LAST_WORDS);
+}
+
+fn port(address: SocketAddr) -> Result<TcpListener, ApiError> {
+    let failed = |source| ApiError::Port { address, source };
+    let listener = TcpListener::bind(address).map_err(failed)?;
+    listener.set_nonblocking(true).map_err(failed)?;
+    Ok(listener)
+}
+
+/// Does what waits for a disk, on a thread for that.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
+    tokio::task::spawn_blocking(work).await.unwrap_or_else(|_| Err(problem::panicked()))
+}

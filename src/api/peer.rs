@@ -1,0 +1,64 @@
+//! Who is at the other end of a connection.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::net::IpAddr;
+use std::sync::Arc;
+
+use crate::hall::{Role, Surface, Who};
+
+/// Of the table of users no more is read.
+const MAX_USERS_LEN: u64 = 1 << 20;
+
+/// The other end of a connection.
+#[derive(Debug, Clone)]
+pub(super) enum Peer {
+    /// A process of this machine that may open the control socket, by the name of its user.
+    Socket(Arc<str>),
+    /// Another machine, or this one by its loopback address.
+    Tcp(IpAddr),
+}
+
+impl Peer {
+    /// The process that the kernel names (`SO_PEERCRED`).
+    pub(super) fn of_user(uid: u32) -> Self {
+        Self::Socket(user(uid).into())
+    }
+}
+
+/// Whoever may open a socket in the file system is engineer.
+pub(super) fn local(name: &str) -> Who {
+    Who { role: Role::Engineer, surface: Surface::Socket, name: name.to_owned() }
+}
+
+/// The name of a user of this machine; `uid N` where the table of users has none.
+pub(super) fn user(uid: u32) -> String {
+    let mut table = String::new();
+    let read = File::open("/etc/passwd").and_then(|file| file.take(MAX_USERS_LEN).read_to_string(&mut table));
+    read.ok().and_then(|_| name_in(&table, uid)).unwrap_or_else(|| format!("uid {uid}"))
+}
+
+/// `name:password:uid:…`, a line each.
+fn name_in(table: &str, uid: u32) -> Option<String> {
+    let mut users = table.lines().map(|line| line.split(':'));
+    users.find_map(|mut fields| {
+        let name = fields.next()?;
+        let plain = !name.is_empty() && name.chars().all(|c| c.is_ascii_graphic());
+        (plain && fields.nth(1)?.parse() == Ok(uid)).then(|| name.to_owned())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_user_is_named_as_the_table_of_users_has_it() {
+        let table = "root:x:0:0:root:/root:/bin/sh\n\nbroken\nanna:x:1000:1000::/home/anna:/bin/sh\n";
+        assert_eq!(name_in(table, 1000).as_deref(), Some("anna"));
+        assert_eq!(name_in(table, 1001), None);
+        assert_eq!(name_in("an na:x:1:1", 1), None, "what could be taken for more than a name");
+        assert_eq!(user(0), "root");
+        assert_eq!(user(4_000_000_000), "uid 4000000000");
+    }
+}

@@ -1,0 +1,62 @@
+//! `/api/v1/playlist`: the list that is loaded, and those there are.
+
+use std::sync::Arc;
+
+use axum::Json as JsonReply;
+use axum::extract::State;
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+use super::asker::{Asker, StatusReply};
+use super::blocking;
+use super::input::{Json, id};
+use super::shared::Shared;
+use crate::hall::{Ask, Problem, Status};
+use crate::playlist::PlaylistInfo;
+
+/// Which playlist.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Choice {
+    /// Its id; null for none.
+    #[serde(deserialize_with = "Option::deserialize")] // null has to be written: an empty object drops nothing
+    #[schema(required = true)]
+    id: Option<String>,
+}
+
+/// Which entry.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Select {
+    /// Counted from 0.
+    entry: usize,
+}
+
+/// The playlists of the hall, also those with faults.
+#[utoipa::path(
+    get, path = "/api/v1/playlists", tag = "playlist", responses((status = 200, body = [PlaylistInfo]))
+)]
+pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Vec<PlaylistInfo>>, Problem> {
+    blocking(move || Ok(shared.shelf.list())).await.map(JsonReply)
+}
+
+/// Loads a playlist, or drops the one that is loaded.
+#[utoipa::path(
+    put, path = "/api/v1/playlist", tag = "playlist", request_body = Choice, responses((status = 200, body = Status))
+)]
+pub(super) async fn choose(asker: Asker, Json(choice): Json<Choice>) -> Result<StatusReply, Problem> {
+    let id = choice.id.map(|text| id(&text)).transpose()?.map(|id| id.to_string());
+    asker.ask(Ask::Playlist { id }).await
+}
+
+/// Makes an entry of the playlist the next to be played.
+#[utoipa::path(
+    post, path = "/api/v1/playlist/select", tag = "playlist", request_body = Select,
+    responses((status = 200, body = Status))
+)]
+pub(super) async fn select(
+    asker: Asker,
+    Json(Select { entry }): Json<Select>,
+) -> Result<StatusReply, Problem> {
+    asker.ask(Ask::Select { entry }).await
+}

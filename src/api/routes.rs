@@ -1,0 +1,145 @@
+//! All routes, and from them the description that is served: what is not here is neither served nor described.
+
+use std::sync::Arc;
+
+use axum::middleware::from_fn_with_state;
+use utoipa::openapi::path::{Operation, Parameter, ParameterBuilder, ParameterIn, PathItem};
+use utoipa::openapi::response::ResponseBuilder;
+use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::{Content, OpenApi, Ref, RefOr, Required};
+use utoipa::{OpenApi as _, ToSchema as _};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::problem::{Body, PROBLEM_JSON};
+use super::shared::Shared;
+use super::{controllers, cues, gate, playlist, reports, service, settings, show, status};
+use crate::hall::Code;
+
+/// What can be said of the whole.
+#[derive(utoipa::OpenApi)]
+#[openapi(
+    info(
+        title = "kinocue",
+        description = "Control of a hall with motion seats. Not a safety device: the emergency stop is hard-wired. Every \
+            change replies with the state that it led to, every refusal with a problem (RFC 9457). Whoever may open the \
+            control socket is engineer; over TCP send Authorization: Bearer TOKEN. Replies carry X-Kinocue-Time, unix \
+            milliseconds, to reckon X-Kinocue-Sent by."
+    ),
+    components(schemas(Body<'static>, Code))
+)]
+struct Document;
+
+/// The routes, still without what they share, and their description.
+pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
+    let router = OpenApiRouter::with_openapi(Document::openapi())
+        .routes(routes!(service::health))
+        .routes(routes!(service::ready))
+        .routes(routes!(service::figures))
+        .routes(routes!(service::document))
+        .routes(routes!(status::status))
+        .routes(routes!(status::events))
+        .routes(routes!(show::home))
+        .routes(routes!(show::load))
+        .routes(routes!(show::arm))
+        .routes(routes!(show::disarm))
+        .routes(routes!(show::go))
+        .routes(routes!(show::pause))
+        .routes(routes!(show::resume))
+        .routes(routes!(show::seek))
+        .routes(routes!(show::stop))
+        .routes(routes!(show::park))
+        .routes(routes!(show::clear))
+        .routes(routes!(settings::trim))
+        .routes(routes!(settings::levels))
+        .routes(routes!(settings::preset))
+        .routes(routes!(settings::preflight))
+        .routes(routes!(settings::test))
+        .routes(routes!(settings::reload))
+        .routes(routes!(controllers::all))
+        .routes(routes!(controllers::one))
+        .routes(routes!(controllers::enable))
+        .routes(routes!(controllers::disable))
+        .routes(routes!(playlist::all))
+        .routes(routes!(playlist::choose))
+        .routes(routes!(playlist::select))
+        .routes(routes!(cues::all))
+        .routes(routes!(cues::one, cues::upload))
+        .routes(routes!(cues::curve))
+        .routes(routes!(reports::one));
+    let (router, mut document) = router.split_for_parts();
+    document.paths.paths.values_mut().for_each(describe);
+    (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), document)
+}
+
+/// The whole: routes behind the gate.
+pub(super) fn guarded(router: axum::Router<Arc<Shared>>, shared: Arc<Shared>) -> axum::Router {
+    router.layer(from_fn_with_state(Arc::clone(&shared), gate::gate)).with_state(shared)
+}
+
+/// Adds what holds of every path.
+fn describe(path: &mut PathItem) {
+    let changes = [&mut path.post, &mut path.put].into_iter().flatten();
+    changes.for_each(|operation| {
+        let headers = [
+            header(
+                "X-Kinocue-Sent",
+                "When it was asked, unix milliseconds; too old, and what would move is refused.",
+            ),
+            header(
+                "Idempotency-Key",
+                "Of two POSTs with the same one the second does nothing, and gets the same reply.",
+            ),
+        ];
+        operation.parameters.get_or_insert_default().extend(headers.map(RefOr::T));
+    });
+    [&mut path.get, &mut path.post, &mut path.put].into_iter().flatten().for_each(may_fail);
+}
+
+fn may_fail(operation: &mut Operation) {
+    let schema = Ref::from_schema_name(Body::name());
+    let problem = ResponseBuilder::new()
+        .description("Why it was not done")
+        .content(PROBLEM_JSON, Content::new(Some(schema)))
+        .build();
+    operation.responses.responses.insert("default".to_owned(), RefOr::T(problem));
+}
+
+fn header(name: &str, description: &str) -> Parameter {
+    ParameterBuilder::new()
+        .name(name)
+        .parameter_in(ParameterIn::Header)
+        .required(Required::False)
+        .description(Some(description))
+        .schema(Some(ObjectBuilder::new().schema_type(Type::String)))
+        .build()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+
+    #[test]
+    fn every_reference_of_the_description_leads_somewhere() {
+        let document = serde_json::to_value(routes().1).unwrap();
+        let mut seen = 0;
+        let mut todo = vec![&document];
+        while let Some(value) = todo.pop() {
+            match value {
+                Value::Object(map) => {
+                    if let Some(Value::String(reference)) = map.get("$ref") {
+                        let place = reference.strip_prefix('#').unwrap();
+                        assert!(document.pointer(place).is_some(), "{reference}");
+                        seen += 1;
+                    }
+                    todo.extend(map.values());
+                }
+                Value::Array(values) => todo.extend(values),
+                _ => {}
+            }
+        }
+        assert!(seen > 50, "{seen}");
+    }
+}

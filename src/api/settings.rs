@@ -1,0 +1,120 @@
+//! What is set rather than done: trim, levels, presets; and what is asked of the hall as a whole.
+
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+use super::asker::{Asker, StatusReply};
+use super::input::{Json, Name, Nothing};
+use super::problem::bad_value;
+use crate::hall::{Ask, LevelsChange, Problem, Status};
+
+type Reply = Result<StatusReply, Problem>;
+
+/// How far the motion may be moved against the film, s, either way.
+const MAX_TRIM_S: f64 = 0.5;
+
+/// How much later than the film the motion is.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Trim {
+    /// Seconds, -0.5 to 0.5, in whole milliseconds.
+    offset_s: f64,
+}
+
+/// Which seats are tested.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Test {
+    /// Their rows; all where none is named.
+    #[serde(default)]
+    rows: Vec<String>,
+}
+
+/// Moves the motion against the film.
+#[utoipa::path(
+    put, path = "/api/v1/trim", tag = "settings", request_body = Trim, responses((status = 200, body = Status))
+)]
+pub(super) async fn trim(asker: Asker, Json(Trim { offset_s }): Json<Trim>) -> Reply {
+    asker.ask(Ask::Trim(trim_ms(offset_s)?)).await
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "500 at the most")]
+fn trim_ms(offset_s: f64) -> Result<i32, Problem> {
+    if (-MAX_TRIM_S..=MAX_TRIM_S).contains(&offset_s) {
+        return Ok((1000.0 * offset_s).round() as i32);
+    }
+    let detail = format!("offset_s: {offset_s} is outside -{MAX_TRIM_S}..={MAX_TRIM_S}");
+    Err(bad_value(detail, "give seconds by which the motion is later than the film"))
+}
+
+/// Changes levels and effects; what is not named stays as it is.
+#[utoipa::path(
+    put, path = "/api/v1/levels", tag = "settings", request_body = LevelsChange, responses((status = 200, body = Status))
+)]
+pub(super) async fn levels(asker: Asker, Json(change): Json<LevelsChange>) -> Reply {
+    check_levels(&change)?;
+    asker.ask(Ask::Levels(change)).await
+}
+
+fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
+    let LevelsChange { motion, vibration, rows, .. } = change;
+    let halls = [("motion", motion), ("vibration", vibration)];
+    let halls = halls.into_iter().filter_map(|(name, level)| Some((name.to_owned(), (*level)?)));
+    let rows = rows.iter().map(|(row, &level)| (format!("row {row}"), level));
+    let outside = halls.chain(rows).filter(|(_, level)| !(0.0..=1.0).contains(level));
+    let faults: Vec<_> = outside.map(|(name, level)| format!("{name}: {level} is outside 0..=1")).collect();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(bad_value(faults.join(", "), "levels are from 0, nothing, to 1, all of it").with(faults))
+}
+
+/// Sets levels and effects as a preset of the configuration says.
+#[utoipa::path(
+    post, path = "/api/v1/presets/{name}", tag = "settings", params(("name" = String, Path, description = "Its name")),
+    responses((status = 200, body = Status))
+)]
+pub(super) async fn preset(asker: Asker, Name(name): Name, _: Nothing) -> Reply {
+    asker.ask(Ask::Preset(name)).await
+}
+
+/// Asks all controllers for their registers and judges them.
+#[utoipa::path(post, path = "/api/v1/preflight", tag = "hall", responses((status = 200, body = Status)))]
+pub(super) async fn preflight(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Preflight).await
+}
+
+/// Moves each axis and effect of empty, armed seats slowly in turn.
+#[utoipa::path(
+    post, path = "/api/v1/test", tag = "hall", request_body = Test, responses((status = 200, body = Status))
+)]
+pub(super) async fn test(asker: Asker, Json(Test { rows }): Json<Test>) -> Reply {
+    asker.ask(Ask::Test { rows }).await
+}
+
+/// Reads the configuration anew, where nothing is armed. The table `[api]` stays as it was until the service starts again.
+#[utoipa::path(post, path = "/api/v1/reload", tag = "hall", responses((status = 200, body = Status)))]
+pub(super) async fn reload(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Reload).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trim_is_rounded_to_a_millisecond_and_kept_within_half_a_second() {
+        assert_eq!(trim_ms(0.0804), Ok(80));
+        assert_eq!((trim_ms(-0.5), trim_ms(0.5)), (Ok(-500), Ok(500)));
+        assert!(trim_ms(0.5001).is_err() && trim_ms(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn every_level_outside_its_range_is_named() {
+        let rows = [("A".to_owned(), 1.5), ("B".to_owned(), 1.0)].into();
+        let change =
+            LevelsChange { motion: Some(-0.1), vibration: Some(0.0), rows, ..LevelsChange::default() };
+        let problem = check_levels(&change).unwrap_err();
+        assert_eq!(problem.faults, ["motion: -0.1 is outside 0..=1", "row A: 1.5 is outside 0..=1"]);
+    }
+}

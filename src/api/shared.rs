@@ -1,0 +1,119 @@
+//! What all handlers share.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use hyper::body::Bytes;
+use tokio::sync::{Semaphore, watch};
+
+use super::Pages;
+use super::access::Access;
+use super::once::Once;
+use super::tries::Tries;
+use crate::hall::{Handle, Status};
+use crate::library::Library;
+use crate::playlist::Shelf;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// How long the tick counter may stand still in a process that is well.
+const STILL: Duration = Duration::from_secs(2);
+/// How many are pushed to at a time.
+pub(super) const STREAMS: usize = 32;
+
+/// What all handlers share. None of it is held while somebody waits.
+pub(super) struct Shared {
+    /// The way to the hall.
+    pub(super) handle: Handle,
+    /// Who may come in over TCP.
+    pub(super) access: Access,
+    /// Wrong tokens.
+    pub(super) tries: Tries,
+    /// Requests that may come twice.
+    pub(super) once: Once,
+    /// Room for those who are pushed to.
+    pub(super) streams: Arc<Semaphore>,
+    /// Whether the server ends.
+    pub(super) closing: watch::Receiver<bool>,
+    /// The description of all this, JSON.
+    pub(super) document: Bytes,
+    /// The cues.
+    pub(super) library: Library,
+    /// The playlists.
+    pub(super) shelf: Shelf,
+    /// The folder of the journal.
+    pub(super) journal: PathBuf,
+    /// The console.
+    pub(super) pages: Pages,
+    /// Whether the tick thread ticks.
+    pub(super) pulse: Pulse,
+    /// The newest status that was written, and its JSON.
+    pub(super) written: Mutex<Option<(Arc<Status>, Bytes)>>,
+}
+
+impl Shared {
+    /// A status as JSON. Of many who ask for the same one it is written once.
+    pub(super) fn write(&self, status: &Arc<Status>) -> Bytes {
+        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((same, json)) = written.as_ref()
+            && Arc::ptr_eq(same, status)
+        {
+            return json.clone();
+        }
+        let json = serde_json::to_vec(&**status).expect("a status is text and numbers");
+        let json = Bytes::from(json);
+        *written = Some((Arc::clone(status), json.clone()));
+        json
+    }
+}
+
+/// When the tick counter last moved.
+#[derive(Debug, Default)]
+pub(super) struct Pulse {
+    ticks: AtomicU64,
+    moved_ns: AtomicU64,
+}
+
+impl Pulse {
+    /// Takes note of the tick counter.
+    pub(super) fn note(&self, ticks: u64, now: MonoTime) {
+        if self.ticks.swap(ticks, Ordering::Relaxed) != ticks {
+            self.moved_ns.store(now.as_nanos(), Ordering::Relaxed);
+        }
+    }
+
+    /// Whether it has moved of late.
+    pub(super) fn beats(&self, now: MonoTime) -> bool {
+        now.since(MonoTime::from_nanos(self.moved_ns.load(Ordering::Relaxed))) < STILL
+    }
+
+    /// Notes every new status until there are none any more.
+    pub(super) async fn follow(shared: Arc<Shared>) {
+        let mut statuses = shared.handle.watch();
+        loop {
+            let ticks = statuses.borrow_and_update().ticks;
+            shared.pulse.note(ticks, Monotonic.now());
+            if statuses.changed().await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pulse_is_a_counter_that_moves() {
+        let at = |seconds| MonoTime::from_nanos(0) + Duration::from_secs(seconds);
+        let pulse = Pulse::default();
+        assert!(!pulse.beats(at(100)), "before the first tick");
+        pulse.note(7, at(100));
+        pulse.note(7, at(101));
+        assert!(pulse.beats(at(101)));
+        assert!(!pulse.beats(at(102)), "the status is new, and the counter in it is not");
+    }
+}

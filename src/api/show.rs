@@ -1,0 +1,103 @@
+//! `/api/v1/show/…`: what an operator does with what is loaded.
+
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+use super::asker::{Asker, StatusReply};
+use super::input::{Json, Nothing, id};
+use super::problem::bad_value;
+use crate::hall::{Ask, Problem, Status};
+use crate::time::ShowTime;
+
+type Reply = Result<StatusReply, Problem>;
+
+/// Which cue.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Load {
+    /// Its id.
+    cue: String,
+}
+
+/// Where to.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Seek {
+    /// Seconds from the beginning of the cue, 0 or more.
+    position_s: f64,
+}
+
+/// Homes all controllers, with nobody on the seats.
+#[utoipa::path(post, path = "/api/v1/show/home", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn home(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Home).await
+}
+
+/// Loads a cue of the library.
+#[utoipa::path(
+    post, path = "/api/v1/show/load", tag = "show", request_body = Load, responses((status = 200, body = Status))
+)]
+pub(super) async fn load(asker: Asker, Json(load): Json<Load>) -> Reply {
+    let cue = id(&load.cue)?.to_string();
+    asker.ask(Ask::Load { cue }).await
+}
+
+/// Gets ready to go. Over TCP for engineers.
+#[utoipa::path(post, path = "/api/v1/show/arm", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn arm(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Arm).await
+}
+
+/// Stands down.
+#[utoipa::path(post, path = "/api/v1/show/disarm", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn disarm(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Disarm).await
+}
+
+/// Starts what is loaded and armed. Over TCP X-Kinocue-Sent has to say when it was asked; one that is older than 2 s is refused.
+#[utoipa::path(post, path = "/api/v1/show/go", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn go(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Go).await
+}
+
+/// Holds; the film waits.
+#[utoipa::path(post, path = "/api/v1/show/pause", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn pause(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Pause).await
+}
+
+/// Goes on.
+#[utoipa::path(post, path = "/api/v1/show/resume", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn resume(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Resume).await
+}
+
+/// Goes on elsewhere in the cue.
+#[utoipa::path(
+    post, path = "/api/v1/show/seek", tag = "show", request_body = Seek, responses((status = 200, body = Status))
+)]
+pub(super) async fn seek(asker: Asker, Json(Seek { position_s }): Json<Seek>) -> Reply {
+    if position_s < 0.0 {
+        let detail = format!("position_s: {position_s} is before the beginning");
+        return Err(bad_value(detail, "give seconds from the beginning of the cue"));
+    }
+    asker.ask(Ask::Seek(ShowTime::from_secs_f64(position_s))).await
+}
+
+/// Brings the seats to rest at once. Not a safety device: the emergency stop is hard-wired.
+#[utoipa::path(post, path = "/api/v1/show/stop", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn stop(asker: Asker) -> Reply {
+    asker.ask(Ask::Stop).await // whatever its body is
+}
+
+/// Brings the seats to their park poses.
+#[utoipa::path(post, path = "/api/v1/show/park", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn park(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Park).await
+}
+
+/// Leaves a stop or a fault.
+#[utoipa::path(post, path = "/api/v1/show/clear", tag = "show", responses((status = 200, body = Status)))]
+pub(super) async fn clear(asker: Asker, _: Nothing) -> Reply {
+    asker.ask(Ask::Clear).await
+}

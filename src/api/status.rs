@@ -1,0 +1,106 @@
+//! `/api/v1/status` and `/api/v1/events`: the status of the hall, once or as it changes.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::HeaderValue;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse as _, Response};
+use hyper::body::{Bytes, Frame};
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+use super::asker::StatusReply;
+use super::shared::{STREAMS, Shared};
+use crate::hall::{Code, Problem, Status};
+
+/// Between two events at the least.
+const PACE: Duration = Duration::from_millis(100);
+/// After how long without an event a comment says that the server lives.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+
+/// The whole state of the hall.
+#[utoipa::path(get, path = "/api/v1/status", tag = "hall", responses((status = 200, body = Status)))]
+pub(super) async fn status(State(shared): State<Arc<Shared>>) -> StatusReply {
+    StatusReply(shared.write(&shared.handle.status()))
+}
+
+/// Server-sent events named `status`, each the whole status: at once, then at each change, ten a second at the most. Between
+/// them come comments. Who reads too slowly misses some, and who reads nothing is cut off.
+#[utoipa::path(
+    get, path = "/api/v1/events", tag = "hall",
+    responses((status = 200, body = Status, content_type = "text/event-stream"))
+)]
+pub(super) async fn events(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    let Ok(place) = Arc::clone(&shared.streams).try_acquire_owned() else {
+        let detail = format!("{STREAMS} are watching already");
+        return Err(Problem::new(
+            Code::Busy,
+            detail,
+            "close a page elsewhere, or ask for the status now and then",
+        ));
+    };
+    // One event waits at the most, beside what the connection holds.
+    let (to, events) = mpsc::channel(1);
+    tokio::spawn(push(shared, to, place));
+    let body = Body::new(Events(events));
+    Ok(([(CONTENT_TYPE, HeaderValue::from_static("text/event-stream"))], body).into_response())
+}
+
+/// Pushes statuses until the other end has gone, or the server ends.
+async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: OwnedSemaphorePermit) {
+    let mut statuses = shared.handle.watch();
+    let mut closing = shared.closing.clone();
+    let mut pace = interval(PACE);
+    pace.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut news = true;
+    while !*closing.borrow() {
+        pace.tick().await;
+        let text = if news {
+            let status = Arc::clone(&statuses.borrow_and_update());
+            event(&shared.write(&status))
+        } else {
+            Bytes::from_static(b": the server lives\n\n")
+        };
+        if to.send(text).await.is_err() {
+            return;
+        }
+        news = tokio::select! {
+            changed = timeout(KEEP_ALIVE, statuses.changed()) => match changed {
+                Ok(Ok(())) => true,
+                Ok(Err(_)) => return, // there is no hall any more
+                Err(_) => false,
+            },
+            () = to.closed() => return,
+            _ = closing.changed() => return,
+        };
+    }
+}
+
+/// One event; JSON of ours is one line.
+fn event(json: &Bytes) -> Bytes {
+    let mut text = Vec::with_capacity(json.len() + 32);
+    text.extend_from_slice(b"event: status\ndata: ");
+    text.extend_from_slice(json);
+    text.extend_from_slice(b"\n\n");
+    text.into()
+}
+
+/// Events as the body of a reply.
+struct Events(mpsc::Receiver<Bytes>);
+
+impl hyper::body::Body for Events {
+    type Data = Bytes;
+    type Error = std::convert::Infallible;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
+        self.0.poll_recv(cx).map(|event| event.map(|event| Ok(Frame::data(event))))
+    }
+}

@@ -1,0 +1,249 @@
+//! The stop socket: a line `stop` is a stop, whatever else is stuck. Its own thread, no runtime, no locks but the flag that
+//! the tick thread reads; no peer can hold it up, because it never waits for one.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::os::fd::AsFd as _;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::net::sockopt::socket_peercred;
+
+use super::socket::{self, SocketFile};
+use super::{ApiError, peer};
+use crate::hall::Handle;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// Connections at a time; of more the oldest goes, so that idle ones keep nobody out.
+const PEERS: usize = 32;
+/// How long a connection may say nothing.
+const SILENCE: Duration = Duration::from_secs(5);
+/// The longest line that is looked at.
+const LINE: usize = 64;
+/// How long nothing is accepted after the system refused a connection.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// The stop socket, served until this is dropped.
+#[derive(Debug)]
+pub struct StopSocket {
+    /// Dropped, it wakes the thread, which then ends.
+    wake: Option<UnixStream>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Serves the stop socket at `path`. A connection that sends the line `stop` has the seats come to rest, and is told
+/// `stopping`; any other line is told what is wanted. The folder has to be there.
+///
+/// # Errors
+/// [`ApiError`] where the socket cannot be made, or another program serves it.
+pub fn stop_socket(path: &Path, handle: Handle) -> Result<StopSocket, ApiError> {
+    let (listener, file) = socket::unix(path)?;
+    let (wake, sleeper) = UnixStream::pair().map_err(ApiError::System)?;
+    let desk = StopDesk { listener, _file: file, sleeper, handle, peers: VecDeque::new(), pause_until: None };
+    let thread = Builder::new().name("stop".to_owned()).spawn(move || desk.run());
+    Ok(StopSocket { wake: Some(wake), thread: Some(thread.map_err(ApiError::System)?) })
+}
+
+impl Drop for StopSocket {
+    fn drop(&mut self) {
+        drop(self.wake.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // it ends as soon as it wakes up
+        }
+    }
+}
+
+/// What the thread holds.
+struct StopDesk {
+    listener: UnixListener,
+    _file: SocketFile,
+    sleeper: UnixStream,
+    handle: Handle,
+    peers: VecDeque<Caller>,
+    pause_until: Option<MonoTime>,
+}
+
+/// A connection.
+struct Caller {
+    stream: UnixStream,
+    line: Vec<u8>,
+    until: MonoTime,
+}
+
+impl StopDesk {
+    fn run(mut self) {
+        loop {
+            let woken = self.wait();
+            let now = Monotonic.now();
+            if woken.is_some_and(|closed| closed) {
+                return;
+            }
+            self.pause_until = self.pause_until.filter(|&until| until > now);
+            self.hear(now);
+            self.accept(now);
+        }
+    }
+
+    /// Waits until there is something to do; says whether that is to end, none where the system would not wait.
+    fn wait(&self) -> Option<bool> {
+        let now = Monotonic.now();
+        let ends = self.peers.iter().map(|caller| caller.until).chain(self.pause_until).min();
+        let timeout = ends.map(|end| timespec(end.since(now)));
+        let mut ready = vec![PollFd::new(&self.sleeper, PollFlags::IN)];
+        if self.pause_until.is_none() {
+            ready.push(PollFd::new(&self.listener, PollFlags::IN));
+        }
+        ready.extend(
+            self.peers.iter().map(|caller| PollFd::from_borrowed_fd(caller.stream.as_fd(), PollFlags::IN)),
+        );
+        if poll(&mut ready, timeout.as_ref()).is_err() {
+            return None; // interrupted by a signal
+        }
+        Some(!ready[0].revents().is_empty())
+    }
+
+    /// Reads what the connections said, without waiting for any.
+    fn hear(&mut self, now: MonoTime) {
+        let handle = &self.handle;
+        self.peers.retain_mut(|caller| caller.until > now && caller.listen(handle));
+    }
+
+    fn accept(&mut self, now: MonoTime) {
+        while self.pause_until.is_none() {
+            match self.listener.accept() {
+                Ok((stream, _)) if stream.set_nonblocking(true).is_ok() => {
+                    let mut caller = Caller { stream, line: Vec::new(), until: now + SILENCE };
+                    if caller.listen(&self.handle) {
+                        self.peers.push_back(caller);
+                        self.peers.drain(..self.peers.len().saturating_sub(PEERS));
+                    }
+                }
+                Ok(_) => {}
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                // Out of descriptors or memory: a moment later there may be some.
+                Err(_) => self.pause_until = Some(now + PAUSE),
+            }
+        }
+    }
+}
+
+impl Caller {
+    /// Takes in what is there; whether more is to come.
+    fn listen(&mut self, handle: &Handle) -> bool {
+        let mut octets = [0; LINE];
+        loop {
+            match self.stream.read(&mut octets) {
+                Ok(0) => break,
+                Ok(read) => self.line.extend_from_slice(&octets[..read]),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return true,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(_) => return false,
+            }
+            if self.line.contains(&b'\n') || self.line.len() >= LINE {
+                break;
+            }
+        }
+        let line = self.line.split(|&octet| octet == b'\n').next().unwrap_or_default();
+        let reply = if line.trim_ascii().eq_ignore_ascii_case(b"stop") {
+            handle.stop(); // before anything that reads a file
+            handle.note_stop(peer::local(&self.user()));
+            "stopping\n"
+        } else {
+            "send the line: stop\n"
+        };
+        let _ = self.stream.write_all(reply.as_bytes()); // fits into an empty socket; who has gone needs none
+        false
+    }
+
+    fn user(&self) -> String {
+        socket_peercred(&self.stream)
+            .map_or_else(|_| "unknown".to_owned(), |peer| peer::user(peer.uid.as_raw()))
+    }
+}
+
+fn timespec(span: Duration) -> Timespec {
+    Timespec::try_from(span).expect("a few seconds fit")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead as _, BufReader};
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::hall::{Ask, Inbox, Role, Status, handle};
+    use crate::rt::Desk;
+
+    struct Hall {
+        _dir: tempfile::TempDir,
+        path: std::path::PathBuf,
+        desk: Arc<Desk>,
+        inbox: Inbox,
+        _socket: StopSocket,
+    }
+
+    fn hall() -> Hall {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("stop.sock");
+        let desk = Arc::new(Desk::new(std::iter::empty()));
+        let (handle, inbox, _) = handle(Arc::clone(&desk), Status::starting("Hall 1"));
+        let socket = stop_socket(&path, handle).unwrap();
+        Hall { _dir: dir, path, desk, inbox, _socket: socket }
+    }
+
+    fn say(path: &Path, text: &str) -> String {
+        let mut stream = UnixStream::connect(path).unwrap();
+        stream.write_all(text.as_bytes()).unwrap();
+        stream.shutdown(std::net::Shutdown::Write).unwrap();
+        let mut reply = String::new();
+        BufReader::new(stream).read_line(&mut reply).unwrap();
+        reply
+    }
+
+    #[test]
+    fn the_line_stop_stops_and_is_noted_with_its_user() {
+        let hall = hall();
+        assert_eq!(say(&hall.path, "stop\n"), "stopping\n");
+        assert!(hall.desk.take_stop());
+        let noted = hall.inbox.next(Duration::ZERO).unwrap().desired;
+        assert_eq!((noted.ask, noted.who.role), (Ask::Stop, Role::Engineer));
+        assert_eq!(noted.who.name, peer::user(rustix::process::getuid().as_raw()));
+        assert_eq!(say(&hall.path, " STOP\r\n"), "stopping\n");
+        assert_eq!(say(&hall.path, "stop"), "stopping\n", "a line without its end");
+    }
+
+    #[test]
+    fn nothing_else_is_a_stop() {
+        let hall = hall();
+        for text in
+            ["", "\n", "go\n", "stop now\n", "stopstop\n", "GET / HTTP/1.1\r\n\r\n", &"stop".repeat(100)]
+        {
+            assert_eq!(say(&hall.path, text), "send the line: stop\n", "{text:?}");
+        }
+        assert!(!hall.desk.take_stop());
+    }
+
+    #[test]
+    fn a_stop_passes_connections_that_say_nothing() {
+        let hall = hall();
+        let mut idle: Vec<_> = (0..4 * PEERS).map(|_| UnixStream::connect(&hall.path).unwrap()).collect();
+        idle[4 * PEERS - 1].write_all(b"sto").unwrap();
+        assert_eq!(say(&hall.path, "stop\n"), "stopping\n");
+        assert!(hall.desk.take_stop());
+        idle[4 * PEERS - 1].write_all(b"p\n").unwrap();
+        let mut reply = [0; 9];
+        idle[4 * PEERS - 1].read_exact(&mut reply).unwrap();
+        assert_eq!(&reply, b"stopping\n", "the newest of the idle ones was kept, and half a line too");
+    }
+
+    #[test]
+    fn the_socket_goes_with_its_owner() {
+        let Hall { path, _socket: socket, .. } = hall();
+        drop(socket);
+        assert!(UnixStream::connect(path).is_err());
+    }
+}

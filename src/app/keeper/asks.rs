@@ -1,0 +1,128 @@
+//! What surfaces ask, and what is done for it.
+
+use std::time::Duration;
+
+use super::Keeper;
+use crate::engine::TRIM_MS;
+use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem};
+use crate::rt::Command;
+use crate::state::{Request, State};
+use crate::time::ShowTime;
+
+impl Keeper {
+    /// Does it, and answers.
+    pub(super) fn on_asked(&mut self, asked: Asked) {
+        self.take_news();
+        let Desired { ask, who } = asked.desired.clone();
+        let result = match ask {
+            Ask::Load { cue } => return self.load(&cue, asked),
+            Ask::Playlist { id } => return self.playlist(id.as_deref(), asked),
+            Ask::Select { entry } => return self.select(entry, asked),
+            Ask::Test { rows } => return self.test(&rows, asked),
+            Ask::Preflight => return self.preflight(asked),
+            Ask::Home => self.request(Request::Home),
+            Ask::Arm => self.request(Request::Arm),
+            Ask::Disarm => self.request(Request::Disarm),
+            Ask::Go => {
+                self.begin_record(&who.to_string(), who.surface);
+                self.request(Request::Go).inspect_err(|_| self.end_record(self.ended))
+            }
+            Ask::Pause => self.request(Request::Pause),
+            Ask::Resume => self.request(Request::Resume),
+            Ask::Park => self.request(Request::Park),
+            Ask::Clear => self.request(Request::Clear),
+            Ask::Stop => {
+                // The flag is set already where it came by a handle; the machine takes a stop in every state.
+                self.reins.desk.stop();
+                self.await_stop();
+                Ok(())
+            }
+            Ask::Seek(film) => self.seek(film),
+            Ask::Trim(ms) => self.trim(ms),
+            Ask::Levels(change) => self.levels(&change),
+            Ask::Enable(name) => self.enable(&name, true),
+            Ask::Disable(name) => self.enable(&name, false),
+            Ask::Reload => self.reload(),
+            Ask::Preset(name) => self.preset(&name),
+        };
+        self.tell_readiness();
+        self.answer(asked, result);
+    }
+
+    fn request(&mut self, request: Request) -> Result<(), Problem> {
+        if matches!(request, Request::Arm | Request::Home) {
+            // Both need the line, or a show that nobody is about to replace.
+            self.is_free()?;
+        }
+        self.command(Command::Request(request))
+    }
+
+    /// Waits until the stop is seen in the state, a tick or two.
+    fn await_stop(&mut self) {
+        for _ in 0..100 {
+            self.take_news();
+            if matches!(self.known.state, State::Stopping | State::Stopped | State::Fault) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn seek(&mut self, film: ShowTime) -> Result<(), Problem> {
+        let Some(cued) = &mut self.cued else {
+            return Err(Problem::new(Code::State, "cannot seek: no cue is loaded", "load one"));
+        };
+        let length = cued.timeline.duration();
+        if film < ShowTime::ZERO || film >= length {
+            let detail = format!("{film} is outside the cue, which is {length} long");
+            return Err(Problem::new(Code::Value, detail, "give a time within it"));
+        }
+        if matches!(self.known.state, State::Armed | State::Parked) {
+            let before = std::mem::replace(&mut cued.start, film);
+            return self.stage().inspect_err(|_| {
+                if let Some(cued) = &mut self.cued {
+                    cued.start = before;
+                }
+            });
+        }
+        self.command(Command::Seek(film))
+    }
+
+    fn trim(&mut self, ms: i32) -> Result<(), Problem> {
+        if ms.abs() > TRIM_MS {
+            let detail = format!("a trim of {ms} ms is outside -{TRIM_MS}..={TRIM_MS}");
+            return Err(Problem::new(Code::Value, detail, "give a smaller one"));
+        }
+        self.board.trim_ms = ms;
+        self.reins.desk.set_trim_ms(ms);
+        Ok(())
+    }
+
+    fn preset(&mut self, name: &str) -> Result<(), Problem> {
+        let Some(preset) = self.reins.config.preset(name) else {
+            let detail = format!("there is no preset {name}");
+            return Err(Problem::new(Code::Unknown, detail, "the status names the presets"));
+        };
+        let change = LevelsChange::from(preset);
+        self.levels(&change)
+    }
+
+    fn levels(&mut self, change: &LevelsChange) -> Result<(), Problem> {
+        let before = self.board.clone();
+        self.board.change(change)?;
+        self.reset().inspect_err(|_| self.board = before)
+    }
+
+    /// Takes the group of a controller in or out.
+    fn enable(&mut self, name: &str, on: bool) -> Result<(), Problem> {
+        let controller = self.reins.config.controllers.iter().find(|one| one.name == name);
+        let Some(controller) = controller else {
+            let detail = format!("there is no controller {name}");
+            return Err(Problem::new(Code::Unknown, detail, "GET /api/v1/controllers lists them"));
+        };
+        let group = controller.group.clone();
+        let before = self.board.clone();
+        self.board.enable(&group, on);
+        self.reset().inspect_err(|_| self.board = before)
+    }
+}

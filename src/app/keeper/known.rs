@@ -1,0 +1,79 @@
+//! What the tick thread has told: the state of the hall, and what became of the command that waits for its answer.
+
+use std::time::Duration;
+
+use crate::hall::{Code, Problem};
+use crate::rt::News;
+use crate::state::{Cause, Next, State};
+use crate::time::MonoTime;
+
+/// What is known of the hall's state.
+#[derive(Debug)]
+pub(super) struct Known {
+    pub(super) state: State,
+    pub(super) cause: Cause,
+    pub(super) next: Next,
+    pub(super) since: MonoTime,
+    /// The answer to the command that was given last.
+    answer: Option<Result<(), Problem>>,
+}
+
+impl Known {
+    pub(super) const fn new(now: MonoTime) -> Self {
+        Self {
+            state: State::Boot,
+            cause: Cause::Started,
+            next: Next::AwaitAnswers,
+            since: now,
+            answer: None,
+        }
+    }
+
+    /// Takes news; says from which state to which the hall went, where it did.
+    pub(super) fn hear(&mut self, news: News) -> Option<(State, State)> {
+        match news {
+            News::Entered { state, cause, next, at } => {
+                let from = self.state;
+                (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
+                return (from != state).then_some((from, state));
+            }
+            News::Taken => self.answer = Some(Ok(())),
+            News::Refused(refusal) => self.answer = Some(Err(refusal.into())),
+            News::NotLoaded(state) => self.answer = Some(Err(not_loaded(state))),
+        }
+        None
+    }
+
+    /// Seconds until the state ends by itself; none where it does not.
+    pub(super) fn lapses(&self, now: MonoTime) -> Option<f64> {
+        let end = self.since + self.state.lasts()?;
+        Some(end.since(now).as_secs_f64())
+    }
+
+    /// An answer is waited for.
+    pub(super) fn expect(&mut self) {
+        self.answer = None;
+    }
+
+    pub(super) const fn take_answer(&mut self) -> Option<Result<(), Problem>> {
+        self.answer.take()
+    }
+}
+
+fn not_loaded(state: State) -> Problem {
+    Problem::new(Code::State, format!("cannot load while {state}: the seats move"), "park first")
+}
+
+/// More commands wait than a person can give.
+pub(super) fn busy() -> Problem {
+    Problem::new(Code::Busy, "too many commands wait for the tick thread", "ask again in a second")
+}
+
+/// The tick thread says nothing.
+pub(super) fn no_answer(after: Duration) -> Problem {
+    Problem::new(
+        Code::Timeout,
+        format!("the tick thread did not answer within {} s", after.as_secs()),
+        "look at the status before asking again: it may still be done",
+    )
+}

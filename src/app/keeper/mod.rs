@@ -1,0 +1,327 @@
+//! The keeper of a hall: answers what surfaces ask, gives the tick thread what it needs next, finds out what it cannot, and
+//! says ten times a second how all of it stands. A thread of the control plane; whatever takes long it has done elsewhere
+//! (`errand`), so that a pause or a park never waits behind a preflight.
+
+mod asks;
+mod board;
+mod errand;
+mod homing;
+mod known;
+mod list;
+mod ready;
+mod record;
+mod show;
+mod status;
+mod sweep;
+mod voice;
+mod warnings;
+
+pub use voice::Voice;
+
+use std::sync::Arc;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+use super::house::{Closed, Reins};
+use crate::config::{self, Config};
+use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::journal::Journal;
+use crate::library::Library;
+use crate::rt::{Command, Line};
+use crate::state::{Cause, State};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+use board::Board;
+use errand::Errand;
+use known::Known;
+use ready::Preflighted;
+use record::Records;
+use show::Cued;
+use status::Rates;
+
+/// How long an ask is waited for before the keeper looks after everything else.
+const LOOK: Duration = Duration::from_millis(10);
+/// From one status to the next.
+const TELL: Duration = Duration::from_millis(100);
+/// Notes that are kept.
+const NOTES: usize = 5;
+/// How long the tick thread has to answer a command; a tick takes a second at most.
+const ANSWER: Duration = Duration::from_secs(2);
+
+/// What a keeper has whatever the configuration is.
+#[derive(Debug)]
+pub struct Ends {
+    /// What surfaces ask.
+    pub inbox: Inbox,
+    /// Where the status goes.
+    pub source: StatusSource,
+    /// The file of the configuration.
+    pub config: PathBuf,
+    /// What the system asks of the program.
+    pub signals: Signals,
+    /// Whom to tell what happens.
+    pub voice: Voice,
+    /// What was set in the hall before; for a first one, nothing.
+    pub memory: Memory,
+}
+
+/// What goes over from a hall to the one that is opened with another configuration.
+#[derive(Debug, Default)]
+pub struct Memory {
+    board: Option<Board>,
+    cue: Option<String>,
+}
+
+/// What the system asks of the program; set by signals.
+#[derive(Debug, Clone, Default)]
+pub struct Signals {
+    /// Park, and end.
+    pub leave: Arc<AtomicBool>,
+    /// Read the configuration anew.
+    pub reload: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// Whether the program is to end.
+    #[must_use]
+    pub fn is_leaving(&self) -> bool {
+        self.leave.load(Ordering::Acquire)
+    }
+}
+
+/// What is left once the hall has closed.
+#[derive(Debug)]
+pub struct Left {
+    /// For the next keeper.
+    pub ends: Ends,
+    /// What the hall came to.
+    pub closed: Box<Closed>,
+    /// The configuration to open the next hall with; none where the program ends.
+    pub reload: Option<Arc<Config>>,
+    /// The journal, still open.
+    pub journal: Journal,
+}
+
+/// The keeper of one hall.
+#[derive(Debug)]
+pub struct Keeper {
+    ends: Ends,
+    began: MonoTime,
+    reins: Reins,
+    known: Known,
+    board: Board,
+    cued: Option<Cued>,
+    preflighted: Option<Preflighted>,
+    errand: Option<Errand>,
+    homing: Option<homing::Settling>,
+    /// What the tick thread was told of readiness.
+    readiness: Option<crate::state::Readiness>,
+    rates: Rates,
+    told: MonoTime,
+    /// The way to the controllers' registers; none while an errand has it.
+    line: Option<Line>,
+    library: Library,
+    /// What went wrong lately and no state says, newest last.
+    notes: VecDeque<String>,
+    list: Option<list::List>,
+    sweep: Option<sweep::Sweep>,
+    record: Records,
+    reload: Option<Arc<Config>>,
+    /// A show has ended, and why.
+    show_over: bool,
+    ended: Cause,
+}
+
+impl Keeper {
+    /// The keeper of a hall that has just opened.
+    #[must_use]
+    pub fn new(mut ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
+        let now = Monotonic.now();
+        let memory = std::mem::take(&mut ends.memory);
+        let mut board = Board::new(&reins.config);
+        if let Some(before) = &memory.board {
+            board.carry_over(before);
+        }
+        ends.source.lead(Arc::clone(&reins.desk));
+        let mut keeper = Self {
+            ends,
+            began: now,
+            known: Known::new(now),
+            board,
+            reins,
+            cued: None,
+            preflighted: None,
+            errand: None,
+            homing: None,
+            readiness: None,
+            rates: Rates::default(),
+            told: now,
+            line: Some(line),
+            library,
+            notes: VecDeque::new(),
+            list: None,
+            sweep: None,
+            record: Records::new(journal),
+            reload: None,
+            show_over: false,
+            ended: Cause::Started,
+        };
+        if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
+            keeper.fetch(cue, None);
+        }
+        keeper
+    }
+
+    /// Keeps the hall until `closed` says what it came to.
+    #[must_use]
+    pub fn run(mut self, closed: &Receiver<Box<Closed>>) -> Left {
+        loop {
+            if let Some(asked) = self.ends.inbox.next(LOOK) {
+                self.on_asked(asked);
+            }
+            self.look_after();
+            if let Ok(closed) = closed.try_recv() {
+                self.end_record(self.ended);
+                let cue = self.cued.map(|cued| cued.id);
+                self.ends.memory = Memory { board: Some(self.board), cue };
+                let journal = self.record.into_journal();
+                return Left { ends: self.ends, closed, reload: self.reload, journal };
+            }
+        }
+    }
+
+    /// Everything that nobody has to ask for.
+    fn look_after(&mut self) {
+        self.take_news();
+        self.end_show();
+        self.follow_sweep();
+        self.end_errand();
+        self.heed_schedule();
+        self.settle_homing();
+        self.tell_readiness();
+        self.heed_signals();
+        let now = Monotonic.now();
+        if now.since(self.told) >= TELL {
+            self.told = now;
+            let table = self.reins.live.table();
+            self.rates.note(&table, now);
+            self.publish();
+        }
+    }
+
+    /// Hears what the tick thread has to say, and does what a new state needs.
+    fn take_news(&mut self) {
+        while let Ok(news) = self.reins.news.pop() {
+            if let Some((from, to)) = self.known.hear(news) {
+                self.on_state(from, to);
+            }
+        }
+    }
+
+    fn on_state(&mut self, from: State, to: State) {
+        if to == State::Homing {
+            self.begin_homing();
+        }
+        if to == State::Parking || to == State::Stopping {
+            self.ended = self.known.cause;
+        }
+        let cause = self.cause();
+        self.say_state(to, &cause);
+        self.record.event(format!("{to}: {cause}"));
+        if from.may_send_motion() && !to.may_send_motion() {
+            self.show_over = true;
+        }
+    }
+
+    /// The engine is done, or rests for good: the next show needs another.
+    fn end_show(&mut self) {
+        if !std::mem::take(&mut self.show_over) {
+            return;
+        }
+        let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
+        self.end_record(self.ended);
+        if self.end_sweep(how) {
+            self.rewind();
+        } else {
+            self.on_show_over(self.ended);
+        }
+    }
+
+    /// Notes what no state says, for the warnings.
+    fn note(&mut self, note: String) {
+        self.notes.push_back(note);
+        if self.notes.len() > NOTES {
+            self.notes.pop_front();
+        }
+    }
+
+    /// Gives the tick thread a command and waits for its answer, a tick or two.
+    fn command(&mut self, command: Command) -> Result<(), Problem> {
+        if self.reins.commands.push(command).is_err() {
+            return Err(known::busy());
+        }
+        self.known.expect();
+        let until = Monotonic.now() + ANSWER;
+        loop {
+            self.take_news();
+            if let Some(answer) = self.known.take_answer() {
+                return answer;
+            }
+            if Monotonic.now() >= until {
+                return Err(known::no_answer(ANSWER));
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+
+    /// Puts the newest status where all can see it.
+    fn publish(&mut self) -> Arc<Status> {
+        let status = Arc::new(self.status());
+        self.speak(&status);
+        self.ends.source.put(Arc::clone(&status));
+        status
+    }
+
+    /// Answers an ask with the state that it led to.
+    fn answer(&mut self, asked: Asked, result: Result<(), Problem>) {
+        self.write_down(&asked.desired, &result);
+        let status = self.publish();
+        asked.answer(result.map(|()| status));
+    }
+
+    fn heed_signals(&mut self) {
+        if self.ends.signals.is_leaving() {
+            // Whatever moves parks first; the tick thread sees to that.
+            self.reins.leave.store(true, Ordering::Release);
+        }
+        if self.ends.signals.reload.swap(false, Ordering::AcqRel)
+            && let Err(problem) = self.reload()
+        {
+            self.note(problem.to_string());
+        }
+    }
+
+    /// Reads the configuration anew, and has the hall opened with it. The old one is kept where the new one is bad, and while
+    /// anything is armed.
+    fn reload(&mut self) -> Result<(), Problem> {
+        let idle = matches!(
+            self.known.state,
+            State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
+        );
+        if !idle {
+            let detail = format!("cannot read the configuration anew while {}", self.known.state);
+            return Err(Problem::new(Code::State, detail, "park, and disarm first"));
+        }
+        let config = config::load(&self.ends.config).map_err(|faults| {
+            let detail = format!("{} is bad; the old configuration is kept", self.ends.config.display());
+            let faults = faults.to_string().lines().map(str::to_owned).collect();
+            Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
+        })?;
+        self.reload = Some(Arc::new(config));
+        self.reins.leave.store(true, Ordering::Release);
+        Ok(())
+    }
+}

@@ -1,0 +1,183 @@
+//! The cue that is loaded, and the show made of it for the tick thread.
+
+use std::sync::Arc;
+
+use super::Keeper;
+use super::errand::Done;
+use crate::app::Staged;
+use crate::app::staged::headroom;
+use crate::config::Config;
+use crate::engine::{Headroom, Rate, Show};
+use crate::hall::{Asked, Code, Problem, ShowStatus};
+use crate::library::{CueId, Library};
+use crate::proof::{self, Digest, Terms};
+use crate::rt::Command;
+use crate::state::State;
+use crate::time::ShowTime;
+use crate::timeline::Timeline;
+
+/// A cue that fits the hall and keeps its limits at full level.
+#[derive(Debug)]
+pub(super) struct Cued {
+    pub(super) id: String,
+    pub(super) title: Option<String>,
+    pub(super) sha256: String,
+    pub(super) timeline: Arc<Timeline>,
+    headroom: Headroom,
+    /// Show time at which it begins.
+    pub(super) start: ShowTime,
+    /// How long the first move onto it takes, seconds.
+    pub(super) join_s: f64,
+}
+
+impl Cued {
+    /// Proves a cue for a hall.
+    ///
+    /// # Errors
+    /// Everything that does not fit.
+    pub(super) fn prove(
+        id: String,
+        config: &Config,
+        timeline: Timeline,
+        sha256: String,
+    ) -> Result<Self, Problem> {
+        let refused = |faults: Vec<String>| {
+            let detail = format!("the cue {id} does not fit this hall");
+            Problem::new(Code::Check, detail, "correct it, or `kinocue fit` it, and load it again").with(faults)
+        };
+        let rate = Rate::from_hz(config.show.rate_hz);
+        let misfits = config.misfits(&timeline);
+        if !misfits.is_empty() {
+            let place = |misfit: &crate::config::Misfit| {
+                format!("{}{misfit}", timeline.cue().column_place(&misfit.column()))
+            };
+            return Err(refused(misfits.iter().map(place).collect()));
+        }
+        let strokes = config.fits_stroke(&timeline).faults;
+        if !strokes.is_empty() {
+            return Err(refused(strokes.iter().map(ToString::to_string).collect()));
+        }
+        let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, 1.0);
+        let proof = proof::prove(&timeline, terms);
+        if !proof.passed() {
+            let mut faults: Vec<String> = proof.violations.iter().map(ToString::to_string).collect();
+            if proof.more > 0 {
+                faults.push(format!("and {} more", proof.more));
+            }
+            return Err(refused(faults));
+        }
+        Ok(Self {
+            title: timeline.cue().title().map(str::to_owned),
+            headroom: headroom(config, &timeline, rate),
+            timeline: Arc::new(timeline),
+            id,
+            sha256,
+            start: ShowTime::ZERO,
+            join_s: 0.0,
+        })
+    }
+
+    /// How many axes it has, and whether it vibrates.
+    pub(super) fn shape(&self) -> (usize, bool) {
+        (self.timeline.axes(), self.timeline.has_vibration())
+    }
+
+    /// As surfaces show it, the film being at `position`.
+    pub(super) fn status(&self, position: ShowTime) -> ShowStatus {
+        ShowStatus {
+            cue: self.id.clone(),
+            title: self.title.clone(),
+            sha256: self.sha256.clone(),
+            length_s: self.timeline.duration().as_secs_f64(),
+            position_s: position.as_secs_f64(),
+            join_s: self.join_s,
+            axes: self.timeline.axes(),
+            effects: self.timeline.effect_names().to_vec(),
+        }
+    }
+}
+
+impl Keeper {
+    /// Reads a cue of the library and proves it; whoever asked for it is answered then.
+    pub(super) fn load(&mut self, id: &str, asked: Asked) {
+        if let Err(problem) = self.may_load().and_then(|()| self.is_free()) {
+            return self.answer(asked, Err(problem));
+        }
+        let id: CueId = match id.parse() {
+            Ok(id) => id,
+            Err(error) => {
+                let problem =
+                    Problem::new(Code::Value, format!("{id:?}: {error}"), "GET /api/v1/cues lists them");
+                return self.answer(asked, Err(problem));
+            }
+        };
+        self.fetch(id, Some(asked));
+    }
+
+    /// Has a cue read and proved.
+    pub(super) fn fetch(&mut self, id: CueId, asked: Option<Asked>) {
+        let (library, config) = (self.library.clone(), self.reins.config.clone());
+        self.send("loading", asked, move || Done::Cued(read(&library, &config, &id)));
+    }
+
+    /// Whether another cue may be loaded.
+    pub(super) fn may_load(&self) -> Result<(), Problem> {
+        let remedy = match self.known.state {
+            State::Armed => "disarm first",
+            state if state.may_send_motion() => "park first",
+            _ => return Ok(()),
+        };
+        Err(Problem::new(Code::State, format!("cannot load while {}", self.known.state), remedy))
+    }
+
+    /// Takes up a cue that was proved.
+    pub(super) fn take_up(&mut self, cued: Cued) -> Result<(), Problem> {
+        self.may_load()?;
+        self.cued = Some(cued);
+        self.stage().inspect_err(|_| self.cued = None)
+    }
+
+    /// Makes the show that the tick thread plays next, as everything is set now, and hands it over.
+    pub(super) fn stage(&mut self) -> Result<(), Problem> {
+        let Some(cued) = &mut self.cued else { return Ok(()) };
+        let mixes = self.board.mixes(cued.timeline.effect_names());
+        let config = &self.reins.config;
+        let show = Show {
+            rate: Rate::from_hz(config.show.rate_hz),
+            timing: config.show.timing,
+            start: cued.start,
+            plays: 1,
+        };
+        let staged = Staged::mixed(config, &cued.timeline, cued.headroom.clone(), show, &mixes, false);
+        let staged = staged.map_err(|error| {
+            Problem::new(Code::Check, error.to_string(), "begin elsewhere in the cue, or lower its level")
+        })?;
+        let course = &staged.course;
+        cued.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
+        self.board.set(&self.reins.desk, cued.timeline.effect_names());
+        self.command(Command::Load(staged.loaded()))
+    }
+
+    /// Makes the show anew after something was set that its first frames hang on; while the seats move the desk is enough.
+    pub(super) fn reset(&mut self) -> Result<(), Problem> {
+        let effects = self.cued.as_ref().map_or(&[][..], |cued| cued.timeline.effect_names());
+        self.board.set(&self.reins.desk, effects);
+        if self.known.state.may_send_motion() { Ok(()) } else { self.stage() }
+    }
+
+    /// The show is over: the same begins at its beginning the next time.
+    pub(super) fn rewind(&mut self) {
+        if let Some(cued) = &mut self.cued {
+            cued.start = ShowTime::ZERO;
+        }
+        if let Err(problem) = self.stage() {
+            self.note(problem.to_string());
+            self.cued = None;
+        }
+    }
+}
+
+pub(super) fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<Cued>, Problem> {
+    let (timeline, sha256) = library.read(id)?;
+    Cued::prove(id.to_string(), config, timeline, sha256).map(Box::new)
+}

@@ -1,0 +1,210 @@
+//! The test of empty seats: each axis in turn moves slowly there and back, then each effect is on for a second. It is a cue
+//! like any other, made here, proved and joined like any other.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::Keeper;
+use super::errand::Done;
+use super::show::Cued;
+use crate::config::Config;
+use crate::cue::{self, Source};
+use crate::hall::{Asked, Code, Problem, Surface, TestRow, TestStatus};
+use crate::motion::MAX_AXES;
+use crate::rt::{Command, Row};
+use crate::state::{Request, State};
+use crate::time::ShowTime;
+use crate::timeline::Timeline;
+
+/// How far an axis moves from park, of its stroke.
+const REACH: f64 = 0.2;
+/// How long one axis takes, there, a rest, and back, ms.
+const AXIS_MS: u32 = 6_000;
+/// How long an effect is given, half of it on, ms.
+const EFFECT_MS: u32 = 2_000;
+/// What comes before the first, ms.
+const LEAD_MS: u32 = 1_000;
+
+/// A test that is under way, or was.
+#[derive(Debug)]
+pub(super) struct Sweep {
+    parts: Vec<Part>,
+    /// The part that is under way, with what was counted when it began.
+    now: Option<(usize, Vec<Row>)>,
+    /// The rows under test; none for all.
+    only: Option<BTreeSet<String>>,
+    pub(super) status: TestStatus,
+    /// The cue that was loaded before.
+    before: Option<Box<Cued>>,
+}
+
+/// One thing that is tested.
+#[derive(Debug, Clone, PartialEq)]
+struct Part {
+    name: String,
+    from: ShowTime,
+    to: ShowTime,
+    /// The axis, from 0; none for an effect.
+    axis: Option<usize>,
+}
+
+/// The parts of a test of a hall, and its cue as CSV.
+fn script(config: &Config) -> (Vec<Part>, String) {
+    let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
+    let effects: Vec<&str> = config.effects.iter().map(|effect| effect.name.as_str()).collect();
+    let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
+    let columns = (1..=axes).map(|axis| format!("a{axis}")).chain(effects.iter().map(|name| format!("fx_{name}")));
+    let mut text =
+        format!("# title: test of empty seats\n# interpolation: monotone\ntime_ms,{}\n", columns.collect::<Vec<_>>().join(","));
+    let mut row = |at_ms: u32, moved: Option<usize>, on: Option<usize>| {
+        let _ = write!(text, "{at_ms}");
+        for (axis, park) in park.iter().enumerate() {
+            let away = if *park + REACH <= 1.0 { *park + REACH } else { *park - REACH };
+            let _ = write!(text, ",{}", if moved == Some(axis) { away } else { *park });
+        }
+        for effect in 0..effects.len() {
+            let _ = write!(text, ",{}", u8::from(on == Some(effect)));
+        }
+        text.push('\n');
+    };
+    let (mut parts, mut at) = (Vec::new(), LEAD_MS);
+    row(0, None, None);
+    let time = |ms: u32| ShowTime::from_millis(i64::from(ms));
+    for axis in 0..axes {
+        row(at, None, None);
+        row(at + AXIS_MS * 5 / 12, Some(axis), None);
+        row(at + AXIS_MS * 7 / 12, Some(axis), None);
+        parts.push(Part { name: format!("a{}", axis + 1), from: time(at), to: time(at + AXIS_MS), axis: Some(axis) });
+        at += AXIS_MS;
+    }
+    for (effect, name) in effects.iter().enumerate() {
+        row(at, None, Some(effect));
+        row(at + EFFECT_MS / 2, None, None);
+        parts.push(Part { name: (*name).to_owned(), from: time(at), to: time(at + EFFECT_MS), axis: None });
+        at += EFFECT_MS;
+    }
+    row(at + LEAD_MS, None, None);
+    (parts, text)
+}
+
+/// Where an axis of the cue rests: that of the first seat that takes it.
+fn park_of(config: &Config, axis: usize) -> f64 {
+    let taker = config.controllers.iter().find(|one| one.takes(axis));
+    taker.and_then(|one| one.seat.park.get(axis - one.axis_offset).copied()).unwrap_or(0.0)
+}
+
+impl Keeper {
+    /// Tests the seats of some rows, or all. The hall has to be armed: whoever armed it has seen that nobody sits there.
+    pub(super) fn test(&mut self, rows: &[String], asked: Asked) {
+        let known = |row: &String| self.board.levels.rows.contains_key(row);
+        let unknown: Vec<&String> = rows.iter().filter(|row| !known(row)).collect();
+        let problem = if self.known.state != State::Armed {
+            let detail = format!("cannot test while {}", self.known.state);
+            Some(Problem::new(Code::State, detail, "load any cue and arm, with nobody on the seats, then test"))
+        } else if let Some(row) = unknown.first() {
+            Some(Problem::new(Code::Unknown, format!("there is no row {row}"), "the status names the rows"))
+        } else {
+            self.is_free().err()
+        };
+        if let Some(problem) = problem {
+            return self.answer(asked, Err(problem));
+        }
+        let only = (!rows.is_empty()).then(|| rows.iter().cloned().collect());
+        let config = self.reins.config.clone();
+        self.send("test", Some(asked), move || {
+            let (parts, text) = script(&config);
+            let cue = cue::read(Path::new("test"), text.as_bytes(), &Source::Native);
+            let cued = cue.map_err(|faults| {
+                Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
+                    .with(faults.to_string().lines().map(str::to_owned).collect())
+            });
+            let cued = cued.and_then(|cue| {
+                Cued::prove("test".to_owned(), &config, Timeline::new(cue), String::new())
+            });
+            let status = TestStatus {
+                running: true,
+                step: "begins".to_owned(),
+                done: 0,
+                total: parts.len(),
+                rows: Vec::new(),
+            };
+            let sweep = Sweep { parts, now: None, only, status, before: None };
+            Done::Swept(cued.map(|cued| (Box::new(sweep), Box::new(cued))))
+        });
+    }
+
+    /// Takes up a test that was made, and lets it go.
+    pub(super) fn take_up_sweep(&mut self, mut sweep: Sweep, cued: Cued) -> Result<(), Problem> {
+        self.board.only = sweep.only.take();
+        sweep.before = self.cued.replace(cued).map(Box::new);
+        self.sweep = Some(sweep);
+        let begun = self.stage().and_then(|()| {
+            self.begin_record("a test of the seats", Surface::Socket);
+            self.command(Command::Request(Request::Go))
+        });
+        begun.inspect_err(|_| {
+            self.end_sweep("did not begin");
+        })
+    }
+
+    /// Follows a test that is under way.
+    pub(super) fn follow_sweep(&mut self) {
+        let (live, config) = (&self.reins.live, &self.reins.config);
+        let Some(sweep) = self.sweep.as_mut().filter(|sweep| sweep.status.running) else { return };
+        let film = live.show();
+        let table = live.table();
+        let part = sweep.parts.iter().position(|part| (part.from..part.to).contains(&film));
+        if sweep.now.as_ref().map(|(part, _)| *part) == part {
+            return;
+        }
+        if let Some((done, before)) = sweep.now.take() {
+            let part = &sweep.parts[done];
+            let board = &self.board;
+            let tested = config.controllers.iter().enumerate().filter(|(lane, one)| {
+                board.is_on(*lane) && part.axis.is_none_or(|axis| one.takes(axis))
+            });
+            for (lane, controller) in tested {
+                let (Some(now), Some(then)) = (table.get(lane), before.get(lane)) else { continue };
+                let row = row_of(&controller.name, &part.name, then, now);
+                let TestRow { asked, acked, .. } = row;
+                let p99 = row.p99_us.map_or_else(|| "-".to_owned(), |us| format!("{us} µs"));
+                let line = format!("{} {}: {acked} of {asked} acked, p99 {p99}", controller.name, part.name);
+                self.record.event(line);
+                sweep.status.rows.push(row);
+            }
+            sweep.status.done = done + 1;
+        }
+        if let Some(part) = part {
+            sweep.status.step.clone_from(&sweep.parts[part].name);
+            sweep.now = Some((part, table));
+        }
+    }
+
+    /// The test is over; says whether there was one. The cue that was loaded before is back.
+    pub(super) fn end_sweep(&mut self, how: &str) -> bool {
+        let Some(sweep) = self.sweep.as_mut().filter(|sweep| sweep.status.running) else { return false };
+        sweep.status.running = false;
+        sweep.status.step = how.to_owned();
+        self.board.only = None;
+        self.cued = sweep.before.take().map(|cued| *cued);
+        true
+    }
+}
+
+fn row_of(controller: &str, part: &str, then: &Row, now: &Row) -> TestRow {
+    let asked = now.counts.asked - then.counts.asked;
+    let acked = now.counts.acked - then.counts.acked;
+    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+    let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
+    TestRow {
+        controller: controller.to_owned(),
+        part: part.to_owned(),
+        asked,
+        acked,
+        p50_us: now.ack_ns.map(|ack| us(ack.p50)),
+        p99_us: now.ack_ns.map(|ack| us(ack.p99)),
+        // What was asked in the last moment may still be on its way.
+        passed: asked > 0 && acked + now.counts.in_flight() >= asked && now.standing.may_move(),
+    }
+}

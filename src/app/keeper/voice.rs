@@ -1,0 +1,98 @@
+//! What the keeper says unasked: to the service manager, and to the log.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use super::Keeper;
+use crate::hall::{Severity, Status, Warning};
+use crate::log::{Line, Log, Priority};
+use crate::sd::Notifier;
+use crate::state::State;
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+
+/// How long controllers have to answer before the hall is ready without them.
+const ROUND: Duration = Duration::from_secs(2);
+
+/// Who is told, and what was told before.
+#[derive(Debug)]
+pub struct Voice {
+    notifier: Notifier,
+    log: Log,
+    ready: bool,
+    stopping: bool,
+    /// Warnings that are in effect, by what and whom they are about.
+    warned: BTreeMap<(String, Option<String>), Severity>,
+}
+
+impl Voice {
+    /// One that speaks to the service manager and to a log.
+    #[must_use]
+    pub fn new(log: Log) -> Self {
+        Self { notifier: Notifier::default(), log, ready: false, stopping: false, warned: BTreeMap::new() }
+    }
+
+    fn warn(&mut self, warnings: &[Warning]) {
+        let key = |warning: &Warning| (warning.id.clone(), warning.controller.clone());
+        let now: BTreeMap<_, _> = warnings.iter().map(|warning| (key(warning), warning.severity)).collect();
+        for warning in warnings.iter().filter(|warning| warning.severity > Severity::Info) {
+            if self.warned.get(&key(warning)) == Some(&warning.severity) {
+                continue;
+            }
+            let priority = match warning.severity {
+                Severity::Error => Priority::Error,
+                _ => Priority::Warning,
+            };
+            let Warning { id, controller, text, remedy, .. } = warning;
+            let who = controller.as_ref().map(|name| format!("{name}: ")).unwrap_or_default();
+            let line = Line::new(priority, id.clone(), format!("{who}{text}; {remedy}"));
+            self.log.say(match controller {
+                Some(name) => line.with("controller", name.clone()),
+                None => line,
+            });
+        }
+        self.warned = now;
+    }
+}
+
+impl Keeper {
+    /// Tells the service manager and the log what is new.
+    pub(super) fn speak(&mut self, status: &Status) {
+        let now = Monotonic.now();
+        let line = format!("{}: {}; next: {}", status.state, status.cause, status.next);
+        let voice = &mut self.ends.voice;
+        voice.warn(&status.warnings);
+        let heard = status.controllers.iter().all(|one| one.heard_s.is_some() || !one.enabled);
+        let told = if !voice.ready && (heard || now.since(self.began) >= ROUND) {
+            voice.ready = true;
+            voice.notifier.ready(&line, now)
+        } else if !voice.stopping && self.reload.is_none() && self.ends.signals.is_leaving() {
+            voice.stopping = true;
+            voice.notifier.stopping(&line, now)
+        } else {
+            voice.notifier.status(&line, now);
+            Ok(())
+        };
+        if let Err(error) = told {
+            let text = format!("the service manager cannot be told: {error}");
+            voice.log.say(Line::new(Priority::Warning, "notify", text));
+        }
+    }
+
+    /// Says that the hall is in another state.
+    pub(super) fn say_state(&self, state: State, cause: &str) {
+        let priority = match state {
+            State::Fault => Priority::Error,
+            State::Stopped | State::Recovering => Priority::Warning,
+            _ => Priority::Notice,
+        };
+        let line = Line::new(priority, format!("state-{state}"), format!("{state}: {cause}"));
+        self.ends.voice.log.say(line.with("state", state.word()));
+    }
+
+    /// Says what somebody asked, and what came of it.
+    pub(super) fn say_ask(&self, who: &str, what: &str, result: &str, word: &str) {
+        let text = format!("{who}: {what}: {result}");
+        self.ends.voice.log.say(Line::new(Priority::Notice, format!("ask-{word}"), text).with("operator", who));
+    }
+}

@@ -1,0 +1,93 @@
+//! What a person should know, with what to do.
+
+use super::Keeper;
+use crate::hall::{Severity, Warning};
+use crate::health::Standing;
+use crate::rt::Row;
+
+/// How a group stands, in one word.
+pub(super) const fn word(standing: Standing) -> &'static str {
+    match standing {
+        Standing::Ok => "ok",
+        Standing::Degraded => "degraded",
+        Standing::Lost => "lost",
+        Standing::Rejoining => "rejoining",
+        Standing::Stopped => "stopped",
+        Standing::Error => "error",
+        Standing::Excluded => "excluded",
+        Standing::Unwatched => "unwatched",
+    }
+}
+
+impl Keeper {
+    /// All of them, gravest first.
+    pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
+        let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
+        warnings.extend(self.of_the_machine());
+        warnings.extend(self.of_preflight());
+        warnings.extend(self.record.trouble().map(|trouble| Warning {
+            id: "journal".to_owned(),
+            severity: Severity::Warning,
+            controller: None,
+            text: trouble,
+            remedy: String::new(),
+        }));
+        warnings.extend(self.notes.iter().rev().map(|note| Warning {
+            id: "note".to_owned(),
+            severity: Severity::Warning,
+            controller: None,
+            text: note.clone(),
+            remedy: String::new(),
+        }));
+        warnings.sort_by_key(|warning| std::cmp::Reverse(warning.severity));
+        warnings
+    }
+
+    fn of_controllers(&self, table: &[Row]) -> impl Iterator<Item = Warning> {
+        let controllers = self.reins.config.controllers.iter().zip(table).enumerate();
+        let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
+            let severity = match row.standing {
+                Standing::Ok | Standing::Rejoining => return None,
+                Standing::Degraded | Standing::Unwatched => Severity::Warning,
+                _ if !self.board.is_on(lane) => Severity::Info,
+                _ => Severity::Error,
+            };
+            Some(Warning {
+                id: format!("controller-{}", word(row.standing)),
+                severity,
+                controller: Some(controller.name.clone()),
+                text: format!("{}: {}", row.standing, row.why),
+                remedy: row.standing.next().to_owned(),
+            })
+        };
+        controllers.filter_map(of).collect::<Vec<_>>().into_iter()
+    }
+
+    fn of_the_machine(&self) -> impl Iterator<Item = Warning> {
+        self.reins.granted.refusals.iter().map(|refusal| {
+            let (text, remedy) = refusal.split_once("; ").unwrap_or((refusal, ""));
+            Warning {
+                id: "not-real-time".to_owned(),
+                severity: Severity::Warning,
+                controller: None,
+                text: text.to_owned(),
+                remedy: remedy.to_owned(),
+            }
+        })
+    }
+
+    fn of_preflight(&self) -> Option<Warning> {
+        let (text, severity) = match &self.preflighted {
+            None => ("preflight was not run since the program started", Severity::Info),
+            Some(it) if !it.has_passed(|lane| self.board.is_on(lane)) => ("preflight failed", Severity::Error),
+            Some(_) => return None,
+        };
+        Some(Warning {
+            id: "preflight".to_owned(),
+            severity,
+            controller: None,
+            text: text.to_owned(),
+            remedy: "run preflight".to_owned(),
+        })
+    }
+}

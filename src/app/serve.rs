@@ -1,0 +1,175 @@
+//! The daemon: a hall that is opened, kept and closed, as often as its configuration is read anew, and the surfaces that
+//! outlive it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::thread::Builder;
+
+use jiff::Zoned;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag;
+
+use super::house::{House, HouseError, Numbers, Reins};
+use super::keeper::{Ends, Keeper, Left, Memory, Signals, Voice};
+use super::surfaces::{Sockets, SurfaceError, Surfaces};
+use crate::config::Config;
+use crate::engine::Rate;
+use crate::api::Pages;
+use crate::hall::{Status, handle};
+use crate::journal::{Journal, Limits};
+use crate::library::{self, Library, LibraryError};
+use crate::log::Log;
+use crate::sd::{self, Feeder};
+use crate::sys::realtime;
+
+/// Where the daemon has its files.
+#[derive(Debug, Clone)]
+pub struct Places {
+    /// The configuration.
+    pub config: PathBuf,
+    /// The folder of what it keeps from one start to the next.
+    pub state: PathBuf,
+    /// The sockets of this machine.
+    pub sockets: Sockets,
+}
+
+/// Why the daemon does not run. Nothing has moved then.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// The hall cannot be opened.
+    #[error(transparent)]
+    House(#[from] HouseError),
+    /// A surface does not open.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// The library cannot be opened.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// A file of its own cannot be written or removed.
+    #[error("{}: {cause}; give the service a folder it may write to (StateDirectory= in the unit, or --state)", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        #[source]
+        cause: io::Error,
+    },
+    /// The system gives no signals, or no thread.
+    #[error("the system refused: {0}")]
+    System(#[source] io::Error),
+}
+
+/// The mark that a start leaves and an orderly end takes away.
+#[derive(Debug)]
+struct Mark(PathBuf);
+
+impl Mark {
+    /// Leaves it; says whether it was there.
+    fn leave(folder: &Path) -> Result<(Self, bool), ServeError> {
+        let path = folder.join("running");
+        let file = |cause| ServeError::File { path: path.clone(), cause };
+        fs::create_dir_all(folder).map_err(file)?;
+        let crashed = path.try_exists().map_err(file)?;
+        fs::write(&path, b"kinocue runs, or has crashed\n").map_err(file)?;
+        Ok((Self(path), crashed))
+    }
+
+    fn take_away(&self) -> Result<(), ServeError> {
+        fs::remove_file(&self.0).map_err(|cause| ServeError::File { path: self.0.clone(), cause })
+    }
+}
+
+/// Runs the daemon until it is told to end. `tell` writes a line for people where there is no journal; `pages` is the console.
+///
+/// # Errors
+/// [`ServeError`]; nothing has moved then, or all of it is parked or at rest.
+///
+/// # Panics
+/// Where one of its threads panicked.
+pub fn serve(
+    config: Config,
+    places: &Places,
+    pages: Pages,
+    tell: impl FnMut(&str) + Send + 'static,
+) -> Result<(), ServeError> {
+    let mut config = Arc::new(config);
+    let signals = signals().map_err(ServeError::System)?;
+    let (mark, crashed) = Mark::leave(&places.state)?;
+    let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
+    let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new())?;
+    let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
+    let log = Log::start(tell).map_err(ServeError::System)?;
+    let voice = Voice::new(log.clone());
+    let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice, memory: Memory::default() };
+    let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
+    let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
+    let mut feeder = None;
+    loop {
+        let left = keep(house, ends, library.clone(), journal, &mut feeder)?;
+        let Some(next) = left.reload else { break };
+        // The seats are parked or at rest, so nothing tells of a crash.
+        config = next;
+        house = House::open(Arc::clone(&config), false, &left.closed.numbers)?;
+        (ends, journal) = (left.ends, left.journal);
+    }
+    surfaces.close();
+    log.close();
+    mark.take_away()
+}
+
+/// Runs one hall on this thread, with a keeper beside it.
+fn keep(
+    house: House,
+    ends: Ends,
+    library: Library,
+    journal: Journal,
+    feeder: &mut Option<Feeder>,
+) -> Result<Left, ServeError> {
+    let (tell, closed) = channel();
+    let mut keeper = None;
+    let mut failed = None;
+    let run = house.run(|reins, line| {
+        let leave = Arc::clone(&reins.leave);
+        // The one before it has fed until now, so that nobody takes the time between two halls for a hang.
+        *feeder = feed_watchdog(&reins);
+        let kept = Keeper::new(ends, reins, line, library, journal);
+        let thread = Builder::new().name("keeper".to_owned()).spawn(move || {
+            let _ = realtime::normal_priority();
+            kept.run(&closed)
+        });
+        match thread {
+            Ok(thread) => keeper = Some(thread),
+            Err(cause) => {
+                failed = Some(cause);
+                leave.store(true, std::sync::atomic::Ordering::Release);
+            }
+        }
+    })?;
+    if let Some(cause) = failed {
+        return Err(ServeError::System(cause));
+    }
+    drop(tell.send(Box::new(run)));
+    let keeper = keeper.expect("it was started before the first tick");
+    Ok(keeper.join().expect("the keeper does not panic"))
+}
+
+/// Feeds the watchdog of the service manager, where it has one, while the tick thread of this hall ticks.
+fn feed_watchdog(reins: &Reins) -> Option<Feeder> {
+    let live = Arc::clone(&reins.live);
+    let period = Rate::from_hz(reins.config.show.rate_hz).period();
+    // Where there is no thread for it, the service manager starts the program anew.
+    sd::watchdog().and_then(|interval| Feeder::start(interval, period, move || live.pulse()).ok())
+}
+
+fn signals() -> io::Result<Signals> {
+    let signals = Signals::default();
+    for signal in [SIGTERM, SIGINT] {
+        flag::register(signal, Arc::clone(&signals.leave))?;
+    }
+    flag::register(SIGHUP, Arc::clone(&signals.reload))?;
+    Ok(signals)
+}

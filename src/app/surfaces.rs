@@ -1,0 +1,149 @@
+//! The surfaces of the daemon: the HTTP API with the console, the stop socket, OSC and the text port. They outlive the hall
+//! that is kept behind them.
+
+use std::io;
+use std::path::PathBuf;
+use std::thread::{Builder, JoinHandle};
+
+use tokio::runtime;
+use tokio::sync::watch;
+
+use crate::api::{self, ApiError, Pages, StopSocket, stop_socket};
+use crate::config::Config;
+use crate::hall::Handle;
+use crate::library::Library;
+use crate::log::{Line, Log, Priority};
+use crate::osc::{self, Osc, OscError};
+use crate::playlist::Shelf;
+use crate::text_port::{self, Text, TextError};
+
+/// Where the sockets of this machine are.
+#[derive(Debug, Clone)]
+pub struct Sockets {
+    /// The control socket.
+    pub control: PathBuf,
+    /// The one that takes a stop alone.
+    pub stop: PathBuf,
+}
+
+/// Why a surface does not open.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// The API, or the stop socket.
+    #[error(transparent)]
+    Api(#[from] ApiError),
+    /// The port for OSC.
+    #[error(transparent)]
+    Osc(#[from] OscError),
+    /// The port for text.
+    #[error(transparent)]
+    Text(#[from] TextError),
+    /// There is no thread, or no timer.
+    #[error("the system refused what the ports for OSC and text need")]
+    System(#[source] io::Error),
+}
+
+/// All surfaces, open until this is dropped.
+#[derive(Debug)]
+pub struct Surfaces {
+    // The stop goes last.
+    ports: Option<Ports>,
+    api: api::Running,
+    stop: StopSocket,
+}
+
+/// The ports for show control, on a thread of their own.
+#[derive(Debug)]
+struct Ports {
+    closing: watch::Sender<bool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Surfaces {
+    /// Opens them; the stop first.
+    ///
+    /// # Errors
+    /// Why one of them does not open.
+    pub fn open(
+        config: &Config,
+        sockets: &Sockets,
+        handle: &Handle,
+        library: Library,
+        pages: Pages,
+        log: &Log,
+    ) -> Result<Self, SurfaceError> {
+        let stop = stop_socket(&sockets.stop, handle.clone())?;
+        let api = api::start(api::Setup {
+            config: config.api.clone(),
+            socket: sockets.control.clone(),
+            handle: handle.clone(),
+            library,
+            playlists: Shelf::new(&config.playlists()),
+            journal: config.log.dir.clone(),
+            pages,
+        })?;
+        for address in api.addresses() {
+            log.say(Line::new(Priority::Info, "listening", format!("the API and the console: http://{address}/")));
+        }
+        let osc = config.osc.as_ref().map(|osc| osc::open(osc, handle.clone())).transpose()?;
+        let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
+        let ports = if osc.is_some() || text.is_some() { Some(Ports::start(osc, text, log.clone())?) } else { None };
+        Ok(Self { ports, api, stop })
+    }
+
+    /// Where the API listens over TCP.
+    #[must_use]
+    pub fn addresses(&self) -> &[std::net::SocketAddr] {
+        self.api.addresses()
+    }
+
+    /// Closes them in turn, the stop last.
+    pub fn close(self) {
+        let Self { ports, api, stop } = self;
+        drop(ports);
+        drop(api);
+        drop(stop);
+    }
+}
+
+impl Ports {
+    fn start(osc: Option<Osc>, text: Option<Text>, log: Log) -> Result<Self, SurfaceError> {
+        let (closing, mut closed) = watch::channel(false);
+        let runtime =
+            runtime::Builder::new_current_thread().enable_all().build().map_err(SurfaceError::System)?;
+        let run = move || {
+            runtime.block_on(async move {
+                let fail = |what: &str, error: io::Error| {
+                    let text = format!("the port for {what} has failed: {error}; start the service anew");
+                    log.say(Line::new(Priority::Error, "port", text));
+                };
+                let osc = async {
+                    if let Some(Err(error)) = match osc { Some(osc) => Some(osc.serve().await), None => None } {
+                        fail("OSC", error);
+                    }
+                };
+                let text = async {
+                    if let Some(Err(error)) = match text { Some(text) => Some(text.serve().await), None => None } {
+                        fail("text", error);
+                    }
+                };
+                tokio::select! {
+                    _ = closed.wait_for(|closing| *closing) => {}
+                    () = async { tokio::join!(osc, text); std::future::pending::<()>().await } => {}
+                }
+            });
+        };
+        let thread = Builder::new().name("ports".to_owned()).spawn(run).map_err(SurfaceError::System)?;
+        Ok(Self { closing, thread: Some(thread) })
+    }
+}
+
+impl Drop for Ports {
+    fn drop(&mut self) {
+        self.closing.send_replace(true);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // a panic in it has been told
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! The daemon's library: what it holds, and a file into it.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::pin::Pin;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use anyhow::{Context as _, anyhow};
+use hyper::Method;
+use hyper::body::{Body, Bytes, Frame, SizeHint};
+use serde::Deserialize;
+
+use super::server::{ServerArgs, in_path};
+use super::table::table;
+use super::{http, reply, view};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+
+/// How long an upload and its proof may take.
+const PATIENCE: Duration = Duration::from_secs(600);
+/// Octets that are read of the file at a time.
+const PIECE: usize = 64 << 10;
+
+/// The commands of the library.
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Command {
+    /// Lists the cues of the daemon's library.
+    #[command(after_help = "Examples:\n  kinocue cues\n  kinocue cues --json")]
+    Cues(ServerArgs),
+    /// Puts a cue file into the daemon's library, which checks it and proves its limits; a bad one is not taken.
+    #[command(after_help = "\
+Examples:
+  kinocue upload coaster.csv
+  kinocue upload \"New Ride v3.mcap\" --id new-ride
+
+Exit codes: 0 taken, 1 it does not pass (every fault is said), 66 no such file, 77 not allowed")]
+    Upload(UploadArgs),
+}
+
+/// A file for the library.
+#[derive(Debug, clap::Args)]
+pub(super) struct UploadArgs {
+    /// The cue file.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// What it is to be called, of a to z, 0 to 9, _ and - [default: the name of the file].
+    #[arg(long, value_name = "ID")]
+    id: Option<String>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// One cue of the library.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Cue {
+    id: String,
+    title: Option<String>,
+    length_s: Option<f64>,
+    axes: Option<usize>,
+    effects: Vec<String>,
+    proved: Proved,
+}
+
+/// Whether it keeps the limits of the hall.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Proved {
+    state: String,
+}
+
+pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Cues(server) => list(server),
+        Command::Upload(args) => upload(args),
+    }
+}
+
+fn list(server: &ServerArgs) -> Result<Exit, Failure> {
+    let reply = server.get("/api/v1/cues")?;
+    server.show(&reply)?;
+    reply::done(&reply)?;
+    if !server.json {
+        let cues: Vec<Cue> = serde_json::from_str(&reply.text).context("the reply is no list").or_exit(Exit::Internal)?;
+        let header = ["cue", "title", "length", "axes", "effects", "proved"];
+        print::out(&table(header, cues.iter().map(Cue::row)))?;
+    }
+    Ok(Exit::Done)
+}
+
+impl Cue {
+    fn row(&self) -> [String; 6] {
+        let or = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+        [
+            self.id.clone(),
+            self.title.clone().unwrap_or_default(),
+            or(self.length_s.map(view::time)),
+            or(self.axes.map(|axes| axes.to_string())),
+            self.effects.join(" "),
+            self.proved.state.clone(),
+        ]
+    }
+}
+
+fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
+    let UploadArgs { file, id, server } = args;
+    let id = id.clone().map_or_else(|| id_of(file), Ok)?;
+    let body = FileBody::open(file).map_err(|error| {
+        let missing = matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::IsADirectory);
+        let exit = if missing { Exit::NoInput } else { Exit::Io };
+        Failure { exit, error: anyhow::Error::new(error).context(file.display().to_string()) }
+    })?;
+    let is_mcap = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
+    let media = if is_mcap { "application/vnd.mcap" } else { "text/csv" };
+    let request = http::request(Method::PUT, &format!("/api/v1/cues/{}", in_path(&id)), Some(media), body)?;
+    let reply = http::block_on(http::exchange(&server.socket(), request, PATIENCE))?;
+    server.show(&reply)?;
+    reply::done(&reply)?;
+    print::tell(&format!("kinocue: {id} is in the library; next: kinocue load {id}"));
+    Ok(Exit::Done)
+}
+
+/// The name of the file without its ending, where that can be an id.
+fn id_of(file: &Path) -> Result<String, Failure> {
+    let fits = |octet: u8| octet.is_ascii_lowercase() || octet.is_ascii_digit() || b"_-".contains(&octet);
+    let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    if (1..=64).contains(&stem.len()) && stem.bytes().all(fits) {
+        return Ok(stem.to_owned());
+    }
+    let why = "cannot be an id, which is 1 to 64 of a to z, 0 to 9, _ and -; name one with --id";
+    Err(anyhow!("{stem:?} {why}")).or_exit(Exit::Usage)
+}
+
+/// A file as the body of a request, read piece by piece.
+#[derive(Debug)]
+struct FileBody {
+    file: File,
+    left: u64,
+}
+
+impl FileBody {
+    fn open(path: &Path) -> io::Result<Self> {
+        let file = File::open(path)?;
+        let about = file.metadata()?;
+        if about.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        Ok(Self { file, left: about.len() })
+    }
+}
+
+impl Body for FileBody {
+    type Data = Bytes;
+    type Error = io::Error;
+
+    /// Waits for the disk, which holds up nothing: there is nothing else to do.
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Self::Data>, Self::Error>>> {
+        if self.left == 0 {
+            return Poll::Ready(None);
+        }
+        let most = usize::try_from(self.left).map_or(PIECE, |left| left.min(PIECE));
+        let mut piece = vec![0; most];
+        Poll::Ready(Some(match self.file.read(&mut piece) {
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()), // it has become shorter
+            Ok(len) => {
+                piece.truncate(len);
+                self.left -= len as u64;
+                Ok(Frame::data(Bytes::from(piece)))
+            }
+            Err(error) => Err(error),
+        }))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.left == 0
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        SizeHint::with_exact(self.left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_called_as_it_is_named_unless_that_is_no_id() {
+        assert_eq!(id_of(Path::new("/tmp/new-ride_2.mcap")).unwrap(), "new-ride_2");
+        for bad in ["New Ride.csv", "..", "", "/", "é.csv"] {
+            assert!(id_of(Path::new(bad)).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! How much of the cue the seats make: trim, levels, effects, presets, seats in and out.
+
+use std::collections::BTreeMap;
+
+use anyhow::anyhow;
+use serde_json::json;
+
+use super::rows::parse_rows;
+use super::server::{ServerArgs, in_path};
+use super::view::Status;
+use crate::cli::times::{parse_level, parse_trim};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::hall::LevelsChange;
+
+/// The commands that set what lasts.
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Command {
+    /// Moves the motion against the film: later by so many milliseconds, earlier where it is negative.
+    #[command(after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0")]
+    Trim(TrimArgs),
+    /// Sets how much of the motion and the vibration the seats make.
+    #[command(after_help = "\
+Examples:
+  kinocue level 60%                     motion and vibration
+  kinocue level motion 60%
+  kinocue level vibration 40%
+  kinocue level 50% --row A             motion and vibration of row A, on top of the hall's
+  kinocue level -6dB --row A-C
+
+A row has one level for its motion and its vibration together.")]
+    Level(LevelArgs),
+    /// Lets effects be on, or keeps them off: those that are named, or all.
+    #[command(after_help = "\
+Examples:
+  kinocue effects off water
+  kinocue effects on water air
+  kinocue effects off")]
+    Effects(EffectsArgs),
+    /// Sets levels and effects as a preset of the configuration says.
+    #[command(after_help = "Example:\n  kinocue preset kids")]
+    Preset(NameArgs),
+    /// Takes a controller in, with all that shares its seat; the seat joins by a move within its limits.
+    #[command(after_help = "Example:\n  kinocue enable F4")]
+    Enable(NameArgs),
+    /// Takes a controller out, with all that shares its seat; the seat parks, the others play on.
+    #[command(after_help = "Example:\n  kinocue disable F4")]
+    Disable(NameArgs),
+}
+
+/// A trim.
+#[derive(Debug, clap::Args)]
+pub(super) struct TrimArgs {
+    /// -500ms to 500ms.
+    #[arg(value_name = "TRIM", value_parser = parse_trim, allow_hyphen_values = true)]
+    trim: i32,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// A level, of what and whose.
+#[derive(Debug, clap::Args)]
+pub(super) struct LevelArgs {
+    /// `motion` or `vibration`, where it is not for both.
+    #[arg(value_name = "WHAT", allow_hyphen_values = true)]
+    first: String,
+    /// 0% to 100%, or 0dB and below.
+    #[arg(value_name = "LEVEL", allow_hyphen_values = true)]
+    second: Option<String>,
+    /// The rows that it is for, as A, A,C or A-C [default: the whole hall].
+    #[arg(long, value_name = "ROWS")]
+    row: Option<String>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// Effects.
+#[derive(Debug, clap::Args)]
+pub(super) struct EffectsArgs {
+    /// Whether they may be on.
+    #[arg(value_name = "on|off", value_parser = ["on", "off"])]
+    switch: String,
+    /// Their names [default: all].
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// Something by its name.
+#[derive(Debug, clap::Args)]
+pub(super) struct NameArgs {
+    /// Its name.
+    #[arg(value_name = "NAME")]
+    name: String,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Trim(TrimArgs { trim, server }) => {
+            let status = server.put("/api/v1/trim", &json!({ "offset_s": f64::from(*trim) / 1e3 }))?;
+            Ok(told(server, &status))
+        }
+        Command::Level(args) => {
+            let row = args.row.as_deref();
+            set(&args.server, &level(&args.first, args.second.as_deref(), row).map_err(anyhow::Error::msg).or_exit(Exit::Usage)?)
+        }
+        Command::Effects(args) => effects(args),
+        Command::Preset(NameArgs { name, server }) => {
+            let status = server.post(&format!("/api/v1/presets/{}", in_path(name)), &json!({}))?;
+            Ok(told(server, &status))
+        }
+        Command::Enable(NameArgs { name, server }) => {
+            server.act(&format!("/api/v1/controllers/{}/enable", in_path(name)), &json!({}))
+        }
+        Command::Disable(NameArgs { name, server }) => {
+            server.act(&format!("/api/v1/controllers/{}/disable", in_path(name)), &json!({}))
+        }
+    }
+}
+
+/// The change that the words of `kinocue level` mean.
+fn level(first: &str, second: Option<&str>, rows: Option<&str>) -> Result<LevelsChange, String> {
+    let none = LevelsChange::default();
+    match (first, second, rows) {
+        ("motion", Some(level), None) => Ok(LevelsChange { motion: Some(parse_level(level)?), ..none }),
+        ("vibration", Some(level), None) => Ok(LevelsChange { vibration: Some(parse_level(level)?), ..none }),
+        ("motion" | "vibration", Some(level), Some(rows)) => Err(format!(
+            "a row has one level for its motion and its vibration; write kinocue level {level} --row {rows}"
+        )),
+        ("motion" | "vibration", None, _) => Err(format!("how much {first}? write kinocue level {first} 60%")),
+        (level, None, None) => {
+            let level = Some(parse_level(level)?);
+            Ok(LevelsChange { motion: level, vibration: level, ..none })
+        }
+        (level, None, Some(rows)) => {
+            let level = parse_level(level)?;
+            let rows = parse_rows(rows)?.into_iter().map(|row| (row, level)).collect();
+            Ok(LevelsChange { rows, ..none })
+        }
+        (what, Some(_), _) => Err(format!("{what:?} has no level; there are motion and vibration")),
+    }
+}
+
+fn effects(args: &EffectsArgs) -> Result<Exit, Failure> {
+    let EffectsArgs { switch, names, server } = args;
+    let names = if names.is_empty() { server.status()?.levels.effects.into_keys().collect() } else { names.clone() };
+    if names.is_empty() {
+        return Err(anyhow!("the hall has no effects; name them in [effects] of its configuration"))
+            .or_exit(Exit::NoInput);
+    }
+    let effects: BTreeMap<String, bool> = names.into_iter().map(|name| (name, switch == "on")).collect();
+    set(server, &LevelsChange { effects, ..LevelsChange::default() })
+}
+
+fn set(server: &ServerArgs, change: &LevelsChange) -> Result<Exit, Failure> {
+    let change = serde_json::to_value(change).or_exit(Exit::Internal)?;
+    let status = server.put("/api/v1/levels", &change)?;
+    Ok(told(server, &status))
+}
+
+/// Says what the levels are by now, and the state as ever.
+fn told(server: &ServerArgs, status: &Status) -> Exit {
+    print::tell(&format!("kinocue: {}", status.mix()));
+    server.tell(status)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_is_for_both_for_one_or_for_rows() {
+        let none = LevelsChange::default;
+        let both = LevelsChange { motion: Some(0.6), vibration: Some(0.6), ..none() };
+        assert_eq!(level("60%", None, None), Ok(both));
+        assert_eq!(level("motion", Some("60%"), None), Ok(LevelsChange { motion: Some(0.6), ..none() }));
+        assert_eq!(level("vibration", Some("0%"), None), Ok(LevelsChange { vibration: Some(0.0), ..none() }));
+        let rows = [("A".to_owned(), 0.5), ("B".to_owned(), 0.5)].into();
+        assert_eq!(level("50%", None, Some("A-B")), Ok(LevelsChange { rows, ..none() }));
+    }
+
+    #[test]
+    fn a_row_has_no_level_of_motion_alone() {
+        let refused = level("motion", Some("60%"), Some("A")).unwrap_err();
+        assert!(refused.ends_with("write kinocue level 60% --row A"), "{refused}");
+        for (first, second) in [("motion", None), ("60", None), ("heave", Some("60%")), ("motion", Some("fast"))] {
+            assert!(level(first, second, None).is_err(), "{first} {second:?}");
+        }
+    }
+}

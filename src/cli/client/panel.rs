@@ -1,0 +1,119 @@
+//! The hall as a few lines of a terminal that are drawn over and over.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::view::{Controller, Show, Status, Warning, percent, time, us};
+
+/// Controllers and warnings that are shown one by one at the most.
+const FEW: usize = 6;
+/// How wide the film is drawn, columns.
+const FILM: usize = 40;
+
+/// The lines.
+pub(super) struct Panel {
+    bar: ProgressBar,
+    /// What was shown last.
+    last: String,
+}
+
+impl Panel {
+    /// Takes over the lower end of the terminal on standard output.
+    pub(super) fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stdout());
+        bar.set_style(ProgressStyle::with_template("{msg}").expect("the template is fixed"));
+        Self { bar, last: String::new() }
+    }
+
+    /// Shows the hall as it is.
+    pub(super) fn show(&mut self, status: &Status) {
+        self.last = text(status);
+        self.bar.set_message(self.last.clone());
+        self.bar.tick();
+    }
+
+    /// Says that what is shown is what was.
+    pub(super) fn gone(&mut self, why: &str) {
+        self.bar.set_message(format!("!! {why}\n\nas it was last:\n{}", self.last));
+        self.bar.tick();
+    }
+}
+
+/// What the panel says.
+fn text(status: &Status) -> String {
+    let hall = &status.hall;
+    let mut lines = vec![
+        format!("{}  {}", hall.state.to_uppercase(), hall.cause),
+        format!("next: {}", hall.next),
+        status.show.as_ref().map_or_else(|| "nothing is loaded".to_owned(), film),
+        status.mix(),
+    ];
+    if let Some(test) = status.test.as_ref().filter(|test| test.running) {
+        lines.push(format!("test: {} ({} of {})", test.step, test.done, test.total));
+    }
+    lines.push(format!(
+        "{} ticks, {} missed; lateness p99 {} µs; acks p99 {} µs",
+        status.ticks,
+        status.missed_ticks,
+        us(status.lateness.p99_us),
+        us(status.ack_latency.p99_us)
+    ));
+    lines.extend(controllers(&status.controllers));
+    lines.extend(few(status.warnings.iter().map(Warning::line).collect()));
+    lines.join("\n")
+}
+
+fn film(show: &Show) -> String {
+    let part = if show.length_s > 0.0 { (show.position_s / show.length_s).clamp(0.0, 1.0) } else { 0.0 };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is 0 to the width")]
+    #[expect(clippy::cast_precision_loss, reason = "the width is small")]
+    let done = (part * FILM as f64) as usize;
+    let drawn = format!("{}{}", "=".repeat(done), " ".repeat(FILM - done));
+    format!("{}  [{drawn}]  {} of {}", show.cue, time(show.position_s), time(show.length_s))
+}
+
+/// How many are well, and those that are not.
+fn controllers(all: &[Controller]) -> Vec<String> {
+    let is_well = |one: &&Controller| one.standing == "ok" && one.enabled;
+    let mut lines = vec![format!("{} of {} controllers ok", all.iter().filter(is_well).count(), all.len())];
+    let ill = all.iter().filter(|one| !is_well(one)).map(|one| {
+        let off = if one.enabled { "" } else { ", off" };
+        let acks = one.ack_rate.map_or_else(String::new, |rate| format!(", acks {}", percent(rate)));
+        format!("  {} {}{off}{acks}  {}", one.name, one.standing, one.why)
+    });
+    lines.extend(few(ill.collect()));
+    lines
+}
+
+/// The first few, and how many more there are.
+fn few(mut lines: Vec<String>) -> Vec<String> {
+    let more = lines.len().saturating_sub(FEW);
+    lines.truncate(FEW);
+    if more > 0 {
+        lines.push(format!("  and {more} more: kinocue status"));
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_panel_names_who_is_not_well_and_no_more_than_a_few() {
+        let lost = |n: u32| Controller { name: format!("A{n}"), standing: "lost".into(), enabled: true, ..<_>::default() };
+        let mut controllers: Vec<Controller> = (0..9).map(lost).collect();
+        controllers.push(Controller { name: "B1".into(), standing: "ok".into(), enabled: true, ..<_>::default() });
+        let show = Show { cue: "c".into(), length_s: 100.0, position_s: 50.0, ..Show::default() };
+        let text = text(&Status { controllers, show: Some(show), ..Status::default() });
+        assert!(text.contains("1 of 10 controllers ok\n  A0 lost"), "{text}");
+        assert!(text.ends_with("  and 3 more: kinocue status"), "{text}");
+        assert!(text.contains(&format!("[{}{}]  00:50.000", "=".repeat(20), " ".repeat(20))), "{text}");
+    }
+
+    #[test]
+    fn a_film_without_length_or_past_its_end_can_be_drawn() {
+        for (length_s, position_s) in [(0.0, 5.0), (10.0, 50.0), (10.0, -5.0), (f64::NAN, 1.0)] {
+            assert!(!film(&Show { length_s, position_s, ..Show::default() }).is_empty());
+        }
+    }
+}

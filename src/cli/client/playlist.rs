@@ -1,0 +1,117 @@
+//! What is to be played: a cue, a playlist, an entry of it.
+
+use serde_json::json;
+
+use super::server::ServerArgs;
+use super::table::table;
+use super::view::{Entry, Playlist, percent, time};
+use crate::cli::{Exit, Failure, print};
+
+/// The commands that choose what is played.
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Command {
+    /// Loads a cue of the daemon's library; it is read and proved before the command ends.
+    #[command(after_help = "\
+Examples:
+  kinocue load coaster
+  kinocue cues
+
+Exit codes: 0 loaded, 1 it does not pass (every fault is said), 66 there is no such cue, 75 not now")]
+    Load(LoadArgs),
+    /// Loads a playlist, drops it, or shows the one that is loaded.
+    #[command(after_help = "\
+Examples:
+  kinocue playlist saturday
+  kinocue playlist
+  kinocue playlist --none")]
+    Playlist(PlaylistArgs),
+    /// Makes an entry of the playlist the next to be played, counted from 1 as `kinocue playlist` shows it.
+    #[command(after_help = "Example:\n  kinocue select 2")]
+    Select(SelectArgs),
+}
+
+/// A cue.
+#[derive(Debug, clap::Args)]
+pub(super) struct LoadArgs {
+    /// The id of the cue.
+    #[arg(value_name = "CUE")]
+    cue: String,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// A playlist.
+#[derive(Debug, clap::Args)]
+pub(super) struct PlaylistArgs {
+    /// The id of the playlist [default: show the one that is loaded].
+    #[arg(value_name = "ID")]
+    id: Option<String>,
+    /// Drop the playlist that is loaded.
+    #[arg(long, conflicts_with = "id")]
+    none: bool,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// An entry.
+#[derive(Debug, clap::Args)]
+pub(super) struct SelectArgs {
+    /// Which entry, counted from 1.
+    #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    entry: u32,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+    match command {
+        Command::Load(LoadArgs { cue, server }) => server.act("/api/v1/show/load", &json!({ "cue": cue })),
+        Command::Playlist(PlaylistArgs { id: None, none: false, server }) => show(server),
+        Command::Playlist(PlaylistArgs { id, server, .. }) => {
+            let status = server.put("/api/v1/playlist", &json!({ "id": id }))?;
+            if let Some(playlist) = status.playlist.as_ref().filter(|_| !server.json) {
+                print::out(&entries(playlist))?;
+            }
+            Ok(server.tell(&status))
+        }
+        Command::Select(SelectArgs { entry, server }) => {
+            server.act("/api/v1/playlist/select", &json!({ "entry": entry - 1 }))
+        }
+    }
+}
+
+fn show(server: &ServerArgs) -> Result<Exit, Failure> {
+    let reply = server.get("/api/v1/status")?;
+    let status = super::reply::status(&reply)?;
+    if server.json {
+        let status: serde_json::Value = serde_json::from_str(&reply.text).unwrap_or_default();
+        print::json(&status["playlist"])?;
+    } else if let Some(playlist) = &status.playlist {
+        print::out(&entries(playlist))?;
+    } else {
+        print::tell("kinocue: no playlist is loaded; next: kinocue playlist ID");
+    }
+    Ok(Exit::Done)
+}
+
+/// The entries, the one that is loaded marked.
+fn entries(playlist: &Playlist) -> String {
+    let row = |(place, entry): (usize, &Entry)| {
+        let mark = if place == playlist.current { ">" } else { "" };
+        let or = |text: Option<String>, otherwise: &str| text.unwrap_or_else(|| otherwise.to_owned());
+        [
+            format!("{mark}{}", place + 1),
+            entry.cue.clone(),
+            or(entry.title.clone(), ""),
+            time(entry.length_s),
+            or(entry.level.map(percent), "-"),
+            or(entry.trim_ms.map(|ms| format!("{ms:+} ms")), "-"),
+            entry.then.clone(),
+            or(entry.at.clone(), "-"),
+        ]
+    };
+    let header = ["", "cue", "title", "length", "level", "trim", "then", "starts at"];
+    let Playlist { id, title, entries, next_start, .. } = playlist;
+    let next = next_start.as_ref().map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
+    format!("{id}: {title}{next}\n\n{}", table(header, entries.iter().enumerate().map(row)))
+}

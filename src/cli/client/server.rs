@@ -1,0 +1,110 @@
+//! Where the daemon is, and the one way in which all commands ask it.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use http_body_util::Full;
+use hyper::Method;
+use hyper::body::Bytes;
+use serde_json::Value;
+
+use super::http::{self, Reply};
+use super::reply;
+use super::view::Status;
+use crate::cli::{Exit, Failure, print};
+
+/// The environment variable that names the socket. Not clap's to read, for which it would count as an argument.
+const SOCKET_VARIABLE: &str = "KINOCUE_SOCKET";
+/// Where the service has its socket.
+const SOCKET: &str = "/run/kinocue/control.sock";
+/// How long an answer may take: the daemon itself gives up after a minute.
+const PATIENCE: Duration = Duration::from_secs(65);
+
+// A comment, because clap would make help of documentation.
+// Where the daemon is, and how its replies are shown.
+#[derive(Debug, Clone, clap::Args)]
+pub(in crate::cli) struct ServerArgs {
+    /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// Print the JSON of the reply as it came.
+    #[arg(long)]
+    pub(in crate::cli) json: bool,
+}
+
+impl ServerArgs {
+    /// Where the daemon listens.
+    pub(super) fn socket(&self) -> PathBuf {
+        let named = || std::env::var_os(SOCKET_VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
+        self.socket.clone().or_else(named).unwrap_or_else(|| PathBuf::from(SOCKET))
+    }
+
+    /// Looks something up.
+    pub(super) fn get(&self, path: &str) -> Result<Reply, Failure> {
+        let request = http::request(Method::GET, path, None, Full::<Bytes>::default())?;
+        http::block_on(http::exchange(&self.socket(), request, PATIENCE))
+    }
+
+    /// The status of the hall.
+    pub(super) fn status(&self) -> Result<Status, Failure> {
+        reply::status(&self.get("/api/v1/status")?)
+    }
+
+    /// Has something done by POST, and gives the state that it led to.
+    pub(super) fn post(&self, path: &str, body: &Value) -> Result<Status, Failure> {
+        http::block_on(self.change(Method::POST, path, body))
+    }
+
+    /// The same for whoever has a runtime already.
+    pub(super) async fn post_now(&self, path: &str, body: &Value) -> Result<Status, Failure> {
+        self.change(Method::POST, path, body).await
+    }
+
+    /// Has something done by PUT, and gives the state that it led to.
+    pub(super) fn put(&self, path: &str, body: &Value) -> Result<Status, Failure> {
+        http::block_on(self.change(Method::PUT, path, body))
+    }
+
+    /// Has something done by POST that is all there is to the command.
+    pub(super) fn act(&self, path: &str, body: &Value) -> Result<Exit, Failure> {
+        Ok(self.tell(&self.post(path, body)?))
+    }
+
+    /// Says in a line what a change led to, and ends well.
+    pub(super) fn tell(&self, status: &Status) -> Exit {
+        print::tell(&format!("kinocue: {}", status.line()));
+        Exit::Done
+    }
+
+    async fn change(&self, method: Method, path: &str, body: &Value) -> Result<Status, Failure> {
+        let body = Full::new(Bytes::from(body.to_string()));
+        let request = http::request(method, path, Some("application/json"), body)?;
+        let reply = http::exchange(&self.socket(), request, PATIENCE).await?;
+        self.show(&reply)?;
+        reply::status(&reply)
+    }
+
+    /// Prints a reply where its JSON is wanted.
+    pub(super) fn show(&self, reply: &Reply) -> Result<(), Failure> {
+        if self.json { print::out(&format!("{}\n", reply.text.trim_end())) } else { Ok(()) }
+    }
+}
+
+/// A name as a part of a path: whatever is no plain letter or digit is written as octets.
+pub(super) fn in_path(name: &str) -> String {
+    let plain = |octet: &u8| octet.is_ascii_alphanumeric() || b"-_.~".contains(octet);
+    let written = |octet: u8| if plain(&octet) { char::from(octet).to_string() } else { format!("%{octet:02X}") };
+    name.bytes().map(written).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_one_part_of_a_path() {
+        assert_eq!(in_path("F4"), "F4");
+        assert_eq!(in_path("row A/1?"), "row%20A%2F1%3F");
+        assert_eq!(in_path("é"), "%C3%A9");
+    }
+}

@@ -1,0 +1,126 @@
+//! What the show does: one word, one request.
+
+use serde_json::json;
+
+use super::server::ServerArgs;
+use super::table::table;
+use super::view::{Preflight, Warning};
+use crate::cli::times::parse_time;
+use crate::cli::{Exit, Failure, ask, print};
+use crate::time::ShowTime;
+
+/// The commands that lead a show.
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Command {
+    /// Gets the hall ready to go: cue loaded, limits proved, preflight passed. Lapses after ten minutes.
+    #[command(after_help = "\
+Examples:
+  kinocue load coaster && kinocue arm
+  kinocue arm --json
+
+Exit codes: 0 armed, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
+    Arm(ServerArgs),
+    /// Stands down: nothing can start until a person arms again.
+    #[command(after_help = "Example:\n  kinocue disarm")]
+    Disarm(ServerArgs),
+    /// Starts what is loaded and armed. The seats move.
+    #[command(after_help = "\
+Examples:
+  kinocue go
+  kinocue arm && kinocue go
+
+A request that arrives more than two seconds late, or twice, starts nothing.
+
+Exit codes: 0 it plays, 75 not armed or too late, 77 not allowed, 69 no daemon")]
+    Go(ServerArgs),
+    /// Holds the seats where they are; the film waits.
+    #[command(after_help = "Example:\n  kinocue pause")]
+    Pause(ServerArgs),
+    /// Goes on from a pause.
+    #[command(after_help = "Example:\n  kinocue resume")]
+    Resume(ServerArgs),
+    /// Goes on elsewhere in the cue; the seats get there by a move within their limits.
+    #[command(after_help = "\
+Examples:
+  kinocue seek 12:30
+  kinocue seek 750.5
+  kinocue seek 00:12:30:12@24")]
+    Seek(SeekArgs),
+    /// Brings the seats to their park poses, and ends the show.
+    #[command(after_help = "Example:\n  kinocue park")]
+    Park(ServerArgs),
+    /// Leaves a stop or a fault, once what caused it is gone.
+    #[command(after_help = "\
+Example:
+  kinocue status && kinocue clear
+
+All positions are read anew before anything moves.")]
+    Clear(ServerArgs),
+    /// Has the daemon read its configuration anew, which it does while nothing is armed; a bad one changes nothing.
+    #[command(after_help = "Example:\n  kinocue check /etc/kinocue/kinocue.toml && kinocue reload")]
+    Reload(ServerArgs),
+}
+
+/// The position, and where the daemon is.
+#[derive(Debug, clap::Args)]
+pub(super) struct SeekArgs {
+    /// Where in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
+    #[arg(value_name = "TIME", value_parser = parse_time)]
+    at: ShowTime,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
+    let (word, server) = match command {
+        Command::Arm(server) => ("arm", server),
+        Command::Disarm(server) => ("disarm", server),
+        Command::Go(server) => ("go", server),
+        Command::Pause(server) => ("pause", server),
+        Command::Resume(server) => ("resume", server),
+        Command::Park(server) => ("park", server),
+        Command::Clear(server) => ("clear", server),
+        Command::Seek(SeekArgs { at, server }) => {
+            return server.act("/api/v1/show/seek", &json!({ "position_s": at.as_secs_f64() }));
+        }
+        Command::Reload(server) => return server.act("/api/v1/reload", &json!({})),
+    };
+    server.act(&format!("/api/v1/show/{word}"), &json!({}))
+}
+
+/// Has the daemon home all controllers, once a person says that the seats are empty.
+pub(in crate::cli) fn home(server: &ServerArgs, seats_empty: bool) -> Result<Exit, Failure> {
+    let question = "All seats of the hall will move over the whole stroke. Are they empty, and is nobody near them?";
+    if !ask::agreed(question, seats_empty, "--seats-empty")? {
+        print::tell("nothing was moved");
+        return Ok(Exit::Done);
+    }
+    server.act("/api/v1/show/home", &json!({}))
+}
+
+/// Has the daemon check its controllers.
+pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
+    let status = server.post("/api/v1/preflight", &json!({}))?;
+    let Some(found) = &status.preflight else {
+        return Ok(server.tell(&status));
+    };
+    if !server.json && !found.findings.is_empty() {
+        print::out(&findings(&found.findings))?;
+    }
+    let Preflight { passed, answered, .. } = found;
+    let verdict = if *passed { "passed" } else { "failed" };
+    print::tell(&format!(
+        "kinocue: preflight {verdict}: {answered} of {} controllers answered; next: {}",
+        status.controllers.len(),
+        status.hall.next
+    ));
+    Ok(if *passed { Exit::Done } else { Exit::CheckFailed })
+}
+
+fn findings(all: &[Warning]) -> String {
+    let row = |one: &Warning| {
+        let Warning { severity, controller, id, text, remedy } = one;
+        [severity.as_str(), controller.as_deref().unwrap_or("-"), id, text, remedy].map(str::to_owned)
+    };
+    table(["severity", "controller", "check", "found", "what to do"], all.iter().map(row))
+}

@@ -1,0 +1,82 @@
+//! `kinocue stop`: by the daemon's stop socket, which works while all else is stuck; by its API where that fails.
+
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::json;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::time::timeout;
+
+use super::http::{block_on, connect};
+use super::server::ServerArgs;
+use crate::cli::{Exit, Failure, print};
+
+/// How long the stop socket may take: its thread does nothing else.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// What this stop is not.
+const NO_EMERGENCY: &str = "this is a soft stop; the emergency stop is hard-wired";
+
+/// Brings the seats to rest at once; they stay there until `kinocue clear`.
+///
+/// Goes by the stop socket of the daemon, which a thread of its own reads, so that it works while anything else is stuck;
+/// by the control socket only where that fails. A soft stop: the emergency stop is hard-wired.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue stop
+  kinocue stop --stop-socket /run/kinocue/stop.sock
+
+Exit codes: 0 the seats come to rest, 69 no daemon took it: use the hard-wired emergency stop")]
+pub(super) struct Args {
+    /// The stop socket of the daemon [default: stop.sock beside the control socket].
+    #[arg(long, value_name = "PATH")]
+    stop_socket: Option<PathBuf>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let beside = || args.server.socket().with_file_name("stop.sock");
+    let socket = args.stop_socket.clone().unwrap_or_else(beside);
+    let path = socket.display();
+    match block_on(async { Ok(say_stop(&socket).await) })? {
+        Ok(()) => {
+            if args.server.json {
+                print::json(&json!({ "state": "stopping", "by": "stop-socket" }))?;
+            }
+            print::tell(&format!("kinocue: stopping, by {path}; next: kinocue clear; {NO_EMERGENCY}"));
+            Ok(Exit::Done)
+        }
+        Err(error) => {
+            print::tell(&format!("kinocue: {path} did not take the stop ({error}); asking the control socket"));
+            by_control_socket(&args.server)
+        }
+    }
+}
+
+/// Writes the line and reads the answer.
+async fn say_stop(socket: &Path) -> io::Result<()> {
+    let talk = async {
+        let mut stream = connect(socket).await?;
+        stream.write_all(b"stop\n").await?;
+        let mut answer = Vec::new();
+        while answer.len() < 64 && !answer.ends_with(b"\n") && stream.read_buf(&mut answer).await? > 0 {}
+        if answer.starts_with(b"stopping") {
+            return Ok(());
+        }
+        let said = String::from_utf8_lossy(&answer).trim_end().to_owned();
+        Err(io::Error::new(ErrorKind::InvalidData, format!("it said {said:?}")))
+    };
+    timeout(PATIENCE, talk).await.unwrap_or_else(|_| Err(ErrorKind::TimedOut.into()))
+}
+
+fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
+    let status = server.post("/api/v1/show/stop", &json!({})).map_err(|mut failure| {
+        failure.error = failure.error.context("NOT STOPPED by kinocue; use the hard-wired emergency stop");
+        failure
+    })?;
+    let (line, socket) = (status.line(), server.socket());
+    print::tell(&format!("kinocue: {line}; by {}; {NO_EMERGENCY}", socket.display()));
+    Ok(Exit::Done)
+}

@@ -1,0 +1,123 @@
+//! `kinocue prove`: the process that the library has cues checked by.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use sha2::{Digest as _, Sha256};
+
+use super::{Exit, Failure, OrExit as _, load, print};
+use crate::app::Staged;
+use crate::config::Config;
+use crate::cue::{self, Cue, CueFaults, Source};
+use crate::engine::{Rate, Show};
+use crate::fanout::Manner;
+use crate::library::Verdict;
+use crate::proof::{Digest, Terms, prove};
+use crate::sys::humble::{self, Bounds};
+use crate::time::ShowTime;
+use crate::timeline::Timeline;
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// The cue.
+    cue: PathBuf,
+    /// The configuration of the hall.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Print the verdict as one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// The most memory that it may take, MiB.
+    #[arg(long, value_name = "N", default_value_t = 4096)]
+    memory_mib: u64,
+    /// The most processor time that it may take, s.
+    #[arg(long, value_name = "N", default_value_t = 300)]
+    seconds: u64,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let bounds = Bounds { memory: args.memory_mib.saturating_mul(1 << 20), cpu_s: args.seconds.max(1) };
+    humble::lower(bounds).context("cannot bound the check").or_exit(Exit::System)?;
+    let config = load::config(&args.config)?;
+    let verdict = judge(&args.cue, config).context("cannot read the cue").or_exit(Exit::Io)?;
+    if args.json {
+        print::json(&verdict)?;
+    } else {
+        print::out(&verdict.lines().iter().map(|line| format!("{line}\n")).collect::<String>())?;
+    }
+    Ok(if verdict.passed { Exit::Done } else { Exit::CheckFailed })
+}
+
+/// Reads a cue and proves it for all seats of a hall, at full level, as `play` does before it starts.
+fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
+    let mut input = Hashed { file: File::open(path)?, hash: Sha256::new(), front: Vec::new() };
+    let cue = cue::read(path, &mut input, &Source::Native);
+    io::copy(&mut input, &mut io::sink())?; // reading ends at the first fault of some kinds
+    let mut verdict = Verdict {
+        passed: false,
+        faults: Vec::new(),
+        more: 0,
+        sha256: input.hash.finalize().iter().map(|octet| format!("{octet:02x}")).collect(),
+        digest: None,
+        title: None,
+        length_s: None,
+        axes: None,
+        effects: Vec::new(),
+        mcap: cue::is_mcap(&input.front),
+    };
+    match cue {
+        Ok(cue) => of_cue(cue, config, &mut verdict),
+        Err(faults) => note(&faults, &mut verdict),
+    }
+    verdict.passed = verdict.faults.is_empty();
+    Ok(verdict)
+}
+
+fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
+    let digest = Digest::of(&cue);
+    let timeline = Timeline::new(cue);
+    verdict.digest = Some(digest.to_string());
+    verdict.title = timeline.cue().title().map(str::to_owned);
+    verdict.length_s = Some(timeline.duration().as_secs_f64());
+    verdict.axes = Some(timeline.axes());
+    verdict.effects = timeline.effect_names().to_vec();
+    for misfit in config.misfits(&timeline) {
+        let place = timeline.cue().column_place(&misfit.column());
+        verdict.faults.push(format!("{place}{misfit}").trim_start().to_owned());
+    }
+    config.fits_stroke(&timeline).faults.iter().for_each(|faults| note(faults, verdict));
+    let rate = Rate::from_hz(config.show.rate_hz);
+    let proof = prove(&timeline, Terms::of_hall(&config, digest, rate, 1.0));
+    verdict.faults.extend(proof.violations.iter().map(|one| one.to_string().trim_start().to_owned()));
+    verdict.more += proof.more;
+    if verdict.faults.is_empty() {
+        let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
+        let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false });
+        verdict.faults.extend(staged.err().map(|error| error.to_string()));
+    }
+}
+
+fn note(faults: &CueFaults, verdict: &mut Verdict) {
+    verdict.faults.extend(faults.told().iter().map(|fault| fault.to_string().trim_start().to_owned()));
+    verdict.more += faults.more();
+}
+
+/// A file whose octets are hashed as they are read.
+struct Hashed {
+    file: File,
+    hash: Sha256,
+    /// Its first octets.
+    front: Vec<u8>,
+}
+
+impl Read for Hashed {
+    fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
+        let octets = self.file.read(buf)?;
+        self.hash.update(&buf[..octets]);
+        let wanted = 16_usize.saturating_sub(self.front.len()).min(octets);
+        self.front.extend_from_slice(&buf[..wanted]);
+        Ok(octets)
+    }
+}

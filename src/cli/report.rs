@@ -1,0 +1,149 @@
+//! `kinocue report`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use jiff::civil::Date;
+
+use super::{Exit, Failure, OrExit as _, load, print};
+use crate::config::Log;
+use crate::journal::{self, JournalError, Report};
+use crate::sys::clock::local_now;
+
+mod csv;
+mod table;
+
+/// Says what was played: every show of a day with its cue, levels, seats, frames and end, and all together.
+///
+/// Reads the journal that `kinocue serve` writes, also while it does. A show that neither ended nor goes on is named as
+/// interrupted. Lines of the journal that were cut short are passed over with a note.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue report --day yesterday
+  kinocue report --day 2026-11-21 --config /etc/kinocue/kinocue.toml
+  kinocue report --from 2026-11-01 --to 2026-11-30 --csv > november.csv
+  kinocue report --day today --actions
+
+Ends with 0 also where nothing was played, with 66 where there is no journal, with 77 where it may not be read.")]
+pub(super) struct Args {
+    /// The day: today, yesterday, or a date as 2026-11-21 [default: today].
+    #[arg(long, value_name = "DAY", value_parser = parse_day, conflicts_with_all = ["from", "to"])]
+    day: Option<Day>,
+    /// The first day.
+    #[arg(long, value_name = "DAY", value_parser = parse_day)]
+    from: Option<Day>,
+    /// The last day [default: today].
+    #[arg(long, value_name = "DAY", value_parser = parse_day, requires = "from")]
+    to: Option<Day>,
+    /// The folder of the journal [default: that of the configuration, else /var/log/kinocue].
+    #[arg(long, value_name = "DIR", conflicts_with = "config")]
+    dir: Option<PathBuf>,
+    /// The configuration that names the folder.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Show what was asked, by whom and what came of it, instead of the shows.
+    #[arg(long)]
+    actions: bool,
+    /// Print CSV (RFC 4180), one record a show or action.
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A day as a person names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Day {
+    Today,
+    Yesterday,
+    On(Date),
+}
+
+fn parse_day(text: &str) -> Result<Day, String> {
+    match text {
+        "today" => Ok(Day::Today),
+        "yesterday" => Ok(Day::Yesterday),
+        date => date
+            .parse()
+            .map(Day::On)
+            .map_err(|_| "write today, yesterday, or a date as 2026-11-21".to_owned()),
+    }
+}
+
+impl Day {
+    fn date(self, today: Date) -> Date {
+        match self {
+            Self::Today => today,
+            Self::Yesterday => today.yesterday().unwrap_or(today),
+            Self::On(date) => date,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let (from, to) = days(args, local_now().date())?;
+    let dir = folder(args)?;
+    let report = journal::report(&dir, from, to)
+        .map_err(|error| Failure { exit: exit(&error), error: error.into() })?;
+    if args.json {
+        print::json(&report)?;
+    } else if args.csv {
+        print::out(&if args.actions { csv::actions(&report) } else { csv::shows(&report) })?;
+        tell_notes(&report);
+    } else {
+        print::out(&if args.actions { table::actions(&report) } else { table::shows(&report) })?;
+        tell_notes(&report);
+    }
+    Ok(Exit::Done)
+}
+
+fn days(args: &Args, today: Date) -> Result<(Date, Date), Failure> {
+    let from = args.from.or(args.day).unwrap_or(Day::Today).date(today);
+    let to = match args.from {
+        Some(_) => args.to.unwrap_or(Day::Today).date(today),
+        None => from,
+    };
+    if from > to {
+        return Err(anyhow!("--from {from} is after --to {to}")).or_exit(Exit::Usage);
+    }
+    Ok((from, to))
+}
+
+fn folder(args: &Args) -> Result<PathBuf, Failure> {
+    let of_config = |path: &Path| load::config(path).map(|config| config.log.dir);
+    let named = args
+        .dir
+        .clone()
+        .map_or_else(|| args.config.as_deref().map(of_config).transpose(), |dir| Ok(Some(dir)));
+    Ok(named?.unwrap_or_else(|| Log::default().dir))
+}
+
+fn exit(error: &JournalError) -> Exit {
+    match error.source.kind() {
+        std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => Exit::NoInput,
+        std::io::ErrorKind::PermissionDenied => Exit::NotAllowed,
+        _ => Exit::Io,
+    }
+}
+
+fn tell_notes(report: &Report) {
+    report.notes.iter().for_each(|note| print::tell(note));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_day_is_named_or_dated() {
+        let today: Date = "2026-03-01".parse().unwrap();
+        assert_eq!(parse_day("today").unwrap().date(today), today);
+        assert_eq!(parse_day("yesterday").unwrap().date(today).to_string(), "2026-02-28");
+        assert_eq!(parse_day("2026-11-21").unwrap().date(today).to_string(), "2026-11-21");
+        for bad in ["", "tomorrow", "21.11.2026", "2026-13-01"] {
+            assert!(parse_day(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! A report for people.
+
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+
+use crate::journal::{Outcome, Report, Shown, Totals};
+
+/// A line under the header, and no other lines.
+const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
+
+/// One row a show, and a line for all together.
+pub(super) fn shows(report: &Report) -> String {
+    let days = days(report);
+    if report.shows.is_empty() {
+        return format!("nothing was played {days}\n");
+    }
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header([
+        "start", "cue", "result", "took", "level", "seats", "sent", "acked", "refused", "lost", "missed",
+        "late p99", "ack p99", "by",
+    ]);
+    report.shows.iter().for_each(|one| {
+        table.add_row(show(one));
+    });
+    table
+        .column_iter_mut()
+        .skip(3)
+        .take(10)
+        .for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    let events: String = report.shows.iter().map(events).collect();
+    let blank = if events.is_empty() { "" } else { "\n" };
+    format!("{}\n{blank}{events}\n{}\n", table.trim_fmt(), totals(&report.totals, &days))
+}
+
+/// One row for each thing that was asked.
+pub(super) fn actions(report: &Report) -> String {
+    if report.actions.is_empty() {
+        return format!("nothing was asked {}\n", days(report));
+    }
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header(["at", "who", "what", "result", "state"]);
+    for one in &report.actions {
+        table.add_row([short(&one.at), safe(&one.who), safe(&one.what), safe(&one.result), safe(&one.state)]);
+    }
+    format!("{}\n", table.trim_fmt())
+}
+
+fn days(report: &Report) -> String {
+    if report.from == report.to {
+        format!("on {}", report.from)
+    } else {
+        format!("from {} to {}", report.from, report.to)
+    }
+}
+
+fn show(show: &Shown) -> Vec<String> {
+    let record = &show.record;
+    let mut row = vec![
+        short(&record.start),
+        safe(&record.cue),
+        show.result.word().to_owned(),
+        show.took_s.map_or_else(String::new, span),
+        format!("{:.0} %", 100.0 * record.level),
+        format!("{}/{}", record.seats_available, record.seats_total),
+    ];
+    match &record.outcome {
+        None => row.resize(13, String::new()),
+        Some(one) => {
+            row.extend([one.sent.to_string(), acked(one)]);
+            row.extend([one.refused, one.lost, one.missed_ticks].map(|count| count.to_string()));
+            row.extend([one.lateness.p99_us, one.ack.p99_us].map(micros));
+        }
+    }
+    let marks = [(record.scheduled, " (scheduled)"), (record.out_of_hours, " (out of hours)")];
+    let marks: String = marks.iter().filter(|(on, _)| *on).map(|(_, mark)| *mark).collect();
+    row.push(safe(&record.operator) + &marks);
+    row
+}
+
+/// What happened in a show, under its start.
+fn events(show: &Shown) -> String {
+    let events = show.record.outcome.iter().flat_map(|outcome| &outcome.events);
+    events
+        .map(|event| format!("{} {}: {}\n", short(&show.record.start), safe(&show.record.cue), safe(event)))
+        .collect()
+}
+
+fn totals(totals: &Totals, days: &str) -> String {
+    let Totals {
+        shows,
+        completed,
+        stopped,
+        faults,
+        interrupted,
+        running,
+        took_s,
+        sent,
+        acked,
+        refused,
+        lost,
+    } = totals;
+    let noun = if *shows == 1 { "show" } else { "shows" };
+    let parts = [
+        (*completed, "completed"),
+        (*stopped, "stopped"),
+        (*faults, "with a fault"),
+        (*interrupted, "interrupted"),
+        (*running, "running"),
+    ];
+    let parts: Vec<_> =
+        parts.iter().filter(|(count, _)| *count > 0).map(|(count, word)| format!("{count} {word}")).collect();
+    let took = span(*took_s);
+    format!(
+        "{shows} {noun} {days}: {}; {took} in all; {sent} frames sent, {acked} acked, {refused} refused, {lost} lost",
+        parts.join(", ")
+    )
+}
+
+#[expect(clippy::cast_precision_loss, reason = "for people")]
+fn acked(outcome: &Outcome) -> String {
+    match outcome.asked {
+        0 => "–".to_owned(),
+        // Rounded down, so that only all of them are 100 %.
+        asked => format!("{:.2} %", (10_000.0 * outcome.acked as f64 / asked as f64).floor() / 100.0),
+    }
+}
+
+fn micros(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |us| format!("{us:.0} µs"))
+}
+
+/// `HH:MM:SS`.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a saturating cast is what is wanted"
+)]
+fn span(seconds: f64) -> String {
+    let s = seconds.round() as u64;
+    format!("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+}
+
+/// `2026-11-21 19:00:03`.
+fn short(stamp: &str) -> String {
+    safe(&stamp.chars().take(19).collect::<String>().replace('T', " "))
+}
+
+/// A text of the journal, which may have come from anywhere, without what a terminal would obey.
+fn safe(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
+}

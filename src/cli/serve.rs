@@ -1,0 +1,69 @@
+//! `kinocue serve`: the daemon.
+
+use std::path::PathBuf;
+
+use super::{Exit, Failure, OrExit as _, print};
+use crate::app::house::HouseError;
+use crate::app::serve::{Places, ServeError, serve};
+use crate::app::surfaces::Sockets;
+use crate::{config, console};
+use crate::net::NetError;
+
+/// Runs a hall: keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
+///
+/// Nothing moves until somebody asks for it, by the client commands, the web console or any other surface. SIGTERM parks the
+/// seats and ends with 0; SIGHUP reads the configuration anew where nothing is armed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue serve --config hall.toml
+  kinocue serve --config hall.toml --socket ./control.sock --state ./state
+
+Exit codes:
+  0   told to end; whatever moved has parked
+  71  the system refused a socket, a thread or a folder
+  75  another program holds the frame port
+  78  the configuration is bad")]
+pub(super) struct Args {
+    /// The hall.
+    #[arg(long, value_name = "FILE", env = "KINOCUE_CONFIG")]
+    config: PathBuf,
+    /// The control socket.
+    #[arg(long, value_name = "PATH", default_value = "/run/kinocue/control.sock")]
+    socket: PathBuf,
+    /// The socket that takes a stop alone [default: stop.sock beside the control socket].
+    #[arg(long, value_name = "PATH")]
+    stop_socket: Option<PathBuf>,
+    /// The folder of what is kept from one start to the next.
+    #[arg(long, value_name = "DIR", default_value = "/var/lib/kinocue")]
+    state: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let config = config::load(&args.config).or_exit(Exit::Config)?;
+    let beside = || args.socket.with_file_name("stop.sock");
+    let sockets =
+        Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
+    let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
+    serve(config, &places, pages, print::tell)?;
+    Ok(Exit::Done)
+}
+
+/// The console.
+fn pages(path: &str) -> Option<(&'static str, &'static [u8])> {
+    console::asset(path).map(|asset| (asset.content_type, asset.body))
+}
+
+impl From<ServeError> for Failure {
+    fn from(error: ServeError) -> Self {
+        let exit = match &error {
+            ServeError::House(HouseError::Net(NetError::Refused { cause, .. }))
+                if cause.kind() == std::io::ErrorKind::AddrInUse =>
+            {
+                Exit::TryAgain
+            }
+            _ => Exit::System,
+        };
+        Self { exit, error: error.into() }
+    }
+}

@@ -1,0 +1,133 @@
+//! `kinocue token`.
+
+use std::fs::File;
+use std::io::{self, Read as _};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use serde::Serialize;
+use sha2::{Digest as _, Sha256};
+
+use super::{Exit, Failure, OrExit as _, print};
+use crate::hall::Role;
+
+/// 256 bits, which nobody guesses.
+const OCTETS: usize = 32;
+/// The longest name.
+const MAX_NAME: usize = 64;
+
+/// Makes a token with which somebody comes in over HTTP, and the lines of the configuration that let them in.
+///
+/// The token is shown this once, on standard output, and is kept nowhere: the configuration holds its SHA-256 alone. Hand it
+/// over as you would a key. Taking its lines out of the configuration, and starting the service again, takes it back.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  kinocue token tablet --role operate
+  kinocue token booth --role engineer --json")]
+pub(super) struct Args {
+    /// Who gets it, as the journal is to name them.
+    #[arg(value_parser = parse_name)]
+    name: String,
+    /// What they may do: look; run the show; home, arm, clear and change the library as well.
+    #[arg(long, value_enum)]
+    role: RoleArg,
+    /// Print one JSON object with all of it.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum RoleArg {
+    View,
+    Operate,
+    Engineer,
+}
+
+impl From<RoleArg> for Role {
+    fn from(role: RoleArg) -> Self {
+        match role {
+            RoleArg::View => Self::View,
+            RoleArg::Operate => Self::Operate,
+            RoleArg::Engineer => Self::Engineer,
+        }
+    }
+}
+
+/// What was made.
+#[derive(Debug, Serialize)]
+struct Token<'n> {
+    name: &'n str,
+    role: Role,
+    token: String,
+    sha256: String,
+    config: String,
+}
+
+fn parse_name(name: &str) -> Result<String, String> {
+    let plain = |c: char| !c.is_control() && c != '"' && c != '\\';
+    if !name.trim().is_empty() && name.chars().count() <= MAX_NAME && name.chars().all(plain) {
+        Ok(name.to_owned())
+    } else {
+        Err(format!("a name has 1 to {MAX_NAME} characters, and neither \" nor \\"))
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let token = Token::of(&args.name, args.role.into(), &chance().or_exit(Exit::System)?);
+    if args.json {
+        print::json(&token)?;
+    } else {
+        print::tell("For the configuration:\n");
+        print::tell(&token.config);
+        print::tell("\nThe token, shown this once:");
+        print::out(&format!("{}\n", token.token))?;
+    }
+    Ok(Exit::Done)
+}
+
+/// From the generator of the kernel, which is ready long before a shell is.
+fn chance() -> io::Result<[u8; OCTETS]> {
+    let mut octets = [0; OCTETS];
+    File::open("/dev/urandom")?.read_exact(&mut octets)?;
+    Ok(octets)
+}
+
+impl<'n> Token<'n> {
+    fn of(name: &'n str, role: Role, octets: &[u8; OCTETS]) -> Self {
+        let token = URL_SAFE_NO_PAD.encode(octets);
+        let sha256: String = Sha256::digest(&token).iter().map(|octet| format!("{octet:02x}")).collect();
+        let config = format!("[[api.token]]\nname = \"{name}\"\nrole = \"{role}\"\nsha256 = \"{sha256}\"");
+        Self { name, role, token, sha256, config }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_goes_to_its_owner_and_its_hash_into_the_configuration() {
+        let token = Token::of("tablet", Role::Operate, &[0xff; OCTETS]);
+        assert_eq!(
+            token.token,
+            format!("{}8", "_".repeat(42)),
+            "no characters that a header or a shell would mind"
+        );
+        assert!(token.config.contains("role = \"operate\"\nsha256 = \""), "{}", token.config);
+        assert!(token.config.contains(&token.sha256) && !token.config.contains(&token.token));
+    }
+
+    #[test]
+    fn no_two_are_alike() {
+        assert_ne!(chance().unwrap(), chance().unwrap());
+    }
+
+    #[test]
+    fn a_name_cannot_break_out_of_its_line() {
+        assert!(parse_name("tablet of row A").is_ok());
+        for bad in ["", " ", "a\nb", "a\"b", "a\\b", &"a".repeat(65)] {
+            assert!(parse_name(bad).is_err(), "{bad:?}");
+        }
+    }
+}

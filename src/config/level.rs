@@ -1,0 +1,64 @@
+//! Levels, trims and switches of effects as configurations and playlists write them.
+
+use std::collections::BTreeMap;
+
+use super::Effect;
+use super::fault::Faults;
+use super::section::{Entry, Section, did_you_mean};
+
+/// How far the motion may be moved against the film, ms, either way.
+const MAX_TRIM_MS: i32 = 500;
+
+/// An intensity, 0 to 1: `60%`, or `-6dB` for 10^(-6/20).
+///
+/// # Errors
+/// What is wrong with the text, for a person.
+pub fn parse_level(text: &str) -> Result<f64, String> {
+    let refuse = || "not a level; write 0% to 100%, or 0dB and below, as -6dB".to_owned();
+    let level = if let Some(percent) = text.strip_suffix('%') {
+        percent.trim_end().parse::<f64>().map_err(|_| refuse())? / 100.0
+    } else if let Some(decibel) = text.strip_suffix("dB") {
+        let decibel: f64 = decibel.trim_end().parse().map_err(|_| refuse())?;
+        10_f64.powf(decibel / 20.0)
+    } else {
+        return Err(refuse());
+    };
+    if (0.0..=1.0).contains(&level) { Ok(level) } else { Err(refuse()) }
+}
+
+/// A level: 0 to 1, or a text as [`parse_level`] takes it.
+pub(crate) fn level(section: &mut Section<'_, '_, '_>, key: &'static str) -> Option<f64> {
+    let entry = section.get(key)?;
+    if !entry.value.is_str() {
+        return entry.number_in(0.0..=1.0, section.faults);
+    }
+    let parsed = parse_level(entry.text(section.faults)?);
+    parsed.map_err(|why| entry.fault(section.faults, &why)).ok()
+}
+
+/// A trim, -500 to 500 ms.
+pub(crate) fn trim(section: &mut Section<'_, '_, '_>, key: &'static str) -> Option<i32> {
+    section.whole_in(key, -MAX_TRIM_MS..=MAX_TRIM_MS)
+}
+
+/// Effects that may be on or not: `{ water = false }`. Where the site's effects are given, others are faults.
+pub(crate) fn switches(
+    entry: Entry<'_>,
+    effects: Option<&[Effect]>,
+    faults: &mut Faults<'_>,
+) -> BTreeMap<String, bool> {
+    let Some(table) = entry.table(faults) else { return BTreeMap::new() };
+    let mut switches = BTreeMap::new();
+    for (name, value) in table {
+        let name = name.get_ref();
+        let entry = Entry::new(name, value);
+        if effects.is_some_and(|effects| !effects.iter().any(|effect| effect.name == **name)) {
+            let known = effects.unwrap_or_default().iter().map(|effect| effect.name.as_str());
+            entry.fault(faults, &format!("is not in [effects]{}", did_you_mean(name, known)));
+        }
+        if let Some(on) = entry.switch(faults) {
+            switches.insert(name.to_string(), on);
+        }
+    }
+    switches
+}

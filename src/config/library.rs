@@ -1,0 +1,56 @@
+//! `[library]`: what the cue library takes in, and where the playlists are.
+
+use std::path::PathBuf;
+
+use super::fault::Faults;
+use super::section::{Entry, Section};
+
+/// What the library and the playlists are kept in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Store {
+    /// The longest cue that can be uploaded, MiB, 1 to 2,048.
+    pub max_cue_mib: u32,
+    /// The folder with the playlists; none for `playlists` beside the library.
+    pub playlists: Option<PathBuf>,
+}
+
+impl Default for Store {
+    fn default() -> Self {
+        Self { max_cue_mib: 256, playlists: None }
+    }
+}
+
+/// Reads the table.
+pub(super) fn store(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Store> {
+    let default = Store::default();
+    let mut section = Section::new("[library]", entry.at, entry.table(faults)?, faults);
+    let store = Store {
+        max_cue_mib: section.whole_in("max_cue_mib", 1..=2048).unwrap_or(default.max_cue_mib),
+        playlists: section.text("playlists").map(PathBuf::from),
+    };
+    section.finish();
+    Some(store)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::config::tests::{faults_of, hall_with};
+
+    #[test]
+    fn playlists_lie_beside_the_library_unless_told_otherwise() {
+        let hall = hall_with("[show]\nlibrary = \"/srv/hall/cues\"\n");
+        assert_eq!(hall.playlists(), Path::new("/srv/hall/playlists"));
+        assert_eq!(hall.store.max_cue_mib, 256);
+        let hall = hall_with("[library]\nmax_cue_mib = 8\nplaylists = \"/srv/lists\"\n");
+        assert_eq!((hall.playlists().as_path(), hall.store.max_cue_mib), (Path::new("/srv/lists"), 8));
+    }
+
+    #[test]
+    fn what_the_library_cannot_be_told_is_refused() {
+        let faults = faults_of("[library]\nmax_cue_mib = 4096\npath = \"x\"\n");
+        assert!(faults[0].ends_with("max_cue_mib: 4096 is outside 1..=2048"), "{faults:?}");
+        assert!(faults[1].contains("path: unknown key in [library]"), "{faults:?}");
+    }
+}

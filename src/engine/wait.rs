@@ -1,0 +1,84 @@
+//! Between shows: an engine that is loaded waits until somebody lets it go, and the next takes over what the last one knows
+//! of the lanes. Nothing is sent meanwhile.
+
+use super::{Engine, Part, Phase, Rest, first_phase};
+use crate::engine::Mix;
+use crate::motion::{Pose, Slot, Window};
+
+/// A seat this near its park pose is there, pulses: positions are read in whole ones.
+const AT_PARK: f64 = 1.5;
+
+impl Engine {
+    /// The same, waiting for [`Engine::go`].
+    #[must_use]
+    pub fn waiting(mut self) -> Self {
+        self.phase = Phase::Waiting;
+        self
+    }
+
+    /// The same with nothing known of any lane, and at rest: nothing goes to a lane before it is found.
+    #[must_use]
+    pub fn unknown(mut self) -> Self {
+        self.riders.iter_mut().for_each(super::Rider::cut);
+        self.rest_untold();
+        self
+    }
+
+    /// The same with what operators want of each lane from the first frame on.
+    #[must_use]
+    pub fn mixed(mut self, mixes: &[Mix]) -> Self {
+        for (rider, mix) in self.riders.iter_mut().zip(mixes) {
+            rider.wanted = *mix;
+            rider.out = !mix.on;
+        }
+        self
+    }
+
+    /// Begins, where it waits.
+    pub fn go(&mut self) {
+        if self.phase == Phase::Waiting {
+            self.phase = first_phase(&self.show);
+        }
+    }
+
+    /// Takes over where the seats are from the engine that is done: lanes to which nothing goes stay so, and those that rest
+    /// elsewhere than at park go on from there. Where the hall is not ready to play (`ready` false), it rests.
+    pub fn take_over(&mut self, before: &Self, ready: bool) {
+        self.trim_ms = before.trim_ms;
+        for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
+            match old.part {
+                Part::Away => rider.cut(),
+                Part::With | Part::Still | Part::Braking(_) => {
+                    if !is_at(&rider.window, old.pose(), rider.pose()) {
+                        rider.come_back(*old.pose());
+                    }
+                }
+            }
+        }
+        if !ready {
+            self.rest_untold();
+        }
+    }
+
+    /// At rest, and no frame says so: the seats have not moved.
+    pub(super) fn rest_untold(&mut self) {
+        self.riders.iter_mut().for_each(super::Rider::halt);
+        self.holds.skip();
+        self.phase = Phase::Resting(Rest::Stopped);
+    }
+
+    /// Whether no frame tells a lane that it is to rest.
+    pub(super) const fn sends_nothing(&self) -> bool {
+        match self.phase {
+            Phase::Waiting | Phase::Done => true,
+            Phase::Resting(Rest::Stopped) => self.holds.are_over(),
+            _ => false,
+        }
+    }
+}
+
+/// Whether two poses are the same as far as the window moves.
+pub(super) fn is_at(window: &Window, pose: &Pose, other: &Pose) -> bool {
+    let apart = |(index, slot): (usize, &Slot)| (pose[index] - other[index]).abs() * slot.stroke_pulses;
+    window.moving().map(apart).all(|pulses| pulses <= AT_PARK)
+}

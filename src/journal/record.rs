@@ -1,0 +1,186 @@
+//! What the journal holds: one line of JSON each.
+
+use jiff::Zoned;
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Events of a show that are kept, and characters of each.
+const MOST_EVENTS: usize = 100;
+const MOST_CHARACTERS: usize = 500;
+
+/// One thing that somebody asked.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Action {
+    /// When, RFC 3339 ([`stamp`]).
+    pub at: String,
+    /// Who.
+    pub who: String,
+    /// What, in the words of the surface.
+    pub what: String,
+    /// What came of it: `done`, or why not.
+    pub result: String,
+    /// The state of the hall that it led to.
+    pub state: String,
+}
+
+/// One show: what was played, how, and what came of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ShowRecord {
+    /// When it began, RFC 3339 with milliseconds and the offset of its zone ([`stamp`]). Tells one show of a hall from the
+    /// others: the record of the end has the same as that of the begin.
+    pub start: String,
+    /// The hall.
+    pub hall: String,
+    /// The id of the cue.
+    pub cue: String,
+    /// SHA-256 of its file, hexadecimal.
+    pub sha256: String,
+    /// Its title.
+    pub title: Option<String>,
+    /// Where it stands in the playlist; null where it was loaded by itself.
+    pub playlist: Option<PlaylistPlace>,
+    /// Level of the motion at the start, 0 to 1.
+    pub level: f64,
+    /// Level of the vibration at the start, 0 to 1.
+    pub vibration: f64,
+    /// Trim at the start, ms.
+    pub trim_ms: i32,
+    /// The effects that were not allowed at the start.
+    pub effects_off: Vec<String>,
+    /// Seats of the hall.
+    pub seats_total: usize,
+    /// Of these: enabled and answering at the start.
+    pub seats_available: usize,
+    /// Who started it.
+    pub operator: String,
+    /// Whether the playlist's time started it.
+    pub scheduled: bool,
+    /// Whether that was outside the hours of the house ([`crate::config::Hours`]).
+    pub out_of_hours: bool,
+    /// How it ended; null where it has not.
+    pub outcome: Option<Outcome>,
+}
+
+/// The place of an entry.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct PlaylistPlace {
+    /// The id of the playlist.
+    pub id: String,
+    /// The entry, counted from 0.
+    pub entry: usize,
+}
+
+/// How a show ended, and its figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Outcome {
+    /// When, RFC 3339.
+    pub end: String,
+    /// How.
+    pub result: Ending,
+    /// Faults and other events, in words, in order; at most 100 are kept.
+    pub events: Vec<String>,
+    /// Ticks that sent.
+    pub ticks: u64,
+    /// Ticks slept through.
+    pub missed_ticks: u64,
+    /// Frames that the kernel took.
+    pub sent: u64,
+    /// Of these: asked for a reply. asked = acked + refused + lost.
+    pub asked: u64,
+    /// Of these: acked.
+    pub acked: u64,
+    /// Refused (x = 3, 4, 5).
+    pub refused: u64,
+    /// Not answered within a second.
+    pub lost: u64,
+    /// Frames that the kernel did not take.
+    pub send_failed: u64,
+    /// How late ticks were.
+    pub lateness: Percentiles,
+    /// How long acks took.
+    pub ack: Percentiles,
+}
+
+/// How a show ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Ending {
+    /// It was played to its end.
+    Completed,
+    /// A person ended it.
+    Stopped,
+    /// A fault ended it.
+    Fault,
+}
+
+/// Percentiles in µs; null where nothing was counted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = RecordPercentiles)]
+pub struct Percentiles {
+    /// Half of them are no longer.
+    pub p50_us: Option<f64>,
+    /// 99 of 100.
+    pub p99_us: Option<f64>,
+    /// The longest.
+    pub max_us: Option<f64>,
+}
+
+/// One line of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub(super) enum Line {
+    /// The program started.
+    Start { at: String, version: String },
+    /// Somebody asked something.
+    Action(Action),
+    /// A show began.
+    Begin(Box<ShowRecord>),
+    /// A show ended.
+    Show(Box<ShowRecord>),
+    /// So many lines could not be written before this one, since the program started.
+    Lost { at: String, lines: u64 },
+}
+
+impl Line {
+    /// When it happened.
+    pub(super) fn at(&self) -> &str {
+        match self {
+            Self::Start { at, .. } | Self::Lost { at, .. } => at,
+            Self::Action(action) => &action.at,
+            Self::Begin(show) | Self::Show(show) => {
+                show.outcome.as_ref().map_or(&show.start, |outcome| &outcome.end)
+            }
+        }
+    }
+}
+
+impl ShowRecord {
+    /// The same with no more events than are kept.
+    pub(super) fn shortened(&self) -> Self {
+        let mut show = self.clone();
+        if let Some(Outcome { events, .. }) = &mut show.outcome {
+            let more = events.len().saturating_sub(MOST_EVENTS);
+            events.truncate(MOST_EVENTS);
+            for event in events.iter_mut() {
+                *event = event.chars().take(MOST_CHARACTERS).collect();
+            }
+            if more > 0 {
+                events.push(format!("and {more} more"));
+            }
+        }
+        show
+    }
+}
+
+/// A time as the records have it: RFC 3339 with milliseconds and the offset of its zone, as
+/// `2026-11-21T19:00:03.250+01:00`.
+#[must_use]
+pub fn stamp(at: &Zoned) -> String {
+    at.strftime("%Y-%m-%dT%H:%M:%S%.3f%:z").to_string()
+}
+
+/// The day of a time as the records have it.
+pub(super) fn day_of(stamp: &str) -> Option<Date> {
+    stamp.get(..10)?.parse().ok()
+}

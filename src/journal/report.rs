@@ -1,0 +1,237 @@
+//! The report of some days: every show that began on them, and what came of it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use jiff::ToSpan as _;
+use jiff::civil::Date;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::record::{Action, Ending, Line, ShowRecord, day_of};
+use super::{files, read};
+use crate::sys::folder::Folder;
+
+/// How long after its day the end of a show is looked for, days.
+const LONGEST_SHOW: i32 = 2;
+/// Notes that are told; of a file that is no journal there would be one for each line.
+const MOST_NOTES: usize = 20;
+
+/// The journal cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read the journal in {}; --dir names its folder, or [log] in the configuration", path.display())]
+pub struct JournalError {
+    /// Its folder.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// What was played, and what was asked, on some days.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Report {
+    /// The first day, YYYY-MM-DD.
+    pub from: String,
+    /// The last day, YYYY-MM-DD.
+    pub to: String,
+    /// The shows that began on these days, in their order.
+    pub shows: Vec<Shown>,
+    /// All of them together.
+    pub totals: Totals,
+    /// What was asked on these days, in its order.
+    pub actions: Vec<Action>,
+    /// What a reader should know of the journal itself: lines that were cut short or lost.
+    pub notes: Vec<String>,
+}
+
+/// One show.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Shown {
+    /// What came of it.
+    pub result: ShowResult,
+    /// How long it took from begin to end, s; null where it has no end.
+    pub took_s: Option<f64>,
+    /// Its record.
+    #[serde(flatten)]
+    pub record: ShowRecord,
+}
+
+/// What came of a show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ShowResult {
+    /// It was played to its end.
+    Completed,
+    /// A person ended it.
+    Stopped,
+    /// A fault ended it.
+    Fault,
+    /// The program or the machine ended before it did.
+    Interrupted,
+    /// It goes on.
+    Running,
+}
+
+/// All shows together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
+pub struct Totals {
+    /// How many began.
+    pub shows: usize,
+    /// Of these: played to their end.
+    pub completed: usize,
+    /// Ended by a person.
+    pub stopped: usize,
+    /// Ended by a fault.
+    pub faults: usize,
+    /// Ended with the program or the machine.
+    pub interrupted: usize,
+    /// Going on.
+    pub running: usize,
+    /// From begin to end, of those that ended, s.
+    pub took_s: f64,
+    /// Frames sent, of those that ended.
+    pub sent: u64,
+    /// Frames acked.
+    pub acked: u64,
+    /// Frames refused.
+    pub refused: u64,
+    /// Frames lost.
+    pub lost: u64,
+}
+
+impl ShowResult {
+    /// Its word.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Completed => "completed",
+            Self::Stopped => "stopped",
+            Self::Fault => "fault",
+            Self::Interrupted => "interrupted",
+            Self::Running => "running",
+        }
+    }
+}
+
+/// Reads the journal in `dir` for the days `from` to `to`, both included. A show belongs to the day on which it began, by
+/// the clock and the zone of the hall. One without an end was interrupted, unless it is the last and the program still runs.
+///
+/// # Errors
+/// [`JournalError`] where the folder or a file of it cannot be read. No records are no error.
+pub fn report(dir: &Path, from: Date, to: Date) -> Result<Report, JournalError> {
+    let mut days = Days { from, to, shows: Vec::new(), actions: Vec::new(), notes: Vec::new() };
+    let mut gather = || -> io::Result<bool> {
+        let folder = Folder::open(dir)?;
+        // The clock may have been set back over midnight during a show.
+        let first = from.yesterday().unwrap_or(from);
+        let until = to.checked_add(LONGEST_SHOW.days()).unwrap_or(Date::MAX);
+        let mut notes = Vec::new();
+        for file in files::all(&folder)?.into_iter().filter(|file| (first..=until).contains(&file.day)) {
+            read::each(&folder, file, &mut notes, |line| days.take(line))?;
+        }
+        days.notes.append(&mut notes);
+        Ok(folder.is_claimed())
+    };
+    let runs = gather().map_err(|source| JournalError { path: dir.to_owned(), source })?;
+    Ok(days.report(runs))
+}
+
+/// What has been read so far.
+struct Days {
+    from: Date,
+    to: Date,
+    shows: Vec<Open>,
+    actions: Vec<Action>,
+    notes: Vec<String>,
+}
+
+/// A show, and whether its begin was followed by a start of the program.
+struct Open {
+    record: ShowRecord,
+    outlived: bool,
+}
+
+impl Days {
+    fn take(&mut self, line: Line) {
+        let (from, to) = (self.from, self.to);
+        let within = |at: &str| day_of(at).is_some_and(|day| (from..=to).contains(&day));
+        match line {
+            Line::Start { .. } => self.shows.iter_mut().for_each(|open| open.outlived = true),
+            Line::Action(action) if within(&action.at) => self.actions.push(action),
+            Line::Begin(record) | Line::Show(record) if within(&record.start) => self.show(*record),
+            Line::Lost { at, lines } if within(&at) => {
+                self.notes.push(format!("at {at}: {lines} lines had been lost since the program started"));
+            }
+            _ => {}
+        }
+    }
+
+    /// The end of a show that has begun, or another show.
+    fn show(&mut self, record: ShowRecord) {
+        let same = |open: &&mut Open| open.record.start == record.start && open.record.hall == record.hall;
+        match self.shows.iter_mut().rev().find(same) {
+            Some(open) => open.record = record,
+            None => self.shows.push(Open { record, outlived: false }),
+        }
+    }
+
+    fn report(self, runs: bool) -> Report {
+        let Self { from, to, shows, actions, mut notes } = self;
+        let last = shows.len();
+        let shows: Vec<_> = shows
+            .into_iter()
+            .enumerate()
+            .map(|(index, open)| open.shown(runs && index + 1 == last))
+            .collect();
+        let more = notes.len().saturating_sub(MOST_NOTES);
+        notes.truncate(MOST_NOTES);
+        notes.extend((more > 0).then(|| format!("and {more} more")));
+        let totals = Totals::of(&shows);
+        Report { from: from.to_string(), to: to.to_string(), shows, totals, actions, notes }
+    }
+}
+
+impl Open {
+    fn shown(self, may_run: bool) -> Shown {
+        let Self { record, outlived } = self;
+        let result = match &record.outcome {
+            Some(outcome) => match outcome.result {
+                Ending::Completed => ShowResult::Completed,
+                Ending::Stopped => ShowResult::Stopped,
+                Ending::Fault => ShowResult::Fault,
+            },
+            None if may_run && !outlived => ShowResult::Running,
+            None => ShowResult::Interrupted,
+        };
+        let took_s = record.outcome.as_ref().and_then(|outcome| {
+            let (start, end): (jiff::Timestamp, jiff::Timestamp) =
+                (record.start.parse().ok()?, outcome.end.parse().ok()?);
+            Some(end.duration_since(start).as_secs_f64())
+        });
+        Shown { result, took_s, record }
+    }
+}
+
+impl Totals {
+    fn of(shows: &[Shown]) -> Self {
+        let mut totals = Self { shows: shows.len(), ..Self::default() };
+        for show in shows {
+            let count = match show.result {
+                ShowResult::Completed => &mut totals.completed,
+                ShowResult::Stopped => &mut totals.stopped,
+                ShowResult::Fault => &mut totals.faults,
+                ShowResult::Interrupted => &mut totals.interrupted,
+                ShowResult::Running => &mut totals.running,
+            };
+            *count += 1;
+            totals.took_s += show.took_s.unwrap_or(0.0);
+            if let Some(outcome) = &show.record.outcome {
+                totals.sent += outcome.sent;
+                totals.acked += outcome.acked;
+                totals.refused += outcome.refused;
+                totals.lost += outcome.lost;
+            }
+        }
+        totals
+    }
+}

@@ -1,0 +1,122 @@
+//! Puts lines at the end of the present file, and begins new files. Journal thread.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::os::unix::fs::FileExt as _;
+use std::path::{Path, PathBuf};
+
+use jiff::civil::Date;
+
+use super::Limits;
+use super::files::{self, FileId};
+use crate::sys::folder::{Folder, Stamp};
+
+/// A line on its way to the disk.
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    /// The day that it belongs to.
+    pub(super) day: Date,
+    /// When it happened.
+    pub(super) at: String,
+    /// The line with its end.
+    pub(super) text: Vec<u8>,
+    /// Whether it is to be on the disk before the next one is written.
+    pub(super) sync: bool,
+}
+
+/// Where lines go.
+#[derive(Debug)]
+pub(super) struct Writer {
+    dir: PathBuf,
+    limits: Limits,
+    /// Kept open, so that others see that somebody writes here.
+    folder: Option<Folder>,
+    current: Option<Current>,
+}
+
+/// The file that lines are added to.
+#[derive(Debug)]
+struct Current {
+    id: FileId,
+    file: File,
+    size: u64,
+    /// Whether its last line has no end.
+    torn: bool,
+}
+
+impl Writer {
+    pub(super) fn new(dir: &Path, limits: Limits) -> Self {
+        Self { dir: dir.to_owned(), limits, folder: None, current: None }
+    }
+
+    /// Writes a line. After an error everything is opened anew the next time.
+    pub(super) fn append(&mut self, entry: &Entry) -> io::Result<()> {
+        self.try_append(entry).inspect_err(|_| self.current = None)
+    }
+
+    fn try_append(&mut self, entry: &Entry) -> io::Result<()> {
+        let folder = match self.folder.take() {
+            Some(folder) => folder,
+            None => {
+                fs::create_dir_all(&self.dir)?;
+                Folder::open(&self.dir)?
+            }
+        };
+        folder.claim(); // a report may have been looking at it the last time
+        let folder = self.folder.insert(folder);
+        let fits = |current: &Current| {
+            let grown = current.size + entry.text.len() as u64;
+            current.id.day == entry.day && (grown <= self.limits.max_size || current.size == 0)
+        };
+        let current = match self.current.take().filter(fits) {
+            Some(current) => current,
+            None => {
+                let current = Current::open(folder, entry, &self.limits)?;
+                // Old files that cannot be removed are no reason to write nothing.
+                let _ = files::clear_out(folder, &self.limits, current.id);
+                current
+            }
+        };
+        self.current.insert(current).append(entry)
+    }
+}
+
+impl Current {
+    /// The last file of the day, or the next one where that is full.
+    fn open(folder: &Folder, entry: &Entry, limits: &Limits) -> io::Result<Self> {
+        let of_day = files::all(folder)?.into_iter().rfind(|id| id.day == entry.day);
+        let mut id = of_day.unwrap_or(FileId { day: entry.day, number: 0 });
+        loop {
+            let file = folder.append(&id.name())?;
+            let size = Stamp::of(&file)?.size;
+            if size == 0 || size + entry.text.len() as u64 <= limits.max_size {
+                let mut last = [b'\n'];
+                if size > 0 {
+                    file.read_exact_at(&mut last, size - 1)?;
+                }
+                folder.sync()?;
+                return Ok(Self { id, file, size, torn: last != [b'\n'] });
+            }
+            id.number += 1;
+        }
+    }
+
+    fn append(&mut self, entry: &Entry) -> io::Result<()> {
+        let line = match self.torn {
+            true => [b"\n", entry.text.as_slice()].concat(),
+            false => entry.text.clone(),
+        };
+        let written = loop {
+            match self.file.write(&line) {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                written => break written?,
+            }
+        };
+        self.size += written as u64;
+        self.torn = written < line.len();
+        if self.torn {
+            return Err(io::Error::new(io::ErrorKind::StorageFull, "the disk took only a part of a line"));
+        }
+        if entry.sync { self.file.sync_data() } else { Ok(()) }
+    }
+}

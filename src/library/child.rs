@@ -1,0 +1,123 @@
+//! The process that checks cues: what comes from outside is taken apart there, at the lowest priority and within limits, and
+//! never in the process that moves seats.
+
+use std::io::{self, Read as _};
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use rustix::process::{Pid, PidfdFlags, pidfd_open};
+
+use super::{Bounds, Hall, Verdict};
+use crate::hall::{Code, Problem};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// The most that is taken of what it prints, octets.
+const MAX_OUTPUT: u64 = 1 << 20;
+/// How it ends where the configuration has faults (sysexits).
+const BAD_CONFIGURATION: i32 = 78;
+
+/// Has a cue file checked for a hall. Blocks until it is.
+pub(super) fn examine(hall: &Hall, cue: &Path) -> Result<Verdict, Problem> {
+    let bounds = &hall.bounds;
+    let mut child = spawn(hall, cue).map_err(|error| {
+        let detail = format!("cannot start the check of the cue: {error}");
+        Problem::new(Code::File, detail, "look at the service's limits on processes and memory")
+    })?;
+    let deadline = Monotonic.now() + bounds.time;
+    let watched = watch(&mut child, deadline);
+    if watched.is_err() {
+        let _ = child.kill(); // it may have ended meanwhile
+    }
+    let status = child.wait().map_err(|error| failed(&error))?;
+    let output = watched.map_err(|error| match error.kind() {
+        io::ErrorKind::TimedOut => too_long(bounds),
+        _ => failed(&error),
+    })?;
+    serde_json::from_slice(&output).map_err(|_| no_verdict(status, bounds))
+}
+
+/// Not a copy of this process, which would slow its real-time thread down: the child lowers itself.
+fn spawn(hall: &Hall, cue: &Path) -> io::Result<Child> {
+    Command::new(&hall.program)
+        .arg0("kinocue")
+        .args(["prove", "--json"])
+        .arg("--config")
+        .arg(&hall.config)
+        .args(["--memory-mib", &hall.bounds.memory_mib.to_string()])
+        .args(["--seconds", &hall.bounds.time.as_secs().to_string()])
+        .arg("--")
+        .arg(cue)
+        .env_clear()
+        .env("MALLOC_ARENA_MAX", "1") // each arena would take of the address space that it may have
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+}
+
+/// What it prints, once it has ended.
+fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
+    let mut stdout = child.stdout.take().expect("its output is a pipe");
+    let mut output = Vec::new();
+    let mut buf = [0; 4096];
+    loop {
+        wait_for(&PollFd::new(&stdout, PollFlags::IN), deadline)?;
+        match stdout.read(&mut buf)? {
+            0 => break,
+            octets => output.extend_from_slice(&buf[..octets]),
+        }
+        if output.len() as u64 > MAX_OUTPUT {
+            return Err(io::Error::other("it printed more than any verdict is long"));
+        }
+    }
+    let ended = pidfd_open(Pid::from_child(child), PidfdFlags::empty())?;
+    wait_for(&PollFd::new(&ended, PollFlags::IN), deadline)?;
+    Ok(output)
+}
+
+/// Waits until there is something to read, or an end.
+fn wait_for(fd: &PollFd<'_>, deadline: MonoTime) -> io::Result<()> {
+    loop {
+        let left = deadline.since(Monotonic.now());
+        if left == Duration::ZERO {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        let left = Timespec::try_from(left).map_err(io::Error::other)?;
+        match poll(&mut [fd.clone()], Some(&left)) {
+            Ok(0) | Err(Errno::INTR) => {}
+            Ok(_) => return Ok(()),
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+fn failed(error: &io::Error) -> Problem {
+    Problem::new(Code::File, format!("the check of the cue failed: {error}"), "try again")
+}
+
+fn too_long(bounds: &Bounds) -> Problem {
+    let detail = format!("the check of the cue took more than {} s and was ended", bounds.time.as_secs());
+    Problem::new(Code::Check, detail, "try again when nothing plays; a cue that never passes is no good one")
+}
+
+/// It ended without a verdict: its limits ended it, or it could not begin.
+fn no_verdict(status: ExitStatus, bounds: &Bounds) -> Problem {
+    if status.code() == Some(BAD_CONFIGURATION) {
+        let remedy = "run kinocue check on the configuration and mend it";
+        return Problem::new(Code::Check, "the configuration of the hall has faults", remedy);
+    }
+    let how = match (status.signal(), status.code()) {
+        (Some(signal), _) => format!("signal {signal}"),
+        (None, code) => format!("code {}", code.unwrap_or_default()),
+    };
+    let (memory, time) = (bounds.memory_mib, bounds.time.as_secs());
+    let detail = format!(
+        "the check of the cue ended with {how}; it may take {memory} MiB of memory and {time} s of processor time"
+    );
+    Problem::new(Code::Check, detail, "make the cue smaller, or try kinocue check on another machine")
+}

@@ -1,0 +1,178 @@
+//! The curves of a cue as a page draws them: for each stretch of time the least and the greatest, exact also between rows.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::config::Config;
+use crate::cue::Unit;
+use crate::motion::SeatType;
+use crate::timeline::{Cubic, Timeline};
+
+/// The most stretches that a curve is asked in.
+pub const MAX_POINTS: usize = 4000;
+
+/// The curves of a cue.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CurveData {
+    /// How long the cue is, s.
+    pub length_s: f64,
+    /// The middle of each stretch of time, s; all are equally long.
+    pub t_s: Vec<f64>,
+    /// Each axis, axis 1 first.
+    pub axes: Vec<AxisCurve>,
+}
+
+/// The curve of one axis, as parts of the stroke, 0 to 1.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AxisCurve {
+    /// `a1` to `a12`.
+    pub name: String,
+    /// The least of each stretch.
+    pub min: Vec<f64>,
+    /// The greatest of each stretch.
+    pub max: Vec<f64>,
+}
+
+/// Draws a cue in so many stretches, 1 to [`MAX_POINTS`]. In a cue that is not in fractions, an axis is measured against the
+/// stroke of the first seat of `hall` that takes it, else of the bench seat.
+pub(super) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
+    let bench = SeatType::bench3(timeline.axes());
+    let to_stroke = |axis: usize| {
+        let taker = hall.and_then(|hall| hall.controllers.iter().find(|one| one.takes(axis)));
+        timeline.unit().to_stroke(taker.map_or(&bench, |one| &one.seat))
+    };
+    let length_s = timeline.duration().as_secs_f64();
+    let span = length_s / count(points);
+    CurveData {
+        length_s,
+        t_s: (0..points).map(|stretch| (count(stretch) + 0.5) * span).collect(),
+        axes: (0..timeline.axes()).map(|axis| axis_curve(timeline, axis, to_stroke(axis), points)).collect(),
+    }
+}
+
+/// Whether the hall has to be known to draw a cue in that unit.
+pub(super) fn needs_hall(unit: Unit) -> bool {
+    unit != Unit::Fraction
+}
+
+fn axis_curve(timeline: &Timeline, axis: usize, to_stroke: f64, points: usize) -> AxisCurve {
+    let times = timeline.cue().times();
+    let span = timeline.duration().as_secs_f64() / count(points);
+    let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); points];
+    for row in 0..times.len() - 1 {
+        let piece = Piece {
+            cubic: timeline.cubic(row, axis),
+            from: times[row].as_secs_f64(),
+            until: times[row + 1].as_secs_f64(),
+        };
+        let (first, last) = (stretch(piece.from, span, points), stretch(piece.until, span, points));
+        for (index, ends) in ends[first..=last].iter_mut().enumerate() {
+            let start = count(first + index) * span;
+            let (low, high) = piece.ends(start, start + span);
+            *ends = (ends.0.min(low), ends.1.max(high));
+        }
+    }
+    let part = |value: f64| (value * to_stroke).clamp(0.0, 1.0);
+    AxisCurve {
+        name: format!("a{}", axis + 1),
+        min: ends.iter().map(|(low, _)| part(*low)).collect(),
+        max: ends.iter().map(|(_, high)| part(*high)).collect(),
+    }
+}
+
+/// The curve of an axis from a row to the next, with their times in s.
+struct Piece {
+    cubic: Cubic,
+    from: f64,
+    until: f64,
+}
+
+impl Piece {
+    /// The least and greatest value between two times, as far as they are its own.
+    fn ends(&self, start: f64, end: f64) -> (f64, f64) {
+        let part = |time: f64| ((time - self.from) / (self.until - self.from)).clamp(0.0, 1.0);
+        let (start, end) = (part(start), part(end));
+        let within = self.cubic.still().filter(|u| (start..=end).contains(u));
+        let values = within.chain([start, end]).map(|u| self.cubic.at(u));
+        values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    }
+}
+
+/// The stretch that a time falls into.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to MAX_POINTS")]
+fn stretch(time: f64, span: f64, points: usize) -> usize {
+    ((time / span) as usize).min(points - 1)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "at most MAX_POINTS")]
+fn count(stretches: usize) -> f64 {
+    stretches as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::cue::{self, Source};
+    use crate::time::ShowTime;
+    use crate::timeline::Hint;
+
+    fn timeline(text: &str) -> Timeline {
+        Timeline::new(cue::read(Path::new("t.csv"), text.as_bytes(), &Source::Native).unwrap())
+    }
+
+    #[test]
+    fn every_stretch_has_the_ends_of_its_own_time() {
+        let cue = timeline("# interpolation: linear\ntime_s,a1,a2\n0,0,0.5\n1,1,0.5\n2,0,0.5\n4,0,0.5\n");
+        let curve = draw(&cue, None, 4);
+        assert_eq!(curve.t_s, [0.5, 1.5, 2.5, 3.5]);
+        assert_eq!(curve.axes[0].max, [1.0, 1.0, 0.0, 0.0]);
+        assert_eq!(curve.axes[0].min, [0.0, 0.0, 0.0, 0.0]);
+        assert_eq!((&curve.axes[1].min, &curve.axes[1].max), (&vec![0.5; 4], &vec![0.5; 4]));
+        assert_eq!(curve.axes[1].name, "a2");
+    }
+
+    #[test]
+    fn more_stretches_than_rows_leave_no_gap() {
+        let curve = draw(&timeline("time_s,a1\n0,0.2\n10,0.4\n"), None, 1000);
+        assert!(curve.axes[0].min.iter().chain(&curve.axes[0].max).all(|v| (0.2..=0.4).contains(v)));
+        assert!(curve.axes[0].min.windows(2).all(|pair| pair[0] < pair[1]), "it rises");
+    }
+
+    #[test]
+    fn millimetres_are_parts_of_the_stroke_of_the_seat() {
+        let curve = draw(&timeline("# units: mm\ntime_s,a1\n0,0\n1,75\n"), None, 1);
+        assert_eq!((curve.axes[0].min[0], curve.axes[0].max[0]), (0.0, 0.5));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_sample_lies_outside_its_stretch(
+            rows in prop::collection::vec((1_i64..900, 0.3_f64..0.7), 2..20),
+            points in 1_usize..50,
+        ) {
+            let mut text = "time_ms,a1\n".to_owned();
+            let mut time = 0;
+            for (span, value) in &rows {
+                text += &format!("{time},{value}\n");
+                time += span;
+            }
+            let cue = timeline(&text);
+            let curve = draw(&cue, None, points);
+            let span = cue.duration().as_secs_f64() / count(points);
+            for step in 0..=500 {
+                let at = cue.duration().as_secs_f64() * f64::from(step) / 500.0;
+                let value = cue.sample(ShowTime::from_secs_f64(at), &mut Hint::default())[0];
+                let stretch = stretch(at, span, points);
+                prop_assert!(curve.axes[0].min[stretch] - 1e-6 <= value, "{at}");
+                prop_assert!(curve.axes[0].max[stretch] + 1e-6 >= value, "{at}");
+            }
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! What the checking process says of a cue, and what the library says of it to others.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::CueId;
+
+/// What a check of one cue for one hall has shown; a line of JSON from the process that checked it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Whether it can be read, fits the hall, and keeps all limits at full level.
+    pub passed: bool,
+    /// Every fault, each with its place in the file, the first twenty in words.
+    pub faults: Vec<String>,
+    /// How many there are beyond those.
+    pub more: u64,
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+    /// SHA-256 of what the cue does, hexadecimal ([`crate::proof::Digest`]); none where it cannot be read.
+    pub digest: Option<String>,
+    /// Its title.
+    pub title: Option<String>,
+    /// How long it is, s; none where it cannot be read.
+    pub length_s: Option<f64>,
+    /// How many axes it has; none where it cannot be read.
+    pub axes: Option<usize>,
+    /// The effects that it names.
+    pub effects: Vec<String>,
+    /// Whether it is MCAP; CSV if not.
+    pub mcap: bool,
+}
+
+impl Verdict {
+    /// Every fault, a line each.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let more = (self.more > 0).then(|| format!("and {} more", self.more));
+        self.faults.iter().cloned().chain(more).collect()
+    }
+}
+
+/// Whether a cue is proved to keep the limits of the hall, as the configuration's file now is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(tag = "state", rename_all = "lowercase")]
+pub enum Proved {
+    /// It is.
+    Passed,
+    /// It is not.
+    Failed {
+        /// Every fault.
+        faults: Vec<String>,
+    },
+    /// Nobody has looked, or the file or the configuration has changed since.
+    Unknown,
+}
+
+/// One cue of the library. What only reading shows is null until it has been checked.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct CueInfo {
+    /// Its id.
+    pub id: String,
+    /// Its title.
+    pub title: Option<String>,
+    /// How long it is, s.
+    pub length_s: Option<f64>,
+    /// How many axes it has.
+    pub axes: Option<usize>,
+    /// The effects that it names.
+    pub effects: Vec<String>,
+    /// The size of its file, octets.
+    pub size: u64,
+    /// SHA-256 of its file, hexadecimal.
+    pub sha256: Option<String>,
+    /// Whether it keeps the limits of the hall.
+    pub proof: Proved,
+}
+
+impl CueInfo {
+    /// Of a file of that size; `known` is what was found of that very content, and whether for the hall as it is now.
+    pub(super) fn new(id: &CueId, size: u64, known: Option<(&Verdict, bool)>) -> Self {
+        let verdict = known.map(|(verdict, _)| verdict);
+        let proof = match known {
+            Some((verdict, true)) if verdict.passed => Proved::Passed,
+            Some((verdict, true)) => Proved::Failed { faults: verdict.lines() },
+            _ => Proved::Unknown,
+        };
+        Self {
+            id: id.to_string(),
+            title: verdict.and_then(|verdict| verdict.title.clone()),
+            length_s: verdict.and_then(|verdict| verdict.length_s),
+            axes: verdict.and_then(|verdict| verdict.axes),
+            effects: verdict.map_or_else(Vec::new, |verdict| verdict.effects.clone()),
+            size,
+            sha256: verdict.map(|verdict| verdict.sha256.clone()),
+            proof,
+        }
+    }
+}

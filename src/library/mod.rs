@@ -1,0 +1,335 @@
+//! The cue library: a folder of checked cues. Ids in; cues, what is known of them, and uploads out. Control plane; every call
+//! may read or write files, and those that say so block for longer.
+//!
+//! A cue named `x` is the file `x.csv` or `x.mcap`, a regular one; of two the newer counts. What comes from outside is
+//! checked and proved in a process of its own, of the lowest priority and with limits on memory, time and files, before it
+//! gets that name. What the library says of a proof is for people and playlists: whoever plays a cue proves it again.
+
+mod child;
+mod curve;
+mod id;
+mod index;
+mod info;
+mod upload;
+
+pub use curve::{AxisCurve, CurveData, MAX_POINTS};
+pub use id::{CueId, Id, IdError};
+pub use info::{CueInfo, Proved, Verdict};
+pub use upload::Upload;
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, AtomicUsize};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use sha2::{Digest as _, Sha256};
+
+use crate::config::{self, Store};
+use crate::cue::{self, Source, limits};
+use crate::hall::{Code, Problem};
+use crate::sys::folder::{Folder, Stamp};
+use crate::timeline::Timeline;
+use index::Index;
+
+/// Curves that are kept; a page asks for the same one again and again.
+const CURVES: usize = 4;
+
+/// The library cannot be opened.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot open the cue library {}; name another with library in [show], or give it to the user of the service", path.display())]
+pub struct LibraryError {
+    /// The folder.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// What cues are checked for, by what, and within which bounds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hall {
+    /// The configuration's file.
+    pub config: PathBuf,
+    /// The program that checks: kinocue.
+    pub program: PathBuf,
+    /// What a cue and its check may take.
+    pub bounds: Bounds,
+}
+
+/// What a cue and its check may take.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Bounds {
+    /// The longest file that is taken in, octets.
+    pub max_octets: u64,
+    /// Memory of the checking process, MiB.
+    pub memory_mib: u64,
+    /// Processor time of the checking process, and how long it is waited for.
+    pub time: Duration,
+}
+
+impl Default for Bounds {
+    /// Room for a cue of two hours and twelve axes at 1 kHz; a proof of it takes seconds where nothing else runs.
+    fn default() -> Self {
+        Self { max_octets: 256 << 20, memory_mib: 4096, time: Duration::from_secs(300) }
+    }
+}
+
+impl Hall {
+    /// The hall of that configuration file, with what its `[library]` says. Cues are checked by this very program, also where
+    /// a newer one has taken its place on the disk since it was started.
+    #[must_use]
+    pub fn new(config: &Path, store: &Store) -> Self {
+        let bounds = Bounds { max_octets: u64::from(store.max_cue_mib) << 20, ..Bounds::default() };
+        Self { config: config.to_owned(), program: PathBuf::from("/proc/self/exe"), bounds }
+    }
+
+    /// What a proof holds for: this version of the program, and the configuration's file as it now is.
+    fn fingerprint(&self) -> String {
+        let hash = Sha256::new().chain_update(env!("CARGO_PKG_VERSION"));
+        let text = fs::read(&self.config).unwrap_or_default(); // the check itself says that it cannot be read
+        hex(&hash.chain_update(text).finalize())
+    }
+}
+
+/// A library of cues. Clones share it; any thread.
+#[derive(Debug, Clone)]
+pub struct Library {
+    inner: Arc<Inner>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    dir: PathBuf,
+    hall: Hall,
+    index: Mutex<Index>,
+    /// Held while a cue is checked: one at a time.
+    proving: Mutex<()>,
+    /// Uploads that have begun.
+    uploads: AtomicUsize,
+    /// Numbers the uploads.
+    serial: AtomicU64,
+    curves: Mutex<Vec<Drawn>>,
+}
+
+/// A curve that was drawn before.
+#[derive(Debug)]
+struct Drawn {
+    name: String,
+    stamp: Stamp,
+    points: usize,
+    curve: Arc<CurveData>,
+}
+
+/// The file of a cue.
+struct Cue {
+    folder: Folder,
+    name: String,
+    file: File,
+    stamp: Stamp,
+}
+
+impl Library {
+    /// Opens the library in `dir`, which is made where it is missing, and removes what uploads left there in a crash.
+    ///
+    /// # Errors
+    /// [`LibraryError`] where the folder cannot be made, read or written.
+    pub fn open(dir: &Path, hall: Hall) -> Result<Self, LibraryError> {
+        let open = || -> io::Result<Index> {
+            fs::create_dir_all(dir)?;
+            let folder = Folder::open(dir)?;
+            for name in folder.names()?.iter().filter(|name| name.starts_with(upload::UNFINISHED)) {
+                folder.remove_abandoned(name)?;
+            }
+            Ok(Index::read(&folder))
+        };
+        let index = open().map_err(|source| LibraryError { path: dir.to_owned(), source })?;
+        let inner = Inner {
+            dir: dir.to_owned(),
+            hall,
+            index: Mutex::new(index),
+            proving: Mutex::new(()),
+            uploads: AtomicUsize::new(0),
+            serial: AtomicU64::new(0),
+            curves: Mutex::new(Vec::new()),
+        };
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
+    /// All cues by their ids, with what is known of them; reads none of them. Empty where the folder cannot be read.
+    #[must_use]
+    pub fn list(&self) -> Vec<CueInfo> {
+        let names = Folder::open(&self.inner.dir).and_then(|folder| folder.names()).unwrap_or_default();
+        let ids: BTreeSet<CueId> = names.iter().filter_map(|name| id_of(name)).collect();
+        let print = self.inner.hall.fingerprint();
+        ids.iter().filter_map(|id| self.info(id, &print)).collect()
+    }
+
+    /// What is known of a cue; reads it not.
+    #[must_use]
+    pub fn get(&self, id: &CueId) -> Option<CueInfo> {
+        self.info(id, &self.inner.hall.fingerprint())
+    }
+
+    fn info(&self, id: &CueId, print: &str) -> Option<CueInfo> {
+        let cue = self.cue(id).ok()?;
+        let index = lock(&self.inner.index);
+        Some(CueInfo::new(id, cue.stamp.size, index.get(&cue.name, cue.stamp, print)))
+    }
+
+    /// Has a cue that is in the folder already checked and proved, unless it is known for the hall as it now is. Blocks until
+    /// that is done: seconds, minutes for a long cue beside a show.
+    ///
+    /// # Errors
+    /// [`Problem`] where there is no such cue, or the check cannot be done. A cue that does not pass is no error.
+    pub fn examine(&self, id: &CueId) -> Result<CueInfo, Problem> {
+        let inner = &self.inner;
+        let _turn = lock(&inner.proving);
+        let print = inner.hall.fingerprint();
+        let info = self.info(id, &print).ok_or_else(|| unknown(id))?;
+        if info.proof != Proved::Unknown {
+            return Ok(info);
+        }
+        let cue = self.cue(id)?;
+        let verdict = child::examine(&inner.hall, &cue.folder.path(&cue.name))?;
+        if cue.folder.stamp(&cue.name).ok().flatten() != Some(cue.stamp) {
+            let detail = format!("the cue {id} changed while it was being checked");
+            return Err(Problem::new(Code::File, detail, "try again when it is all there"));
+        }
+        let info = CueInfo::new(id, cue.stamp.size, Some((&verdict, true)));
+        lock(&inner.index).put(&cue.folder, &cue.name, cue.stamp, &print, verdict);
+        Ok(info)
+    }
+
+    /// Has every cue checked that is not known for the hall as it now is, one after another; for a thread of its own, when
+    /// the service has started and after the configuration has changed. Those that cannot be checked stay unknown.
+    pub fn examine_all(&self) {
+        for info in self.list() {
+            if let (Proved::Unknown, Ok(id)) = (&info.proof, info.id.parse()) {
+                let _ = self.examine(&id); // it stays unknown, and whoever loads it is told why
+            }
+        }
+    }
+
+    /// Reads a cue whole into memory, and gives the SHA-256 of those very octets, hexadecimal. Blocks for as long as that
+    /// takes, seconds for the longest.
+    ///
+    /// # Errors
+    /// [`Problem`] where there is no such cue, it cannot be read, or it has faults, each with its place.
+    pub fn read(&self, id: &CueId) -> Result<(Timeline, String), Problem> {
+        let cue = self.cue(id)?;
+        self.timeline(id, &cue)
+    }
+
+    fn timeline(&self, id: &CueId, cue: &Cue) -> Result<(Timeline, String), Problem> {
+        let path = cue.folder.path(&cue.name);
+        let mut octets = Vec::new();
+        let read = (&cue.file).take(limits::MAX_FILE + 1).read_to_end(&mut octets);
+        read.map_err(|error| file_problem("read the cue", &error))?;
+        let sha256 = hex(&Sha256::digest(&octets));
+        let cue = cue::read(&path, octets.as_slice(), &Source::Native).map_err(|faults| {
+            let lines = faults.to_string().lines().map(str::to_owned).collect();
+            let detail = format!("the cue {id} cannot be played as it is");
+            Problem::new(Code::Check, detail, "mend what is named, and upload it again").with(lines)
+        })?;
+        Ok((Timeline::new(cue), sha256))
+    }
+
+    /// The curves of a cue in so many stretches of time, 1 to [`MAX_POINTS`]. Reads the cue, unless it was asked the same
+    /// before; one at a time.
+    ///
+    /// # Errors
+    /// As for [`Library::read`]; [`Code::Value`] where `points` is out of range, [`Code::Check`] where the cue is in mm or
+    /// pulses and the configuration cannot be read.
+    pub fn curve(&self, id: &CueId, points: usize) -> Result<Arc<CurveData>, Problem> {
+        if !(1..=MAX_POINTS).contains(&points) {
+            let detail = format!("{points} points are outside 1..={MAX_POINTS}");
+            return Err(Problem::new(Code::Value, detail, "ask for as many as the page is wide"));
+        }
+        let cue = self.cue(id)?;
+        let mut curves = lock(&self.inner.curves);
+        let same =
+            |drawn: &&Drawn| drawn.name == cue.name && drawn.stamp == cue.stamp && drawn.points == points;
+        if let Some(drawn) = curves.iter().find(same) {
+            return Ok(Arc::clone(&drawn.curve));
+        }
+        let (timeline, _) = self.timeline(id, &cue)?;
+        let hall = curve::needs_hall(timeline.unit()).then(|| config::load(&self.inner.hall.config));
+        let hall = hall.transpose().map_err(|faults| {
+            let remedy =
+                "mend the configuration; the strokes of the seats are needed for a cue in mm or pulses";
+            Problem::new(Code::Check, faults.to_string(), remedy)
+        })?;
+        let curve = Arc::new(curve::draw(&timeline, hall.as_ref(), points));
+        curves.truncate(CURVES - 1);
+        let drawn = Drawn { name: cue.name, stamp: cue.stamp, points, curve: Arc::clone(&curve) };
+        curves.insert(0, drawn);
+        Ok(curve)
+    }
+
+    /// The longest file that is taken in, octets.
+    #[must_use]
+    pub fn max_octets(&self) -> u64 {
+        self.inner.hall.bounds.max_octets
+    }
+
+    /// Begins to take a cue in; it replaces the one with that id when it is finished and passes. Two at a time.
+    ///
+    /// # Errors
+    /// [`Problem`] where two are being taken in already, or the folder cannot be written.
+    pub fn begin(&self, id: &CueId) -> Result<Upload, Problem> {
+        Upload::begin(self, id)
+    }
+
+    /// Opens the file of a cue: of two the newer.
+    fn cue(&self, id: &CueId) -> Result<Cue, Problem> {
+        let open = || -> io::Result<Option<Cue>> {
+            let mut found: Option<Cue> = None;
+            for mcap in [false, true] {
+                let (folder, name) = (Folder::open(&self.inner.dir)?, file_name(id, mcap));
+                let Some((file, stamp)) = folder.file(&name)? else { continue };
+                if found.as_ref().is_none_or(|other| !stamp.is_before(&other.stamp)) {
+                    found = Some(Cue { folder, name, file, stamp });
+                }
+            }
+            Ok(found)
+        };
+        open().map_err(|error| file_problem("open the cue", &error))?.ok_or_else(|| unknown(id))
+    }
+}
+
+/// The file of a cue.
+fn file_name(id: &CueId, mcap: bool) -> String {
+    format!("{id}.{}", if mcap { "mcap" } else { "csv" })
+}
+
+/// The cue that a file is, if it is one.
+fn id_of(name: &str) -> Option<CueId> {
+    name.strip_suffix(".csv").or_else(|| name.strip_suffix(".mcap"))?.parse().ok()
+}
+
+fn unknown(id: &CueId) -> Problem {
+    Problem::new(Code::Unknown, format!("there is no cue {id} in the library"), "upload it, or name another")
+}
+
+fn file_problem(what: &str, error: &io::Error) -> Problem {
+    Problem::new(
+        Code::File,
+        format!("cannot {what}: {error}"),
+        "look at the folder of the library and its disk",
+    )
+}
+
+/// Octets as hexadecimal digits.
+fn hex(octets: &[u8]) -> String {
+    octets.iter().map(|octet| format!("{octet:02x}")).collect()
+}
+
+/// What is behind a lock is whole at any time, also where a thread that held it panicked.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+//! A cue on its way into the library: into a file that no cue can be, then checked, then put in its place at once. Where
+//! anything goes wrong nothing of it stays.
+
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::sync::atomic::Ordering;
+
+use sha2::{Digest as _, Sha256};
+
+use super::{CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
+use crate::hall::{Code, Problem};
+use crate::sys::folder::Folder;
+
+/// What the names of unfinished files begin with; no id does.
+pub(super) const UNFINISHED: &str = ".upload-";
+/// Uploads at a time.
+const MOST: usize = 2;
+
+/// A cue that is being uploaded. Dropped, it leaves nothing.
+#[derive(Debug)]
+pub struct Upload {
+    place: Place,
+    id: CueId,
+    file: File,
+    size: u64,
+    hash: Sha256,
+}
+
+/// Where it is written to, and its turn among the uploads; both are given back when it is dropped.
+#[derive(Debug)]
+struct Place {
+    library: Library,
+    folder: Folder,
+    name: String,
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        // Where it cannot be removed now, it is at the next start.
+        let _ = self.folder.remove(&self.name);
+        self.library.inner.uploads.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+impl Upload {
+    pub(super) fn begin(library: &Library, id: &CueId) -> Result<Self, Problem> {
+        let inner = &library.inner;
+        let folder = Folder::open(&inner.dir).map_err(|error| file_problem("open the library", &error))?;
+        let taken = inner.uploads.fetch_update(Ordering::AcqRel, Ordering::Acquire, |uploads| {
+            (uploads < MOST).then_some(uploads + 1)
+        });
+        if taken.is_err() {
+            let detail = format!("{MOST} cues are being uploaded already");
+            return Err(Problem::new(Code::Busy, detail, "try again when they are done"));
+        }
+        let serial = inner.serial.fetch_add(1, Ordering::Relaxed);
+        let name = format!("{UNFINISHED}{}-{serial}", std::process::id());
+        let place = Place { library: library.clone(), folder, name };
+        let file = place.folder.create(&place.name).map_err(|error| unwritten(&error))?;
+        Ok(Self { place, id: id.clone(), file, size: 0, hash: Sha256::new() })
+    }
+
+    /// Takes the next octets of the file. Blocks while they are written.
+    ///
+    /// # Errors
+    /// [`Problem`] where the file grows over the limit of the library, or the disk does not take it.
+    pub fn write(&mut self, octets: &[u8]) -> Result<(), Problem> {
+        let most = self.place.library.inner.hall.bounds.max_octets;
+        self.size = self.size.saturating_add(octets.len() as u64);
+        if self.size > most {
+            let detail = format!("the cue is longer than {} MiB", most >> 20);
+            let remedy = "make it smaller, as MCAP perhaps, or raise max_cue_mib in [library]";
+            return Err(Problem::new(Code::Size, detail, remedy));
+        }
+        self.hash.update(octets);
+        self.file.write_all(octets).map_err(|error| unwritten(&error))
+    }
+
+    /// Has the file checked and proved by a process of the lowest priority, one at a time, and puts it into the library.
+    /// Blocks until that is done, minutes for a long cue beside a show; not for a thread that others wait for.
+    ///
+    /// # Errors
+    /// [`Problem`] with every fault where the cue is refused; where the check cannot be done, or the disk fails.
+    pub fn finish(self) -> Result<CueInfo, Problem> {
+        let Self { place, id, file, hash, .. } = self;
+        let inner = &place.library.inner;
+        file.sync_all().map_err(|error| unwritten(&error))?;
+        let print = inner.hall.fingerprint();
+        let verdict = {
+            let _turn = lock(&inner.proving);
+            child::examine(&inner.hall, &place.folder.path(&place.name))?
+        };
+        if verdict.sha256 != hex(&hash.finalize()) {
+            let detail = "the file changed while it was being checked";
+            return Err(Problem::new(Code::File, detail, "upload it again"));
+        }
+        if !verdict.passed {
+            let faults = verdict.lines();
+            let detail = format!("the cue {id} is refused: it does not pass");
+            let remedy = "mend what is named, or make it fit with kinocue fit";
+            return Err(Problem::new(Code::Check, detail, remedy).with(faults));
+        }
+        let name = file_name(&id, verdict.mcap);
+        // From the old whole to the new whole: never a name with half a file.
+        let placed = place.folder.rename(&place.name, &name);
+        let placed = placed.and_then(|()| place.folder.remove(&file_name(&id, !verdict.mcap)));
+        placed.and_then(|()| place.folder.sync()).map_err(|error| unwritten(&error))?;
+        let stamp = place.folder.stamp(&name).map_err(|error| file_problem("read the cue", &error))?;
+        let Some(stamp) = stamp else {
+            return Err(Problem::new(Code::File, "the cue is gone again", "upload it again"));
+        };
+        let info = CueInfo::new(&id, stamp.size, Some((&verdict, true)));
+        lock(&inner.index).put(&place.folder, &name, stamp, &print, verdict);
+        Ok(info)
+    }
+}
+
+fn unwritten(error: &io::Error) -> Problem {
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Problem::new(
+            Code::File,
+            "the disk with the library is full; nothing of the cue is kept",
+            "make room, and upload it again",
+        ),
+        _ => file_problem("write the cue", error),
+    }
+}

@@ -1,0 +1,104 @@
+//! Figures of each controller.
+
+use super::{Family, Labels, Values, flag};
+use crate::hall::ControllerStatus;
+
+pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<Family> {
+    let mut all = standing(controllers);
+    all.extend(frames(controllers));
+    all
+}
+
+fn standing(all: &[ControllerStatus]) -> Vec<Family> {
+    vec![
+        gauges(all, "controller_up", "1 where the controller answers", |one| answers(one.standing)),
+        gauges(all, "controller_enabled", "1 where it is to take part", |one| Some(flag(one.enabled))),
+        Family {
+            name: "controller_standing",
+            help: "1, with how it stands",
+            values: Values::Gauges(all.iter().map(|one| (and(one, "standing", one.standing), 1.0)).collect()),
+        },
+        gauges(all, "controller_emergency_stop", "1 while an emergency stop is in effect", |one| {
+            Some(flag(one.emergency_stop))
+        }),
+        gauges(all, "controller_error", "Its error number, 0 for none", |one| one.error.map(f64::from)),
+        gauges(all, "controller_silence_seconds", "Since it was last heard", |one| one.heard_s),
+        gauges(all, "controller_ack_ratio", "Acks over frames that asked, in the last second", |one| {
+            one.ack_rate
+        }),
+        latencies(all),
+    ]
+}
+
+fn frames(all: &[ControllerStatus]) -> Vec<Family> {
+    let acks = all.iter().flat_map(|one| {
+        [("acked", one.acked), ("refused", one.refused), ("lost", one.lost)]
+            .map(|(result, count)| (and(one, "result", result), count))
+    });
+    vec![
+        counters(all, "frames_sent", "Frames handed to the kernel", |one| one.sent),
+        counters(all, "frames_failed", "Frames that the kernel did not take", |one| one.send_failed),
+        counters(all, "frames_asked", "Frames that asked for a reply", |one| one.asked),
+        Family {
+            name: "acks",
+            help: "What became of the frames that asked; lost: no reply within a second",
+            values: Values::Counters(acks.collect()),
+        },
+        counters(all, "limit_interventions", "How often the last gate held motion back", |one| one.clamps),
+    ]
+}
+
+/// Whether it answers; none where nobody listens for its answers.
+fn answers(standing: &str) -> Option<f64> {
+    match standing {
+        "lost" | "unknown" => Some(0.0),
+        "unwatched" => None,
+        _ => Some(1.0),
+    }
+}
+
+/// Percentiles, not a histogram for each: those of all controllers together are in `ack_latency_seconds`.
+fn latencies(all: &[ControllerStatus]) -> Family {
+    let values = all.iter().flat_map(|one| {
+        [("0.5", one.ack_p50_us), ("0.99", one.ack_p99_us)]
+            .into_iter()
+            .filter_map(|(quantile, us)| Some((and(one, "quantile", quantile), us? / 1e6)))
+    });
+    Family {
+        name: "controller_ack_latency_seconds",
+        help: "Latency of its acks since the program started",
+        values: Values::Gauges(values.collect()),
+    }
+}
+
+fn gauges(
+    all: &[ControllerStatus],
+    name: &'static str,
+    help: &'static str,
+    value: impl Fn(&ControllerStatus) -> Option<f64>,
+) -> Family {
+    let values = all.iter().filter_map(|one| Some((of(one), value(one)?))).collect();
+    Family { name, help, values: Values::Gauges(values) }
+}
+
+fn counters(
+    all: &[ControllerStatus],
+    name: &'static str,
+    help: &'static str,
+    count: impl Fn(&ControllerStatus) -> u64,
+) -> Family {
+    let values = all.iter().map(|one| (of(one), count(one))).collect();
+    Family { name, help, values: Values::Counters(values) }
+}
+
+fn of(one: &ControllerStatus) -> Labels {
+    let mut labels = vec![("controller", one.name.clone())];
+    labels.extend(one.row.clone().map(|row| ("row", row)));
+    labels
+}
+
+fn and(one: &ControllerStatus, name: &'static str, value: &str) -> Labels {
+    let mut labels = of(one);
+    labels.push((name, value.to_owned()));
+    labels
+}

@@ -1,0 +1,128 @@
+//! The status of the hall as figures for Prometheus: `OpenMetrics` text, in base units, nothing of it told by the tick thread.
+//! Every label has as many values as the configuration has names. Control plane.
+
+use std::fmt;
+
+use prometheus_client::collector::Collector;
+use prometheus_client::encoding::{DescriptorEncoder, NoLabelSet, text};
+use prometheus_client::metrics::MetricType;
+use prometheus_client::metrics::exemplar::Exemplar;
+use prometheus_client::registry::Registry;
+
+use crate::hall::{self, Status};
+
+mod controllers;
+mod shows;
+#[cfg(test)]
+mod tests;
+
+/// The type of what [`render`] gives.
+pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// All figures of a status as `OpenMetrics` text.
+///
+/// # Panics
+/// Never: a `String` takes whatever is written to it.
+#[must_use]
+pub fn render(status: &Status) -> String {
+    let mut registry = Registry::with_prefix("kinocue");
+    registry.register_collector(Box::new(Families(families(status))));
+    let mut page = String::new();
+    text::encode(&mut page, &registry).expect("a string takes all that is written to it");
+    page
+}
+
+fn families(status: &Status) -> Vec<Family> {
+    let mut families = shows::families(status);
+    families.extend(controllers::families(&status.controllers));
+    families
+}
+
+/// Counters can name one thing that they counted; ours do not.
+const NO_EXEMPLAR: Option<&Exemplar<NoLabelSet, u64>> = None;
+
+/// Names of labels, and their values.
+type Labels = Vec<(&'static str, String)>;
+
+/// One figure, for each set of labels.
+#[derive(Debug)]
+struct Family {
+    /// Its name, without `kinocue_` in front, and without `_total` or `_info` behind.
+    name: &'static str,
+    /// What it is, for a person; no full stop.
+    help: &'static str,
+    values: Values,
+}
+
+#[derive(Debug)]
+enum Values {
+    /// What goes up and down.
+    Gauges(Vec<(Labels, f64)>),
+    /// What only grows while the program runs.
+    Counters(Vec<(Labels, u64)>),
+    /// What is said by labels alone.
+    Info(Labels),
+    /// Counts by size, s.
+    Histogram { sum: f64, buckets: Vec<(f64, u64)> },
+}
+
+impl Family {
+    fn gauge(name: &'static str, help: &'static str, value: impl Into<Option<f64>>) -> Self {
+        let values = value.into().map(|value| (Labels::new(), value)).into_iter().collect();
+        Self { name, help, values: Values::Gauges(values) }
+    }
+
+    fn counter(name: &'static str, help: &'static str, value: u64) -> Self {
+        Self { name, help, values: Values::Counters(vec![(Labels::new(), value)]) }
+    }
+
+    fn histogram(name: &'static str, help: &'static str, histogram: &hall::Histogram) -> Self {
+        let bounds = histogram.bounds_us.iter().map(|us| us / 1e6).chain([f64::INFINITY]);
+        let mut buckets: Vec<_> = bounds.zip(histogram.counts.iter().copied()).collect();
+        if buckets.is_empty() {
+            buckets.push((f64::INFINITY, 0)); // the format asks for this one
+        }
+        Self { name, help, values: Values::Histogram { sum: histogram.sum_s, buckets } }
+    }
+
+    fn encode(&self, encoder: &mut DescriptorEncoder) -> fmt::Result {
+        let Self { name, help, values } = self;
+        let kind = match values {
+            Values::Gauges(_) => MetricType::Gauge,
+            Values::Counters(_) => MetricType::Counter,
+            Values::Info(_) => MetricType::Info,
+            Values::Histogram { .. } => MetricType::Histogram,
+        };
+        let mut metric = encoder.encode_descriptor(name, help, None, kind)?;
+        match values {
+            Values::Gauges(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
+                [] => metric.encode_gauge(value),
+                _ => metric.encode_family(labels)?.encode_gauge(value),
+            }),
+            Values::Counters(all) => all.iter().try_for_each(|(labels, value)| match labels.as_slice() {
+                [] => metric.encode_counter(value, NO_EXEMPLAR),
+                _ => metric.encode_family(labels)?.encode_counter(value, NO_EXEMPLAR),
+            }),
+            Values::Info(labels) => metric.encode_info(labels),
+            Values::Histogram { sum, buckets } => {
+                let count = buckets.iter().map(|(_, count)| count).sum();
+                metric.encode_histogram::<NoLabelSet>(*sum, count, buckets, None)
+            }
+        }
+    }
+}
+
+/// What a registry asks for its figures.
+#[derive(Debug)]
+struct Families(Vec<Family>);
+
+impl Collector for Families {
+    fn encode(&self, mut encoder: DescriptorEncoder) -> fmt::Result {
+        self.0.iter().try_for_each(|family| family.encode(&mut encoder))
+    }
+}
+
+/// 1 for yes, 0 for no.
+fn flag(yes: bool) -> f64 {
+    f64::from(u8::from(yes))
+}

@@ -1,0 +1,167 @@
+//! Figures of the hall: its state, its show, the ticks, and what the machine grants.
+
+use std::collections::BTreeMap;
+
+use super::{Family, Labels, Values, flag};
+use crate::hall::{Severity, Status};
+
+/// Every state there is, so that a panel shows which ones it is not in; as `hall::Status` has them.
+const STATES: [&str; 13] = [
+    "boot",
+    "recovering",
+    "parked",
+    "homing",
+    "armed",
+    "joining",
+    "playing",
+    "freewheeling",
+    "paused",
+    "parking",
+    "stopping",
+    "stopped",
+    "fault",
+];
+
+pub(super) fn families(status: &Status) -> Vec<Family> {
+    let mut all = state(status);
+    all.extend(ticks(status));
+    all.extend(levels(status));
+    all.extend(machine(status));
+    all.push(warnings(status));
+    all
+}
+
+fn state(status: &Status) -> Vec<Family> {
+    let show = status.show.as_ref();
+    let preflight = status.preflight.as_ref();
+    let states = STATES.iter().map(|state| (label("state", *state), flag(*state == status.state)));
+    vec![
+        Family {
+            name: "build",
+            help: "What program this is",
+            values: Values::Info(label("version", status.version)),
+        },
+        Family::gauge("uptime_seconds", "Since the program started", status.uptime_s),
+        Family {
+            name: "state",
+            help: "1 for the state of the hall",
+            values: Values::Gauges(states.collect()),
+        },
+        Family::gauge("state_age_seconds", "Since the hall is in its state", status.since_s),
+        Family::gauge("moving", "1 while motion frames leave", flag(status.moving)),
+        Family::gauge(
+            "show_position_seconds",
+            "Where the film is in the loaded cue",
+            show.map(|show| show.position_s),
+        ),
+        Family::gauge("show_length_seconds", "The length of the loaded cue", show.map(|show| show.length_s)),
+        Family::gauge(
+            "trim_seconds",
+            "How much later than the film the motion is",
+            f64::from(status.trim_ms) / 1e3,
+        ),
+        Family::gauge(
+            "preflight_passed",
+            "1 where the last preflight found nothing that fails",
+            preflight.map(|preflight| flag(preflight.passed)),
+        ),
+        Family::gauge(
+            "preflight_age_seconds",
+            "Since the last preflight",
+            preflight.map(|preflight| preflight.age_s),
+        ),
+    ]
+}
+
+fn ticks(status: &Status) -> Vec<Family> {
+    vec![
+        Family::gauge("tick_rate_hertz", "Ticks per second, as configured", status.rate_hz),
+        Family::counter("ticks", "Ticks, in every state", status.ticks),
+        Family::counter("ticks_missed", "Ticks slept through", status.missed_ticks),
+        Family::histogram(
+            "tick_lateness_seconds",
+            "First send of a tick after its deadline, of the ticks that sent",
+            &status.lateness.histogram,
+        ),
+        Family::histogram(
+            "ack_latency_seconds",
+            "From sending a frame to its ack, all controllers",
+            &status.ack_latency.histogram,
+        ),
+    ]
+}
+
+fn levels(status: &Status) -> Vec<Family> {
+    let levels = &status.levels;
+    let groups = [("motion", levels.motion), ("vibration", levels.vibration)];
+    let groups = groups.map(|(group, level)| (label("group", group), level));
+    let rows = levels.rows.iter().map(|(row, level)| (label("row", row), *level));
+    let effects = levels.effects.iter().map(|(effect, on)| (label("effect", effect), flag(*on)));
+    vec![
+        Family {
+            name: "level_ratio",
+            help: "How much of the cue the seats make, 0 to 1",
+            values: Values::Gauges(groups.into()),
+        },
+        Family {
+            name: "row_level_ratio",
+            help: "The same of a row, on top of the hall's",
+            values: Values::Gauges(rows.collect()),
+        },
+        Family {
+            name: "effect_allowed",
+            help: "1 where the effect may be on",
+            values: Values::Gauges(effects.collect()),
+        },
+    ]
+}
+
+fn machine(status: &Status) -> Vec<Family> {
+    let granted = &status.realtime;
+    let memory_locked = if granted.memory_locked { "yes" } else { "no" };
+    let info = vec![
+        ("policy", granted.policy.clone()),
+        ("priority", granted.priority.to_string()),
+        ("memlock", memory_locked.to_owned()),
+    ];
+    let realtime = matches!(granted.policy.as_str(), "fifo" | "rr") && granted.memory_locked;
+    vec![
+        Family {
+            name: "rt_scheduling",
+            help: "What the system granted the tick thread",
+            values: Values::Info(info),
+        },
+        Family::gauge(
+            "realtime",
+            "1 where the tick thread is real-time and memory is locked",
+            flag(realtime),
+        ),
+    ]
+}
+
+/// How many warnings there are of each kind: one and the same may be about many controllers.
+fn warnings(status: &Status) -> Family {
+    let mut counts: BTreeMap<(&str, &str), u32> = BTreeMap::new();
+    for warning in &status.warnings {
+        *counts.entry((&warning.id, word(warning.severity))).or_default() += 1;
+    }
+    let labels = |id: &str, severity: &str| vec![("id", id.to_owned()), ("severity", severity.to_owned())];
+    let counts = counts.iter().map(|((id, severity), count)| (labels(id, severity), f64::from(*count)));
+    Family {
+        name: "warnings",
+        help: "What a person should know, how many of each kind",
+        values: Values::Gauges(counts.collect()),
+    }
+}
+
+const fn word(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Info => "info",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    }
+}
+
+fn label(name: &'static str, value: impl Into<String>) -> Labels {
+    vec![(name, value.into())]
+}

@@ -1,0 +1,262 @@
+use std::collections::BTreeMap;
+
+use super::*;
+use crate::hall::{
+    ControllerStatus, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus, Severity, ShowStatus,
+    Warning,
+};
+
+mod strict;
+
+use strict::{Page, check};
+
+fn times() -> Percentiles {
+    let histogram =
+        Histogram { bounds_us: vec![10.0, 20.0, 40.0], counts: vec![5, 3, 0, 2], sum_s: 0.001_25 };
+    Percentiles { p50_us: Some(10.0), p99_us: Some(40.0), p999_us: Some(90.0), max_us: Some(90.0), histogram }
+}
+
+fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
+    ControllerStatus {
+        name: name.to_owned(),
+        row: row.map(str::to_owned),
+        seat: "bench3".to_owned(),
+        address: "127.0.0.1:7408".to_owned(),
+        group: name.to_owned(),
+        enabled: true,
+        standing: "ok",
+        why: "its acks come".to_owned(),
+        heard_s: Some(0.25),
+        ack_rate: Some(1.0),
+        ack_p50_us: Some(40.0),
+        ack_p99_us: None,
+        sent: 1_000,
+        asked: 900,
+        acked: 890,
+        refused: 2,
+        lost: 8,
+        send_failed: 1,
+        clamps: 3,
+        homed: Some(true),
+        emergency_stop: false,
+        error: Some(0),
+        servo_errors: None,
+        inputs: Some(0),
+        outputs: None,
+        positions_mm: None,
+    }
+}
+
+/// A hall in the middle of a show.
+fn playing() -> Status {
+    let warning = |controller: &str| Warning {
+        id: "controller-lost".to_owned(),
+        severity: Severity::Error,
+        controller: Some(controller.to_owned()),
+        text: "silent".to_owned(),
+        remedy: "look at its power".to_owned(),
+    };
+    Status {
+        test: None,
+        hall: "1".to_owned(),
+        version: "9.9.9",
+        uptime_s: 60.5,
+        state: "playing",
+        cause: "somebody asked".to_owned(),
+        next: "nothing".to_owned(),
+        since_s: 5.0,
+        lapses_s: None,
+        moving: true,
+        show: Some(ShowStatus {
+            cue: "storm".to_owned(),
+            title: None,
+            sha256: "00".to_owned(),
+            length_s: 120.0,
+            position_s: 12.5,
+            join_s: 1.5,
+            axes: 6,
+            effects: vec![],
+        }),
+        playlist: None,
+        trim_ms: -80,
+        levels: Levels {
+            motion: 0.6,
+            vibration: 1.0,
+            effects: BTreeMap::from([("water".to_owned(), false)]),
+            rows: BTreeMap::from([("A".to_owned(), 0.5)]),
+        },
+        presets: vec![],
+        ticks: 6_050,
+        missed_ticks: 2,
+        rate_hz: 100.0,
+        lateness: times(),
+        ack_latency: times(),
+        realtime: RealTimeStatus {
+            policy: "fifo".to_owned(),
+            priority: 50,
+            memory_locked: true,
+            refusals: vec![],
+        },
+        controllers: vec![controller("A1", Some("A")), controller("B1", None)],
+        preflight: Some(PreflightStatus { passed: true, age_s: 300.0, answered: 2, findings: vec![] }),
+        warnings: vec![warning("A1"), warning("B1")],
+        journal: vec![],
+    }
+}
+
+/// Before anything was read, loaded or played.
+fn booting() -> Status {
+    Status {
+        state: "boot",
+        moving: false,
+        show: None,
+        lateness: Percentiles::default(),
+        ack_latency: Percentiles::default(),
+        realtime: RealTimeStatus::default(),
+        controllers: vec![],
+        preflight: None,
+        warnings: vec![],
+        ..playing()
+    }
+}
+
+fn page(status: &Status) -> Page {
+    check(&render(status)).unwrap()
+}
+
+#[test]
+fn every_page_is_what_the_format_asks_for() {
+    for status in [playing(), booting()] {
+        let page = page(&status);
+        assert!(page.families.iter().all(|family| family.starts_with("kinocue_")), "{:?}", page.families);
+    }
+}
+
+#[test]
+fn the_checker_of_these_tests_finds_what_is_wrong() {
+    let good = render(&playing());
+    let broken = [
+        (good.replace("# EOF\n", ""), "EOF"),
+        (good.replace("kinocue_ticks_total 6050", "kinocue_ticks 6050"), "suffix"),
+        (good.replace("kinocue_moving 1.0", "kinocue_moving yes"), "value"),
+        (good.replace("le=\"+Inf\"} 10", "le=\"+Inf\"} 9"), "count"),
+        (good.replace("kinocue_moving 1.0", "kinocue_moving 1.0\nkinocue_moving 1.0"), "twice"),
+        (good.replace("{group=\"motion\"}", "{group=motion}"), "label"),
+        (good.replace("# TYPE kinocue_moving gauge\n", ""), "TYPE"),
+    ];
+    for (text, why) in broken {
+        assert_ne!(text, good, "{why}: nothing was broken");
+        let fault = check(&text).map(drop).unwrap_err();
+        assert!(fault.contains(why), "{why}: {fault}");
+    }
+}
+
+#[test]
+fn the_state_is_the_one_of_all_states_that_is_1() {
+    let page = page(&playing());
+    let states: Vec<_> =
+        page.samples.iter().filter(|(series, _)| series.starts_with("kinocue_state{")).collect();
+    assert_eq!(states.len(), 13);
+    let on: Vec<_> =
+        states.iter().filter(|(_, value)| **value == 1.0).map(|(series, _)| series.as_str()).collect();
+    assert_eq!(on, ["kinocue_state{state=\"playing\"}"]);
+}
+
+#[test]
+fn figures_are_in_base_units() {
+    let page = page(&playing());
+    for (series, value) in [
+        ("kinocue_show_position_seconds", 12.5),
+        ("kinocue_trim_seconds", -0.08),
+        ("kinocue_level_ratio{group=\"motion\"}", 0.6),
+        ("kinocue_row_level_ratio{row=\"A\"}", 0.5),
+        ("kinocue_effect_allowed{effect=\"water\"}", 0.0),
+        ("kinocue_ticks_missed_total", 2.0),
+        ("kinocue_realtime", 1.0),
+        ("kinocue_rt_scheduling_info{policy=\"fifo\",priority=\"50\",memlock=\"yes\"}", 1.0),
+        ("kinocue_build_info{version=\"9.9.9\"}", 1.0),
+        ("kinocue_warnings{id=\"controller-lost\",severity=\"error\"}", 2.0),
+        ("kinocue_frames_sent_total{controller=\"A1\",row=\"A\"}", 1_000.0),
+        ("kinocue_acks_total{controller=\"B1\",result=\"lost\"}", 8.0),
+        ("kinocue_limit_interventions_total{controller=\"B1\"}", 3.0),
+        ("kinocue_controller_ack_latency_seconds{controller=\"B1\",quantile=\"0.5\"}", 40e-6),
+    ] {
+        assert_eq!(page.samples.get(series), Some(&value), "{series}");
+    }
+}
+
+#[test]
+fn lateness_is_a_histogram_of_seconds_that_counts_all_below_each_bound() {
+    let page = page(&playing());
+    assert_eq!(["0.00001", "0.00002", "0.00004", "+Inf"].map(|le| bucket(&page, le)), [5.0, 8.0, 8.0, 10.0]);
+    assert_eq!(page.samples["kinocue_tick_lateness_seconds_count"], 10.0);
+    assert_eq!(page.samples["kinocue_tick_lateness_seconds_sum"], 0.001_25);
+}
+
+/// By the value of the bound, however it is written.
+fn bucket(page: &Page, le: &str) -> f64 {
+    let bound = |text: &str| if text == "+Inf" { f64::INFINITY } else { text.parse().unwrap() };
+    let of = |series: &str| {
+        let text = series.strip_prefix("kinocue_tick_lateness_seconds_bucket{le=\"")?.strip_suffix("\"}")?;
+        Some(bound(text))
+    };
+    let found = page.samples.iter().find(|(series, _)| of(series) == Some(bound(le)));
+    *found.unwrap().1
+}
+
+#[test]
+fn what_nobody_knows_is_left_out_rather_than_told_as_0() {
+    let mut status = playing();
+    status.controllers[0].standing = "unwatched";
+    status.controllers[0].heard_s = None;
+    status.controllers[1].standing = "lost";
+    status.show = None;
+    let page = page(&status);
+    assert_eq!(page.samples.get("kinocue_controller_up{controller=\"A1\",row=\"A\"}"), None);
+    assert_eq!(page.samples.get("kinocue_controller_silence_seconds{controller=\"A1\",row=\"A\"}"), None);
+    assert_eq!(page.samples.get("kinocue_controller_up{controller=\"B1\"}"), Some(&0.0));
+    assert_eq!(page.samples.get("kinocue_show_position_seconds"), None);
+}
+
+#[test]
+fn a_name_cannot_break_out_of_its_label() {
+    let mut status = playing();
+    status.controllers[0].name = "a\"} 1\nkinocue_realtime 0\\".to_owned();
+    let page = page(&status);
+    assert_eq!(page.samples["kinocue_realtime"], 1.0);
+    assert!(page.samples.contains_key(
+        "kinocue_controller_enabled{controller=\"a\\\"} 1\\nkinocue_realtime 0\\\\\",row=\"A\"}"
+    ));
+}
+
+/// Every name that begins with `kinocue_` in a text.
+fn names(text: &str) -> Vec<&str> {
+    let end = |c: char| !(c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    let found = text.match_indices("kinocue_").map(|(at, _)| text[at..].split(end).next().unwrap());
+    found.collect()
+}
+
+#[test]
+fn alerts_and_dashboard_ask_for_figures_that_exist() {
+    let page = page(&playing());
+    let exists = |name: &str| {
+        let suffixes = ["", "_total", "_info", "_bucket", "_sum", "_count"];
+        let of = |series: &String| series.split('{').next() == Some(name);
+        suffixes
+            .iter()
+            .any(|suffix| name.strip_suffix(suffix).is_some_and(|family| page.families.contains(family)))
+            && page.samples.keys().any(of)
+    };
+    let rules = include_str!("../../systemd/prometheus/kinocue.rules.yml");
+    let dashboard = include_str!("../../systemd/grafana/kinocue.json");
+    serde_json::from_str::<serde_json::Value>(dashboard).unwrap();
+    for (file, text) in [("rules", rules), ("dashboard", dashboard)] {
+        let asked = names(text);
+        assert!(asked.len() > 10, "{file}");
+        assert!(
+            asked.iter().all(|name| exists(name)),
+            "{file}: {:?}",
+            asked.iter().find(|name| !exists(name))
+        );
+    }
+}

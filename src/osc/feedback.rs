@@ -1,0 +1,60 @@
+//! What a receiver of feedback is told: what it has not been told yet.
+
+use rosc::{OscMessage, OscType};
+
+use crate::hall::{Severity, Status, Warning};
+
+/// What one receiver has been told so far.
+#[derive(Debug, Default)]
+pub(super) struct Said {
+    state: Option<&'static str>,
+    position: Option<f64>,
+    /// Whole seconds of the hall.
+    beat: Option<i32>,
+    warnings: Vec<Warning>,
+}
+
+impl Said {
+    /// What is new to it. A heartbeat is the hall's own clock in whole seconds: a hall that hangs does not beat.
+    pub(super) fn news(&mut self, status: &Status) -> Vec<OscMessage> {
+        let mut news = Vec::new();
+        if self.state.replace(status.state) != Some(status.state) {
+            news.push(message("state", vec![OscType::from(status.state)]));
+        }
+        let position = status.show.as_ref().map(|show| show.position_s);
+        if let Some(s) = position.filter(|_| position != self.position) {
+            #[expect(clippy::cast_possible_truncation, reason = "OSC 1.0 has no doubles; it is to be shown")]
+            news.push(message("position", vec![OscType::Float(s as f32)]));
+        }
+        self.position = position;
+        let new = status.warnings.iter().filter(|warning| !self.warnings.contains(warning));
+        news.extend(new.map(|warning| warn(warning.severity, &sentence(warning))));
+        self.warnings.clone_from(&status.warnings);
+        #[expect(clippy::cast_possible_truncation, reason = "a saturating cast, after 68 years")]
+        let beat = status.uptime_s as i32;
+        if self.beat.replace(beat) != Some(beat) {
+            news.push(message("heartbeat", vec![OscType::Int(beat)]));
+        }
+        news
+    }
+}
+
+/// `/kinocue/warning`, with 0 for news, 1 for a warning and 2 for an error.
+pub(super) fn warn(severity: Severity, text: &str) -> OscMessage {
+    let grade = match severity {
+        Severity::Info => 0,
+        Severity::Warning => 1,
+        Severity::Error => 2,
+    };
+    message("warning", vec![OscType::Int(grade), OscType::from(text)])
+}
+
+fn sentence(warning: &Warning) -> String {
+    let Warning { controller, text, remedy, .. } = warning;
+    let about = controller.as_ref().map_or_else(String::new, |name| format!("{name}: "));
+    format!("{about}{text}; {remedy}")
+}
+
+fn message(word: &str, args: Vec<OscType>) -> OscMessage {
+    OscMessage { addr: format!("/kinocue/{word}"), args }
+}

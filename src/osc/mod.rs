@@ -1,0 +1,89 @@
+//! OSC over UDP: messages of show-control gear in, asks of the hall out, and feedback to whoever subscribed. Control plane.
+//!
+//! A datagram proves nothing about who sent it, so that it may never arm, home or clear: whoever forges one plays at worst
+//! what a person has armed, or stops it. Off unless the configuration has `[osc]`.
+//!
+//! ```text
+//!  in   /kinocue/go   /kinocue/pause   /kinocue/resume   /kinocue/stop   /kinocue/park
+//!       /kinocue/seek f(s)   /kinocue/trim f(ms)   /kinocue/level/motion f   /kinocue/level/vibration f
+//!       /kinocue/effect/NAME i   /kinocue/row/ROW/level f   /kinocue/seat/NAME/enable i
+//!       /kinocue/subscribe i(port) i(s)
+//!  out  /kinocue/state s   /kinocue/position f(s)   /kinocue/warning is   /kinocue/heartbeat i(s)
+//! ```
+
+mod counts;
+mod feedback;
+mod order;
+mod packet;
+mod port;
+mod repeats;
+mod subscribers;
+#[cfg(test)]
+mod tests;
+
+use std::io;
+use std::net::{SocketAddrV4, UdpSocket};
+use std::sync::Arc;
+
+pub use counts::Counts;
+
+use crate::config::OscPort;
+use crate::hall::Handle;
+use port::Port;
+
+/// Why the port cannot be opened.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot listen for OSC at {address}; name an address of this machine and a free port in [osc]")]
+#[non_exhaustive]
+pub struct OscError {
+    /// Where it was to listen.
+    pub address: SocketAddrV4,
+    /// What the system said.
+    #[source]
+    pub cause: io::Error,
+}
+
+/// The port, open but not yet served.
+#[derive(Debug)]
+pub struct Osc {
+    socket: UdpSocket,
+    config: OscPort,
+    hall: Handle,
+    counts: Arc<Counts>,
+}
+
+/// Opens the port that the configuration names.
+///
+/// # Errors
+/// [`OscError`] where the system does not give it.
+pub fn open(config: &OscPort, hall: Handle) -> Result<Osc, OscError> {
+    let refused = |cause| OscError { address: config.listen, cause };
+    let socket = UdpSocket::bind(config.listen).map_err(refused)?;
+    socket.set_nonblocking(true).map_err(refused)?;
+    Ok(Osc { socket, config: config.clone(), hall, counts: Arc::new(Counts::default()) })
+}
+
+impl Osc {
+    /// Where it listens.
+    ///
+    /// # Errors
+    /// Where the system does not say.
+    pub fn address(&self) -> io::Result<std::net::SocketAddr> {
+        self.socket.local_addr()
+    }
+
+    /// What has come so far, for whoever counts.
+    #[must_use]
+    pub fn counts(&self) -> Arc<Counts> {
+        Arc::clone(&self.counts)
+    }
+
+    /// Serves the port until its future is dropped. To be awaited within a tokio runtime with time and network.
+    ///
+    /// # Errors
+    /// Where the socket fails; it never ends otherwise.
+    pub async fn serve(self) -> io::Result<std::convert::Infallible> {
+        let incoming = tokio::net::UdpSocket::from_std(self.socket.try_clone()?)?;
+        Port::new(self.socket, self.config, self.hall, self.counts).serve(&incoming).await
+    }
+}

@@ -1,0 +1,304 @@
+//! A message into what it asks.
+
+use rosc::{OscMessage, OscType};
+
+use crate::config::OscWord;
+use crate::hall::{Ask, LevelsChange};
+use crate::time::ShowTime;
+
+/// The longest that a subscription lasts before it has to be renewed, s.
+const LONGEST_S: u16 = 3_600;
+
+/// What a message asks.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Order {
+    /// Of the hall.
+    Ask(Ask),
+    /// Feedback to that port of its sender, for so many seconds; 0 ends it.
+    Subscribe { port: u16, seconds: u16 },
+    /// Nothing: a button was let go.
+    Released,
+}
+
+/// Why a message is not obeyed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(super) enum Fault {
+    #[error("{0:?} is no address of kinocue; the README lists them")]
+    Unknown(String),
+    #[error("OSC may never {0}; a person does that on the console or with `kinocue {0}`")]
+    Forbidden(&'static str),
+    #[error("{0:?} is not allowed here; list it in `allow` of [osc]")]
+    NotAllowed(String),
+    #[error("{address:?} takes {wanted}")]
+    Argument { address: String, wanted: &'static str },
+    #[error("{0:?} was in a bundle for a later time, and nothing is done later; send it when it is to be done")]
+    Early(String),
+    #[error("{0} receivers of feedback are subscribed already; let one lapse")]
+    Crowded(usize),
+    #[error("too many messages wait; {0:?} was not done, send it again")]
+    Busy(String),
+}
+
+/// What `message` asks, of what is allowed.
+pub(super) fn order(message: &OscMessage, allow: &[OscWord]) -> Result<Order, Fault> {
+    let unknown = || Fault::Unknown(message.addr.clone());
+    let path = message.addr.strip_prefix("/kinocue/").ok_or_else(unknown)?;
+    let parts: Vec<&str> = path.split('/').collect();
+    let taken = Taken { message, allow };
+    match parts[..] {
+        ["stop"] => taken.button(Ask::Stop),
+        ["go"] => taken.allowed(OscWord::Go)?.button(Ask::Go),
+        ["pause"] => taken.allowed(OscWord::Pause)?.button(Ask::Pause),
+        ["resume"] => taken.allowed(OscWord::Resume)?.button(Ask::Resume),
+        ["park"] => taken.allowed(OscWord::Park)?.button(Ask::Park),
+        ["seek"] => taken.allowed(OscWord::Seek)?.seek(),
+        ["trim"] => taken.allowed(OscWord::Trim)?.trim(),
+        ["subscribe"] => taken.subscribe(),
+        ["level", "motion"] => taken.levels(|motion| LevelsChange { motion: Some(motion), ..<_>::default() }),
+        ["level", "vibration"] => {
+            taken.levels(|vibration| LevelsChange { vibration: Some(vibration), ..<_>::default() })
+        }
+        ["row", row, "level"] if !row.is_empty() => {
+            taken.levels(|level| LevelsChange { rows: [(row.to_owned(), level)].into(), ..<_>::default() })
+        }
+        ["effect", name] if !name.is_empty() => {
+            let on = taken.allowed(OscWord::Levels)?.switch()?;
+            let effects = [(name.to_owned(), on)].into();
+            Ok(Order::Ask(Ask::Levels(LevelsChange { effects, ..<_>::default() })))
+        }
+        ["seat", name, "enable"] if !name.is_empty() => {
+            let on = taken.allowed(OscWord::Seats)?.switch()?;
+            let name = name.to_owned();
+            Ok(Order::Ask(if on { Ask::Enable(name) } else { Ask::Disable(name) }))
+        }
+        ["arm", ..] => Err(Fault::Forbidden("arm")),
+        ["disarm", ..] => Err(Fault::Forbidden("disarm")),
+        ["home", ..] => Err(Fault::Forbidden("home")),
+        ["clear", ..] => Err(Fault::Forbidden("clear")),
+        ["load", ..] => Err(Fault::Forbidden("load")),
+        _ => Err(unknown()),
+    }
+}
+
+/// A message whose address is known.
+#[derive(Clone, Copy)]
+struct Taken<'m> {
+    message: &'m OscMessage,
+    allow: &'m [OscWord],
+}
+
+impl Taken<'_> {
+    fn allowed(self, word: OscWord) -> Result<Self, Fault> {
+        if self.allow.contains(&word) { Ok(self) } else { Err(Fault::NotAllowed(self.message.addr.clone())) }
+    }
+
+    /// Without an argument, or with one that says whether a button went down or up.
+    fn button(self, ask: Ask) -> Result<Order, Fault> {
+        let pressed = match self.message.args.as_slice() {
+            [] => true,
+            [value] => switch(value).ok_or_else(|| self.wants("nothing, or 1 for a button that goes down"))?,
+            _ => return Err(self.wants("nothing, or 1 for a button that goes down")),
+        };
+        Ok(if pressed { Order::Ask(ask) } else { Order::Released })
+    }
+
+    fn seek(self) -> Result<Order, Fault> {
+        let at = self.number().filter(|&s| (0.0..=1e6).contains(&s));
+        let at = at.ok_or_else(|| self.wants("a position in seconds, 0 or more"))?;
+        Ok(Order::Ask(Ask::Seek(ShowTime::from_secs_f64(at))))
+    }
+
+    fn trim(self) -> Result<Order, Fault> {
+        let ms = self.number().filter(|ms| (-500.0..=500.0).contains(ms));
+        let ms = ms.ok_or_else(|| self.wants("milliseconds, -500 to 500"))?;
+        #[expect(clippy::cast_possible_truncation, reason = "it is within -500 to 500")]
+        Ok(Order::Ask(Ask::Trim(ms.round() as i32)))
+    }
+
+    fn levels(self, change: impl FnOnce(f64) -> LevelsChange) -> Result<Order, Fault> {
+        let taken = self.allowed(OscWord::Levels)?;
+        let level = taken.number().filter(|level| (0.0..=1.0).contains(level));
+        let level = level.ok_or_else(|| taken.wants("a level, 0 to 1"))?;
+        Ok(Order::Ask(Ask::Levels(change(level))))
+    }
+
+    fn subscribe(self) -> Result<Order, Fault> {
+        let wants = || self.wants("a port, 1 to 65535, and seconds, 0 to 3600");
+        let [OscType::Int(port), OscType::Int(seconds)] = self.message.args.as_slice() else {
+            return Err(wants());
+        };
+        let port = u16::try_from(*port).ok().filter(|&port| port > 0).ok_or_else(wants)?;
+        let seconds = u16::try_from(*seconds).ok().filter(|&s| s <= LONGEST_S).ok_or_else(wants)?;
+        Ok(Order::Subscribe { port, seconds })
+    }
+
+    fn switch(self) -> Result<bool, Fault> {
+        let on = if let [value] = self.message.args.as_slice() { switch(value) } else { None };
+        on.ok_or_else(|| self.wants("1 for on or 0 for off"))
+    }
+
+    /// The only argument as a number.
+    fn number(self) -> Option<f64> {
+        if let [value] = self.message.args.as_slice() { number(value) } else { None }
+    }
+
+    fn wants(self, wanted: &'static str) -> Fault {
+        Fault::Argument { address: self.message.addr.clone(), wanted }
+    }
+}
+
+/// A finite number of whichever type.
+fn number(value: &OscType) -> Option<f64> {
+    let number = match value {
+        OscType::Int(number) => f64::from(*number),
+        OscType::Long(number) => f64::from(i32::try_from(*number).ok()?),
+        OscType::Float(number) => shortest(*number),
+        OscType::Double(number) => *number,
+        _ => return None,
+    };
+    number.is_finite().then_some(number)
+}
+
+/// The decimal that a single was written as: 0.6 and not 0.6000000238.
+fn shortest(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(f64::NAN)
+}
+
+fn switch(value: &OscType) -> Option<bool> {
+    match value {
+        OscType::Bool(on) => Some(*on),
+        _ => match number(value)? {
+            0.0 => Some(false),
+            1.0 => Some(true),
+            _ => None,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn all() -> Vec<OscWord> {
+        OscWord::ALL.map(|(_, word)| word).to_vec()
+    }
+
+    fn ordered(addr: &str, args: Vec<OscType>) -> Result<Order, Fault> {
+        order(&OscMessage { addr: addr.to_owned(), args }, &all())
+    }
+
+    #[test]
+    fn each_address_asks_what_it_says() {
+        let levels = |change| Ask::Levels(change);
+        for (addr, args, ask) in [
+            ("/kinocue/go", vec![], Ask::Go),
+            ("/kinocue/pause", vec![OscType::Float(1.0)], Ask::Pause),
+            ("/kinocue/resume", vec![OscType::Int(1)], Ask::Resume),
+            ("/kinocue/stop", vec![OscType::Bool(true)], Ask::Stop),
+            ("/kinocue/park", vec![], Ask::Park),
+            ("/kinocue/seek", vec![OscType::Float(12.5)], Ask::Seek(ShowTime::from_millis(12_500))),
+            ("/kinocue/seek", vec![OscType::Int(750)], Ask::Seek(ShowTime::from_millis(750_000))),
+            ("/kinocue/trim", vec![OscType::Float(-80.4)], Ask::Trim(-80)),
+            (
+                "/kinocue/level/motion",
+                vec![OscType::Float(0.6)],
+                levels(LevelsChange { motion: Some(0.6), ..LevelsChange::default() }),
+            ),
+            (
+                "/kinocue/level/vibration",
+                vec![OscType::Double(0.25)],
+                levels(LevelsChange { vibration: Some(0.25), ..LevelsChange::default() }),
+            ),
+            (
+                "/kinocue/effect/water",
+                vec![OscType::Int(0)],
+                levels(LevelsChange { effects: [("water".to_owned(), false)].into(), ..LevelsChange::default() }),
+            ),
+            (
+                "/kinocue/row/A/level",
+                vec![OscType::Int(0)],
+                levels(LevelsChange { rows: [("A".to_owned(), 0.0)].into(), ..LevelsChange::default() }),
+            ),
+            ("/kinocue/seat/F4/enable", vec![OscType::Int(1)], Ask::Enable("F4".to_owned())),
+            ("/kinocue/seat/F4/enable", vec![OscType::Bool(false)], Ask::Disable("F4".to_owned())),
+        ] {
+            assert_eq!(ordered(addr, args), Ok(Order::Ask(ask)), "{addr}");
+        }
+    }
+
+    #[test]
+    fn a_button_that_is_let_go_asks_nothing() {
+        assert_eq!(ordered("/kinocue/go", vec![OscType::Float(0.0)]), Ok(Order::Released));
+        assert!(matches!(ordered("/kinocue/go", vec![OscType::Float(0.5)]), Err(Fault::Argument { .. })));
+    }
+
+    #[test]
+    fn nothing_arms_homes_clears_or_loads() {
+        for word in ["arm", "disarm", "home", "clear", "load"] {
+            for addr in [format!("/kinocue/{word}"), format!("/kinocue/{word}/x")] {
+                let fault = ordered(&addr, vec![OscType::Int(1)]).unwrap_err();
+                assert!(matches!(fault, Fault::Forbidden(said) if said == word), "{fault}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_outside_its_range_is_refused() {
+        for (addr, value) in [
+            ("/kinocue/level/motion", OscType::Float(1.01)),
+            ("/kinocue/level/motion", OscType::Float(f32::NAN)),
+            ("/kinocue/level/vibration", OscType::Int(-1)),
+            ("/kinocue/seek", OscType::Float(-0.5)),
+            ("/kinocue/seek", OscType::Double(f64::INFINITY)),
+            ("/kinocue/trim", OscType::Int(501)),
+            ("/kinocue/effect/water", OscType::String("on".to_owned())),
+            ("/kinocue/seat/A1/enable", OscType::Int(2)),
+        ] {
+            let fault = ordered(addr, vec![value]).unwrap_err();
+            assert!(matches!(fault, Fault::Argument { .. }), "{addr}: {fault}");
+        }
+        assert!(ordered("/kinocue/seek", vec![]).is_err());
+        assert!(ordered("/kinocue/seek", vec![OscType::Int(1), OscType::Int(2)]).is_err());
+    }
+
+    #[test]
+    fn patterns_and_other_addresses_are_unknown() {
+        for addr in ["/kinocue/*", "/kinocue", "/kinocue/", "/go", "/kinocue/go/", "/kinocue/row//level", "/{a,b}"] {
+            assert!(matches!(ordered(addr, vec![]), Err(Fault::Unknown(_))), "{addr}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_listed_is_not_allowed_but_stop_is() {
+        let message = |addr: &str| OscMessage { addr: addr.to_owned(), args: Vec::new() };
+        assert_eq!(order(&message("/kinocue/stop"), &[]), Ok(Order::Ask(Ask::Stop)));
+        assert!(matches!(order(&message("/kinocue/go"), &[OscWord::Pause]), Err(Fault::NotAllowed(_))));
+    }
+
+    #[test]
+    fn a_subscription_names_a_port_and_how_long() {
+        let subscribe = |port, s| ordered("/kinocue/subscribe", vec![OscType::Int(port), OscType::Int(s)]);
+        assert_eq!(subscribe(53001, 60), Ok(Order::Subscribe { port: 53001, seconds: 60 }));
+        for (port, seconds) in [(0, 60), (65_536, 60), (-1, 60), (53001, 3_601), (53001, -1)] {
+            assert!(subscribe(port, seconds).is_err(), "{port} {seconds}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_a_message_says_it_never_arms_homes_clears_loads_or_reloads(
+            addr in "/kinocue/[a-z]{0,9}(/[a-zA-Z0-9*]{0,4}){0,2}",
+            value in any::<f32>(),
+            with_value in any::<bool>(),
+        ) {
+            let args = if with_value { vec![OscType::Float(value)] } else { Vec::new() };
+            if let Ok(Order::Ask(ask)) = ordered(&addr, args) {
+                let words =
+                    ["go", "pause", "resume", "stop", "park", "seek", "trim", "levels", "enable", "disable"];
+                prop_assert!(words.contains(&ask.word()), "{}", ask.word());
+            }
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Whether a playlist can be played: everything that may go wrong is found when it is loaded, not when it starts.
+
+use std::collections::BTreeSet;
+
+use super::{Entry, Playlist};
+use crate::config::{Config, ConfigFault, did_you_mean};
+use crate::library::{CueId, Library, Proved};
+
+impl Playlist {
+    /// Every fault of a playlist for a library and a hall: a cue that is missing or does not pass, a preset or an effect
+    /// that is unknown. Cues that nobody has looked at are checked and proved now, so this blocks: seconds a cue, minutes for
+    /// a long one beside a show. Empty where all of it can be played.
+    #[must_use]
+    pub fn check(&self, library: &Library, config: &Config) -> Vec<ConfigFault> {
+        let mut faults = Vec::new();
+        let mut examined: BTreeSet<&CueId> = BTreeSet::new();
+        for entry in &self.entries {
+            self.check_names(entry, config, &mut faults);
+            if examined.insert(&entry.cue)
+                && let Err(message) = examine(library, &entry.cue)
+            {
+                faults.push(self.fault(entry.places.cue, message));
+            }
+        }
+        faults
+    }
+
+    fn check_names(&self, entry: &Entry, config: &Config, faults: &mut Vec<ConfigFault>) {
+        if let Some(name) = entry.preset.as_deref().filter(|name| config.preset(name).is_none()) {
+            let hint = did_you_mean(name, config.presets.iter().map(|preset| preset.name.as_str()));
+            let message = format!("preset: there is no [preset.{name}] in the configuration{hint}");
+            faults.push(self.fault(entry.places.preset, message));
+        }
+        for name in entry.effects.keys() {
+            if !config.effects.iter().any(|effect| effect.name == *name) {
+                let hint = did_you_mean(name, config.effects.iter().map(|effect| effect.name.as_str()));
+                let message = format!("{name}: is not in [effects] of the configuration{hint}");
+                faults.push(self.fault(entry.places.effects, message));
+            }
+        }
+    }
+
+    fn fault(&self, (line, column): (usize, usize), message: String) -> ConfigFault {
+        ConfigFault { path: self.path.clone(), line, column, message }
+    }
+}
+
+/// Why a cue cannot be played, if it cannot.
+fn examine(library: &Library, cue: &CueId) -> Result<(), String> {
+    let info =
+        library.examine(cue).map_err(|problem| format!("cue: {}; {}", problem.detail, problem.remedy))?;
+    match info.proof {
+        Proved::Passed => Ok(()),
+        Proved::Failed { faults } => {
+            let first = faults.first().map_or("it does not pass", String::as_str);
+            let more = match faults.len() {
+                0 | 1 => String::new(),
+                faults => format!(" (and {} more)", faults - 1),
+            };
+            Err(format!("cue: {cue} does not pass: {first}{more}"))
+        }
+        Proved::Unknown => Err(format!("cue: {cue} has not been checked")),
+    }
+}

@@ -1,0 +1,124 @@
+//! Playlists: the cues of a day in order, each with its levels, and when it starts. From TOML to checked entries, and from
+//! the wall clock to what is due. Control plane; the schedule is pure and told the time.
+//!
+//! A schedule starts nothing by itself: it only says what is due. Whoever keeps the hall starts it, and only while a person
+//! has armed the hall.
+
+mod check;
+mod parse;
+mod schedule;
+mod shelf;
+#[cfg(test)]
+mod tests;
+
+pub use schedule::{LATEST, Schedule, due, next_start};
+pub use shelf::{PlaylistInfo, Shelf};
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use jiff::civil::{Time, Weekday};
+use jiff::tz::TimeZone;
+
+use crate::config::{Config, Preset};
+use crate::hall::LevelsChange;
+use crate::library::{CueId, Id};
+
+/// The name of a playlist.
+pub type PlaylistId = Id;
+
+/// The cues of a day.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Playlist {
+    /// Its file.
+    pub path: PathBuf,
+    /// Its title.
+    pub title: String,
+    /// The zone of its times; none for that of the machine.
+    pub timezone: Option<TimeZone>,
+    /// Its entries, at least one.
+    pub entries: Vec<Entry>,
+}
+
+/// One cue of a playlist, and how it is played. What it does not name stays as the hall has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// The cue.
+    pub cue: CueId,
+    /// The preset that is set before all else.
+    pub preset: Option<String>,
+    /// Level of the motion, 0 to 1.
+    pub level: Option<f64>,
+    /// Level of the vibration, 0 to 1.
+    pub vibration: Option<f64>,
+    /// How much later than the film the motion is, ms, -500 to 500.
+    pub trim_ms: Option<i32>,
+    /// Whether an effect may be on, by its name.
+    pub effects: BTreeMap<String, bool>,
+    /// What follows its end.
+    pub then: Then,
+    /// When it starts by the wall clock; none where a person starts it, or the entry before goes on to it.
+    pub at: Option<At>,
+    /// Where the file says what has to be looked up elsewhere.
+    pub(crate) places: Places,
+}
+
+/// What follows the end of an entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Then {
+    /// The next entry waits for a person, or for its time.
+    #[default]
+    Hold,
+    /// The next entry starts.
+    Go,
+}
+
+/// A time of day, on some days of the week.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct At {
+    /// The time of day.
+    pub time: Time,
+    /// On which days, as 0 for Monday to 6 for Sunday; at least one.
+    pub days: BTreeSet<i8>,
+}
+
+/// Lines and columns of an entry, counted from 1.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Places {
+    cue: (usize, usize),
+    preset: (usize, usize),
+    effects: (usize, usize),
+}
+
+impl Then {
+    /// Its word: `hold` or `go`.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Hold => "hold",
+            Self::Go => "go",
+        }
+    }
+}
+
+impl At {
+    /// Whether it is a time of that day.
+    #[must_use]
+    pub fn is_on(&self, day: Weekday) -> bool {
+        self.days.contains(&day.to_monday_zero_offset())
+    }
+}
+
+impl Entry {
+    /// What it sets of levels and effects: its preset, and over that its own. A preset that the configuration has not counts
+    /// for nothing; [`Playlist::check`] names it.
+    #[must_use]
+    pub fn levels(&self, config: &Config) -> LevelsChange {
+        let preset: Option<&Preset> = self.preset.as_deref().and_then(|name| config.preset(name));
+        let mut change = preset.map_or_else(LevelsChange::default, LevelsChange::from);
+        change.motion = self.level.or(change.motion);
+        change.vibration = self.vibration.or(change.vibration);
+        change.effects.extend(self.effects.clone());
+        change
+    }
+}

@@ -1,0 +1,103 @@
+//! A folder of playlists. Ids in, playlists out; nothing outside the folder is ever read.
+
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::{Playlist, PlaylistId};
+use crate::hall::{Code, Problem};
+use crate::sys::folder::Folder;
+
+/// The largest playlist that is read, octets.
+const MAX_LEN: u64 = 1 << 20;
+/// What a playlist's file is called behind its id.
+const ENDING: &str = ".toml";
+
+/// A folder of playlists; cheap to make, reads at each question.
+#[derive(Debug, Clone)]
+pub struct Shelf {
+    dir: PathBuf,
+}
+
+/// One playlist of the folder.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+pub struct PlaylistInfo {
+    /// Its id.
+    pub id: String,
+    /// Its title; null where it has faults.
+    pub title: Option<String>,
+    /// The ids of its cues, in order.
+    pub cues: Vec<String>,
+    /// Every fault of its file. What the library and the configuration say of it shows when it is loaded.
+    pub faults: Vec<String>,
+}
+
+impl Shelf {
+    /// The playlists in `dir`; there are none where there is no such folder.
+    #[must_use]
+    pub fn new(dir: &Path) -> Self {
+        Self { dir: dir.to_owned() }
+    }
+
+    /// All playlists by their ids, also those with faults.
+    #[must_use]
+    pub fn list(&self) -> Vec<PlaylistInfo> {
+        let names = Folder::open(&self.dir).and_then(|folder| folder.names()).unwrap_or_default();
+        let ids = names.iter().filter_map(|name| name.strip_suffix(ENDING)?.parse::<PlaylistId>().ok());
+        ids.filter_map(|id| match self.read(&id) {
+            Ok(Playlist { title, entries, .. }) => Some(PlaylistInfo {
+                id: id.to_string(),
+                title: Some(title),
+                cues: entries.iter().map(|entry| entry.cue.to_string()).collect(),
+                faults: Vec::new(),
+            }),
+            Err(problem) if problem.code == Code::Unknown => None, // a folder, a symbolic link, or gone since
+            Err(problem) => Some(PlaylistInfo {
+                id: id.to_string(),
+                title: None,
+                cues: Vec::new(),
+                faults: if problem.faults.is_empty() { vec![problem.detail] } else { problem.faults },
+            }),
+        })
+        .collect()
+    }
+
+    /// Reads a playlist.
+    ///
+    /// # Errors
+    /// [`Problem`] where there is none of that name, or it has faults, each with its place.
+    pub fn read(&self, id: &PlaylistId) -> Result<Playlist, Problem> {
+        let name = format!("{id}{ENDING}");
+        let path = self.dir.join(&name);
+        let text = match self.text(&name) {
+            Ok(Some(text)) => text,
+            Ok(None) => return Err(unknown(id)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(unknown(id)),
+            Err(error) => {
+                let detail = format!("cannot read {}: {error}", path.display());
+                return Err(Problem::new(Code::File, detail, "look at the file; it is text in UTF-8"));
+            }
+        };
+        Playlist::parse(&path, &text).map_err(|faults| {
+            let lines = faults.to_string().lines().map(str::to_owned).collect();
+            Problem::new(Code::Check, format!("the playlist {id} has faults"), "mend what is named")
+                .with(lines)
+        })
+    }
+
+    fn text(&self, name: &str) -> io::Result<Option<String>> {
+        let Some((file, stamp)) = Folder::open(&self.dir)?.file(name)? else { return Ok(None) };
+        if stamp.size > MAX_LEN {
+            return Err(io::Error::other(format!("it is longer than {MAX_LEN} octets")));
+        }
+        let mut text = String::new();
+        file.take(MAX_LEN).read_to_string(&mut text)?;
+        Ok(Some(text))
+    }
+}
+
+fn unknown(id: &PlaylistId) -> Problem {
+    Problem::new(Code::Unknown, format!("there is no playlist {id}"), "name one of the list")
+}

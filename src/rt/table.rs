@@ -1,0 +1,55 @@
+//! How each controller stands, as the ack thread tells it ten times a second.
+
+use crate::health::{Standing, Why};
+use crate::observe::ControllerState;
+use crate::time::MonoTime;
+use crate::tracker::{Counts, Tracker};
+
+/// Controllers whose percentiles are looked up in one telling; the others keep theirs until it is their turn.
+const AT_A_TIME: usize = 32;
+
+/// One controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Its accounts since the program started.
+    pub counts: Counts,
+    /// Latency of its acks, ns; none where there were none.
+    pub ack_ns: Option<AckTimes>,
+    /// How its group stands.
+    pub standing: Standing,
+    /// Why.
+    pub why: Why,
+    /// What it said of itself.
+    pub state: ControllerState,
+    /// Whether it knows its position; none where it never told.
+    pub homed: Option<bool>,
+    /// When this was told.
+    pub at: MonoTime,
+}
+
+/// Percentiles of ack latency, ns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AckTimes {
+    /// Half of them are no longer.
+    pub p50: u64,
+    /// 99 of 100.
+    pub p99: u64,
+}
+
+/// Whose percentiles are looked up next.
+#[derive(Debug, Default)]
+pub(super) struct Turns(usize);
+
+impl Turns {
+    /// Brings the percentiles of the next few controllers up to date.
+    pub(super) fn look_up(&mut self, rows: &mut [Row], tracker: &Tracker) {
+        for _ in 0..rows.len().min(AT_A_TIME) {
+            self.0 = (self.0 + 1) % rows.len();
+            let latency = tracker.latency(self.0);
+            rows[self.0].ack_ns = (!latency.is_empty()).then(|| AckTimes {
+                p50: latency.value_at_quantile(0.5),
+                p99: latency.value_at_quantile(0.99),
+            });
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The watchdog of the service manager: fed only while the tick thread ticks, in whatever state. A thread of its own looks,
+//! so that no surface that hangs starves it, and none that lives feeds it for a tick thread that hangs.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use sd_notify::{NotifyState, notify};
+
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// Looks within the time that the service manager waits.
+const LOOKS: u32 = 4;
+/// How long a hall may take to close or to open, while nothing ticks.
+const BETWEEN: Duration = Duration::from_secs(10);
+
+/// Whether the watchdog is to be fed, by a counter of ticks; told the time.
+#[derive(Debug)]
+pub struct Hunger {
+    patience: Duration,
+    seen: Option<u64>,
+    /// When the counter moved last, or was there, or went.
+    moved: MonoTime,
+}
+
+impl Hunger {
+    /// One for a service manager that waits `interval` long, and ticks every `period`. The counter may stand still from one
+    /// look to the next no longer than a quarter of the interval, or two periods where ticks are rare.
+    #[must_use]
+    pub fn new(interval: Duration, period: Duration, beats: Option<u64>, now: MonoTime) -> Self {
+        Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: now }
+    }
+
+    /// Whether all goes on: to be asked [`LOOKS`] times within the interval. Where there is no counter, because a hall closes
+    /// or opens, that is as good for ten seconds.
+    #[must_use]
+    pub fn feed(&mut self, beats: Option<u64>, now: MonoTime) -> bool {
+        if beats != self.seen {
+            self.seen = beats;
+            self.moved = now;
+        }
+        now.since(self.moved) < if beats.is_some() { self.patience } else { BETWEEN }
+    }
+}
+
+/// The thread that feeds the watchdog. It ends when this is dropped.
+#[derive(Debug)]
+pub struct Feeder {
+    done: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Feeder {
+    /// Feeds the service manager that waits `interval` long ([`super::watchdog`]) while `beats` counts ticks, which come
+    /// every `period`, in every state of the hall; it gives none while no hall is open. To be started by a thread of ordinary
+    /// priority.
+    ///
+    /// # Errors
+    /// Where the system starts no further thread.
+    pub fn start(
+        interval: Duration,
+        period: Duration,
+        beats: impl Fn() -> Option<u64> + Send + 'static,
+    ) -> io::Result<Self> {
+        // A message that does not get through is missed by whom it is for, which is what a watchdog is there for.
+        Self::feeding(interval, period, beats, || drop(notify(&[NotifyState::Watchdog])))
+    }
+
+    fn feeding(
+        interval: Duration,
+        period: Duration,
+        beats: impl Fn() -> Option<u64> + Send + 'static,
+        mut feed: impl FnMut() + Send + 'static,
+    ) -> io::Result<Self> {
+        let done = Arc::new(AtomicBool::new(false));
+        let end = Arc::clone(&done);
+        let thread = thread::Builder::new().name("watchdog".to_owned()).spawn(move || {
+            let mut hunger = Hunger::new(interval, period, beats(), Monotonic.now());
+            while !end.load(Ordering::Acquire) {
+                // Not a sleep: who wants it to end unparks it. A look too early does no harm.
+                thread::park_timeout(interval / LOOKS);
+                if hunger.feed(beats(), Monotonic.now()) {
+                    feed();
+                }
+            }
+        })?;
+        Ok(Self { done, thread: Some(thread) })
+    }
+}
+
+impl Drop for Feeder {
+    fn drop(&mut self) {
+        self.done.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            thread.thread().unpark();
+            // It has nothing to tell, and a panic of it is no reason for another.
+            let _ = thread.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+    use std::sync::mpsc;
+
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    fn ms(ms: u64) -> MonoTime {
+        MonoTime::default() + Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn it_is_fed_while_the_counter_moves_and_not_once_it_stands() {
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), Some(0), ms(0));
+        assert!(hunger.feed(Some(25), ms(250)));
+        assert!(hunger.feed(Some(26), ms(500)), "one tick is enough");
+        assert!(!hunger.feed(Some(26), ms(750)), "it hangs");
+        assert!(!hunger.feed(Some(26), ms(1_000)));
+        assert!(hunger.feed(Some(27), ms(1_250)), "it was late, and goes on");
+    }
+
+    #[test]
+    fn a_tick_thread_that_never_ticked_gets_nothing() {
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(1), Some(0), ms(0));
+        assert!((1..40).all(|look| !hunger.feed(Some(0), ms(250 * look))));
+    }
+
+    #[test]
+    fn ticks_once_a_second_are_no_hang() {
+        let mut hunger = Hunger::new(4 * SECOND, SECOND, Some(0), ms(0));
+        assert!((1..=10).all(|s| hunger.feed(Some(s), ms(1_000 * s))));
+        assert!(hunger.feed(Some(10), ms(11_000)), "the next tick may be due this very moment");
+        assert!(!hunger.feed(Some(10), ms(12_000)));
+    }
+
+    #[test]
+    fn a_hall_that_is_opened_anew_has_ten_seconds_and_counts_from_where_it_likes() {
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), Some(7_000), ms(0));
+        assert!((1..40).all(|look| hunger.feed(None, ms(250 * look))));
+        assert!(hunger.feed(Some(0), ms(10_000)));
+        assert!(!hunger.feed(Some(0), ms(10_250)), "open, it has to tick");
+        assert!(hunger.feed(None, ms(10_500)));
+        assert!(!hunger.feed(None, ms(20_500)), "it neither opens nor ends");
+    }
+
+    #[test]
+    fn the_thread_feeds_while_ticks_come_and_ends_when_it_is_dropped() {
+        let ticks = Arc::new(AtomicU64::new(0));
+        let (fed, feeds) = mpsc::channel();
+        let beats = move || Some(ticks.fetch_add(1, Ordering::Relaxed));
+        let interval = Duration::from_millis(4);
+        let feeder = Feeder::feeding(interval, interval, beats, move || {
+            let _ = fed.send(());
+        })
+        .unwrap();
+        for _ in 0..3 {
+            feeds.recv().unwrap();
+        }
+        drop(feeder);
+        while feeds.try_recv().is_ok() {}
+        assert_eq!(feeds.try_recv(), Err(mpsc::TryRecvError::Disconnected), "the thread is gone");
+    }
+}

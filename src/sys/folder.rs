@@ -1,0 +1,208 @@
+//! A folder of plain files. Nothing here follows a symbolic link out of it, waits on a pipe, or names anything outside it.
+
+use std::fs::File;
+use std::io;
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{AtFlags, CWD, Dir, FileType, FlockOperation, Mode, OFlags};
+use rustix::io::Errno;
+use serde::{Deserialize, Serialize};
+
+/// What tells one content of a file from another without reading it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Stamp {
+    /// Octets.
+    pub(crate) size: u64,
+    /// When it was last written: seconds and nanoseconds since 1970.
+    mtime: (i64, u64),
+    inode: u64,
+}
+
+impl Stamp {
+    pub(crate) fn of(file: &File) -> io::Result<Self> {
+        use std::os::unix::fs::MetadataExt as _;
+        let metadata = file.metadata()?;
+        let mtime = (metadata.mtime(), metadata.mtime_nsec().unsigned_abs());
+        Ok(Self { size: metadata.len(), mtime, inode: metadata.ino() })
+    }
+
+    /// Whether `other` was written after this.
+    pub(crate) fn is_before(&self, other: &Self) -> bool {
+        self.mtime < other.mtime
+    }
+}
+
+/// An open folder.
+#[derive(Debug)]
+pub(crate) struct Folder {
+    fd: OwnedFd,
+    path: PathBuf,
+}
+
+impl Folder {
+    /// Opens a folder. The way to it may lead over symbolic links: it comes from the configuration.
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
+        let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC;
+        Ok(Self { fd: rustix::fs::openat(CWD, path, flags, Mode::empty())?, path: path.to_owned() })
+    }
+
+    /// Where a file of it is.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// The names of all that is in it, sorted, as far as they are UTF-8.
+    pub(crate) fn names(&self) -> io::Result<Vec<String>> {
+        let mut names = Vec::new();
+        for entry in Dir::read_from(self.fd.as_fd())? {
+            match entry?.file_name().to_str() {
+                Ok("." | "..") | Err(_) => {}
+                Ok(name) => names.push(name.to_owned()),
+            }
+        }
+        names.sort_unstable();
+        Ok(names)
+    }
+
+    /// Opens a regular file to read it; none where there is nothing of that name, or something else.
+    pub(crate) fn file(&self, name: &str) -> io::Result<Option<(File, Stamp)>> {
+        // Without NONBLOCK, opening a pipe would wait for somebody to write to it.
+        let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        let fd = match rustix::fs::openat(&self.fd, name, flags, Mode::empty()) {
+            Ok(fd) => fd,
+            Err(Errno::NOENT | Errno::LOOP | Errno::NXIO) => return Ok(None),
+            Err(error) => return Err(error.into()),
+        };
+        if FileType::from_raw_mode(rustix::fs::fstat(&fd)?.st_mode) != FileType::RegularFile {
+            return Ok(None);
+        }
+        let file = File::from(fd);
+        let stamp = Stamp::of(&file)?;
+        Ok(Some((file, stamp)))
+    }
+
+    /// The stamp of a regular file; none where there is no such.
+    pub(crate) fn stamp(&self, name: &str) -> io::Result<Option<Stamp>> {
+        Ok(self.file(name)?.map(|(_, stamp)| stamp))
+    }
+
+    /// Makes a new file, locked for as long as it is open, so that [`Folder::remove_abandoned`] leaves it alone.
+    pub(crate) fn create(&self, name: &str) -> io::Result<File> {
+        let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+        let mode = Mode::RUSR | Mode::WUSR | Mode::RGRP;
+        let fd = rustix::fs::openat(&self.fd, name, flags, mode)?;
+        rustix::fs::flock(&fd, FlockOperation::NonBlockingLockExclusive)?;
+        Ok(File::from(fd))
+    }
+
+    /// Opens a regular file, made where there is none, to write at its end.
+    pub(crate) fn append(&self, name: &str) -> io::Result<File> {
+        let flags = OFlags::RDWR
+            | OFlags::APPEND
+            | OFlags::CREATE
+            | OFlags::NOFOLLOW
+            | OFlags::NONBLOCK
+            | OFlags::CLOEXEC;
+        let mode = Mode::RUSR | Mode::WUSR | Mode::RGRP;
+        let fd = rustix::fs::openat(&self.fd, name, flags, mode)?;
+        if FileType::from_raw_mode(rustix::fs::fstat(&fd)?.st_mode) != FileType::RegularFile {
+            return Err(io::Error::other(format!("{name} is no regular file")));
+        }
+        Ok(File::from(fd))
+    }
+
+    /// Marks the folder as being written to, for as long as this is open; false where somebody else has.
+    pub(crate) fn claim(&self) -> bool {
+        rustix::fs::flock(&self.fd, FlockOperation::NonBlockingLockExclusive).is_ok()
+    }
+
+    /// Whether somebody has claimed the folder.
+    pub(crate) fn is_claimed(&self) -> bool {
+        let shared = rustix::fs::flock(&self.fd, FlockOperation::NonBlockingLockShared);
+        if shared.is_ok() {
+            let _ = rustix::fs::flock(&self.fd, FlockOperation::Unlock);
+        }
+        shared == Err(Errno::WOULDBLOCK)
+    }
+
+    /// Removes a file that nobody has locked.
+    pub(crate) fn remove_abandoned(&self, name: &str) -> io::Result<()> {
+        if let Some((file, _)) = self.file(name)?
+            && rustix::fs::flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok()
+        {
+            self.remove(name)?;
+        }
+        Ok(())
+    }
+
+    /// Puts a file in the place of another, at once.
+    pub(crate) fn rename(&self, from: &str, to: &str) -> io::Result<()> {
+        Ok(rustix::fs::renameat(&self.fd, from, &self.fd, to)?)
+    }
+
+    /// Removes a file; that there is none is no error.
+    pub(crate) fn remove(&self, name: &str) -> io::Result<()> {
+        match rustix::fs::unlinkat(&self.fd, name, AtFlags::empty()) {
+            Ok(()) | Err(Errno::NOENT) => Ok(()),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Has the folder's own entries on the disk.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        Ok(rustix::fs::fsync(&self.fd)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::io::Write as _;
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    #[test]
+    fn only_regular_files_of_the_folder_itself_are_opened() {
+        let outside = tempfile::tempdir().unwrap();
+        fs::write(outside.path().join("secret"), "x").unwrap();
+        let inside = tempfile::tempdir().unwrap();
+        let at = |name: &str| inside.path().join(name);
+        symlink(outside.path().join("secret"), at("link")).unwrap();
+        symlink("/dev/zero", at("zero")).unwrap();
+        fs::create_dir(at("folder")).unwrap();
+        rustix::fs::mknodat(CWD, at("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        fs::write(at("plain"), "abc").unwrap();
+        let folder = Folder::open(inside.path()).unwrap();
+        for name in ["link", "zero", "folder", "pipe", "missing"] {
+            assert!(folder.file(name).unwrap().is_none(), "{name}");
+        }
+        assert_eq!(folder.stamp("plain").unwrap().unwrap().size, 3);
+    }
+
+    #[test]
+    fn a_file_that_somebody_writes_is_not_taken_for_abandoned() {
+        let inside = tempfile::tempdir().unwrap();
+        let folder = Folder::open(inside.path()).unwrap();
+        let mut file = folder.create("new").unwrap();
+        file.write_all(b"half").unwrap();
+        folder.remove_abandoned("new").unwrap();
+        assert!(folder.stamp("new").unwrap().is_some());
+        drop(file);
+        folder.remove_abandoned("new").unwrap();
+        assert!(folder.stamp("new").unwrap().is_none());
+    }
+
+    #[test]
+    fn another_content_has_another_stamp() {
+        let inside = tempfile::tempdir().unwrap();
+        let folder = Folder::open(inside.path()).unwrap();
+        fs::write(inside.path().join("a"), "1").unwrap();
+        let first = folder.stamp("a").unwrap().unwrap();
+        fs::write(inside.path().join("b"), "2").unwrap();
+        folder.rename("b", "a").unwrap();
+        assert_ne!(folder.stamp("a").unwrap().unwrap(), first);
+        assert_eq!(folder.names().unwrap(), ["a"]);
+    }
+}

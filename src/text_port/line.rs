@@ -1,0 +1,144 @@
+//! A line of text into what it asks.
+
+use crate::cli::times::{parse_level, parse_time, parse_trim};
+use crate::hall::{Ask, Code, LevelsChange, Problem};
+
+/// The lines that there are, as a refusal lists them.
+const LINES: &str = "go, pause, resume, stop, park, status, seek 12:30, trim +80ms, level 60%, level motion 60%, effect \
+                     water off, enable F4, disable F4";
+
+/// What a line asks.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Order {
+    /// Of the hall.
+    Ask(Ask),
+    /// How it is.
+    Status,
+}
+
+/// What a line asks; it has no end of line any more.
+pub(super) fn order(line: &[u8]) -> Result<Order, Problem> {
+    let text = str::from_utf8(line).ok().filter(|text| text.is_ascii());
+    let text = text.ok_or_else(|| value("the line is not ASCII".to_owned(), "send plain ASCII"))?;
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    Ok(Order::Ask(match words[..] {
+        ["status"] => return Ok(Order::Status),
+        ["go"] => Ask::Go,
+        ["pause"] => Ask::Pause,
+        ["resume"] => Ask::Resume,
+        ["stop"] => Ask::Stop,
+        ["park"] => Ask::Park,
+        ["seek", at] => Ask::Seek(parse_time(at).map_err(|why| argument(at, &why))?),
+        ["trim", trim] => Ask::Trim(parse_trim(trim).map_err(|why| argument(trim, &why))?),
+        ["level", all] => level(all, |all| (Some(all), Some(all)))?,
+        ["level", "motion", motion] => level(motion, |motion| (Some(motion), None))?,
+        ["level", "vibration", vibration] => level(vibration, |vibration| (None, Some(vibration)))?,
+        ["effect", name, "on"] => effect(name, true),
+        ["effect", name, "off"] => effect(name, false),
+        ["enable", name] => Ask::Enable(name.to_owned()),
+        ["disable", name] => Ask::Disable(name.to_owned()),
+        [word @ ("arm" | "disarm" | "home" | "clear" | "load"), ..] => {
+            let detail = format!("lines of text may never {word}");
+            return Err(Problem::new(Code::Role, detail, "a person does that on the console"));
+        }
+        _ => return Err(value(format!("{text:?} is no line of kinocue"), &format!("there are {LINES}"))),
+    }))
+}
+
+fn level(text: &str, of: impl FnOnce(f64) -> (Option<f64>, Option<f64>)) -> Result<Ask, Problem> {
+    let (motion, vibration) = of(parse_level(text).map_err(|why| argument(text, &why))?);
+    Ok(Ask::Levels(LevelsChange { motion, vibration, ..LevelsChange::default() }))
+}
+
+fn effect(name: &str, on: bool) -> Ask {
+    Ask::Levels(LevelsChange { effects: [(name.to_owned(), on)].into(), ..LevelsChange::default() })
+}
+
+/// A refusal of one word of a line; `why` says what is wrong and, where it has one, what to write.
+fn argument(word: &str, why: &str) -> Problem {
+    let (detail, remedy) = why.split_once("; ").unwrap_or((why, "write it so"));
+    value(format!("{word:?}: {detail}"), remedy)
+}
+
+fn value(detail: String, remedy: &str) -> Problem {
+    Problem::new(Code::Value, detail, remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::time::ShowTime;
+
+    fn asked(line: &str) -> Ask {
+        match order(line.as_bytes()) {
+            Ok(Order::Ask(ask)) => ask,
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn each_line_asks_what_it_says() {
+        let levels = |motion, vibration| Ask::Levels(LevelsChange { motion, vibration, ..<_>::default() });
+        for (line, ask) in [
+            ("go", Ask::Go),
+            ("  pause ", Ask::Pause),
+            ("resume", Ask::Resume),
+            ("stop", Ask::Stop),
+            ("park", Ask::Park),
+            ("seek 12:30", Ask::Seek(ShowTime::from_millis(750_000))),
+            ("trim +80ms", Ask::Trim(80)),
+            ("trim -80ms", Ask::Trim(-80)),
+            ("level 60%", levels(Some(0.6), Some(0.6))),
+            ("level motion 60%", levels(Some(0.6), None)),
+            ("level  vibration\t60%", levels(None, Some(0.6))),
+            ("effect water off", effect("water", false)),
+            ("effect water on", effect("water", true)),
+            ("enable F4", Ask::Enable("F4".to_owned())),
+            ("disable F4", Ask::Disable("F4".to_owned())),
+        ] {
+            assert_eq!(asked(line), ask, "{line}");
+        }
+        assert_eq!(order(b"status"), Ok(Order::Status));
+    }
+
+    #[test]
+    fn nothing_arms_homes_clears_or_loads() {
+        for line in ["arm", "disarm", "home", "home A1", "clear", "load coaster"] {
+            assert_eq!(order(line.as_bytes()).unwrap_err().code, Code::Role, "{line}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_line_is_refused_with_what_to_write() {
+        for (line, says) in [
+            ("", "there are go, pause"),
+            ("GO", "\"GO\" is no line"),
+            ("go now", "no line"),
+            ("seek", "no line"),
+            ("seek soon", "write SS[.mmm], MM:SS"),
+            ("trim 501", "\"501\": a trim is -500ms to 500ms"),
+            ("level 101%", "write 0% to 100%"),
+            ("effect water maybe", "no line"),
+        ] {
+            let problem = order(line.as_bytes()).unwrap_err();
+            assert_eq!(problem.code, Code::Value, "{line}");
+            assert!(problem.to_string().contains(says), "{line}: {problem}");
+        }
+        assert!(order("gö".as_bytes()).unwrap_err().detail.contains("not ASCII"));
+        assert!(order(&[0xff, 0xfe]).unwrap_err().detail.contains("not ASCII"));
+    }
+
+    proptest! {
+        #[test]
+        fn no_octets_panic_and_none_arm(octets in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
+            let line = [word.as_bytes(), b" ", &octets].concat();
+            for line in [octets.as_slice(), line.as_slice()] {
+                if let Ok(Order::Ask(ask)) = order(line) {
+                    prop_assert!(!["arm", "disarm", "home", "clear", "load"].contains(&ask.word()));
+                }
+            }
+        }
+    }
+}

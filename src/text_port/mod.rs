@@ -1,0 +1,119 @@
+//! Lines of plain text over TCP: what a show controller can type in, asks of the hall out, one line back for each.
+//! Control plane.
+//!
+//! ```text
+//!  go   pause   resume   stop   park   status          ok playing 00:12.340
+//!  seek 12:30   trim +80ms                             error state cannot go while parked: …; arm first
+//!  level 60%   level motion 60%   level vibration 60%
+//!  effect water off   enable F4   disable F4
+//! ```
+//!
+//! As with OSC, who speaks is known by address alone, so nothing here arms, homes or clears. Off unless the configuration
+//! has `[text]`.
+
+mod line;
+mod talk;
+#[cfg(test)]
+mod tests;
+
+use std::convert::Infallible;
+use std::io;
+use std::net::{SocketAddr, SocketAddrV4, TcpListener};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::io::AsyncWriteExt as _;
+use tokio::net::TcpStream;
+use tokio::sync::Semaphore;
+
+use crate::config::TextPort;
+use crate::hall::{Code, Handle, Problem, Role, Surface, Who};
+use talk::{Talk, reply};
+
+/// Connections at the most.
+const CONNECTIONS: usize = 16;
+/// A connection without a line for so long is closed.
+const IDLE: Duration = Duration::from_secs(600);
+/// How long a refusal may take to be written.
+const PARTING: Duration = Duration::from_secs(1);
+/// How long to wait where the system has no room for a further connection.
+const BREATH: Duration = Duration::from_millis(100);
+
+/// Why the port cannot be opened.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot listen for text at {address}; name an address of this machine and a free port in [text]")]
+#[non_exhaustive]
+pub struct TextError {
+    /// Where it was to listen.
+    pub address: SocketAddrV4,
+    /// What the system said.
+    #[source]
+    pub cause: io::Error,
+}
+
+/// The port, open but not yet served.
+#[derive(Debug)]
+pub struct Text {
+    listener: TcpListener,
+    config: TextPort,
+    hall: Handle,
+    idle: Duration,
+}
+
+/// Opens the port that the configuration names.
+///
+/// # Errors
+/// [`TextError`] where the system does not give it.
+pub fn open(config: &TextPort, hall: Handle) -> Result<Text, TextError> {
+    let refused = |cause| TextError { address: config.listen, cause };
+    let listener = TcpListener::bind(config.listen).map_err(refused)?;
+    listener.set_nonblocking(true).map_err(refused)?;
+    Ok(Text { listener, config: config.clone(), hall, idle: IDLE })
+}
+
+impl Text {
+    /// Where it listens.
+    ///
+    /// # Errors
+    /// Where the system does not say.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Serves the port until its future is dropped; connections outlive it by one line at the most. To be awaited within
+    /// a tokio runtime with time and network.
+    ///
+    /// # Errors
+    /// Where the socket cannot be served; it never ends otherwise.
+    pub async fn serve(self) -> io::Result<Infallible> {
+        let listener = tokio::net::TcpListener::from_std(self.listener)?;
+        let room = Arc::new(Semaphore::new(CONNECTIONS));
+        loop {
+            let Ok((stream, from)) = listener.accept().await else {
+                // Too many files are open, or the peer left at once.
+                tokio::time::sleep(BREATH).await;
+                continue;
+            };
+            let SocketAddr::V4(from) = from else { continue };
+            if !self.config.sources.contains(from.ip()) {
+                continue; // no word to strangers
+            }
+            let Ok(place) = Arc::clone(&room).try_acquire_owned() else {
+                tokio::spawn(turn_away(stream));
+                continue;
+            };
+            let who = Who { role: Role::Operate, surface: Surface::Text, name: from.ip().to_string() };
+            let talk = Talk { hall: self.hall.clone(), who, idle: self.idle };
+            tokio::spawn(async move {
+                talk.run(stream).await;
+                drop(place);
+            });
+        }
+    }
+}
+
+async fn turn_away(mut stream: TcpStream) {
+    let detail = format!("{CONNECTIONS} connections are open already");
+    let line = reply(&Err(Problem::new(Code::Busy, detail, "close one")));
+    let _ = tokio::time::timeout(PARTING, stream.write_all(line.as_bytes())).await; // or it has left
+}

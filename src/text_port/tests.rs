@@ -1,0 +1,182 @@
+//! The port with real connections over loopback, before a hall that a double of its keeper keeps.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::runtime::{Builder, Runtime};
+
+use super::{CONNECTIONS, open};
+use crate::config::TextPort;
+use crate::hall::{Ask, Code, Inbox, Problem, Role, ShowStatus, Status, Surface, handle};
+use crate::rt::Desk;
+
+/// Nothing is waited for longer; where all is well it takes milliseconds.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+struct Stage {
+    /// Serves the port until it is dropped.
+    _runtime: Runtime,
+    port: SocketAddr,
+    inbox: Inbox,
+    desk: Arc<Desk>,
+}
+
+impl Stage {
+    fn new() -> Self {
+        Self::with(Ipv4Addr::LOCALHOST, super::IDLE)
+    }
+
+    fn with(source: Ipv4Addr, idle: Duration) -> Self {
+        let desk = Arc::new(Desk::new(std::iter::empty()));
+        let (hall, inbox, _source) = handle(Arc::clone(&desk), playing());
+        let config = TextPort { listen: SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0), sources: vec![source] };
+        let mut text = open(&config, hall).unwrap();
+        text.idle = idle;
+        let port = text.address().unwrap();
+        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+        runtime.spawn(text.serve());
+        Self { _runtime: runtime, port, inbox, desk }
+    }
+
+    fn connect(&self) -> Peer {
+        let stream = TcpStream::connect(self.port).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        Peer(BufReader::new(stream))
+    }
+
+    /// What the hall is asked next, and the way to answer it.
+    fn asked(&self) -> crate::hall::Asked {
+        let asked = self.inbox.next(PATIENCE).expect("something is asked");
+        assert_eq!((asked.desired.who.role, asked.desired.who.surface), (Role::Operate, Surface::Text));
+        asked
+    }
+}
+
+struct Peer(BufReader<TcpStream>);
+
+impl Peer {
+    fn send(&mut self, octets: &[u8]) {
+        self.0.get_mut().write_all(octets).unwrap();
+    }
+
+    /// The next line; empty where the port closed the connection.
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.0.read_line(&mut line).unwrap();
+        line
+    }
+}
+
+fn playing() -> Status {
+    let show = ShowStatus {
+        cue: "coaster".to_owned(),
+        title: None,
+        sha256: String::new(),
+        length_s: 60.0,
+        position_s: 12.34,
+        join_s: 2.0,
+        axes: 3,
+        effects: Vec::new(),
+    };
+    Status { state: "playing", show: Some(show), ..Status::starting("Hall 1") }
+}
+
+#[test]
+fn a_line_is_asked_and_answered_with_state_and_position() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"go\r\n");
+    let asked = stage.asked();
+    assert_eq!(asked.desired.ask, Ask::Go);
+    asked.answer(Ok(Arc::new(playing())));
+    assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
+    peer.send(b"pause\n");
+    stage.asked().answer(Err(Problem::new(Code::State, "cannot pause", "go first").with(vec!["x".to_owned()])));
+    assert_eq!(peer.line(), "error state cannot pause; go first\r\n");
+    peer.send(b"status\n");
+    assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
+}
+
+#[test]
+fn nothing_arms_homes_or_clears() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"arm\nhome\nclear\n");
+    for word in ["arm", "home", "clear"] {
+        assert!(peer.line().starts_with(&format!("error role lines of text may never {word}; ")));
+    }
+    assert!(stage.inbox.next(Duration::ZERO).is_none());
+}
+
+#[test]
+fn a_stop_is_read_while_an_answer_is_waited_for() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"park\nstop\n");
+    let (park, stop) = (stage.asked(), stage.asked());
+    assert_eq!((&park.desired.ask, &stop.desired.ask), (&Ask::Park, &Ask::Stop));
+    assert!(stage.desk.take_stop(), "before anything is answered");
+    stop.answer(Err(Problem::new(Code::State, "second", "-")));
+    park.answer(Err(Problem::new(Code::State, "first", "-")));
+    assert_eq!([peer.line(), peer.line()].map(|line| line.contains("first")), [true, false], "in their order");
+}
+
+#[test]
+fn who_closes_its_own_side_still_gets_its_answer() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"park\n");
+    peer.0.get_ref().shutdown(std::net::Shutdown::Write).unwrap();
+    stage.asked().answer(Ok(Arc::new(Status::starting("Hall 1"))));
+    assert_eq!(peer.line(), "ok boot -\r\n");
+    assert_eq!(peer.line(), "");
+}
+
+#[test]
+fn a_line_without_end_and_lines_without_number_end_the_connection() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(&[b'a'; 256]);
+    assert!(peer.line().starts_with("error value the line is longer than 256 octets"));
+    assert_eq!(peer.line(), "");
+    let mut peer = stage.connect();
+    peer.send(&b"park\n".repeat(100));
+    // Nobody answers the first; what was read ahead is asked, and the rest is not read.
+    let asked = std::iter::from_fn(|| stage.inbox.next(Duration::ZERO).or_else(|| stage.inbox.next(PATIENCE / 40)));
+    assert!(asked.count() < 20);
+    let mut rest = Vec::new();
+    let _ = peer.0.read_to_end(&mut rest); // a reset, as lines were left unread
+}
+
+#[test]
+fn strangers_are_shut_out_without_a_word() {
+    let stage = Stage::with(Ipv4Addr::new(10, 0, 0, 5), super::IDLE);
+    let mut peer = stage.connect();
+    assert_eq!(peer.line(), "");
+}
+
+#[test]
+fn one_connection_too_many_is_told_so() {
+    let stage = Stage::new();
+    let mut peers: Vec<Peer> = (0..CONNECTIONS).map(|_| stage.connect()).collect();
+    peers[CONNECTIONS - 1].send(b"status\n");
+    assert!(peers[CONNECTIONS - 1].line().starts_with("ok "));
+    assert_eq!(stage.connect().line(), "error busy 16 connections are open already; close one\r\n");
+    drop(peers.pop());
+    // As soon as its end is noticed there is room.
+    let mut line = String::new();
+    while !line.starts_with("ok ") {
+        let mut peer = stage.connect();
+        let _ = peer.0.get_mut().write_all(b"status\n"); // it may have been turned away already
+        line.clear();
+        let _ = peer.0.read_line(&mut line);
+    }
+}
+
+#[test]
+fn a_silent_connection_is_closed() {
+    let stage = Stage::with(Ipv4Addr::LOCALHOST, Duration::from_millis(1));
+    assert_eq!(stage.connect().line(), "");
+}

@@ -1,0 +1,125 @@
+//! Abuse, and what goes on beside it.
+
+use std::io::{Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::Ordering;
+use std::thread;
+
+use kinocue::hall::{Ask, Role};
+
+use crate::client::{Reply, Request, problem};
+use crate::hall::Hall;
+
+/// Whether the other end ends the connection.
+fn ends(connection: &mut dyn crate::client::Connection) -> bool {
+    let mut rest = Vec::new();
+    match connection.read_to_end(&mut rest) {
+        Ok(_) => true,
+        Err(error) => error.kind() == std::io::ErrorKind::ConnectionReset,
+    }
+}
+
+#[test]
+fn a_body_beyond_its_limit_is_refused() {
+    let hall = Hall::open();
+    let long = format!("{{\"cue\":\"{}\"}}", "a".repeat(70_000));
+    let load = Request::new("POST", "/api/v1/show/load").json(long.clone());
+    assert_eq!(load.send(&hall.socket()).problem(), problem(413, "size"));
+    // The same in chunks, whose length nobody says before.
+    let mut connection = hall.socket().connect();
+    let head = "POST /api/v1/show/load HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
+                Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n";
+    connection.write_all(head.as_bytes()).unwrap();
+    let _ = connection.write_all(format!("{:x}\r\n{long}\r\n0\r\n\r\n", long.len()).as_bytes());
+    assert_eq!(Reply::read(&mut *connection).problem(), problem(413, "size"));
+    assert!(hall.asks().is_empty());
+}
+
+#[test]
+fn a_head_without_end_is_cut_off_before_it_fills_the_memory() {
+    let hall = Hall::open();
+    let mut connection = hall.port().connect();
+    connection.write_all(b"GET / HTTP/1.1\r\nX: ").unwrap();
+    let piece = [b'x'; 65_536];
+    let taken = (0..1_600).take_while(|_| connection.write_all(&piece).is_ok()).count();
+    assert!(taken < 200, "{taken} pieces of 64 KiB were taken");
+    assert_eq!(hall.port().get("/").status, 200);
+}
+
+#[test]
+fn heads_and_requests_that_are_none_end_their_connections_alone() {
+    let hall = Hall::open();
+    for octets in [
+        &b"\x16\x03\x01\x02\x00"[..],
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost\r\n\r\n",
+        b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+        b"POST /api/v1/show/go HTTP/1.1\r\nHost: localhost\r\nContent-Length: x\r\n\r\n",
+        b"POST /api/v1/show/go HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
+    ] {
+        let mut connection = hall.socket().connect();
+        connection.write_all(octets).unwrap();
+        let mut reply = String::new();
+        connection.read_to_string(&mut reply).unwrap();
+        assert!(reply.is_empty() || reply.starts_with("HTTP/1.1 4"), "{octets:?}: {reply}");
+    }
+    assert!(hall.asks().is_empty());
+    assert_eq!(hall.socket().get("/api/v1/status").status, 200);
+}
+
+#[test]
+fn a_head_that_does_not_come_is_not_waited_for() {
+    let hall = Hall::open();
+    let mut connection = hall.port().connect();
+    connection.write_all(b"GET /api/v1/status HTTP/1.1\r\nHost:").unwrap();
+    assert!(ends(&mut *connection));
+}
+
+#[test]
+fn connections_beyond_their_number_are_closed_at_once_and_the_socket_is_not_meant() {
+    let hall = Hall::open();
+    let mut idle: Vec<_> = (0..64).map(|_| hall.port().connect()).collect();
+    let mut beyond: Vec<_> = (0..200).map(|_| hall.port().connect()).collect();
+    assert!(beyond.iter_mut().all(|connection| ends(&mut **connection)));
+    assert_eq!(hall.socket().post("/api/v1/show/stop").state(), "stopping");
+    let request = Request::new("GET", "/").octets(&hall.port());
+    idle[0].write_all(&request).unwrap();
+    assert_eq!(Reply::read(&mut *idle[0]).status, 200, "who was let in is served");
+}
+
+#[test]
+fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
+    let hall = Hall::with(crate::hall::with_controller(), |api| kinocue::config::Api {
+        open_role: Some(Role::View),
+        ..api
+    });
+    hall.awake.store(false, Ordering::Relaxed); // nothing that is asked is taken any more
+    thread::scope(|scope| {
+        // One after the other asks, until nothing more fits into the queue.
+        let stuffed: Vec<_> = (0..64).map(|_| hall.handle.post(engineer(), Ask::Pause).unwrap()).collect();
+        assert_eq!(hall.socket().post("/api/v1/show/pause").problem(), problem(429, "busy"));
+        let _idle: Vec<_> = (0..64).map(|_| hall.socket().connect()).collect();
+        let _floods: Vec<_> =
+            (0..4).map(|_| scope.spawn(|| (0..50).for_each(|_| drop(hall.port().get("/"))))).collect();
+        let mut stop = UnixStream::connect(hall.stop_socket()).unwrap();
+        stop.write_all(b"stop\n").unwrap();
+        let mut reply = String::new();
+        stop.read_to_string(&mut reply).unwrap();
+        assert_eq!(reply, "stopping\n");
+        assert!(hall.desk.take_stop());
+        // And by HTTP, though the hall does not answer.
+        assert_eq!(hall.port().post("/api/v1/show/stop").state(), "parked");
+        assert!(hall.desk.take_stop());
+        hall.awake.store(true, Ordering::Relaxed);
+        drop(stuffed);
+    });
+}
+
+fn engineer() -> kinocue::hall::Who {
+    kinocue::hall::Who {
+        role: Role::Engineer,
+        surface: kinocue::hall::Surface::Schedule,
+        name: "test".to_owned(),
+    }
+}

@@ -1,0 +1,262 @@
+//! The cue library with the real process that checks what is uploaded.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use kinocue::hall::{Code, Problem};
+use kinocue::library::{Bounds, CueInfo, Hall, Library, Proved};
+use kinocue::playlist::Playlist;
+use tempfile::TempDir;
+
+const GOOD: &str = "# title: Ride\ntime_ms,a1,a2,a3,fx_air\n0,0,0,0,0\n1000,0,0,0,1\n2000,0,0,0,0\n";
+/// Out of the stroke in one row, and far too fast.
+const BAD: &str = "# interpolation: linear\ntime_ms,a1,a2,a3,fx_mist\n0,0,0,0,0\n100,1,0,0,1\n2000,0,0,0,0\n";
+
+/// A library in a folder of its own, beside a hall of one seat.
+struct Fixture {
+    dir: TempDir,
+    library: Library,
+}
+
+impl Fixture {
+    fn new() -> Self {
+        Self::bounded(Bounds::default())
+    }
+
+    fn bounded(bounds: Bounds) -> Self {
+        let dir = tempfile::tempdir().expect("a folder");
+        let config = dir.path().join("hall.toml");
+        fs::write(
+            &config,
+            "[seat.bench3]\naxes = 3\nstroke_mm = 150.0\nlead_mm = 5.0\npulses_per_rev = 10000\nmax_velocity_mm_s = 240.0\n\
+             max_acceleration_mm_s2 = 3000.0\nmax_jerk_mm_s3 = 60000.0\n[effects]\nair = 1\n[preset.kids]\nmotion = 0.6\n\
+             [[controller]]\nname = \"A1\"\nseat = \"bench3\"\naddress = \"127.0.0.1:7408\"\n",
+        )
+        .expect("the folder is ours");
+        let program = PathBuf::from(env!("CARGO_BIN_EXE_kinocue"));
+        let library = Library::open(&dir.path().join("cues"), Hall { config, program, bounds });
+        let library = library.expect("the folder is ours");
+        Self { dir, library }
+    }
+
+    fn upload(&self, id: &str, octets: &[u8]) -> Result<CueInfo, Problem> {
+        let mut upload = self.library.begin(&id.parse().expect("an id"))?;
+        for part in octets.chunks(1000) {
+            upload.write(part)?;
+        }
+        upload.finish()
+    }
+
+    fn cues(&self) -> PathBuf {
+        self.dir.path().join("cues")
+    }
+
+    /// What lies in the library, but for what it keeps of its own.
+    fn files(&self) -> Vec<String> {
+        let names = fs::read_dir(self.cues())
+            .expect("it is ours")
+            .map(|entry| entry.expect("it is ours").file_name());
+        let mut names: Vec<_> = names.map(|name| name.into_string().expect("UTF-8")).collect();
+        names.retain(|name| name != ".index.json");
+        names.sort();
+        names
+    }
+}
+
+fn mcap(cue: &str) -> Vec<u8> {
+    let cue =
+        kinocue::cue::read(Path::new("x.csv"), cue.as_bytes(), &Default::default()).expect("a good cue");
+    let mut file = std::io::Cursor::new(Vec::new());
+    kinocue::cue::write_mcap(&cue, &mut file).expect("it fits in memory");
+    file.into_inner()
+}
+
+#[test]
+fn a_cue_that_passes_is_taken_in_with_all_that_is_known_of_it() {
+    let fixture = Fixture::new();
+    let info = fixture.upload("ride", GOOD.as_bytes()).unwrap();
+    assert_eq!((info.title.as_deref(), info.length_s, info.axes), (Some("Ride"), Some(2.0), Some(3)));
+    assert_eq!((info.effects.as_slice(), info.size), (["air".to_owned()].as_slice(), GOOD.len() as u64));
+    assert_eq!(info.proof, Proved::Passed);
+    assert_eq!(fixture.files(), ["ride.csv"]);
+    assert_eq!(fixture.library.list(), std::slice::from_ref(&info));
+    let (timeline, sha256) = fixture.library.read(&"ride".parse().unwrap()).unwrap();
+    assert_eq!((Some(sha256), timeline.axes()), (info.sha256, 3));
+}
+
+#[test]
+fn a_cue_that_does_not_pass_is_refused_with_every_fault_and_leaves_nothing() {
+    let fixture = Fixture::new();
+    let problem = fixture.upload("ride", BAD.as_bytes()).unwrap_err();
+    assert_eq!(problem.code, Code::Check);
+    let told = |part: &str| problem.faults.iter().any(|fault| fault.contains(part));
+    assert!(told("fx_mist: unknown effect") && told("velocity") && told("jerk"), "{problem}");
+    assert!(problem.faults.iter().all(|fault| !fault.contains(".upload")), "{problem}");
+    let problem = fixture.upload("ride", b"time_ms,a1\n0,0\n10,2\n20,3\n").unwrap_err();
+    assert!(problem.faults[0].starts_with("3:4: a1: 2"), "{problem}");
+    assert_eq!(problem.faults.len(), 2, "{problem}");
+    assert_eq!(fixture.upload("ride", b"").unwrap_err().code, Code::Check);
+    assert!(fixture.files().is_empty());
+    assert!(fixture.library.list().is_empty());
+}
+
+#[test]
+fn what_is_uploaded_is_known_by_its_content_and_replaces_what_was_there() {
+    let fixture = Fixture::new();
+    fixture.upload("ride", GOOD.as_bytes()).unwrap();
+    let first = fixture.library.read(&"ride".parse().unwrap()).unwrap().1;
+    fixture.upload("ride", &mcap(GOOD)).unwrap();
+    assert_eq!(fixture.files(), ["ride.mcap"]);
+    assert_ne!(fixture.library.read(&"ride".parse().unwrap()).unwrap().1, first);
+    fixture.upload("ride", BAD.as_bytes()).unwrap_err();
+    assert_eq!(fixture.files(), ["ride.mcap"], "a refused cue takes the place of nothing");
+    fixture.upload("ride", GOOD.as_bytes()).unwrap();
+    assert_eq!(fixture.files(), ["ride.csv"]);
+}
+
+#[test]
+fn what_is_known_lasts_over_a_restart_until_the_hall_changes() {
+    let fixture = Fixture::new();
+    fixture.upload("ride", GOOD.as_bytes()).unwrap();
+    let config = fixture.dir.path().join("hall.toml");
+    let hall = Hall { config: config.clone(), program: "/nonexistent".into(), bounds: Bounds::default() };
+    let again = Library::open(&fixture.cues(), hall).unwrap();
+    let ride = "ride".parse().unwrap();
+    assert_eq!(again.examine(&ride).unwrap().proof, Proved::Passed, "without checking it again");
+    let text = fs::read_to_string(&config).unwrap();
+    fs::write(&config, text.replace("air = 1", "mist = 1")).unwrap();
+    assert_eq!(again.get(&ride).unwrap().proof, Proved::Unknown);
+    fixture.library.examine_all();
+    let Proved::Failed { faults } = fixture.library.get(&ride).unwrap().proof else { panic!("air is gone") };
+    assert!(faults[0].contains("fx_air: unknown effect"), "{faults:?}");
+    assert_eq!(fixture.files(), ["ride.csv"], "what was taken in stays");
+}
+
+#[test]
+fn a_hall_with_faults_proves_nothing() {
+    let fixture = Fixture::new();
+    fs::write(fixture.dir.path().join("hall.toml"), "nonsense = 1\n").unwrap();
+    let problem = fixture.upload("ride", GOOD.as_bytes()).unwrap_err();
+    assert!(problem.detail.contains("configuration of the hall has faults"), "{problem}");
+    assert!(fixture.files().is_empty());
+}
+
+/// A chunk of 60 MiB in some kilobytes.
+fn bomb() -> Vec<u8> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new()
+        .compression(Some(mcap::Compression::Zstd))
+        .chunk_size(Some(128 << 20))
+        .create(&mut file)
+        .expect("it fits in memory");
+    let channel = writer.add_channel(0, "/cue/axes", "json", &Default::default()).expect("it fits in memory");
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    writer.write_to_known_channel(&header, &vec![b' '; 60 << 20]).expect("it fits in memory");
+    writer.finish().expect("it fits in memory");
+    drop(writer);
+    file.into_inner()
+}
+
+#[test]
+fn a_bomb_is_refused_within_its_bounds() {
+    let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
+    fixture.upload("ride", GOOD.as_bytes()).unwrap();
+    let octets = bomb();
+    assert!(octets.len() < 1 << 20, "{} octets", octets.len());
+    let problem = fixture.upload("bomb", &octets).unwrap_err();
+    assert_eq!(problem.code, Code::Check);
+    assert!(problem.detail.contains("signal 6; it may take 48 MiB of memory"), "{problem}");
+    assert_eq!(fixture.files(), ["ride.csv"]);
+    let roomy = Fixture::new();
+    let problem = roomy.upload("bomb", &octets).unwrap_err();
+    assert!(problem.faults[0].contains("65536"), "with room it is a message that is too long: {problem}");
+}
+
+/// An upload whose check is a script.
+fn upload_with(script: &str, time: Duration) -> Problem {
+    let fixture = Fixture::new();
+    let program = fixture.dir.path().join("check");
+    fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("it is ours");
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    let bounds = Bounds { time, ..Bounds::default() };
+    let hall = Hall { config: fixture.dir.path().join("hall.toml"), program, bounds };
+    let library = Library::open(&fixture.cues(), hall).expect("the folder is ours");
+    let mut upload = library.begin(&"ride".parse().expect("an id")).expect("it is the first");
+    upload.write(GOOD.as_bytes()).expect("it is ours");
+    let problem = upload.finish().expect_err("it is refused");
+    assert!(fixture.files().is_empty());
+    problem
+}
+
+#[test]
+fn a_check_that_hangs_or_prints_without_end_is_ended() {
+    let problem = upload_with("exec sleep 60", Duration::from_millis(50));
+    assert!(problem.detail.contains("took more than"), "{problem}");
+    let problem = upload_with("exec >&-; exec sleep 60", Duration::from_millis(50));
+    assert!(problem.detail.contains("took more than"), "{problem}");
+    let problem = upload_with("exec yes", Duration::from_secs(60));
+    assert!(problem.detail.contains("more than any verdict"), "{problem}");
+}
+
+#[test]
+fn a_check_that_fails_takes_nothing_in() {
+    for script in ["exit 0", "kill -9 $$", "echo '{\"passed\":true}'"] {
+        let problem = upload_with(script, Duration::from_secs(60));
+        assert!(problem.detail.contains("the check of the cue ended with"), "{problem}");
+    }
+    let foreign = r#"echo '{"passed":true,"faults":[],"more":0,"sha256":"00","effects":[],"mcap":false}'"#;
+    assert!(
+        upload_with(foreign, Duration::from_secs(60)).detail.contains("changed while it was being checked")
+    );
+}
+
+#[test]
+fn the_check_lowers_itself_before_it_reads() {
+    let fixture = Fixture::new();
+    let hall = fixture.dir.path().join("hall.toml");
+    let pipe = fixture.dir.path().join("pipe.csv");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_kinocue"))
+        .args(["prove".as_ref(), pipe.as_os_str(), "--json".as_ref(), "--config".as_ref(), hall.as_os_str()])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Opening a pipe to write waits until the other end is open to read: the child is past its first steps then.
+    let feed = fs::OpenOptions::new().write(true).open(&pipe).unwrap();
+    let of = |name: &str| fs::read_to_string(format!("/proc/{}/{name}", child.id())).unwrap();
+    let stat = of("stat");
+    let fields: Vec<_> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
+    assert_eq!((fields[16], fields[38]), ("19", "5"), "nice 19, SCHED_IDLE: {stat}");
+    let limits = of("limits");
+    let limit = |name: &str| limits.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
+    assert!(limit("Max address space").contains(&(4096_u64 << 20).to_string()), "{limits}");
+    assert!(limit("Max cpu time").contains("300"), "{limits}");
+    for none in ["Max file size", "Max core file size"] {
+        assert_eq!(limit(none).trim_start_matches(none).split_whitespace().next(), Some("0"), "{limits}");
+    }
+    assert_eq!(of("oom_score_adj").trim(), "1000");
+    drop(feed);
+    child.wait().unwrap();
+}
+
+#[test]
+fn a_playlist_of_proved_cues_has_no_faults_and_unknown_ones_are_proved_when_it_is_loaded() {
+    let fixture = Fixture::new();
+    fs::write(fixture.cues().join("ride.csv"), GOOD).unwrap();
+    fs::write(fixture.cues().join("wild.csv"), BAD).unwrap();
+    let config = kinocue::config::load(&fixture.dir.path().join("hall.toml")).unwrap();
+    let check = |text: &str| {
+        let playlist = Playlist::parse(Path::new("day.toml"), text).unwrap();
+        playlist.check(&fixture.library, &config).iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let good = "title = \"Day\"\n[[entry]]\ncue = \"ride\"\npreset = \"kids\"\neffects = { air = false }\n";
+    assert!(check(good).is_empty());
+    assert_eq!(fixture.library.get(&"ride".parse().unwrap()).unwrap().proof, Proved::Passed);
+    let faults = check("title = \"Day\"\n[[entry]]\ncue = \"wild\"\n[[entry]]\ncue = \"gone\"\n");
+    assert!(faults[0].starts_with("day.toml:3:7: cue: wild does not pass: "), "{faults:?}");
+    assert!(faults[1].starts_with("day.toml:5:7: cue: there is no cue gone"), "{faults:?}");
+}

@@ -1,0 +1,166 @@
+//! What is shipped beside the program: the package names only what exists, examples that drive nothing by themselves, a unit
+//! that gives nothing away, manual pages for every command.
+
+use std::fs;
+use std::io::Write as _;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn text(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+fn toml(path: &str) -> toml::Table {
+    text(path).parse().unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+fn kinocue(args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+    command.current_dir(root()).args(args).output().expect("kinocue runs")
+}
+
+/// What a tool says that not every machine has; none, said so, where it is not there.
+fn tool(program: &str, args: &[&str]) -> Option<Output> {
+    let output = Command::new(program).current_dir(root()).args(args).output();
+    if output.is_err() {
+        let _ = writeln!(std::io::stderr(), "skipped: no {program} is installed");
+    }
+    output.ok()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+/// The files that a pattern of the package means; those of `target` are built for it.
+fn files(pattern: &str) -> Vec<PathBuf> {
+    let (folder, name) = pattern.rsplit_once('/').unwrap_or((".", pattern));
+    let Some((front, back)) = name.split_once('*') else { return vec![root().join(pattern)] };
+    let entries = fs::read_dir(root().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let fits = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        path.is_file() && name.starts_with(front) && name.ends_with(back)
+    };
+    paths.filter(fits).collect()
+}
+
+#[test]
+fn every_file_that_the_package_names_exists() {
+    let manifest = toml("Cargo.toml");
+    let deb = manifest["package"]["metadata"]["deb"].as_table().unwrap();
+    let assets = deb["assets"].as_array().unwrap();
+    let sources = assets.iter().map(|asset| asset[0].as_str().unwrap());
+    for source in sources.filter(|source| !source.starts_with("target/")) {
+        let found = files(source);
+        assert!(!found.is_empty() && found.iter().all(|path| path.is_file()), "{source}: {found:?}");
+    }
+    assert!(root().join(deb["license-file"][0].as_str().unwrap()).is_file());
+    assert_eq!(files("systemd/debian/p*").len(), 3, "the maintainer scripts");
+}
+
+#[test]
+fn every_path_of_the_unit_is_one_that_the_package_installs() {
+    let manifest = toml("Cargo.toml");
+    let assets = manifest["package"]["metadata"]["deb"]["assets"].as_array().unwrap();
+    let targets: Vec<_> = assets.iter().map(|asset| asset[1].as_str().unwrap()).collect();
+    let unit = text("systemd/kinocue.service");
+    assert!(unit.contains("\nExecStart=/usr/bin/kinocue serve --config /etc/kinocue/kinocue.toml\n"));
+    assert!(targets.contains(&"usr/bin/") && targets.contains(&"usr/lib/systemd/system/"));
+    assert!(!targets.iter().any(|target| target.starts_with("etc/")), "no configuration is installed");
+}
+
+#[test]
+fn installing_and_upgrading_start_nothing() {
+    for script in ["postinst", "postrm"] {
+        let text = text(&format!("systemd/debian/{script}"));
+        let commands =
+            text.lines().map(str::trim).filter(|line| !line.starts_with("echo") && !line.starts_with('"'));
+        for line in commands.filter(|line| line.contains("systemctl")) {
+            assert!(line.contains("daemon-reload") || line.contains("is-active"), "{script}: {line}");
+        }
+    }
+}
+
+#[test]
+fn the_examples_pass_their_check() {
+    for example in ["systemd/kinocue.toml", "systemd/simulated.toml"] {
+        let output = kinocue(&["check", example]);
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
+#[test]
+fn the_simulated_hall_reaches_nothing_but_this_machine() {
+    let hall = toml("systemd/simulated.toml");
+    let controllers = hall["controller"].as_array().unwrap();
+    let addresses = controllers.iter().map(|one| one["address"].as_str().unwrap());
+    for address in addresses.chain([hall["show"]["bind"].as_str().unwrap()]) {
+        let address: SocketAddr = address.parse().unwrap();
+        assert!(address.ip().is_loopback(), "{address}");
+    }
+    let rows: std::collections::BTreeSet<_> =
+        controllers.iter().map(|one| one["row"].as_str().unwrap()).collect();
+    assert_eq!(rows.len(), 2);
+}
+
+#[test]
+fn the_unit_is_as_closed_as_it_was_measured_to_be() {
+    let unit = "systemd/kinocue.service";
+    // Exposure in tenths; ends with a failure above it.
+    if let Some(output) = tool("systemd-analyze", &["security", "--offline=true", "--threshold=12", unit]) {
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
+#[test]
+fn the_unit_lets_nothing_run_with_rights() {
+    let unit = text("systemd/kinocue.service");
+    for line in ["User=kinocue", "CapabilityBoundingSet=", "AmbientCapabilities=", "NoNewPrivileges=yes"] {
+        assert!(unit.lines().any(|found| found == line), "{line}");
+    }
+    assert!(!unit.lines().any(|line| line.contains("CAP_")), "no capability is named");
+}
+
+#[test]
+fn alerts_are_what_prometheus_takes() {
+    if let Some(output) = tool("promtool", &["check", "rules", "systemd/prometheus/kinocue.rules.yml"]) {
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
+#[test]
+fn shell_scripts_are_shell_scripts() {
+    let scripts = files("systemd/*.sh").into_iter().chain(files("systemd/debian/*"));
+    for script in scripts {
+        let output = Command::new("bash").arg("-n").arg(&script).output().unwrap();
+        assert!(output.status.success(), "{}: {}", script.display(), said(&output));
+    }
+}
+
+#[test]
+fn every_command_has_its_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = kinocue(&["man", folder.path().to_str().unwrap()]);
+    assert!(output.status.success(), "{}", said(&output));
+    let page =
+        |name: &str| fs::read_to_string(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let all = page("kinocue.1");
+    for command in ["play", "sim", "check", "preflight", "doctor"] {
+        assert!(all.contains(&format!("kinocue\\-{command}(1)")), "{command} is in kinocue(1)");
+        assert!(page(&format!("kinocue-{command}.1")).contains(".SH OPTIONS"), "{command}");
+    }
+    assert!(page("kinocue-register-read.1").contains(".SH OPTIONS"), "and those within commands");
+    assert!(!all.contains("kinocue\\-man(1)"), "not those for whoever makes packages");
+}
+
+#[test]
+fn a_folder_that_is_not_there_takes_no_manual_pages() {
+    let output = kinocue(&["man", "/nonexistent/folder"]);
+    assert_eq!(output.status.code(), Some(74), "{}", said(&output));
+}

@@ -1,0 +1,179 @@
+//! `kinocue report` as a person runs it.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+use kinocue::journal::{Action, Ending, Journal, Limits, Outcome, Percentiles, ShowRecord};
+use serde_json::Value;
+
+const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
+
+struct Run {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+fn report(args: &[&str]) -> Run {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_kinocue")).arg("report").args(args).output().expect("kinocue runs");
+    let text = |octets| String::from_utf8(octets).expect("UTF-8");
+    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> ShowRecord {
+    let percentiles = Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), max_us: Some(60.0) };
+    ShowRecord {
+        start: start.to_owned(),
+        hall: "one".to_owned(),
+        cue: cue.to_owned(),
+        sha256: "ab".repeat(32),
+        title: Some(title.to_owned()),
+        playlist: None,
+        level: 0.6,
+        vibration: 1.0,
+        trim_ms: 40,
+        effects_off: vec!["water".to_owned()],
+        seats_total: 4,
+        seats_available: 3,
+        operator: "ann".to_owned(),
+        scheduled: false,
+        out_of_hours: false,
+        outcome: end.map(|(end, result)| Outcome {
+            end: end.to_owned(),
+            result,
+            events: vec!["A2 was lost at 00:12.000".to_owned()],
+            ticks: 1000,
+            missed_ticks: 1,
+            sent: 4000,
+            asked: 4000,
+            acked: 3999,
+            refused: 0,
+            lost: 1,
+            send_failed: 0,
+            lateness: percentiles,
+            ack: percentiles,
+        }),
+    }
+}
+
+/// A day with a show that was played, one that a person stopped, and one that a crash ended.
+fn journal(dir: &Path) {
+    let now = "2026-11-21T08:00:00Z".parse::<Timestamp>().expect("RFC 3339").to_zoned(TimeZone::UTC);
+    let mut journal = Journal::open(dir, LIMITS, &now);
+    let (seven, eight) = ("2026-11-21T19:00:00.000+01:00", "2026-11-21T20:00:00.000+01:00");
+    journal.note(&Action {
+        at: "2026-11-21T18:59:30.000+01:00".to_owned(),
+        who: "ann (socket, engineer)".to_owned(),
+        what: "arm".to_owned(),
+        result: "done".to_owned(),
+        state: "armed\u{1b}[31m".to_owned(),
+    });
+    let ends = [
+        show(seven, "storm", "=Storm, \"II\"", Some(("2026-11-21T19:10:00.000+01:00", Ending::Completed))),
+        show(eight, "ride", "Ride", Some(("2026-11-21T20:00:30.000+01:00", Ending::Stopped))),
+    ];
+    for end in &ends {
+        journal.begin(end);
+        journal.show(end);
+    }
+    journal.begin(&show("2026-11-21T21:00:00.000+01:00", "ride", "Ride", None));
+}
+
+#[test]
+fn a_day_is_a_table_with_a_line_for_all_together() {
+    let dir = tempfile::tempdir().unwrap();
+    journal(dir.path());
+    let run = report(&["--day", "2026-11-21", "--dir", dir.path().to_str().unwrap()]);
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+    for part in
+        ["2026-11-21 19:00:00", "storm", "completed", "00:10:00", "60 %", "3/4", "99.97 %", "interrupted"]
+    {
+        assert!(run.stdout.contains(part), "{part}: {}", run.stdout);
+    }
+    assert!(run.stdout.contains("ride: A2 was lost at 00:12.000"), "{}", run.stdout);
+    let totals = "3 shows on 2026-11-21: 1 completed, 1 stopped, 1 interrupted; 00:10:30 in all; 8000 frames sent, 7998 \
+                  acked, 0 refused, 2 lost";
+    assert_eq!(run.stdout.lines().last(), Some(totals));
+    let run = report(&["--from", "2026-11-01", "--to", "2026-11-20", "--dir", dir.path().to_str().unwrap()]);
+    assert_eq!(
+        (run.code, run.stdout.as_str()),
+        (Some(0), "nothing was played from 2026-11-01 to 2026-11-20\n")
+    );
+}
+
+#[test]
+fn what_was_asked_is_shown_without_what_a_terminal_obeys() {
+    let dir = tempfile::tempdir().unwrap();
+    journal(dir.path());
+    let run = report(&["--day", "2026-11-21", "--actions", "--dir", dir.path().to_str().unwrap()]);
+    assert!(
+        run.stdout.contains("ann (socket, engineer)") && run.stdout.contains("armed?[31m"),
+        "{}",
+        run.stdout
+    );
+    assert!(!run.stdout.contains('\u{1b}'));
+}
+
+#[test]
+fn csv_reads_back_whatever_a_title_holds() {
+    let dir = tempfile::tempdir().unwrap();
+    journal(dir.path());
+    let run = report(&["--day", "2026-11-21", "--csv", "--dir", dir.path().to_str().unwrap()]);
+    assert!(run.stdout.lines().count() == 4 && run.stdout.ends_with("\r\n"), "{}", run.stdout);
+    let mut reader = csv::Reader::from_reader(run.stdout.as_bytes());
+    let head = reader.headers().unwrap().clone();
+    let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+    let cell = |row: usize, name: &str| {
+        let column = head.iter().position(|column| column == name).unwrap_or_else(|| panic!("{name}"));
+        rows[row][column].to_owned()
+    };
+    assert_eq!(cell(0, "title"), "'=Storm, \"II\"");
+    assert_eq!(
+        (cell(0, "took_s"), cell(0, "acked"), cell(0, "lateness_p99_us")),
+        ("600".into(), "3999".into(), "9.5".into())
+    );
+    assert_eq!(
+        (cell(1, "result"), cell(2, "result"), cell(2, "end")),
+        ("stopped".into(), "interrupted".into(), String::new())
+    );
+}
+
+#[test]
+fn json_has_every_figure_and_notes_what_was_cut() {
+    let dir = tempfile::tempdir().unwrap();
+    journal(dir.path());
+    let file = dir.path().join("kinocue-2026-11-21-000.jsonl");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, &text[..text.len() - 5]).unwrap();
+    let run = report(&["--day", "2026-11-21", "--json", "--dir", dir.path().to_str().unwrap()]);
+    let report: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(report["totals"]["shows"], 2, "the begin of the third was cut");
+    assert_eq!(report["shows"][0]["outcome"]["lateness"]["p99_us"], 9.5);
+    assert_eq!(report["shows"][0]["result"], "completed");
+    assert_eq!(report["actions"][0]["what"], "arm");
+    assert!(report["notes"][0].as_str().unwrap().ends_with("is cut short, and passed over"), "{report}");
+}
+
+#[test]
+fn wrong_use_and_a_missing_journal_have_their_exit_codes() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().to_str().unwrap();
+    let code = |args: &[&str]| report(args).code;
+    assert_eq!(code(&["--dir", &format!("{path}/none")]), Some(66));
+    assert_eq!(code(&["--day", "tomorrow", "--dir", path]), Some(64));
+    assert_eq!(code(&["--from", "2026-11-02", "--to", "2026-11-01", "--dir", path]), Some(64));
+    assert_eq!(code(&["--config", &format!("{path}/none.toml")]), Some(66));
+    assert_eq!(report(&["--dir", path]).stdout.split(' ').next(), Some("nothing"));
+    let config = dir.path().join("hall.toml");
+    let hall =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/config/hall.toml"))
+            .unwrap();
+    std::fs::write(&config, format!("[log]\ndir = \"{path}/logs\"\n{hall}")).unwrap();
+    std::fs::create_dir(dir.path().join("logs")).unwrap();
+    journal(&dir.path().join("logs"));
+    let run = report(&["--day", "2026-11-21", "--config", config.to_str().unwrap()]);
+    assert!(run.stdout.contains("3 shows on 2026-11-21"), "{} {}", run.stdout, run.stderr);
+}
