@@ -17,7 +17,8 @@ export function startPlaylist() {
   onPress(byId('playlist-drop'), (button) => ask(button, 'drop the playlist', () => change('PUT', 'playlist', { id: null })));
   onPress(byId('cue-load'), (button) => {
     const cue = byId('cues').value;
-    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue }));
+    // Only reading a cue shows its title and length, or its faults.
+    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(readLists);
   });
   onPress(byId('lists-again'), readLists);
   byId('cues').addEventListener('change', showCueNote);
