@@ -96,13 +96,7 @@ impl Problem {
     /// One of that kind.
     #[must_use]
     pub fn new(code: Code, detail: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self {
-            status: code.status(),
-            code,
-            detail: detail.into(),
-            remedy: remedy.into(),
-            faults: Vec::new(),
-        }
+        Self { status: code.status(), code, detail: detail.into(), remedy: remedy.into(), faults: Vec::new() }
     }
 
     /// The same, with every fault.

@@ -15,7 +15,7 @@ Examples:
   kinocue watch            the same, live
 
 Exit codes: 0 shown, 69 no daemon, 77 not allowed")]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     #[command(flatten)]
     server: ServerArgs,
 }

@@ -28,7 +28,7 @@ Examples:
   kinocue stop --stop-socket /run/kinocue/stop.sock
 
 Exit codes: 0 the seats come to rest, 69 no daemon took it: use the hard-wired emergency stop")]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// The stop socket of the daemon [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
@@ -49,7 +49,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             Ok(Exit::Done)
         }
         Err(error) => {
-            print::tell(&format!("kinocue: {path} did not take the stop ({error}); asking the control socket"));
+            print::tell(&format!(
+                "kinocue: {path} did not take the stop ({error}); asking the control socket"
+            ));
             by_control_socket(&args.server)
         }
     }
@@ -76,7 +78,7 @@ fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
         failure.error = failure.error.context("NOT STOPPED by kinocue; use the hard-wired emergency stop");
         failure
     })?;
-    let (line, socket) = (status.line(), server.socket().display());
-    print::tell(&format!("kinocue: {line}; by {socket}; {NO_EMERGENCY}"));
+    let (line, socket) = (status.line(), server.socket());
+    print::tell(&format!("kinocue: {line}; by {}; {NO_EMERGENCY}", socket.display()));
     Ok(Exit::Done)
 }
