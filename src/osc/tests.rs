@@ -14,7 +14,8 @@ use crate::hall::{
     Warning, handle,
 };
 use crate::rt::Desk;
-use crate::sys::clock::wall_now_ns;
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::time::Clock as _;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -82,6 +83,15 @@ impl Stage {
         }
     }
 
+    /// Waits until something has been counted.
+    fn wait_for(&self, word: &str) {
+        let until = Monotonic.now() + PATIENCE;
+        while self.counts.of(word) == 0 {
+            assert!(Monotonic.now() < until, "nothing is {word}");
+            std::thread::yield_now();
+        }
+    }
+
     fn subscribe(&self, seconds: i32) {
         let port = i32::from(self.gear.local_addr().unwrap().port());
         self.say("subscribe", vec![OscType::Int(port), OscType::Int(seconds)]);
@@ -134,8 +144,7 @@ fn a_stop_reaches_the_tick_thread_while_nobody_answers() {
     }
     stage.say("stop", vec![]);
     stage.say("arm", vec![]);
-    // Once that is refused, what came before it was read.
-    while !format!("{:?}", stage.heard("warning")).contains("never arm") {}
+    stage.wait_for("forbidden"); // what came before it was read
     assert!(stage.desk.take_stop());
 }
 
@@ -156,9 +165,7 @@ fn nothing_arms_and_whoever_tries_is_told() {
 fn strangers_are_not_heard() {
     let stage = Stage::of(&[Ipv4Addr::new(10, 0, 0, 5)]);
     stage.say("stop", vec![]);
-    while stage.counts.of("foreign") == 0 {
-        std::thread::yield_now();
-    }
+    stage.wait_for("foreign");
     assert!(!stage.desk.take_stop());
 }
 

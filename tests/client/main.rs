@@ -27,6 +27,11 @@ fn hall(state: &str) -> Value {
     })
 }
 
+/// A text with each run of blanks as one, as the width of columns is no matter.
+fn squeezed(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 fn told(run: &Run, says: &str) {
     assert!(run.stderr.contains(says), "{says}\n{run:?}");
 }
@@ -268,14 +273,14 @@ fn the_library_and_the_playlist_are_listed() {
     let cues = json!([{"id": "coaster", "title": "Coaster", "length_s": 60.0, "axes": 3, "effects": ["air"], "size": 9,
         "sha256": null, "proved": {"state": "passed"}}]);
     let run = Daemon::start(move |_, _| Answer::Reply(200, cues.clone())).run(&["cues"]);
-    assert!(run.stdout.contains("coaster  Coaster  01:00.000  3     air      passed"), "{run:?}");
+    assert!(squeezed(&run.stdout).contains("coaster Coaster 01:00.000 3 air passed"), "{run:?}");
     let mut status = hall("parked");
     let entry = json!({"cue": "coaster", "title": null, "length_s": 60.0, "level": 0.6, "trim_ms": null, "then": "hold",
         "at": "14:00"});
     status["playlist"] = json!({"id": "saturday", "title": "Saturday", "entries": [entry, entry], "current": 1,
         "next_start": null});
     let run = Daemon::with(status).run(&["playlist"]);
-    assert!(run.stdout.contains(">2  coaster"), "{run:?}");
+    assert!(squeezed(&run.stdout).contains(">2 coaster"), "{run:?}");
 }
 
 #[test]
@@ -330,7 +335,7 @@ fn a_sweep_is_followed_to_its_end_and_its_table_shown() {
         let run = daemon.run(&["test", "sweep", "--rows", "A-C", "--seats-empty"]);
         assert_eq!(run.code, Some(exit), "{run:?}");
         assert_eq!(daemon.request().json(), json!({"rows": ["A", "B", "C"]}));
-        assert!(run.stdout.contains("A1          a1    200    200    41      93      ok"), "{run:?}");
+        assert!(squeezed(&run.stdout).contains("A1 a1 200 200 41 93 ok"), "{run:?}");
         assert_eq!(run.stdout.contains("FAIL"), !passed);
         told(&run, "test ended: 2 of 2 axes and effects");
     }
