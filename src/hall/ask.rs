@@ -127,6 +127,22 @@ impl Ask {
         }
     }
 
+    /// Whether it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
+    /// another by then.
+    #[must_use]
+    pub const fn goes_stale(&self) -> bool {
+        matches!(
+            self,
+            Self::Home
+                | Self::Arm
+                | Self::Go
+                | Self::Resume
+                | Self::Seek(_)
+                | Self::Clear
+                | Self::Test { .. }
+        )
+    }
+
     /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.
     #[must_use]
     pub const fn least_role(&self) -> Role {

@@ -1,19 +1,24 @@
 //! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
 //! stop, which waits for neither.
 
-use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
 use tokio::sync::{oneshot, watch};
 
 use super::{Ask, Code, Problem, Status, Who};
 use crate::rt::Desk;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
 
 /// Asks that wait at the most; of a flood the rest is refused.
 const ASKS: usize = 64;
 /// How long an answer may take: a cue of two hours is proved meanwhile.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// How old an ask that [goes stale](Ask::goes_stale) may be when its turn comes.
+pub const FRESH: Duration = Duration::from_secs(2);
 
 /// What a surface wants, and on whose behalf.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,10 +34,15 @@ pub struct Desired {
 pub struct Asked {
     /// What, and who.
     pub desired: Desired,
+    asked_at: MonoTime,
     reply: oneshot::Sender<Result<Arc<Status>, Problem>>,
 }
 
 impl Asked {
+    fn is_stale(&self, now: MonoTime) -> bool {
+        self.desired.ask.goes_stale() && now.since(self.asked_at) > FRESH
+    }
+
     /// Answers it: the state that it led to, or why it was not done.
     pub fn answer(self, answer: Result<Arc<Status>, Problem>) {
         drop(self.reply.send(answer)); // whoever asked may have gone
@@ -44,15 +54,23 @@ impl Asked {
 pub struct Inbox(mpsc::Receiver<Asked>);
 
 impl Inbox {
-    /// The next ask, waited for so long; none where nobody asked. None as well where all surfaces are gone.
+    /// The next ask, waited for so long; none where nobody asked. None as well where all surfaces are gone. What has gone
+    /// stale while it waited is answered here and never comes out: nobody expects it any more.
     #[must_use]
     pub fn next(&self, wait: Duration) -> Option<Asked> {
-        match self.0.recv_timeout(wait) {
-            Ok(asked) => Some(asked),
-            Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => {
-                std::thread::sleep(wait);
-                None
+        let until = Monotonic.now() + wait;
+        loop {
+            match self.0.recv_timeout(until.since(Monotonic.now())) {
+                Ok(asked) if asked.is_stale(Monotonic.now()) => {
+                    let problem = late(asked.desired.ask.word());
+                    asked.answer(Err(problem));
+                }
+                Ok(asked) => return Some(asked),
+                Err(RecvTimeoutError::Timeout) => return None,
+                Err(RecvTimeoutError::Disconnected) => {
+                    Monotonic.sleep_until(until);
+                    return None;
+                }
             }
         }
     }
@@ -60,9 +78,14 @@ impl Inbox {
 
 /// Where the keeper puts the newest status.
 #[derive(Debug)]
-pub struct StatusSource(watch::Sender<Arc<Status>>);
+pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Arc<Desk>>>);
 
 impl StatusSource {
+    /// From now on a stop goes to that desk: the hall was opened anew.
+    pub fn lead(&self, desk: Arc<Desk>) {
+        *self.1.write().unwrap_or_else(PoisonError::into_inner) = desk;
+    }
+
     /// Makes a status known to all who watch.
     pub fn put(&self, status: Arc<Status>) {
         self.0.send_replace(status);
@@ -74,7 +97,7 @@ impl StatusSource {
 pub struct Handle {
     asks: SyncSender<Asked>,
     status: watch::Receiver<Arc<Status>>,
-    desk: Arc<Desk>,
+    desk: Arc<RwLock<Arc<Desk>>>,
 }
 
 /// The ends of a hall: for its surfaces, and for its keeper. `desk` is the tick thread's.
@@ -82,13 +105,21 @@ pub struct Handle {
 pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
     let (asks, inbox) = mpsc::sync_channel(ASKS);
     let (source, status) = watch::channel(Arc::new(first));
-    (Handle { asks, status, desk }, Inbox(inbox), StatusSource(source))
+    let desk = Arc::new(RwLock::new(desk));
+    (Handle { asks, status, desk: Arc::clone(&desk) }, Inbox(inbox), StatusSource(source, desk))
 }
 
 impl Handle {
     /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
     pub fn stop(&self) {
-        self.desk.stop();
+        self.desk.read().unwrap_or_else(PoisonError::into_inner).stop();
+    }
+
+    /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
+    pub fn note_stop(&self, who: Who) {
+        let (reply, _) = oneshot::channel();
+        let note = Asked { desired: Desired { ask: Ask::Stop, who }, asked_at: Monotonic.now(), reply };
+        drop(self.asks.try_send(note));
     }
 
     /// The newest status.
@@ -116,6 +147,14 @@ impl Handle {
     /// # Errors
     /// [`Problem`] where it is not even queued: the role is too low, or too many wait.
     pub fn post(&self, who: Who, ask: Ask) -> Result<Posted, Problem> {
+        self.post_asked(who, ask, Monotonic.now())
+    }
+
+    /// The same for what was asked a while ago.
+    ///
+    /// # Errors
+    /// [`Problem`] where it is not even queued: the role is too low, it is stale already, or too many wait.
+    pub fn post_asked(&self, who: Who, ask: Ask, asked_at: MonoTime) -> Result<Posted, Problem> {
         if who.role < ask.least_role() {
             let (word, least) = (ask.word(), ask.least_role());
             let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
@@ -125,7 +164,11 @@ impl Handle {
             self.stop();
         }
         let (reply, answer) = oneshot::channel();
-        self.asks.try_send(Asked { desired: Desired { ask, who }, reply }).map_err(|error| match error {
+        let asked = Asked { desired: Desired { ask, who }, asked_at, reply };
+        if asked.is_stale(Monotonic.now()) {
+            return Err(late(asked.desired.ask.word()));
+        }
+        self.asks.try_send(asked).map_err(|error| match error {
             TrySendError::Full(_) => {
                 Problem::new(Code::Busy, format!("{ASKS} requests wait already"), "ask again in a second")
             }
@@ -156,6 +199,66 @@ impl Posted {
     }
 }
 
+fn late(word: &str) -> Problem {
+    let detail = format!("{word} came more than {} s after it was asked", FRESH.as_secs());
+    Problem::new(Code::Late, detail, "look at the seats, then ask again")
+}
+
 fn gone() -> Problem {
     Problem::new(Code::Timeout, "the hall is shutting down", "wait until the service is back")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hall::{Role, Surface};
+
+    fn who(role: Role) -> Who {
+        Who { role, surface: Surface::Http, name: "anna".to_owned() }
+    }
+
+    fn hall() -> (Handle, Inbox, Arc<Desk>) {
+        let desk = Arc::new(Desk::new(std::iter::empty()));
+        let (handle, inbox, _source) = handle(Arc::clone(&desk), Status::starting("Hall 1"));
+        (handle, inbox, desk)
+    }
+
+    const NOW: Duration = Duration::ZERO;
+
+    #[test]
+    fn what_waited_too_long_never_comes_out_but_a_stop_does() {
+        let (handle, inbox, _) = hall();
+        let long_ago = Monotonic.now().before(2 * FRESH);
+        assert_eq!(handle.post_asked(who(Role::Operate), Ask::Go, long_ago).unwrap_err().code, Code::Late);
+        let stale = Monotonic.now().before(FRESH - Duration::from_millis(1));
+        let posted = handle.post_asked(who(Role::Operate), Ask::Go, stale);
+        Monotonic.sleep_until(stale + FRESH + Duration::from_micros(1));
+        handle.post_asked(who(Role::View), Ask::Stop, long_ago).unwrap();
+        assert_eq!(inbox.next(NOW).unwrap().desired.ask, Ask::Stop);
+        drop(posted); // it may have gone stale on its way in
+    }
+
+    #[test]
+    fn a_stop_is_set_also_where_nothing_more_fits_and_noted_where_it_does() {
+        let (handle, inbox, desk) = hall();
+        for _ in 0..ASKS {
+            handle.post(who(Role::Operate), Ask::Pause).unwrap();
+        }
+        assert_eq!(handle.post(who(Role::Operate), Ask::Pause).unwrap_err().code, Code::Busy);
+        handle.stop();
+        handle.note_stop(who(Role::View));
+        assert!(desk.take_stop());
+        assert_eq!(inbox.next(NOW).unwrap().desired.ask, Ask::Pause);
+        handle.note_stop(who(Role::View));
+        let last = std::iter::from_fn(|| inbox.next(NOW)).last().unwrap();
+        assert_eq!(last.desired.ask, Ask::Stop);
+    }
+
+    #[test]
+    fn a_role_that_may_not_ask_reaches_nobody() {
+        let (handle, inbox, _) = hall();
+        let problem = handle.post(who(Role::View), Ask::Go).unwrap_err();
+        assert_eq!((problem.code, problem.status), (Code::Role, 403));
+        assert!(inbox.next(NOW).is_none());
+    }
 }

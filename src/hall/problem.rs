@@ -22,6 +22,12 @@ pub enum Code {
     Value,
     /// There is nothing of that name.
     Unknown,
+    /// What is there cannot be asked that way.
+    Method,
+    /// It is longer than may be.
+    Size,
+    /// It is written in a form that is not read here.
+    Media,
     /// The cue, playlist or configuration does not pass.
     Check,
     /// It came more than two seconds after it was asked.
@@ -36,6 +42,8 @@ pub enum Code {
     File,
     /// It is not built, or turned off in the configuration.
     Off,
+    /// A fault of our own.
+    Internal,
 }
 
 /// Why something was not done (RFC 9457).
@@ -64,6 +72,9 @@ impl Code {
             Self::Token => "token",
             Self::Value => "value",
             Self::Unknown => "unknown",
+            Self::Method => "method",
+            Self::Size => "size",
+            Self::Media => "media",
             Self::Check => "check",
             Self::Late => "late",
             Self::Origin => "origin",
@@ -71,6 +82,7 @@ impl Code {
             Self::Timeout => "timeout",
             Self::File => "file",
             Self::Off => "off",
+            Self::Internal => "internal",
         }
     }
 
@@ -82,10 +94,13 @@ impl Code {
             Self::Token => 401,
             Self::Role | Self::Origin => 403,
             Self::Unknown => 404,
+            Self::Method => 405,
             Self::State | Self::Late => 409,
+            Self::Size => 413,
+            Self::Media => 415,
             Self::Check => 422,
             Self::Busy => 429,
-            Self::File => 500,
+            Self::File | Self::Internal => 500,
             Self::Off => 501,
             Self::Timeout => 503,
         }
