@@ -45,8 +45,13 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sockets =
         Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
     let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
-    serve(config, &places, console::page, print::tell)?;
+    serve(config, &places, pages, print::tell)?;
     Ok(Exit::Done)
+}
+
+/// The console, as the API takes it.
+fn pages(path: &str) -> Option<(&'static str, &'static [u8])> {
+    console::asset(path).map(|asset| (asset.content_type, asset.body))
 }
 
 impl From<ServeError> for Failure {

@@ -4,7 +4,7 @@ import { byId, make, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, onTwoPresses } from './press.js';
 import { hall } from './state.js';
-import { STANDINGS, mark } from './marks.js';
+import { mark, standingOf } from './marks.js';
 import { ackRate, bits, micros, sentence, whole } from './words.js';
 
 const FIGURES = {
@@ -36,9 +36,17 @@ export const selected = () => name;
 
 /** Looks at a controller, or at none. */
 export function select(which) {
+  const before = name;
   name = which;
   parts = null;
   showController(hall());
+  const place = byId('controller');
+  if (!place.hidden) {
+    place.scrollIntoView({ block: 'nearest' });
+    place.focus({ preventScroll: true });
+  } else if (before !== null) {
+    document.querySelector(`[data-controller="${CSS.escape(before)}"]`)?.focus();
+  }
 }
 
 /** Shows the controller that is looked at. */
@@ -51,13 +59,13 @@ export function showController(status) {
     parts = build(controller);
     place.replaceChildren(...parts.all);
   }
-  const standing = STANDINGS[controller.standing] ?? STANDINGS.unknown;
+  const standing = standingOf(controller);
   setProperty(parts.standing, 'className', `standing look-${standing.look}`);
   if (parts.shape !== standing.mark) {
     parts.shape = standing.mark;
     parts.picture.replaceChildren(mark(standing.mark));
   }
-  setText(parts.word, controller.standing);
+  setText(parts.word, controller.enabled ? controller.standing : `taken out, ${controller.standing}`);
   setText(parts.why, sentence(controller.why));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);

@@ -8,7 +8,10 @@ import { hall } from './state.js';
 import { clock } from './words.js';
 
 const MAY_SEEK = ['armed', 'joining', 'playing', 'freewheeling', 'paused'];
+/** A place that was chosen and left alone is forgotten, so that the bar follows the film again. */
+const FORGET_MS = 15_000;
 let chosen = null;
+let timer = null;
 
 /** Makes the bar work. */
 export function startFilm() {
@@ -28,10 +31,13 @@ function choose(position) {
   const show = hall()?.show;
   if (!show) return;
   chosen = Math.min(Math.max(position, 0), show.length_s);
+  clearTimeout(timer);
+  timer = setTimeout(leave, FORGET_MS);
   showFilm(hall());
 }
 
 function leave() {
+  clearTimeout(timer);
   chosen = null;
   if (hall()) showFilm(hall());
 }
@@ -50,7 +56,7 @@ export function showFilm(status) {
   }
   showBar(show, maySeek);
   setProperty(byId('seek-ask'), 'hidden', chosen === null);
-  if (chosen !== null) setText(byId('seek-go'), `Seek to ${clock(chosen)}`);
+  if (chosen !== null) setText(byId('seek-go'), `Seek ${clock(chosen)}`);
 }
 
 function showBar(show, maySeek) {

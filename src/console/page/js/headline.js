@@ -1,7 +1,7 @@
 // The state of the hall in large words, with its cause and the next action; whether the seats may move; the link.
 
 import { byId, setAttribute, setProperty, setText } from './dom.js';
-import { hasSpoken, silence } from './stream.js';
+import { hasSpoken, refusal, silence } from './stream.js';
 import { linkState } from './state.js';
 import { lasting, sentence } from './words.js';
 
@@ -26,7 +26,8 @@ export function showHeadline(status, link) {
 }
 
 function showSilence() {
-  const since = hasSpoken() ? `for ${silence().toFixed(0)} s; trying to reach it.` : 'yet; trying to reach it.';
+  const why = refusal() ?? 'trying to reach it';
+  const since = hasSpoken() ? `for ${silence().toFixed(0)} s; ${why}.` : `yet; ${why}.`;
   setText(byId('lost-since'), since);
 }
 
@@ -50,8 +51,8 @@ function showStatus(status, link) {
 }
 
 function times(status) {
-  const lapses = status.lapses_s === null ? '' : `, for ${lasting(status.lapses_s)} more`;
-  return `since ${lasting(status.since_s)}${lapses}`;
+  const lapses = status.lapses_s === null ? '' : `; ends by itself in ${lasting(status.lapses_s)}`;
+  return `for ${lasting(status.since_s)}${lapses}`;
 }
 
 function badge(id, shown, text, why) {

@@ -11,13 +11,14 @@ import { showMap, startMap } from './map.js';
 import { readLists, showPlaylist, startPlaylist } from './playlist.js';
 import { showReports, startReports } from './reports.js';
 import { showTrim, startTrim } from './trim.js';
-import { showWarnings } from './warnings.js';
+import { showWarnings, startWarnings } from './warnings.js';
 import { startStream } from './stream.js';
 import { startToken } from './token.js';
 import { watch } from './state.js';
 
 const STARTS = [
   startTransport, startToken, startHeadline, startFilm, startMap, startTrim, startPlaylist, startReports, startCurves,
+  startWarnings,
 ];
 const SHOWS = [
   showHeadline, showTransport, showFilm, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,

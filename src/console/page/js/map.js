@@ -1,7 +1,7 @@
 // The hall as a map: a line for each row, a field for each controller, coloured and marked by how it stands.
 
 import { byId, choice, make, setAttribute, setProperty, setText } from './dom.js';
-import { BANDS, STANDINGS, ackBand, latencyBand, mark } from './marks.js';
+import { BANDS, STANDINGS, ackBand, latencyBand, mark, standingOf } from './marks.js';
 import { ackRate, micros } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
@@ -56,6 +56,7 @@ function makeField({ name }) {
   const button = make('button', { type: 'button', className: 'field' },
     make('span', { className: 'field-head' }, picture, letters),
     make('span', { className: 'field-name' }, name), figure);
+  button.dataset.controller = name;
   button.addEventListener('click', () => select(selected() === name ? null : name));
   fields.set(name, { button, picture, letters, figure, shape: '' });
   return button;
@@ -76,15 +77,15 @@ function showField(field, controller) {
 }
 
 function lookOf(controller) {
-  const standing = STANDINGS[controller.standing] ?? STANDINGS.unknown;
+  const standing = standingOf(controller);
   // A controller that takes no part has no figures worth a colour.
-  if (by === 'standing' || ['excluded', 'unknown', 'lost', 'stopped', 'error'].includes(controller.standing)) return standing;
+  if (by === 'standing' || ['away', 'bad', 'held'].includes(standing.look)) return standing;
   return by === 'acks' ? ackBand(controller.ack_rate) : latencyBand(controller.ack_p99_us);
 }
 
-function spoken({ name, row, standing, ack_rate: acks, ack_p99_us: p99 }) {
+function spoken({ name, row, enabled, standing, ack_rate: acks, ack_p99_us: p99 }) {
   const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${standing}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  return `${name}${place}: ${enabled ? standing : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
 }
 
 function showLegend() {

@@ -15,6 +15,9 @@ export const STANDINGS = {
   unknown: { look: 'away', mark: 'what', letters: '??', means: 'never heard' },
 };
 
+/** How a controller stands; one that a person took out is shown as that, however well it answers. */
+export const standingOf = ({ enabled, standing }) => STANDINGS[enabled ? standing : 'excluded'] ?? STANDINGS.unknown;
+
 /** The bands of a figure. */
 export const BANDS = {
   good: { look: 'good', mark: 'disc', letters: 'A' },

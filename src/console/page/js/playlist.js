@@ -17,7 +17,8 @@ export function startPlaylist() {
   onPress(byId('playlist-drop'), (button) => ask(button, 'drop the playlist', () => change('PUT', 'playlist', { id: null })));
   onPress(byId('cue-load'), (button) => {
     const cue = byId('cues').value;
-    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue }));
+    // Only reading a cue shows its title and length, or its faults.
+    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(readLists);
   });
   onPress(byId('lists-again'), readLists);
   byId('cues').addEventListener('change', showCueNote);
@@ -41,7 +42,7 @@ function fill(list, entries) {
   const before = list.value;
   const options = entries.map((entry) => {
     const length = entry.length_s ? ` (${clock(entry.length_s, 0)})` : '';
-    const failed = entry.faults?.length > 0 || faultsOf(entry).length > 0 ? ' – has faults' : '';
+    const failed = faultsOf(entry).length > 0 ? ' – has faults' : '';
     return make('option', { value: entry.id }, `${entry.title ?? entry.id}${length}${failed}`);
   });
   list.replaceChildren(...options);
@@ -49,8 +50,8 @@ function fill(list, entries) {
   if (entries.length === 0) list.append(make('option', { value: '' }, 'none'));
 }
 
-/** The faults that a proof against the hall's limits found. */
-const faultsOf = (cue) => cue.proof?.faults ?? cue.proof?.failed?.faults ?? [];
+/** The faults of a playlist's file, or those that the proof of a cue against the hall's limits found. */
+const faultsOf = (entry) => entry.faults ?? entry.proof?.faults ?? [];
 
 function showCueNote() {
   const cue = cues.find((each) => each.id === byId('cues').value);

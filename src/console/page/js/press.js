@@ -6,6 +6,11 @@ import { sentence } from './words.js';
 
 const SURE_WITHIN_MS = 3000;
 const BOUNCE_MS = 250;
+/** How long it stays said what came of a press, and why it was not done. */
+const DONE_MS = 8000;
+const FAILED_MS = 30_000;
+
+const timers = new Map();
 
 /** Says something in the live region that belongs to an element; `failed` in the manner of a problem. */
 export function say(near, text, failed = false) {
@@ -13,6 +18,12 @@ export function say(near, text, failed = false) {
   const reply = byId(place ? place.dataset.reply : 'show-reply');
   reply.classList.toggle('failed', failed);
   setText(reply, text);
+  clearTimeout(timers.get(reply));
+  const forget = () => {
+    setText(reply, '');
+    reply.classList.remove('failed');
+  };
+  timers.set(reply, setTimeout(forget, failed ? FAILED_MS : DONE_MS));
 }
 
 /** Asks, and says what came of it beside the element that was pressed. Gives whether it was done. */

@@ -15,12 +15,16 @@ let heard = performance.now();
 let everHeard = false;
 let attempt = null;
 let wakeUp = () => {};
+let refused = null;
 
 /** Seconds since the last status. */
 export const silence = () => (performance.now() - heard) / 1000;
 
 /** Whether there ever was one. */
 export const hasSpoken = () => everHeard;
+
+/** Why the server does not speak, where it said so; null where nobody knows. */
+export const refusal = () => refused;
 
 /** Reads for as long as the page is open. */
 export async function startStream() {
@@ -29,7 +33,7 @@ export async function startStream() {
   onToken(() => wakeUp());
   for (let wait = FIRST_WAIT_MS; ; wait = Math.min(wait * 2, LONGEST_WAIT_MS)) {
     const before = heard;
-    await read().catch(() => {});
+    await read().catch(() => { refused = null; });
     if (heard !== before) wait = FIRST_WAIT_MS;
     await new Promise((resolve) => {
       wakeUp = resolve;
@@ -56,7 +60,7 @@ async function read() {
     signal: attempt.abort.signal,
   });
   hear(response.headers, attempt.begun);
-  if (response.status === 401) askForToken();
+  refused = response.ok ? null : await refusalOf(response);
   if (!response.ok) return;
   let text = '';
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
@@ -69,6 +73,15 @@ async function read() {
     const newest = events.map(dataOf).filter((data) => data !== '').pop();
     if (newest !== undefined) take(newest);
   }
+}
+
+async function refusalOf(response) {
+  if (response.status === 401) {
+    askForToken();
+    return 'it wants a token';
+  }
+  const problem = await response.json().catch(() => ({}));
+  return problem.detail ?? `it said ${response.status}`;
 }
 
 /** The data of an event: its data lines, joined. Comments have none. */

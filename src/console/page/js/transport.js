@@ -39,7 +39,7 @@ export function startTransport() {
     ask(button, what, () => post(what));
   });
   onTwoPresses(byId('home'), {
-    asks: 'HOME: NOBODY ON SEATS?',
+    asks: 'SEATS EMPTY?',
     label: () => byId('home'),
     action: (button) => ask(button, 'home', () => post('home')),
   });
@@ -85,11 +85,12 @@ function showArm(state) {
 function showGo(state, status) {
   const live = may('go', state);
   if (!live) relaxGo();
-  setText(byId('go-note'), goNote(state, status));
+  const sure = byId('go').classList.contains('sure');
+  setText(byId('go-note'), sure ? 'press again' : goNote(state, status));
 }
 
 function goNote(state, status) {
-  if (state === null) return 'no word from the server';
+  if (state === null) return 'no word';
   if (may('go', state)) return 'press twice';
   if (may('pause', state)) return 'the show runs';
   if (!status.show) return 'load a cue first';

@@ -1,0 +1,196 @@
+//! The console as a technician uses it: in a real browser, against a real `kinocue serve` and virtual controllers. Pictures of
+//! what was seen are kept in `target/console-shots`. Where there is no chromium the tests say so and are skipped.
+
+#[path = "../common/process.rs"]
+#[expect(dead_code, reason = "each test uses its own part")]
+mod process;
+
+mod browser;
+mod hall;
+
+use std::time::Duration;
+
+use serde_json::json;
+
+use browser::{Browser, ESCAPE};
+use hall::{Hall, TOKEN};
+
+/// Landscape and portrait tablets, and a screen of the booth.
+const SIZES: [(u32, u32); 3] = [(1280, 800), (1024, 768), (768, 1024)];
+
+/// Opens the page and tells it the token that it asks for.
+fn enter(browser: &Browser, hall: &Hall) {
+    browser.resize(1024, 768);
+    browser.open(hall.url());
+    browser.wait("!document.getElementById('token').hidden");
+    browser.shot("00-token");
+    browser.press("#token-text");
+    browser.type_text(TOKEN);
+    browser.press("#token button");
+    browser.reads("state", "parked");
+    browser.reads("link", "connected");
+}
+
+/// Loads the cue, checks the hall and arms it.
+fn arm(browser: &Browser) {
+    browser.wait("document.getElementById('cues').value === 'swell'");
+    browser.press("#cue-load");
+    browser.reads("film-title", "swell");
+    browser.press("#preflight-run");
+    browser.reads("preflight-verdict", "of 4 controllers answered");
+    browser.wait("document.getElementById('preflight-reply').textContent.includes('done')");
+    browser.press("#arm");
+    browser.reads("state", "armed");
+}
+
+/// Presses GO twice, as a person who means it.
+fn go(browser: &Browser) {
+    browser.press("#go");
+    browser.reads("go-word", "sure?");
+    browser.wait("(window.goPressed ??= performance.now()) + 400 < performance.now()");
+    browser.press("#go");
+    browser.reads("state", "playing");
+}
+
+#[test]
+fn a_show_is_armed_played_paused_turned_down_and_stopped_from_the_page() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    browser.shot("01-parked");
+    assert_eq!(browser.eval("return document.getElementById('go').disabled"), json!(true), "behind ARM");
+
+    browser.press("#arm");
+    browser.reads("show-reply", "not done");
+    browser.shot("02-arm-refused");
+    arm(&browser);
+    browser.shot("03-armed");
+
+    browser.press("#go");
+    browser.reads("go-word", "sure?");
+    browser.shot("04-go-sure");
+    browser.wait("document.getElementById('go-word').textContent === 'GO'");
+    browser.reads("state", "armed"); // one press alone does nothing
+    go(&browser);
+    browser.wait("document.querySelectorAll('#map .look-good').length === 4");
+    browser.wait("document.querySelector('#curves canvas') !== null");
+    browser.shot("05-playing");
+
+    browser.press("#pause");
+    browser.reads("state", "paused");
+    browser.press("#seek"); // in its middle
+    browser.press("#seek-go");
+    browser.reads("seek-reply", "done");
+    browser.reads("position", "01:00");
+    browser.press("#resume");
+    browser.reads("state", "playing");
+
+    browser.press("[aria-label='Motion less']");
+    browser.reads("levels-reply", "motion 95 %: done");
+    browser.press("#presets button");
+    browser.wait("document.getElementById('level-motion').value === '60'");
+    browser.wait("document.querySelector('[data-effect=water]').getAttribute('aria-checked') === 'false'");
+    browser.press("[data-trim='10']");
+    browser.reads("levels-reply", "trim +10 ms: done");
+    browser.shot("06-levels");
+
+    browser.press("[data-controller=A2]");
+    browser.press("#controller-disable");
+    browser.wait("document.querySelector('[data-controller=A2]').classList.contains('look-away')");
+    browser.shot("07-seat-out");
+
+    browser.touch("#stop");
+    browser.reads("stop-reply", "STOP was received");
+    browser.reads("state", "stopped");
+    browser.shot("08-stopped");
+    browser.press("#clear");
+    browser.reads("state", "recovering");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn the_escape_key_stops_wherever_the_focus_is_and_a_pulled_plug_is_named_first() {
+    let Some(browser) = Browser::start() else { return };
+    let mut hall = Hall::open();
+    enter(&browser, &hall);
+    arm(&browser);
+    go(&browser);
+    hall.pull(1);
+    let took = browser.reads("warnings", "B1");
+    browser.wait("document.querySelector('[data-controller=B1]').classList.contains('look-bad')");
+    browser.shot("10-plug-pulled");
+    assert!(took < Duration::from_secs(3), "{took:?}");
+
+    browser.press("#level-vibration");
+    browser.type_text(ESCAPE);
+    browser.reads("stop-reply", "STOP was received");
+    browser.reads("state", "stopped");
+}
+
+#[test]
+fn the_page_says_at_once_that_the_server_is_gone_still_tries_to_stop_and_comes_back_by_itself() {
+    let Some(browser) = Browser::start() else { return };
+    let mut hall = Hall::open();
+    enter(&browser, &hall);
+    hall.kill();
+    let took = browser.wait("document.documentElement.dataset.link === 'lost'");
+    browser.wait("!document.getElementById('lost').hidden && document.getElementById('main').querySelector('.live').inert");
+    assert!(took < Duration::from_secs(3), "{took:?}");
+    browser.touch("#stop");
+    browser.reads("stop-reply", "could not be delivered");
+    browser.reads("stop-reply", "hard-wired");
+    browser.shot("20-server-gone");
+
+    hall.start_again();
+    browser.reads("link", "connected");
+    browser.reads("state", "recovering"); // nothing moves by itself
+    browser.wait("document.getElementById('lost').hidden && !document.querySelector('main .live').inert");
+    browser.shot("21-server-back");
+}
+
+#[test]
+fn everything_is_large_enough_for_a_finger_and_stop_in_view_at_every_size() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    arm(&browser);
+    browser.press("[data-controller=B1]");
+    for (width, height) in SIZES {
+        browser.resize(width, height);
+        browser.wait(&format!("innerWidth === {width} && document.fonts.status === 'loaded'"));
+        let wrong = browser.eval(
+            "const wrong = [];
+             const box = (one) => one.getBoundingClientRect();
+             const name = (one) => one.id || one.textContent || one.className;
+             for (const one of document.querySelectorAll('button, select, input')) {
+               const { width, height } = box(one);
+               if (width > 0 && (height < 47.5 || width < 47.5)) wrong.push(`${name(one)} is ${width} x ${height}`);
+             }
+             for (const one of document.querySelectorAll('.controls button, #state, #position')) {
+               const { left, top, right, bottom } = box(one);
+               if (left < 0 || top < 0 || right > innerWidth || bottom > innerHeight) wrong.push(`${name(one)} is cut off`);
+             }
+             const [arm, go, stop] = ['arm', 'go', 'stop'].map((id) => box(document.getElementById(id)));
+             if (go.left - arm.right < 100) wrong.push('ARM and GO are close to each other');
+             if (stop.left - go.right < 16) wrong.push('GO and STOP are close to each other');
+             if (document.documentElement.scrollWidth > innerWidth) wrong.push('it is wider than the screen');
+             return wrong;",
+        );
+        browser.shot(&format!("30-{width}x{height}"));
+        assert_eq!(wrong, json!([]), "{width}x{height}");
+    }
+}
+
+#[test]
+fn everything_that_can_be_pressed_has_a_name_and_can_be_reached_by_the_keyboard() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    let nameless = browser.eval(
+        "const text = (one) => one.getAttribute('aria-label') || one.textContent.trim() || one.labels?.[0]?.textContent;
+         const all = [...document.querySelectorAll('button, select, input')];
+         return all.filter((one) => !text(one) || (one.tabIndex < 0 && one.getAttribute('role') !== 'radio')).map((one) => one.outerHTML);",
+    );
+    assert_eq!(nameless, json!([]));
+    assert!(browser.eval("return document.querySelectorAll('[aria-live], [role=alert], [role=status]').length").as_u64() > Some(5));
+}
