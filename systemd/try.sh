@@ -28,7 +28,8 @@ root=$folder/root
 mount -t overlay overlay -o "lowerdir=/,upperdir=$folder/upper,workdir=$folder/work" "$root" ||
   cannot "needs overlayfs over /"
 
-# As the package does it.
+# As the package does it, and as if nothing had been there before.
+rm -rf "$root"/{etc,run,var/lib,var/log}/kinocue
 install -D -m 755 "$program" "$root/usr/bin/kinocue"
 install -D -m 644 "$here/kinocue.service" "$root/usr/lib/systemd/system/kinocue.service"
 install -D -m 644 "$here/kinocue.sysusers" "$root/usr/lib/sysusers.d/kinocue.conf"

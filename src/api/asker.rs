@@ -25,8 +25,9 @@ const STOP_PATIENCE: Duration = Duration::from_secs(1);
 /// Who asks, and the way to the hall.
 pub(super) struct Asker {
     who: Who,
-    /// How long ago they asked, ms, by two wall clocks: negative where theirs is ahead. None where they did not say.
-    age_ms: Option<i128>,
+    /// How long ago they asked, ms, by two wall clocks: negative where theirs is ahead. None where they did not say. What is
+    /// wrong with it matters only to what goes stale.
+    age_ms: Result<Option<i128>, Problem>,
     shared: Arc<Shared>,
 }
 
@@ -44,7 +45,7 @@ impl FromRequestParts<Arc<Shared>> for Asker {
 
     async fn from_request_parts(parts: &mut Parts, shared: &Arc<Shared>) -> Result<Self, Problem> {
         let who = parts.extensions.get::<Who>().cloned().ok_or_else(panicked)?; // the gate names all who may get here
-        let age_ms = age_ms(&parts.headers, wall_now_ns())?;
+        let age_ms = age_ms(&parts.headers, wall_now_ns());
         Ok(Self { who, age_ms, shared: Arc::clone(shared) })
     }
 }
@@ -87,7 +88,7 @@ impl Asker {
         if !ask.goes_stale() {
             return Ok(now);
         }
-        let Some(age_ms) = self.age_ms else {
+        let Some(age_ms) = self.age_ms.clone()? else {
             if *ask == Ask::Go && self.who.surface != Surface::Socket {
                 let remedy = format!("send the header {SENT}, unix milliseconds, with a go");
                 return Err(bad_value("nobody can tell how old this go is", remedy));

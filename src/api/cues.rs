@@ -17,7 +17,6 @@ use utoipa::IntoParams;
 
 use super::access::one as one_header;
 use super::asker::Asker;
-use super::blocking;
 use super::input::{Id, check_length};
 use super::problem::bad_value;
 use super::shared::Shared;
@@ -45,7 +44,8 @@ pub(super) struct CurveQuery {
 /// All cues, by their ids.
 #[utoipa::path(get, path = "/api/v1/cues", tag = "library", responses((status = 200, body = [CueInfo])))]
 pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Vec<CueInfo>>, Problem> {
-    blocking(move || Ok(shared.library.list())).await.map(JsonReply)
+    let library = shared.library.clone();
+    shared.blocking(move || Ok(library.list())).await.map(JsonReply)
 }
 
 /// One cue.
@@ -57,14 +57,14 @@ pub(super) async fn one(
     State(shared): State<Arc<Shared>>,
     Id(id): Id,
 ) -> Result<JsonReply<CueInfo>, Problem> {
-    blocking(move || {
-        shared.library.get(&id).ok_or_else(|| {
+    let library = shared.library.clone();
+    let found = shared.blocking(move || {
+        library.get(&id).ok_or_else(|| {
             let detail = format!("there is no cue {id} in the library");
             Problem::new(Code::Unknown, detail, "upload it, or name another")
         })
-    })
-    .await
-    .map(JsonReply)
+    });
+    found.await.map(JsonReply)
 }
 
 /// The curves of a cue, as a page draws them.
@@ -81,7 +81,8 @@ pub(super) async fn curve(
         bad_value("the query is not what is wanted here", format!("?points= and 1 to {MAX_POINTS}"))
     })?;
     let points = query.points.unwrap_or(POINTS);
-    let curve = blocking(move || shared.library.curve(&id, points)).await?;
+    let library = shared.library.clone();
+    let curve = shared.blocking(move || library.curve(&id, points)).await?;
     Ok(JsonReply(&*curve).into_response())
 }
 
@@ -105,7 +106,7 @@ pub(super) async fn upload(
     let library = shared.library.clone();
     let fed =
         async { timeout(WHOLE, feed(request.into_body(), to)).await.unwrap_or_else(|_| Err(slow(WHOLE))) };
-    let (fed, taken) = tokio::join!(fed, blocking(move || take_in(&library, &id, pieces)));
+    let (fed, taken) = tokio::join!(fed, shared.blocking(move || take_in(&library, &id, pieces)));
     fed?;
     taken.map(JsonReply)
 }

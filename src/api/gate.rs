@@ -8,7 +8,8 @@ use std::task::Poll;
 
 use axum::extract::{Request, State};
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
+    X_FRAME_OPTIONS,
 };
 use axum::http::{HeaderName, HeaderValue, Method};
 use axum::middleware::Next;
@@ -19,7 +20,9 @@ use super::once::Reply;
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
 use super::shared::Shared;
-use crate::hall::{Problem, Who};
+use super::show::STOP;
+use crate::hall::{Code, Problem, Who};
+use crate::log::{Line, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
@@ -43,7 +46,10 @@ pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, ne
 async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let who = match admit(shared, &request) {
         Ok(who) => who,
-        Err(problem) => return render(problem.into_response(), None),
+        Err(problem) => {
+            note(shared, &request, &problem);
+            return render(problem.into_response(), None);
+        }
     };
     let Some(who) = who else {
         return render(caught(next.run(request)).await, None);
@@ -51,10 +57,12 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     let asker = format!("{who}");
     request.extensions_mut().insert(who);
     let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));
+    let is_stop = request.uri().path() == STOP;
     let response = match key {
         Ok(Some(key)) if request.method() == Method::POST => once(shared, &asker, &key, request, next).await,
         Ok(_) => caught(next.run(request)).await,
-        Err(problem) => problem.into_response(),
+        Err(problem) if !is_stop => problem.into_response(),
+        Err(_) => caught(next.run(request)).await,
     };
     render(response, Some(&shared.handle.status()))
 }
@@ -68,7 +76,7 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
         shared.access.check_host(headers, request.uri())?;
     }
     let in_the_open = is_public(path);
-    if !in_the_open && !takes_query(path) && request.uri().query().is_some() {
+    if !in_the_open && path != STOP && !takes_query(path) && request.uri().query().is_some() {
         return Err(bad_value(
             "there is a query, and nothing here takes one",
             "leave out what is behind the ?",
@@ -90,6 +98,17 @@ fn is_public(path: &str) -> bool {
     }
 }
 
+/// Says who was turned away at the door: nobody guesses tokens unseen. Who just comes without one is not worth a line.
+fn note(shared: &Shared, request: &Request, problem: &Problem) {
+    let guessed = request.headers().contains_key(AUTHORIZATION);
+    if guessed && matches!(problem.code, Code::Token | Code::Busy) || problem.code == Code::Origin {
+        let from = request.extensions().get::<Peer>().map_or_else(String::new, ToString::to_string);
+        let line =
+            Line::new(Priority::Warning, "turned-away", format!("turned away {from}: {}", problem.detail));
+        shared.log.say(line.with("code", problem.code.word()).with("from", from));
+    }
+}
+
 fn takes_query(path: &str) -> bool {
     path.strip_prefix("/api/v1/cues/").is_some_and(|rest| rest.ends_with("/curve"))
 }
@@ -99,6 +118,7 @@ async fn once(shared: &Shared, asker: &str, key: &str, request: Request, next: N
     let what = format!("{} {}", request.method(), request.uri().path());
     let first = match shared.once.first(asker, key, &what, Monotonic.now()) {
         Ok(first) => first,
+        Err(_) if request.uri().path() == STOP => return caught(next.run(request)).await,
         Err(problem) => return problem.into_response(),
     };
     let reply = first.get_or_init(|| async {

@@ -15,11 +15,12 @@ use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
 use tokio::runtime::{self, Runtime};
-use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::sync::{mpsc, watch};
 
 use crate::config;
-use crate::hall::{Handle, Problem};
+use crate::hall::Handle;
 use crate::library::Library;
+use crate::log::Log;
 use crate::playlist::Shelf;
 
 mod access;
@@ -49,9 +50,11 @@ mod tries;
 pub use stop::{StopSocket, stop_socket};
 
 use access::Access;
-use shared::{Pulse, STREAMS, Shared};
+use shared::{Pulse, Shared};
 use socket::SocketFile;
 
+/// What its threads are called. A panic on one of them ends the request that it was for, and nothing else.
+pub const THREAD: &str = "api";
 /// Threads that wait for disks.
 const BLOCKING: usize = 8;
 /// How long what is under way may go on when the server ends.
@@ -77,6 +80,8 @@ pub struct Setup {
     pub journal: PathBuf,
     /// The console.
     pub pages: Pages,
+    /// Where it is said who was turned away.
+    pub log: Log,
 }
 
 /// Why the API is not served.
@@ -155,7 +160,7 @@ impl Drop for Running {
 /// # Errors
 /// [`ApiError`] where a socket or a port cannot be had; nothing is served then.
 pub fn start(setup: Setup) -> Result<Running, ApiError> {
-    let Setup { config, socket, handle, library, playlists, journal, pages } = setup;
+    let Setup { config, socket, handle, library, playlists, journal, pages, log } = setup;
     let (local, file) = socket::unix(&socket)?;
     let tcp = config.listen.iter().map(|&address| port(address)).collect::<Result<Vec<_>, _>>()?;
     let addresses: Vec<_> =
@@ -167,13 +172,15 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         access: Access::new(&config, &addresses),
         tries: Default::default(),
         once: Default::default(),
-        streams: Arc::new(Semaphore::new(STREAMS)),
+        streams: shared::streams(),
+        errands: shared::errands(),
         closing: closed.clone(),
         document: document.to_json().expect("a description is text").into(),
         library,
         shelf: playlists,
         journal,
         pages,
+        log: log.clone(),
         pulse: Pulse::default(),
         written: Mutex::new(None),
     };
@@ -181,11 +188,12 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
     let router = routes::guarded(router, Arc::clone(&shared));
     let runtime = runtime::Builder::new_current_thread()
         .enable_all()
+        .thread_name(THREAD)
         .max_blocking_threads(BLOCKING)
         .build()
         .map_err(ApiError::System)?;
-    let sockets = Sockets { local, _file: file, tcp };
-    let thread = Builder::new().name("api".to_owned()).spawn(move || run(runtime, sockets, shared, router));
+    let sockets = Sockets { local, _file: file, tcp, log };
+    let thread = Builder::new().name(THREAD.to_owned()).spawn(move || run(runtime, sockets, shared, router));
     Ok(Running { addresses, closing, thread: Some(thread.map_err(ApiError::System)?) })
 }
 
@@ -195,14 +203,15 @@ struct Sockets {
     /// Goes when the server ends.
     _file: SocketFile,
     tcp: Vec<TcpListener>,
+    log: Log,
 }
 
 /// Serves until the server ends.
 fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Router) {
-    let Sockets { local, _file, tcp } = sockets;
+    let Sockets { local, _file, tcp, log } = sockets;
     let mut closing = shared.closing.clone();
     let (alive, mut all_gone) = mpsc::channel(1);
-    let hall = serve::Hall { router, closing: closing.clone(), alive };
+    let hall = serve::Hall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(shared));
         let slots = serve::tcp_slots();
@@ -224,11 +233,4 @@ fn port(address: SocketAddr) -> Result<TcpListener, ApiError> {
     let listener = TcpListener::bind(address).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     Ok(listener)
-}
-
-/// Does what waits for a disk, on a thread for that.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
-) -> Result<T, Problem> {
-    tokio::task::spawn_blocking(work).await.unwrap_or_else(|_| Err(problem::panicked()))
 }

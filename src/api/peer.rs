@@ -1,5 +1,6 @@
 //! Who is at the other end of a connection.
 
+use std::fmt;
 use std::fs::File;
 use std::io::Read as _;
 use std::net::IpAddr;
@@ -23,6 +24,15 @@ impl Peer {
     /// The process that the kernel names (`SO_PEERCRED`).
     pub(super) fn of_user(uid: u32) -> Self {
         Self::Socket(user(uid).into())
+    }
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Socket(name) => f.write_str(name),
+            Self::Tcp(address) => address.fmt(f),
+        }
     }
 }
 

@@ -8,7 +8,6 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::asker::{Asker, StatusReply};
-use super::blocking;
 use super::input::{Json, id};
 use super::shared::Shared;
 use crate::hall::{Ask, Problem, Status};
@@ -37,7 +36,8 @@ pub(super) struct Select {
     get, path = "/api/v1/playlists", tag = "playlist", responses((status = 200, body = [PlaylistInfo]))
 )]
 pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Vec<PlaylistInfo>>, Problem> {
-    blocking(move || Ok(shared.shelf.list())).await.map(JsonReply)
+    let shelf = shared.shelf.clone();
+    shared.blocking(move || Ok(shelf.list())).await.map(JsonReply)
 }
 
 /// Loads a playlist, or drops the one that is loaded.

@@ -6,7 +6,6 @@ use axum::Json as JsonReply;
 use axum::extract::State;
 use jiff::civil::Date;
 
-use super::blocking;
 use super::input::Name;
 use super::problem::bad_value;
 use super::shared::Shared;
@@ -23,8 +22,9 @@ pub(super) async fn one(
     Name(day): Name,
 ) -> Result<JsonReply<Report>, Problem> {
     let day = date(&day)?;
-    let report = blocking(move || {
-        journal::report(&shared.journal, day, day).map_err(|error| {
+    let dir = shared.journal.clone();
+    let report = shared.blocking(move || {
+        journal::report(&dir, day, day).map_err(|error| {
             Problem::new(Code::File, error.to_string(), "look at the folder of the journal and its disk")
         })
     });

@@ -16,6 +16,7 @@ use tokio::sync::{mpsc, watch};
 use super::guarded::Guarded;
 use super::peer::Peer;
 use super::slots::{Slot, Slots};
+use crate::log::{Line, Log, Priority};
 
 /// Connections over TCP, and of one address.
 const TCP: (usize, usize) = (256, 64);
@@ -39,6 +40,15 @@ pub(super) struct Hall {
     pub(super) closing: watch::Receiver<bool>,
     /// Held by whatever still serves.
     pub(super) alive: mpsc::Sender<Infallible>,
+    /// Where it is said that there is no room.
+    pub(super) log: Log,
+}
+
+impl Hall {
+    fn no_room(&self, from: &str) {
+        let text = format!("there is no room for more connections from {from}; they are closed");
+        self.log.say(Line::new(Priority::Warning, "connections", text).with("from", from));
+    }
 }
 
 /// Serves the control socket until the server ends.
@@ -52,7 +62,11 @@ pub(super) async fn local(listener: UnixListener, hall: Hall) {
         };
         match accepted {
             Ok((stream, _)) => {
-                let (Some(slot), Ok(user)) = (slots.take(None), stream.peer_cred()) else { continue };
+                let Some(slot) = slots.take(None) else {
+                    hall.no_room("the control socket");
+                    continue;
+                };
+                let Ok(user) = stream.peer_cred() else { continue };
                 tokio::spawn(connection(stream, Peer::of_user(user.uid()), slot, hall.clone()));
             }
             Err(_) => tokio::time::sleep(PAUSE).await, // out of descriptors or memory: a moment later there may be some
@@ -70,9 +84,13 @@ pub(super) async fn tcp(listener: TcpListener, slots: Slots, hall: Hall) {
         };
         match accepted {
             Ok((stream, from)) => {
-                let Some(slot) = slots.take(Some(from.ip())) else { continue };
+                let address = from.ip().to_canonical();
+                let Some(slot) = slots.take(Some(address)) else {
+                    hall.no_room(&address.to_string());
+                    continue;
+                };
                 let _ = stream.set_nodelay(true); // a stop is worth a packet of its own
-                tokio::spawn(connection(stream, Peer::Tcp(from.ip()), slot, hall.clone()));
+                tokio::spawn(connection(stream, Peer::Tcp(address), slot, hall.clone()));
             }
             Err(_) => tokio::time::sleep(PAUSE).await,
         }
@@ -88,7 +106,7 @@ async fn connection<S>(stream: S, peer: Peer, _slot: Slot, hall: Hall)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let Hall { router, mut closing, alive: _alive } = hall;
+    let Hall { router, mut closing, alive: _alive, .. } = hall;
     let router = Arc::new(TowerToHyperService::new(router));
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer.clone());

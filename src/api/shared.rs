@@ -11,17 +11,25 @@ use tokio::sync::{Semaphore, watch};
 use super::Pages;
 use super::access::Access;
 use super::once::Once;
+use super::peer::Peer;
+use super::problem::panicked;
+use super::slots::{Slot, Slots};
 use super::tries::Tries;
-use crate::hall::{Handle, Status};
+use crate::hall::{Code, Handle, Problem, Status};
 use crate::library::Library;
+use crate::log::Log;
 use crate::playlist::Shelf;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
 /// How long the tick counter may stand still in a process that is well.
 const STILL: Duration = Duration::from_secs(2);
-/// How many are pushed to at a time.
-pub(super) const STREAMS: usize = 32;
+/// How many are pushed to at a time over the control socket.
+const LOCAL_STREAMS: usize = 16;
+/// The same over TCP, and of one address.
+const TCP_STREAMS: (usize, usize) = (32, 16);
+/// What waits for a disk at the most.
+const ERRANDS: usize = 32;
 
 /// What all handlers share. None of it is held while somebody waits.
 pub(super) struct Shared {
@@ -33,8 +41,10 @@ pub(super) struct Shared {
     pub(super) tries: Tries,
     /// Requests that may come twice.
     pub(super) once: Once,
-    /// Room for those who are pushed to.
-    pub(super) streams: Arc<Semaphore>,
+    /// Room for those who are pushed to: over the control socket, over TCP.
+    pub(super) streams: [Slots; 2],
+    /// Room for what waits for a disk.
+    pub(super) errands: Arc<Semaphore>,
     /// Whether the server ends.
     pub(super) closing: watch::Receiver<bool>,
     /// The description of all this, JSON.
@@ -47,13 +57,54 @@ pub(super) struct Shared {
     pub(super) journal: PathBuf,
     /// The console.
     pub(super) pages: Pages,
+    /// Where it is said who was turned away.
+    pub(super) log: Log,
     /// Whether the tick thread ticks.
     pub(super) pulse: Pulse,
     /// The newest status that was written, and its JSON.
     pub(super) written: Mutex<Option<(Arc<Status>, Bytes)>>,
 }
 
+/// Room for those who are pushed to.
+pub(super) fn streams() -> [Slots; 2] {
+    [Slots::new(LOCAL_STREAMS, LOCAL_STREAMS), Slots::new(TCP_STREAMS.0, TCP_STREAMS.1)]
+}
+
+/// Room for what waits for a disk.
+pub(super) fn errands() -> Arc<Semaphore> {
+    Arc::new(Semaphore::new(ERRANDS))
+}
+
 impl Shared {
+    /// A place among those who are pushed to.
+    pub(super) fn stream(&self, peer: &Peer) -> Result<Slot, Problem> {
+        let [local, tcp] = &self.streams;
+        let slot = match peer {
+            Peer::Socket(_) => local.take(None),
+            Peer::Tcp(address) => tcp.take(Some(*address)),
+        };
+        slot.ok_or_else(|| {
+            let remedy = "close a page elsewhere, or ask for the status now and then";
+            Problem::new(Code::Busy, "too many are watching already", remedy)
+        })
+    }
+
+    /// Does what waits for a disk, on a thread for that.
+    pub(super) async fn blocking<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let Ok(place) = Arc::clone(&self.errands).try_acquire_owned() else {
+            let detail = format!("{ERRANDS} requests wait for a disk already");
+            return Err(Problem::new(Code::Busy, detail, "ask again in a second"));
+        };
+        let done = tokio::task::spawn_blocking(move || {
+            let _place = place; // held until it is done, also where nobody waits for it any more
+            work()
+        });
+        done.await.unwrap_or_else(|_| Err(panicked()))
+    }
+
     /// A status as JSON. Of many who ask for the same one it is written once.
     pub(super) fn write(&self, status: &Arc<Status>) -> Bytes {
         let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);

@@ -9,6 +9,9 @@ use super::problem::bad_value;
 use crate::hall::{Ask, Problem, Status};
 use crate::time::ShowTime;
 
+/// Where a stop is asked: nothing that comes with it, and is not as it should be, is a reason not to stop.
+pub(super) const STOP: &str = "/api/v1/show/stop";
+
 type Reply = Result<StatusReply, Problem>;
 
 /// Which cue.

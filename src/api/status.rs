@@ -5,18 +5,21 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use axum::Extension;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::HeaderValue;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse as _, Response};
 use hyper::body::{Bytes, Frame};
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::asker::StatusReply;
-use super::shared::{STREAMS, Shared};
-use crate::hall::{Code, Problem, Status};
+use super::peer::Peer;
+use super::shared::Shared;
+use super::slots::Slot;
+use crate::hall::{Problem, Status};
 
 /// Between two events at the least.
 const PACE: Duration = Duration::from_millis(100);
@@ -35,15 +38,11 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> StatusReply {
     get, path = "/api/v1/events", tag = "hall",
     responses((status = 200, body = Status, content_type = "text/event-stream"))
 )]
-pub(super) async fn events(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
-    let Ok(place) = Arc::clone(&shared.streams).try_acquire_owned() else {
-        let detail = format!("{STREAMS} are watching already");
-        return Err(Problem::new(
-            Code::Busy,
-            detail,
-            "close a page elsewhere, or ask for the status now and then",
-        ));
-    };
+pub(super) async fn events(
+    State(shared): State<Arc<Shared>>,
+    Extension(peer): Extension<Peer>,
+) -> Result<Response, Problem> {
+    let place = shared.stream(&peer)?;
     // One event waits at the most, beside what the connection holds.
     let (to, events) = mpsc::channel(1);
     tokio::spawn(push(shared, to, place));
@@ -52,7 +51,7 @@ pub(super) async fn events(State(shared): State<Arc<Shared>>) -> Result<Response
 }
 
 /// Pushes statuses until the other end has gone, or the server ends.
-async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: OwnedSemaphorePermit) {
+async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: Slot) {
     let mut statuses = shared.handle.watch();
     let mut closing = shared.closing.clone();
     let mut pace = interval(PACE);

@@ -82,6 +82,7 @@ impl Surfaces {
             playlists: Shelf::new(&config.playlists()),
             journal: config.log.dir.clone(),
             pages,
+            log: log.clone(),
         })?;
         for address in api.addresses() {
             log.say(Line::new(Priority::Info, "listening", format!("the API and the console: http://{address}/")));

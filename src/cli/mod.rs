@@ -1,8 +1,11 @@
 //! The commands: one small file each; arguments in, exit code out.
 
-use std::process::ExitCode;
+use std::process::{self, ExitCode};
+use std::{panic, thread};
 
 use clap::{Parser, Subcommand};
+
+use crate::api;
 
 mod ask;
 mod check;
@@ -75,6 +78,7 @@ enum Command {
 /// Runs the program on the process's arguments and says how it ends.
 #[must_use]
 pub fn main() -> ExitCode {
+    end_on_panic();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -90,6 +94,18 @@ pub fn main() -> ExitCode {
             failure.exit.into()
         }
     }
+}
+
+/// Has a panic end the program at once, wherever it happens but where a request is served: what is left of a program without
+/// its tick thread, or its keeper, must not go on as if it were whole. Silence is what the seats stand best.
+fn end_on_panic() {
+    let tell = panic::take_hook();
+    panic::set_hook(Box::new(move |panic| {
+        tell(panic);
+        if thread::current().name() != Some(api::THREAD) {
+            process::abort();
+        }
+    }));
 }
 
 fn run(command: Command) -> Result<Exit, Failure> {

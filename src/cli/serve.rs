@@ -49,7 +49,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The console.
+/// The console, as the API takes it.
 fn pages(path: &str) -> Option<(&'static str, &'static [u8])> {
     console::asset(path).map(|asset| (asset.content_type, asset.body))
 }

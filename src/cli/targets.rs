@@ -64,7 +64,9 @@ impl TargetArgs {
     /// Wrong use where some are chosen of a hall that is the daemon's: that does all or none.
     pub(super) fn refuse_choice(&self, names: &[String]) -> Result<(), Failure> {
         let Some(name) = names.first() else { return Ok(()) };
-        let why = anyhow!("the daemon does this for its whole hall; name {name} with --to or --config, or leave it out");
+        let why = anyhow!(
+            "the daemon does this for its whole hall; name {name} with --to or --config, or leave it out"
+        );
         Err(why).or_exit(Exit::Usage)
     }
 

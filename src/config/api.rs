@@ -36,7 +36,7 @@ pub struct ApiToken {
 pub(super) fn api(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Api> {
     let mut section = Section::new("[api]", entry.at, entry.table(faults)?, faults);
     let open = [("none", None), ("view", Some(Role::View))];
-    let listen = list(&mut section, "listen", |entry, faults| address(entry, faults));
+    let listen = list(&mut section, "listen", address);
     let hosts = list(&mut section, "hosts", |entry, faults| checked(entry, faults, check_host));
     let api = Api {
         origins: list(&mut section, "origins", |entry, faults| checked(entry, faults, check_origin)),

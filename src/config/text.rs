@@ -40,7 +40,8 @@ mod tests {
 
     #[test]
     fn an_unknown_key_is_refused() {
-        let faults = with("[text]\nlisten = \"127.0.0.1:1\"\nsources = [\"127.0.0.1\"]\nallow = []").unwrap_err();
+        let faults =
+            with("[text]\nlisten = \"127.0.0.1:1\"\nsources = [\"127.0.0.1\"]\nallow = []").unwrap_err();
         assert!(faults[0].contains("allow: unknown key in [text]"), "{faults:?}");
     }
 }

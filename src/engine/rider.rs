@@ -133,6 +133,11 @@ impl Rider {
         self.gate.restart(pose);
     }
 
+    /// Goes on counting what the gate has to do where another left off.
+    pub(super) const fn count_on(&mut self, before: &Self) {
+        self.gate.count_on(before.gate.counts());
+    }
+
     /// What the gate had to do.
     pub(super) const fn clamps(&self) -> &Counts {
         self.gate.counts()

@@ -46,6 +46,7 @@ impl Engine {
     pub fn take_over(&mut self, before: &Self, ready: bool) {
         self.trim_ms = before.trim_ms;
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
+            rider.count_on(old);
             match old.part {
                 Part::Away => rider.cut(),
                 Part::With | Part::Still | Part::Braking(_) => {

@@ -115,6 +115,13 @@ impl Gate {
         &self.counter.counts
     }
 
+    /// Goes on counting where another gate of the same lane left off; its latched fault is its own.
+    pub const fn count_on(&mut self, before: &Counts) {
+        let fault = self.counter.counts.fault;
+        self.counter.counts = *before;
+        self.counter.counts.fault = fault;
+    }
+
     /// The pose sent last.
     #[must_use]
     pub fn sent(&self) -> &Pose {

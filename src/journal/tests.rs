@@ -80,6 +80,13 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// How many starts of the program can be read.
+fn starts(file: &Path) -> usize {
+    let text = fs::read_to_string(file).unwrap();
+    let lines = text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok());
+    lines.filter(|line| matches!(line, Line::Start { .. })).count()
+}
+
 fn of_day(dir: &Path, text: &str) -> Report {
     report(dir, day(text), day(text)).unwrap()
 }
@@ -124,6 +131,15 @@ fn a_show_that_goes_on_is_running_and_one_without_an_end_was_interrupted() {
     assert!(folder.claim());
     assert_eq!(result(dir.path()), [ShowResult::Running]);
     drop(folder);
+    drop(Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T18:30:00Z")));
+    let folder = crate::sys::folder::Folder::open(dir.path()).unwrap();
+    assert!(folder.claim());
+    assert_eq!(
+        result(dir.path()),
+        [ShowResult::Interrupted],
+        "a program that started later does not play it"
+    );
+    drop(folder);
     let mut journal = Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T19:00:00Z"));
     journal.begin(&record("2026-11-21T20:00:00.000+01:00"));
     journal.show(&ended("2026-11-21T20:00:00.000+01:00", "2026-11-21T20:00:09.000+01:00", Ending::Stopped));
@@ -161,6 +177,7 @@ fn a_line_that_a_crash_cut_is_passed_over_and_the_next_is_whole() {
     assert_eq!(asked, ["go"]);
     let [note] = &report.notes[..] else { panic!("one note: {:?}", report.notes) };
     assert!(note.starts_with("kinocue-2026-11-21-000.jsonl:2: "), "{note}");
+    assert_eq!(starts(&file), 2);
 }
 
 #[test]
@@ -293,6 +310,8 @@ proptest! {
         let wanted: Vec<_> = wanted.chain((0..after).map(|serial| format!("after {serial}"))).collect();
         prop_assert_eq!(asked, wanted);
         prop_assert!(report.notes.len() <= 1, "{:?}", report.notes);
+        let first = text[..left].lines().next().is_some_and(|line| line.ends_with('}'));
+        prop_assert_eq!(starts(&file), usize::from(first) + 1);
     }
 
     /// Whatever a file holds, a report is made of what can be read.

@@ -31,7 +31,9 @@ pub(super) enum Fault {
     NotAllowed(String),
     #[error("{address:?} takes {wanted}")]
     Argument { address: String, wanted: &'static str },
-    #[error("{0:?} was in a bundle for a later time, and nothing is done later; send it when it is to be done")]
+    #[error(
+        "{0:?} was in a bundle for a later time, and nothing is done later; send it when it is to be done"
+    )]
     Early(String),
     #[error("{0} receivers of feedback are subscribed already; let one lapse")]
     Crowded(usize),
@@ -96,7 +98,9 @@ impl Taken<'_> {
     fn button(self, ask: Ask) -> Result<Order, Fault> {
         let pressed = match self.message.args.as_slice() {
             [] => true,
-            [value] => switch(value).ok_or_else(|| self.wants("nothing, or 1 for a button that goes down"))?,
+            [value] => {
+                switch(value).ok_or_else(|| self.wants("nothing, or 1 for a button that goes down"))?
+            }
             _ => return Err(self.wants("nothing, or 1 for a button that goes down")),
         };
         Ok(if pressed { Order::Ask(ask) } else { Order::Released })
@@ -214,7 +218,10 @@ mod tests {
             (
                 "/kinocue/effect/water",
                 vec![OscType::Int(0)],
-                levels(LevelsChange { effects: [("water".to_owned(), false)].into(), ..LevelsChange::default() }),
+                levels(LevelsChange {
+                    effects: [("water".to_owned(), false)].into(),
+                    ..LevelsChange::default()
+                }),
             ),
             (
                 "/kinocue/row/A/level",
@@ -265,7 +272,9 @@ mod tests {
 
     #[test]
     fn patterns_and_other_addresses_are_unknown() {
-        for addr in ["/kinocue/*", "/kinocue", "/kinocue/", "/go", "/kinocue/go/", "/kinocue/row//level", "/{a,b}"] {
+        for addr in
+            ["/kinocue/*", "/kinocue", "/kinocue/", "/go", "/kinocue/go/", "/kinocue/row//level", "/{a,b}"]
+        {
             assert!(matches!(ordered(addr, vec![]), Err(Fault::Unknown(_))), "{addr}");
         }
     }

@@ -50,7 +50,8 @@ mod tests {
     fn another_place_is_no_repeat_and_a_stop_never_is() {
         let mut repeats = Repeats::default();
         let seek = |s| Ask::Seek(ShowTime::from_millis(s));
-        let asks = [seek(1), seek(2), seek(2), Ask::Resume, Ask::Go, Ask::Stop, Ask::Stop, Ask::Pause, Ask::Pause];
+        let asks =
+            [seek(1), seek(2), seek(2), Ask::Resume, Ask::Go, Ask::Stop, Ask::Stop, Ask::Pause, Ask::Pause];
         let repeated = asks.map(|ask| repeats.is_repeat(&ask, ms(10)));
         assert_eq!(repeated, [false, false, true, false, false, false, false, false, false]);
     }

@@ -5,22 +5,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType, decoder, encoder};
-use tokio::runtime::{Builder, Runtime};
+use tokio::runtime::Builder;
 
 use super::{Counts, open};
 use crate::config::{OscPort, OscWord};
 use crate::hall::{
-    Ask, Code, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status, StatusSource, Surface, Warning, handle,
+    Ask, Code, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status, StatusSource, Surface,
+    Warning, handle,
 };
 use crate::rt::Desk;
-use crate::sys::clock::wall_now_ns;
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::time::Clock as _;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 struct Stage {
-    /// Serves the port until it is dropped.
-    _runtime: Runtime,
     port: SocketAddr,
     counts: Arc<Counts>,
     inbox: Inbox,
@@ -44,11 +44,11 @@ impl Stage {
         };
         let osc = open(&config, hall).unwrap();
         let (port, counts) = (osc.address().unwrap(), osc.counts());
-        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-        runtime.spawn(osc.serve());
+        let runtime = Builder::new_current_thread().enable_all().build().unwrap();
+        std::thread::spawn(move || runtime.block_on(osc.serve())); // as long as the tests run
         let gear = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         gear.set_read_timeout(Some(PATIENCE)).unwrap();
-        Self { _runtime: runtime, port, counts, inbox, source, desk, gear }
+        Self { port, counts, inbox, source, desk, gear }
     }
 
     fn send(&self, packet: &OscPacket) {
@@ -80,6 +80,15 @@ impl Stage {
             if message.addr == format!("/kinocue/{word}") {
                 return message.args;
             }
+        }
+    }
+
+    /// Waits until something has been counted.
+    fn wait_for(&self, word: &str) {
+        let until = Monotonic.now() + PATIENCE;
+        while self.counts.of(word) == 0 {
+            assert!(Monotonic.now() < until, "nothing is {word}");
+            std::thread::yield_now();
         }
     }
 
@@ -135,8 +144,7 @@ fn a_stop_reaches_the_tick_thread_while_nobody_answers() {
     }
     stage.say("stop", vec![]);
     stage.say("arm", vec![]);
-    // Once that is refused, what came before it was read.
-    while !format!("{:?}", stage.heard("warning")).contains("never arm") {}
+    stage.wait_for("forbidden"); // what came before it was read
     assert!(stage.desk.take_stop());
 }
 
@@ -145,9 +153,8 @@ fn nothing_arms_and_whoever_tries_is_told() {
     let stage = Stage::new();
     for word in ["arm", "home", "clear"] {
         stage.say(word, vec![]);
-        let [OscType::Int(2), OscType::String(text)] = stage.heard("warning").try_into().unwrap() else {
-            panic!("a grade and a text")
-        };
+        let heard = stage.heard("warning");
+        let [OscType::Int(2), OscType::String(text)] = heard.as_slice() else { panic!("{heard:?}") };
         assert!(text.starts_with(&format!("OSC may never {word}")), "{text}");
     }
     assert_eq!(stage.counts.of("forbidden"), 3);
@@ -158,9 +165,7 @@ fn nothing_arms_and_whoever_tries_is_told() {
 fn strangers_are_not_heard() {
     let stage = Stage::of(&[Ipv4Addr::new(10, 0, 0, 5)]);
     stage.say("stop", vec![]);
-    while stage.counts.of("foreign") == 0 {
-        std::thread::yield_now();
-    }
+    stage.wait_for("foreign");
     assert!(!stage.desk.take_stop());
 }
 
@@ -227,7 +232,9 @@ fn a_subscriber_hears_state_position_warnings_and_the_beat() {
 #[test]
 fn octets_that_are_no_osc_are_counted_and_the_port_lives_on() {
     let stage = Stage::new();
-    for octets in [b"".as_slice(), b"GET / HTTP/1.1\r\n\r\n", &[0xff; 1400], b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\xff\xff"] {
+    for octets in
+        [b"".as_slice(), b"GET / HTTP/1.1\r\n\r\n", &[0xff; 1400], b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\xff\xff"]
+    {
         stage.gear.send_to(octets, stage.port).unwrap();
     }
     stage.say("park", vec![]);

@@ -99,10 +99,31 @@ pub struct Live {
     beats: AtomicU64,
     closed: AtomicBool,
     moving: AtomicBool,
+    /// How often the last gate held each lane back; empty where nobody wants to know.
+    clamps: Box<[AtomicU64]>,
     table: Mutex<Vec<Row>>,
 }
 
 impl Live {
+    /// One that tells as well how often the last gate held back each of so many lanes.
+    #[must_use]
+    pub fn with_clamps(lanes: usize) -> Self {
+        Self { clamps: (0..lanes).map(|_| AtomicU64::new(0)).collect(), ..Self::default() }
+    }
+
+    /// How often the last gate held a lane back since the program started; 0 where that is not told.
+    #[must_use]
+    pub fn clamps(&self, lane: usize) -> u64 {
+        self.clamps.get(lane).map_or(0, |clamps| clamps.load(Ordering::Relaxed))
+    }
+
+    /// Notes how often the last gate held a lane back.
+    pub(super) fn on_clamps(&self, lane: usize, clamps: u64) {
+        if let Some(told) = self.clamps.get(lane) {
+            told.store(clamps, Ordering::Relaxed);
+        }
+    }
+
     /// How far the play is.
     #[must_use]
     pub fn phase(&self) -> Phase {

@@ -250,6 +250,11 @@ impl Mail {
         self.answers.pop().ok()
     }
 
+    /// Notes how often the last gate held a lane back.
+    pub(super) fn clamps(&self, lane: usize, clamps: u64) {
+        self.live.on_clamps(lane, clamps);
+    }
+
     /// Notes a tick.
     pub(super) fn beat(&self) {
         self.live.beat();

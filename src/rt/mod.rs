@@ -181,6 +181,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             if let Delivery::Failed(_) = self.sink.send(index, datagram) {
                 self.mail.post(Sent::Failed { lane: of, frame: stamped.frame });
             }
+            self.mail.clamps(index, self.engine.clamps(index).clamps);
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
         let report = TickReport { late_ns, missed: tick.missed, show: self.engine.film() };

@@ -1,5 +1,6 @@
 //! System calls that the standard library lacks; the only unsafe code of the project, each block with its reason.
-//! Linux only. Any thread; nothing here allocates except where a refusal is put into words.
+//! Linux only. Any thread; nothing here allocates except where a refusal is put into words, and in `folder`, which is of the
+//! control plane.
 
 pub mod batch;
 pub mod clock;

@@ -85,7 +85,9 @@ impl Talk {
         if ask == Ask::Stop {
             self.hall.stop();
         }
-        self.hall.post(self.who.clone(), ask).map_or_else(|problem| Read::Answered(Err(problem)), Read::Posted)
+        self.hall
+            .post(self.who.clone(), ask)
+            .map_or_else(|problem| Read::Answered(Err(problem)), Read::Posted)
     }
 }
 
@@ -107,7 +109,8 @@ async fn answer(mut outgoing: OwnedWriteHalf, mut read: mpsc::Receiver<Read>) {
 pub(super) fn reply(answer: &Answer) -> String {
     let text = match answer {
         Ok(status) => {
-            let position = status.show.as_ref().map(|show| ShowTime::from_secs_f64(show.position_s).to_string());
+            let position =
+                status.show.as_ref().map(|show| ShowTime::from_secs_f64(show.position_s).to_string());
             format!("ok {} {}", status.state, position.as_deref().unwrap_or("-"))
         }
         Err(problem) => format!("error {} {}; {}", problem.code.word(), problem.detail, problem.remedy),
@@ -116,5 +119,9 @@ pub(super) fn reply(answer: &Answer) -> String {
 }
 
 fn too_long() -> Problem {
-    Problem::new(Code::Value, format!("the line is longer than {LONGEST} octets"), "end each line with LF or CRLF")
+    Problem::new(
+        Code::Value,
+        format!("the line is longer than {LONGEST} octets"),
+        "end each line with LF or CRLF",
+    )
 }

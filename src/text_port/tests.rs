@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::runtime::{Builder, Runtime};
+use tokio::runtime::Builder;
 
 use super::{CONNECTIONS, open};
 use crate::config::TextPort;
@@ -16,8 +16,6 @@ use crate::rt::Desk;
 const PATIENCE: Duration = Duration::from_secs(20);
 
 struct Stage {
-    /// Serves the port until it is dropped.
-    _runtime: Runtime,
     port: SocketAddr,
     inbox: Inbox,
     desk: Arc<Desk>,
@@ -35,9 +33,9 @@ impl Stage {
         let mut text = open(&config, hall).unwrap();
         text.idle = idle;
         let port = text.address().unwrap();
-        let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-        runtime.spawn(text.serve());
-        Self { _runtime: runtime, port, inbox, desk }
+        let runtime = Builder::new_current_thread().enable_all().build().unwrap();
+        std::thread::spawn(move || runtime.block_on(text.serve())); // as long as the tests run
+        Self { port, inbox, desk }
     }
 
     fn connect(&self) -> Peer {
@@ -93,7 +91,9 @@ fn a_line_is_asked_and_answered_with_state_and_position() {
     asked.answer(Ok(Arc::new(playing())));
     assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
     peer.send(b"pause\n");
-    stage.asked().answer(Err(Problem::new(Code::State, "cannot pause", "go first").with(vec!["x".to_owned()])));
+    stage
+        .asked()
+        .answer(Err(Problem::new(Code::State, "cannot pause", "go first").with(vec!["x".to_owned()])));
     assert_eq!(peer.line(), "error state cannot pause; go first\r\n");
     peer.send(b"status\n");
     assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
@@ -120,7 +120,11 @@ fn a_stop_is_read_while_an_answer_is_waited_for() {
     assert!(stage.desk.take_stop(), "before anything is answered");
     stop.answer(Err(Problem::new(Code::State, "second", "-")));
     park.answer(Err(Problem::new(Code::State, "first", "-")));
-    assert_eq!([peer.line(), peer.line()].map(|line| line.contains("first")), [true, false], "in their order");
+    assert_eq!(
+        [peer.line(), peer.line()].map(|line| line.contains("first")),
+        [true, false],
+        "in their order"
+    );
 }
 
 #[test]
@@ -144,7 +148,8 @@ fn a_line_without_end_and_lines_without_number_end_the_connection() {
     let mut peer = stage.connect();
     peer.send(&b"park\n".repeat(100));
     // Nobody answers the first; what was read ahead is asked, and the rest is not read.
-    let asked = std::iter::from_fn(|| stage.inbox.next(Duration::ZERO).or_else(|| stage.inbox.next(PATIENCE / 40)));
+    let asked =
+        std::iter::from_fn(|| stage.inbox.next(Duration::ZERO).or_else(|| stage.inbox.next(PATIENCE / 40)));
     assert!(asked.count() < 20);
     let mut rest = Vec::new();
     let _ = peer.0.read_to_end(&mut rest); // a reset, as lines were left unread

@@ -67,16 +67,15 @@ fn who_reads_nothing_is_cut_off_and_the_others_go_on() {
         quick.next();
     }
     let mut rest = Vec::new();
-    let ended = slow.read_to_end(&mut rest);
-    assert!(ended.is_ok() || rest.len() < 4_000_000, "{ended:?}");
-    assert!(rest.len() < 4_000_000, "what was on its way, and no more: {}", rest.len());
+    slow.take(4_000_000).read_to_end(&mut rest).unwrap();
+    assert!(rest.len() < 4_000_000, "what was on its way, and then the end");
     quick.next();
 }
 
 #[test]
 fn there_is_room_for_so_many_and_a_place_is_free_again_when_one_goes() {
     let hall = Hall::open();
-    let mut watching: Vec<_> = (0..32).map(|_| Events::open(&hall.socket())).collect();
+    let mut watching: Vec<_> = (0..16).map(|_| Events::open(&hall.socket())).collect();
     watching.iter_mut().for_each(|events| {
         events.next();
     });

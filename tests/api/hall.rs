@@ -15,6 +15,7 @@ use kinocue::hall::{
     handle,
 };
 use kinocue::library::{self, Bounds, Library};
+use kinocue::log::Log;
 use kinocue::playlist::Shelf;
 use kinocue::rt::Desk;
 use sha2::{Digest as _, Sha256};
@@ -69,6 +70,7 @@ impl Hall {
             playlists: Shelf::new(&dir.path().join("playlists")),
             journal: dir.path().join("journal"),
             pages,
+            log: Log::start(|_| {}).unwrap(),
         };
         let running = api::start(setup).unwrap();
         let stop = api::stop_socket(&dir.path().join("stop.sock"), handle.clone()).unwrap();

@@ -1,9 +1,11 @@
 //! What each request does, and what it is answered.
 
+use std::io::Write as _;
+
 use kinocue::hall::{Ask, LevelsChange, Role, Surface};
 use kinocue::time::ShowTime;
 
-use crate::client::{Request, problem};
+use crate::client::{Reply, Request, problem};
 use crate::hall::{Hall, with_controller};
 
 fn put(path: &str, body: &str) -> Request {
@@ -130,8 +132,12 @@ fn what_is_not_as_it_may_be_is_refused_and_reaches_nobody() {
 fn a_stop_is_a_stop_whatever_comes_with_it() {
     let hall = Hall::open();
     let stop = Request::new("POST", "/api/v1/show/stop").header("Content-Type", "text/plain").body("{broken");
-    assert_eq!(stop.sent_ago(60_000).send(&hall.socket()).state(), "stopping");
-    assert!(hall.desk.take_stop());
+    let odd = stop.clone().header("Idempotency-Key", "a b").header("X-Kinocue-Sent", "soon");
+    let asked = Request::new("POST", "/api/v1/show/stop?now");
+    for request in [stop.sent_ago(60_000), odd, asked] {
+        assert_eq!(request.send(&hall.socket()).state(), "stopping", "{request:?}");
+        assert!(hall.desk.take_stop());
+    }
 }
 
 #[test]
@@ -152,6 +158,18 @@ fn the_service_says_whether_it_is_well_and_ready_and_gives_its_figures() {
     let figures = hall.socket().get("/metrics");
     assert!(figures.header("content-type").unwrap().starts_with("application/openmetrics-text"));
     assert!(figures.text().contains("kinocue_state{"), "{}", figures.text());
+}
+
+#[test]
+fn a_connection_is_good_for_one_request_after_another() {
+    let hall = Hall::open();
+    let mut connection = hall.socket().connect();
+    let first = b"POST /api/v1/show/pause HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    connection.write_all(first).unwrap();
+    connection.write_all(&Request::new("POST", "/api/v1/show/park").octets(&hall.socket())).unwrap();
+    let both = String::from_utf8(Reply::read(&mut *connection).body).unwrap();
+    assert!(both.contains("asked: pause") && both.contains("asked: park"), "{both}");
+    assert_eq!(hall.asks(), [Ask::Pause, Ask::Park]);
 }
 
 #[test]

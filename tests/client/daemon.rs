@@ -164,7 +164,8 @@ fn write(mut stream: UnixStream, answer: &Answer) {
             format!("HTTP/1.1 {status} As It Is\r\nContent-Length: {length}\r\n\r\n{body}")
         }
         Answer::Events(events) => {
-            let head = "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n\r\n: hello\n\n";
+            let head =
+                "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n\r\n: hello\n\n";
             let events = events.iter().map(|event| format!("event: status\ndata: {event}\n\n"));
             head.to_owned() + &events.collect::<String>()
         }

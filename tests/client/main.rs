@@ -27,6 +27,11 @@ fn hall(state: &str) -> Value {
     })
 }
 
+/// A text with each run of blanks as one, as the width of columns is no matter.
+fn squeezed(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 fn told(run: &Run, says: &str) {
     assert!(run.stderr.contains(says), "{says}\n{run:?}");
 }
@@ -53,7 +58,12 @@ fn each_command_is_one_request_in_the_words_of_the_api() {
         (vec!["trim", "-80ms"], "PUT", "/api/v1/trim", json!({"offset_s": -0.08})),
         (vec!["level", "60%"], "PUT", "/api/v1/levels", json!({"motion": 0.6, "vibration": 0.6})),
         (vec!["level", "motion", "60%"], "PUT", "/api/v1/levels", json!({"motion": 0.6})),
-        (vec!["level", "50%", "--row", "A,B"], "PUT", "/api/v1/levels", json!({"rows": {"A": 0.5, "B": 0.5}})),
+        (
+            vec!["level", "50%", "--row", "A,B"],
+            "PUT",
+            "/api/v1/levels",
+            json!({"rows": {"A": 0.5, "B": 0.5}}),
+        ),
         (vec!["effects", "off", "water"], "PUT", "/api/v1/levels", json!({"effects": {"water": false}})),
         (vec!["preset", "kids show"], "POST", "/api/v1/presets/kids%20show", json!({})),
         (vec!["enable", "A2"], "POST", "/api/v1/controllers/A2/enable", json!({})),
@@ -68,7 +78,11 @@ fn each_command_is_one_request_in_the_words_of_the_api() {
         assert_eq!(request.json(), body, "{args:?}");
         assert_eq!(request.header("content-type"), Some("application/json"));
         assert!(request.header("idempotency-key").is_some_and(|key| key.len() == 32));
-        assert!(request.header("x-kinocue-sent").is_some_and(|ms| ms.parse::<u64>().is_ok_and(|ms| ms > 1_700_000_000_000)));
+        assert!(
+            request
+                .header("x-kinocue-sent")
+                .is_some_and(|ms| ms.parse::<u64>().is_ok_and(|ms| ms > 1_700_000_000_000))
+        );
         assert!(daemon.is_done(), "{args:?}");
         told(&run, "kinocue: armed: armed by anna; next: go on; at 01:10.120 of 03:20.000");
     }
@@ -117,7 +131,13 @@ fn json_is_printed_as_it_came() {
 fn status_shows_state_controllers_and_warnings() {
     let run = Daemon::with(hall("playing")).run(&["status"]);
     assert_eq!(run.code, Some(0));
-    for part in ["playing by anna", "next       go on", "coaster, at 01:10.120 of 03:20.000", "no ack for 3 s", "look at its plug"] {
+    for part in [
+        "playing by anna",
+        "next       go on",
+        "coaster, at 01:10.120 of 03:20.000",
+        "no ack for 3 s",
+        "look at its plug",
+    ] {
         assert!(run.stdout.contains(part), "{part}\n{}", run.stdout);
     }
 }
@@ -130,7 +150,13 @@ fn without_a_daemon_it_says_how_to_start_one() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
         let run = run(command.args(args).env("KINOCUE_SOCKET", &nowhere));
         assert_eq!(run.code, Some(69), "{run:?}");
-        told(&run, &format!("no daemon answers at {}; start it with `sudo systemctl start kinocue`", nowhere.display()));
+        told(
+            &run,
+            &format!(
+                "no daemon answers at {}; start it with `sudo systemctl start kinocue`",
+                nowhere.display()
+            ),
+        );
     }
 }
 
@@ -247,14 +273,14 @@ fn the_library_and_the_playlist_are_listed() {
     let cues = json!([{"id": "coaster", "title": "Coaster", "length_s": 60.0, "axes": 3, "effects": ["air"], "size": 9,
         "sha256": null, "proved": {"state": "passed"}}]);
     let run = Daemon::start(move |_, _| Answer::Reply(200, cues.clone())).run(&["cues"]);
-    assert!(run.stdout.contains("coaster  Coaster  01:00.000  3     air      passed"), "{run:?}");
+    assert!(squeezed(&run.stdout).contains("coaster Coaster 01:00.000 3 air passed"), "{run:?}");
     let mut status = hall("parked");
     let entry = json!({"cue": "coaster", "title": null, "length_s": 60.0, "level": 0.6, "trim_ms": null, "then": "hold",
         "at": "14:00"});
     status["playlist"] = json!({"id": "saturday", "title": "Saturday", "entries": [entry, entry], "current": 1,
         "next_start": null});
     let run = Daemon::with(status).run(&["playlist"]);
-    assert!(run.stdout.contains(">2  coaster"), "{run:?}");
+    assert!(squeezed(&run.stdout).contains(">2 coaster"), "{run:?}");
 }
 
 #[test]
@@ -265,7 +291,8 @@ fn watch_writes_a_line_a_change_and_says_at_once_when_the_daemon_is_gone_and_bac
         _ => Answer::Events(vec![hall("stopped")]),
     });
     let mut watch = Running(daemon.command(&["watch"]).stderr(Stdio::piped()).spawn().expect("it starts"));
-    let mut lines = BufReader::new(watch.0.stdout.take().expect("piped")).lines().map(|line| line.expect("text"));
+    let mut lines =
+        BufReader::new(watch.0.stdout.take().expect("piped")).lines().map(|line| line.expect("text"));
     assert_eq!(lines.next().as_deref(), Some("armed: armed by anna; next: go on; at 01:10.120 of 03:20.000"));
     assert_eq!(lines.next().as_deref(), Some("loaded: coaster"));
     let playing = lines.by_ref().find(|line| line.starts_with("playing"));
@@ -274,7 +301,10 @@ fn watch_writes_a_line_a_change_and_says_at_once_when_the_daemon_is_gone_and_bac
     watch.0.kill().expect("it runs");
     let mut said = String::new();
     watch.0.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
-    assert!(said.contains("is gone: it closed the connection; waiting for it\nkinocue: the daemon is back\n"), "{said}");
+    assert!(
+        said.contains("is gone: it closed the connection; waiting for it\nkinocue: the daemon is back\n"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -288,9 +318,7 @@ fn watch_prints_events_as_they_come_and_ends_when_nobody_reads() {
 }
 
 fn tested(running: bool, done: u64, passed: bool) -> Value {
-    let row = |part: &str, passed: bool| {
-        json!({"controller": "A1", "part": part, "asked": 200, "acked": 200, "p50_us": 41.0, "p99_us": 93.0, "passed": passed})
-    };
+    let row = |part: &str, passed: bool| json!({"controller": "A1", "part": part, "asked": 200, "acked": 200, "p50_us": 41.0, "p99_us": 93.0, "passed": passed});
     let mut status = hall("playing");
     status["test"] = json!({"running": running, "step": "ended", "done": done, "total": 2, "rows": [row("a1", true),
         row("air", passed)]});
@@ -307,7 +335,7 @@ fn a_sweep_is_followed_to_its_end_and_its_table_shown() {
         let run = daemon.run(&["test", "sweep", "--rows", "A-C", "--seats-empty"]);
         assert_eq!(run.code, Some(exit), "{run:?}");
         assert_eq!(daemon.request().json(), json!({"rows": ["A", "B", "C"]}));
-        assert!(run.stdout.contains("A1          a1    200    200    41      93      ok"), "{run:?}");
+        assert!(squeezed(&run.stdout).contains("A1 a1 200 200 41 93 ok"), "{run:?}");
         assert_eq!(run.stdout.contains("FAIL"), !passed);
         told(&run, "test ended: 2 of 2 axes and effects");
     }

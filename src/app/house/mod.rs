@@ -112,7 +112,7 @@ impl House {
         let rate = Rate::from_hz(config.show.rate_hz);
         let opened = boot::open(&config, numbers)?;
         let desk = Arc::new(opened.desk());
-        let live = Arc::new(Live::default());
+        let live = Arc::new(Live::with_clamps(config.controllers.len()));
         let (mail, ends) = mailboxes(config.controllers.len(), rate, Arc::clone(&live));
         let (line, line_end) = line(opened.sender.clone(), config.controllers.len());
         let (orders, orders_end) = RingBuffer::new(ORDERS);

@@ -143,7 +143,7 @@ impl Keeper {
             refused: counts.refused(),
             lost: counts.lost,
             send_failed: counts.send_failed,
-            clamps: 0,
+            clamps: self.reins.live.clamps(index),
             homed: row.and_then(|row| row.homed),
             emergency_stop: state.emergency_stop(),
             error: state.error.map(|heard| heard.value),

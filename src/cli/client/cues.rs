@@ -24,7 +24,7 @@ const PIECE: usize = 64 << 10;
 
 /// The commands of the library.
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Command {
+pub(in crate::cli) enum Command {
     /// Lists the cues of the daemon's library.
     #[command(after_help = "Examples:\n  kinocue cues\n  kinocue cues --json")]
     Cues(ServerArgs),
@@ -40,7 +40,7 @@ Exit codes: 0 taken, 1 it does not pass (every fault is said), 66 no such file, 
 
 /// A file for the library.
 #[derive(Debug, clap::Args)]
-pub(super) struct UploadArgs {
+pub(in crate::cli) struct UploadArgs {
     /// The cue file.
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -82,7 +82,8 @@ fn list(server: &ServerArgs) -> Result<Exit, Failure> {
     server.show(&reply)?;
     reply::done(&reply)?;
     if !server.json {
-        let cues: Vec<Cue> = serde_json::from_str(&reply.text).context("the reply is no list").or_exit(Exit::Internal)?;
+        let cues: Vec<Cue> =
+            serde_json::from_str(&reply.text).context("the reply is no list").or_exit(Exit::Internal)?;
         let header = ["cue", "title", "length", "axes", "effects", "proved"];
         print::out(&table(header, cues.iter().map(Cue::row)))?;
     }

@@ -31,8 +31,10 @@ impl Events {
     pub(super) async fn open(socket: &Path) -> Result<Self, Failure> {
         let asked = request(Method::GET, "/api/v1/events", None, Full::<Bytes>::default())?;
         let silent = || anyhow!("the daemon at {} lets us in, but says nothing", socket.display());
-        let response =
-            timeout(BEGINNING, send(socket, asked)).await.map_err(|_| silent()).or_exit(Exit::Unavailable)??;
+        let response = timeout(BEGINNING, send(socket, asked))
+            .await
+            .map_err(|_| silent())
+            .or_exit(Exit::Unavailable)??;
         let status = response.status().as_u16();
         if status != 200 {
             let text = response.into_body().collect().await.map(|body| body.to_bytes()).unwrap_or_default();
@@ -49,7 +51,8 @@ impl Events {
             if let Some(data) = self.lines.event() {
                 return Ok(data);
             }
-            let frame = timeout(SILENCE, self.body.frame()).await.map_err(|_| "it hangs: nothing comes any more")?;
+            let frame =
+                timeout(SILENCE, self.body.frame()).await.map_err(|_| "it hangs: nothing comes any more")?;
             let frame = frame.ok_or("it closed the connection")?.map_err(|_| "the connection broke")?;
             if let Ok(piece) = frame.into_data() {
                 self.lines.take(&piece)?;

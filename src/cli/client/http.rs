@@ -72,7 +72,8 @@ where
         let response = send(socket, request).await?;
         let status = response.status().as_u16();
         let body = Limited::new(response.into_body(), LONGEST).collect().await;
-        let body = body.map_err(|error| anyhow!(error)).context(cut_off(socket)).or_exit(Exit::Unavailable)?;
+        let body =
+            body.map_err(|error| anyhow!(error)).context(cut_off(socket)).or_exit(Exit::Unavailable)?;
         Ok(Reply { status, text: String::from_utf8_lossy(&body.to_bytes()).into_owned() })
     };
     timeout(patience, whole).await.unwrap_or_else(|_| {
@@ -94,8 +95,10 @@ where
     B::Error: Into<Box<dyn std::error::Error + Send + Sync>>,
 {
     let stream = connect(socket).await.map_err(|error| unreachable_at(socket, error))?;
-    let (mut sender, connection) =
-        http1::handshake(TokioIo::new(stream)).await.with_context(|| cut_off(socket)).or_exit(Exit::Unavailable)?;
+    let (mut sender, connection) = http1::handshake(TokioIo::new(stream))
+        .await
+        .with_context(|| cut_off(socket))
+        .or_exit(Exit::Unavailable)?;
     tokio::spawn(connection); // what goes wrong on it, the request is told
     sender.send_request(request).await.with_context(|| cut_off(socket)).or_exit(Exit::Unavailable)
 }
@@ -136,7 +139,8 @@ fn cut_off(socket: &Path) -> String {
 /// A key like no other: the standard library seeds its hashers at random.
 fn key() -> String {
     use std::hash::{BuildHasher as _, RandomState};
-    let (a, b) = (RandomState::new().hash_one(std::process::id()), RandomState::new().hash_one(wall_now_ns()));
+    let (a, b) =
+        (RandomState::new().hash_one(std::process::id()), RandomState::new().hash_one(wall_now_ns()));
     format!("{a:016x}{b:016x}")
 }
 
@@ -147,7 +151,8 @@ mod tests {
     #[test]
     fn no_two_requests_have_the_same_key_and_what_changes_nothing_has_none() {
         let of = |method| request(method, "/api/v1/show/go", None, ()).unwrap();
-        let keys = [of(Method::POST), of(Method::POST)].map(|request| request.headers()["idempotency-key"].clone());
+        let keys =
+            [of(Method::POST), of(Method::POST)].map(|request| request.headers()["idempotency-key"].clone());
         assert_ne!(keys[0], keys[1]);
         assert!(!of(Method::GET).headers().contains_key("idempotency-key"));
     }

@@ -14,7 +14,7 @@ use crate::hall::LevelsChange;
 
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Command {
+pub(in crate::cli) enum Command {
     /// Moves the motion against the film: later by so many milliseconds, earlier where it is negative.
     #[command(after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0")]
     Trim(TrimArgs),
@@ -49,7 +49,7 @@ Examples:
 
 /// A trim.
 #[derive(Debug, clap::Args)]
-pub(super) struct TrimArgs {
+pub(in crate::cli) struct TrimArgs {
     /// -500ms to 500ms.
     #[arg(value_name = "TRIM", value_parser = parse_trim, allow_hyphen_values = true)]
     trim: i32,
@@ -59,7 +59,7 @@ pub(super) struct TrimArgs {
 
 /// A level, of what and whose.
 #[derive(Debug, clap::Args)]
-pub(super) struct LevelArgs {
+pub(in crate::cli) struct LevelArgs {
     /// `motion` or `vibration`, where it is not for both.
     #[arg(value_name = "WHAT", allow_hyphen_values = true)]
     first: String,
@@ -75,7 +75,7 @@ pub(super) struct LevelArgs {
 
 /// Effects.
 #[derive(Debug, clap::Args)]
-pub(super) struct EffectsArgs {
+pub(in crate::cli) struct EffectsArgs {
     /// Whether they may be on.
     #[arg(value_name = "on|off", value_parser = ["on", "off"])]
     switch: String,
@@ -88,7 +88,7 @@ pub(super) struct EffectsArgs {
 
 /// Something by its name.
 #[derive(Debug, clap::Args)]
-pub(super) struct NameArgs {
+pub(in crate::cli) struct NameArgs {
     /// Its name.
     #[arg(value_name = "NAME")]
     name: String,
@@ -104,7 +104,12 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
         }
         Command::Level(args) => {
             let row = args.row.as_deref();
-            set(&args.server, &level(&args.first, args.second.as_deref(), row).map_err(anyhow::Error::msg).or_exit(Exit::Usage)?)
+            set(
+                &args.server,
+                &level(&args.first, args.second.as_deref(), row)
+                    .map_err(anyhow::Error::msg)
+                    .or_exit(Exit::Usage)?,
+            )
         }
         Command::Effects(args) => effects(args),
         Command::Preset(NameArgs { name, server }) => {
@@ -129,7 +134,9 @@ fn level(first: &str, second: Option<&str>, rows: Option<&str>) -> Result<Levels
         ("motion" | "vibration", Some(level), Some(rows)) => Err(format!(
             "a row has one level for its motion and its vibration; write kinocue level {level} --row {rows}"
         )),
-        ("motion" | "vibration", None, _) => Err(format!("how much {first}? write kinocue level {first} 60%")),
+        ("motion" | "vibration", None, _) => {
+            Err(format!("how much {first}? write kinocue level {first} 60%"))
+        }
         (level, None, None) => {
             let level = Some(parse_level(level)?);
             Ok(LevelsChange { motion: level, vibration: level, ..none })
@@ -145,7 +152,8 @@ fn level(first: &str, second: Option<&str>, rows: Option<&str>) -> Result<Levels
 
 fn effects(args: &EffectsArgs) -> Result<Exit, Failure> {
     let EffectsArgs { switch, names, server } = args;
-    let names = if names.is_empty() { server.status()?.levels.effects.into_keys().collect() } else { names.clone() };
+    let names =
+        if names.is_empty() { server.status()?.levels.effects.into_keys().collect() } else { names.clone() };
     if names.is_empty() {
         return Err(anyhow!("the hall has no effects; name them in [effects] of its configuration"))
             .or_exit(Exit::NoInput);
@@ -185,7 +193,9 @@ mod tests {
     fn a_row_has_no_level_of_motion_alone() {
         let refused = level("motion", Some("60%"), Some("A")).unwrap_err();
         assert!(refused.ends_with("write kinocue level 60% --row A"), "{refused}");
-        for (first, second) in [("motion", None), ("60", None), ("heave", Some("60%")), ("motion", Some("fast"))] {
+        for (first, second) in
+            [("motion", None), ("60", None), ("heave", Some("60%")), ("motion", Some("fast"))]
+        {
             assert!(level(first, second, None).is_err(), "{first} {second:?}");
         }
     }

@@ -100,9 +100,19 @@ mod tests {
 
     #[test]
     fn the_panel_names_who_is_not_well_and_no_more_than_a_few() {
-        let lost = |n: u32| Controller { name: format!("A{n}"), standing: "lost".into(), enabled: true, ..<_>::default() };
+        let lost = |n: u32| Controller {
+            name: format!("A{n}"),
+            standing: "lost".into(),
+            enabled: true,
+            ..<_>::default()
+        };
         let mut controllers: Vec<Controller> = (0..9).map(lost).collect();
-        controllers.push(Controller { name: "B1".into(), standing: "ok".into(), enabled: true, ..<_>::default() });
+        controllers.push(Controller {
+            name: "B1".into(),
+            standing: "ok".into(),
+            enabled: true,
+            ..<_>::default()
+        });
         let show = Show { cue: "c".into(), length_s: 100.0, position_s: 50.0, ..Show::default() };
         let text = text(&Status { controllers, show: Some(show), ..Status::default() });
         assert!(text.contains("1 of 10 controllers ok\n  A0 lost"), "{text}");

@@ -9,7 +9,7 @@ use crate::cli::{Exit, Failure, print};
 
 /// The commands that choose what is played.
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Command {
+pub(in crate::cli) enum Command {
     /// Loads a cue of the daemon's library; it is read and proved before the command ends.
     #[command(after_help = "\
 Examples:
@@ -32,7 +32,7 @@ Examples:
 
 /// A cue.
 #[derive(Debug, clap::Args)]
-pub(super) struct LoadArgs {
+pub(in crate::cli) struct LoadArgs {
     /// The id of the cue.
     #[arg(value_name = "CUE")]
     cue: String,
@@ -42,7 +42,7 @@ pub(super) struct LoadArgs {
 
 /// A playlist.
 #[derive(Debug, clap::Args)]
-pub(super) struct PlaylistArgs {
+pub(in crate::cli) struct PlaylistArgs {
     /// The id of the playlist [default: show the one that is loaded].
     #[arg(value_name = "ID")]
     id: Option<String>,
@@ -55,7 +55,7 @@ pub(super) struct PlaylistArgs {
 
 /// An entry.
 #[derive(Debug, clap::Args)]
-pub(super) struct SelectArgs {
+pub(in crate::cli) struct SelectArgs {
     /// Which entry, counted from 1.
     #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     entry: u32,
@@ -112,6 +112,7 @@ fn entries(playlist: &Playlist) -> String {
     };
     let header = ["", "cue", "title", "length", "level", "trim", "then", "starts at"];
     let Playlist { id, title, entries, next_start, .. } = playlist;
-    let next = next_start.as_ref().map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
+    let next =
+        next_start.as_ref().map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
     format!("{id}: {title}{next}\n\n{}", table(header, entries.iter().enumerate().map(row)))
 }

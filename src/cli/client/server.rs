@@ -26,7 +26,7 @@ const PATIENCE: Duration = Duration::from_secs(65);
 pub(in crate::cli) struct ServerArgs {
     /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
     #[arg(long, value_name = "PATH")]
-    socket: Option<PathBuf>,
+    pub(super) socket: Option<PathBuf>,
     /// Print the JSON of the reply as it came.
     #[arg(long)]
     pub(in crate::cli) json: bool,
@@ -93,7 +93,8 @@ impl ServerArgs {
 /// A name as a part of a path: whatever is no plain letter or digit is written as octets.
 pub(super) fn in_path(name: &str) -> String {
     let plain = |octet: &u8| octet.is_ascii_alphanumeric() || b"-_.~".contains(octet);
-    let written = |octet: u8| if plain(&octet) { char::from(octet).to_string() } else { format!("%{octet:02X}") };
+    let written =
+        |octet: u8| if plain(&octet) { char::from(octet).to_string() } else { format!("%{octet:02X}") };
     name.bytes().map(written).collect()
 }
 

@@ -11,7 +11,7 @@ use crate::time::ShowTime;
 
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
-pub(super) enum Command {
+pub(in crate::cli) enum Command {
     /// Gets the hall ready to go: cue loaded, limits proved, preflight passed. Lapses after ten minutes.
     #[command(after_help = "\
 Examples:
@@ -63,7 +63,7 @@ All positions are read anew before anything moves.")]
 
 /// The position, and where the daemon is.
 #[derive(Debug, clap::Args)]
-pub(super) struct SeekArgs {
+pub(in crate::cli) struct SeekArgs {
     /// Where in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
     #[arg(value_name = "TIME", value_parser = parse_time)]
     at: ShowTime,
@@ -90,7 +90,8 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
 
 /// Has the daemon home all controllers, once a person says that the seats are empty.
 pub(in crate::cli) fn home(server: &ServerArgs, seats_empty: bool) -> Result<Exit, Failure> {
-    let question = "All seats of the hall will move over the whole stroke. Are they empty, and is nobody near them?";
+    let question =
+        "All seats of the hall will move over the whole stroke. Are they empty, and is nobody near them?";
     if !ask::agreed(question, seats_empty, "--seats-empty")? {
         print::tell("nothing was moved");
         return Ok(Exit::Done);

@@ -15,7 +15,7 @@ Examples:
   kinocue watch            the same, live
 
 Exit codes: 0 shown, 69 no daemon, 77 not allowed")]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -127,7 +127,7 @@ mod tests {
         for part in [
             "state      armed for 4 s, for 596 s more: by anna\nnext       go\n",
             "coaster \"Coaster\", at 00:00.000 of 01:00.000",
-            "A1          A    ok         100 %",
+            " A1           A     ok          100 %",
             "lost, off",
             "\nerror controller-lost: A2: lost; look\n",
         ] {

@@ -28,7 +28,7 @@ Examples:
   kinocue stop --stop-socket /run/kinocue/stop.sock
 
 Exit codes: 0 the seats come to rest, 69 no daemon took it: use the hard-wired emergency stop")]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// The stop socket of the daemon [default: stop.sock beside the control socket].
     #[arg(long, value_name = "PATH")]
     stop_socket: Option<PathBuf>,
@@ -49,7 +49,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             Ok(Exit::Done)
         }
         Err(error) => {
-            print::tell(&format!("kinocue: {path} did not take the stop ({error}); asking the control socket"));
+            print::tell(&format!(
+                "kinocue: {path} did not take the stop ({error}); asking the control socket"
+            ));
             by_control_socket(&args.server)
         }
     }

@@ -17,7 +17,7 @@ use crate::cli::{Exit, Failure, OrExit as _, print};
 
 /// Tests seats and effects.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     #[command(subcommand)]
     what: What,
 }
@@ -51,10 +51,13 @@ struct Sweep {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let What::Sweep(Sweep { rows, seats_empty, server }) = &args.what;
-    let rows = rows.as_deref().map(parse_rows).transpose().map_err(anyhow::Error::msg).or_exit(Exit::Usage)?;
+    let rows =
+        rows.as_deref().map(parse_rows).transpose().map_err(anyhow::Error::msg).or_exit(Exit::Usage)?;
     let rows = rows.unwrap_or_default();
-    let which = if rows.is_empty() { "All seats".to_owned() } else { format!("The seats of {}", rows.join(", ")) };
-    let question = format!("{which} will move, one axis after the other. Are they empty, and is nobody near them?");
+    let which =
+        if rows.is_empty() { "All seats".to_owned() } else { format!("The seats of {}", rows.join(", ")) };
+    let question =
+        format!("{which} will move, one axis after the other. Are they empty, and is nobody near them?");
     if !agreed(&question, *seats_empty, "--seats-empty")? {
         print::tell("nothing was moved");
         return Ok(Exit::Done);
@@ -86,7 +89,8 @@ struct Outcome {
 /// Waits for the end of the test, with progress on a terminal.
 fn follow(server: &ServerArgs, begun: Status) -> Result<Outcome, Failure> {
     let bar = std::io::stderr().is_terminal().then(|| {
-        let style = ProgressStyle::with_template("{msg} [{wide_bar}] {pos} of {len}").expect("the template is fixed");
+        let style =
+            ProgressStyle::with_template("{msg} [{wide_bar}] {pos} of {len}").expect("the template is fixed");
         ProgressBar::new(begun.test.map_or(0, |test| test.total)).with_style(style.progress_chars("=> "))
     });
     let outcome = block_on(async {
@@ -136,7 +140,8 @@ fn text(test: &Test) -> String {
     let row = |row: &TestRow| {
         let TestRow { controller, part, asked, acked, p50_us, p99_us, passed } = row;
         let passed = if *passed { "ok" } else { "FAIL" };
-        [controller, part, &asked.to_string(), &acked.to_string(), &us(*p50_us), &us(*p99_us), passed].map(String::from)
+        [controller, part, &asked.to_string(), &acked.to_string(), &us(*p50_us), &us(*p99_us), passed]
+            .map(String::from)
     };
     table(["controller", "part", "asked", "acked", "p50 µs", "p99 µs", ""], test.rows.iter().map(row))
 }

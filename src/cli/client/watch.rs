@@ -26,7 +26,7 @@ Examples:
   kinocue watch
   kinocue watch >> changes.txt
   kinocue watch --json | jq .state")]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -146,7 +146,8 @@ fn changes(before: Option<&Status>, now: &Status) -> Vec<String> {
             lines.push(format!("{name} {standing}{off}{why}"));
         }
     }
-    let same = |a: &super::view::Warning, b: &super::view::Warning| (&a.id, &a.controller) == (&b.id, &b.controller);
+    let same =
+        |a: &super::view::Warning, b: &super::view::Warning| (&a.id, &a.controller) == (&b.id, &b.controller);
     for warning in &now.warnings {
         if !was.warnings.iter().any(|one| same(one, warning)) {
             lines.push(warning.line());
