@@ -137,15 +137,10 @@ impl Keeper {
             let before: u64 = table.iter().map(|row| of(&row.counts)).sum();
             after.saturating_sub(before)
         };
-        let result = match ended {
-            Cause::CueEnded => Ending::Completed,
-            Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
-            _ => Ending::Stopped,
-        };
         let after = live.times();
         record.outcome = Some(Outcome {
             end: stamp(&Zoned::now()),
-            result,
+            result: ending(ended),
             events,
             ticks: live.ticks().saturating_sub(ticks),
             missed_ticks: live.missed().saturating_sub(missed),
@@ -159,6 +154,15 @@ impl Keeper {
             ack: percentiles(after.acks, &times.acks),
         });
         self.record.journal.show(&record);
+    }
+}
+
+/// How a show ended for that cause.
+pub(super) const fn ending(cause: Cause) -> Ending {
+    match cause {
+        Cause::CueEnded => Ending::Completed,
+        Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
+        _ => Ending::Stopped,
     }
 }
 

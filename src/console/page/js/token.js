@@ -1,8 +1,10 @@
-// The token by which the server knows who asks: kept while the page is open, asked for when the server wants one.
+// The token by which the server knows who asks: kept while the page is open, asked for when the server wants one. A link may
+// bring it as `#token=…`: what is behind the # is never sent to a server, and it is taken out of the address bar at once.
 
 import { byId, setProperty, setText } from './dom.js';
 
 const KEY = 'kinocue-token';
+const IN_LINK = /^#token=([\w.~-]{1,256})$/;
 const given = [];
 let left = false;
 
@@ -21,6 +23,18 @@ export function askForToken({ pressed }) {
 /** The server knows who asks, and they may not. */
 export const askForAnother = () => open('That needs a token of somebody who may do more.');
 
+/** Takes the token of the link that led here; says whether there was one. */
+function takeFromLink() {
+  const found = IN_LINK.exec(location.hash);
+  if (!found) return false;
+  history.replaceState(history.state, '', location.pathname + location.search);
+  sessionStorage.setItem(KEY, found[1]);
+  return true;
+}
+
+// Before anything is asked: whoever asks imports this.
+takeFromLink();
+
 /** Opens the dialog. It leaves the rest of the page usable: STOP must stay in reach. */
 function open(why) {
   const form = byId('token');
@@ -33,17 +47,21 @@ function open(why) {
 /** Makes the dialog work. */
 export function startToken() {
   const form = byId('token');
+  const use = () => {
+    form.hidden = true;
+    left = false;
+    for (const listener of given) listener();
+  };
   form.addEventListener('submit', (event) => {
     event.preventDefault();
     const text = byId('token-text');
     sessionStorage.setItem(KEY, text.value.trim());
     text.value = '';
-    form.hidden = true;
-    left = false;
-    for (const listener of given) listener();
+    use();
   });
   byId('token-leave').addEventListener('click', () => {
     form.hidden = true;
     left = true;
   });
+  addEventListener('hashchange', () => takeFromLink() && use());
 }
