@@ -150,7 +150,7 @@ pub struct EntryStatus {
     pub trim_ms: Option<i32>,
     /// What follows its end: `hold` (a person goes on) or `go`.
     pub then: &'static str,
-    /// The time of day at which it starts, HH:MM[:SS]; null where a person starts it.
+    /// The time of day at which it starts, `HH:MM[:SS]`; null where a person starts it.
     pub at: Option<String>,
 }
 
