@@ -172,6 +172,7 @@ fn wrong_use_asks_nothing() {
         vec!["effects", "maybe"],
         vec!["home"],
         vec!["home", "A1", "--seats-empty"],
+        vec!["preflight", "--rate", "250"],
         vec!["test", "sweep", "--rows", "C-A", "--seats-empty"],
         vec!["test", "sweep"],
     ] {

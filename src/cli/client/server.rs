@@ -20,8 +20,7 @@ const SOCKET: &str = "/run/kinocue/control.sock";
 /// How long an answer may take: the daemon itself gives up after a minute.
 const PATIENCE: Duration = Duration::from_secs(65);
 
-// A comment, because clap would make help of documentation.
-// Where the daemon is, and how its replies are shown.
+// Where the daemon is, and how its replies are shown. No documentation: clap would show it as the help of `arm` and others.
 #[derive(Debug, Clone, clap::Args)]
 pub(in crate::cli) struct ServerArgs {
     /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
