@@ -47,7 +47,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
     let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
     let log = Log::start(print::tell).or_exit(Exit::System)?;
-    let parts = Parts { config, places, pages: pages: console::page, signals: signals()?, log: log.clone() };
+    let parts = Parts { config, places, pages: console::page, signals: signals()?, log: log.clone() };
     serve(parts, |_, addresses| {
         for address in addresses {
             let text = format!("the API and the console: http://{address}/");
