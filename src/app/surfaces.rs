@@ -84,9 +84,6 @@ impl Surfaces {
             pages,
             log: log.clone(),
         })?;
-        for address in api.addresses() {
-            log.say(Line::new(Priority::Info, "listening", format!("the API and the console: http://{address}/")));
-        }
         let osc = config.osc.as_ref().map(|osc| osc::open(osc, handle.clone())).transpose()?;
         let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
         let ports = if osc.is_some() || text.is_some() { Some(Ports::start(osc, text, log.clone())?) } else { None };

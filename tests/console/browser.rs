@@ -57,7 +57,8 @@ impl Browser {
             .expect("it says on which port it listens");
         // Whatever else it says is taken, so that it never waits for us.
         std::thread::spawn(move || lines.for_each(drop));
-        let shots = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target").join("console-shots");
+        let shots =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target").join("console-shots");
         std::fs::create_dir_all(&shots).expect("a folder for the pictures");
         let mut browser = Self { driver, port, session: String::new(), shots, _only: only };
         let arguments = [
@@ -140,7 +141,8 @@ impl Browser {
     /// Puts a finger on an element, and leaves it there.
     pub fn touch(&self, selector: &str) {
         let element = self.find(selector);
-        let there = json!({"type": "pointerMove", "duration": 0, "origin": {ELEMENT: element}, "x": 0, "y": 0});
+        let there =
+            json!({"type": "pointerMove", "duration": 0, "origin": {ELEMENT: element}, "x": 0, "y": 0});
         let finger = json!({"type": "pointer", "id": "finger", "parameters": {"pointerType": "touch"},
             "actions": [there, {"type": "pointerDown", "button": 0}]});
         self.command("/actions", &json!({"actions": [finger]}));
@@ -150,7 +152,9 @@ impl Browser {
     pub fn type_text(&self, text: &str) {
         let keys: Vec<Value> = text
             .chars()
-            .flat_map(|key| [json!({"type": "keyDown", "value": key}), json!({"type": "keyUp", "value": key})])
+            .flat_map(|key| {
+                [json!({"type": "keyDown", "value": key}), json!({"type": "keyUp", "value": key})]
+            })
             .collect();
         self.command("/actions", &json!({"actions": [{"type": "key", "id": "keys", "actions": keys}]}));
     }

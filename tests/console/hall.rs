@@ -57,13 +57,18 @@ pub struct Hall {
 }
 
 impl Hall {
-    /// Open, with the cue `swell` in its library.
+    /// Open, with the cue `swell` in its library, to nobody without a token.
     pub fn open() -> Self {
+        Self::open_to("none")
+    }
+
+    /// The same, with that role for whoever comes without a token.
+    pub fn open_to(role: &str) -> Self {
         let dir = tempfile::tempdir().expect("a folder");
         let sims: Vec<Sim> = (0..2).map(|_| Sim::start(SEATS, &["--safe"])).collect();
         let path = |text: &str| format!("\"{}/{text}\"", dir.path().display());
         let mut config = CONFIG.replace("\"cues\"", &path("cues")).replace("\"log\"", &path("log"));
-        write_api(&mut config);
+        write_api(&mut config, role);
         for (row, sim) in ["A", "B"].iter().zip(&sims) {
             for (seat, address) in sim.addresses.iter().enumerate() {
                 let name = format!("{row}{}", seat + 1);
@@ -118,11 +123,11 @@ fn swell() -> String {
     cue
 }
 
-fn write_api(config: &mut String) {
+fn write_api(config: &mut String, open_role: &str) {
     let sha256: String = Sha256::digest(TOKEN).iter().map(|octet| format!("{octet:02x}")).collect();
     write!(
         config,
-        "[api]\nlisten = [\"127.0.0.1:0\"]\n\n\
+        "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"{open_role}\"\n\n\
          [[api.token]]\nname = \"booth\"\nrole = \"engineer\"\nsha256 = \"{sha256}\"\n\n"
     )
     .expect("memory");

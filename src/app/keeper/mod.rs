@@ -28,7 +28,7 @@ use std::time::Duration;
 use super::house::{Closed, Reins};
 use crate::config::{self, Config};
 use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
-use crate::journal::Journal;
+use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::{Command, Line};
 use crate::state::{Cause, State};
@@ -101,6 +101,8 @@ pub struct Left {
     pub closed: Box<Closed>,
     /// The configuration to open the next hall with; none where the program ends.
     pub reload: Option<Arc<Config>>,
+    /// How its last show ended; stopped where there was none.
+    pub ended: Ending,
     /// The journal, still open.
     pub journal: Journal,
 }
@@ -169,6 +171,7 @@ impl Keeper {
             show_over: false,
             ended: Cause::Started,
         };
+        keeper.examine_library();
         if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
             keeper.fetch(cue, None);
         }
@@ -188,7 +191,8 @@ impl Keeper {
                 let cue = self.cued.map(|cued| cued.id);
                 self.ends.memory = Memory { board: Some(self.board), cue };
                 let journal = self.record.into_journal();
-                return Left { ends: self.ends, closed, reload: self.reload, journal };
+                let ended = record::ending(self.ended);
+                return Left { ends: self.ends, closed, reload: self.reload, ended, journal };
             }
         }
     }
@@ -208,6 +212,7 @@ impl Keeper {
             self.told = now;
             let table = self.reins.live.table();
             self.rates.note(&table, now);
+            self.say_journal();
             self.publish();
         }
     }
