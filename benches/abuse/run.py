@@ -72,9 +72,11 @@ class Hall:
             time.sleep(0.05)
 
     def ask(self, *words):
-        """A client command; its words are those of the API."""
-        command = [self.program, *map(str, words), "--socket", str(self.socket)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=90)
+        """A client command."""
+        command = [self.program, *words, "--socket", str(self.socket)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=90)
+        if done.returncode != 0:
+            sys.exit(f"{' '.join(words)}: {done.stderr}")
 
     def state(self):
         return self.status().get("state")
@@ -93,29 +95,13 @@ class Hall:
         sys.exit("the server gives no status any more")
 
     def play(self):
-        self.until("rest", lambda: self.state() in ("parked", "recovering", "stopped"))
-        for words in (["park"], ["preflight", "--config", self.folder / "hall.toml"], ["load", "waves"]):
-            if words[0] != "park" or self.state() != "parked":
-                command = self.ask(*words) if words[0] != "preflight" else self.post("/api/v1/preflight")
-                if getattr(command, "returncode", 0) != 0:
-                    sys.exit(f"{words[0]}: {command.stderr}")
-            self.until("rest", lambda: self.state() == "parked", 60)
-        for words in (["arm"], ["go"]):
-            done = self.ask(*words)
-            if done.returncode != 0:
-                sys.exit(f"{words[0]}: {done.stderr}")
+        self.until("rest", lambda: self.state() in ("parked", "recovering"))
+        if self.state() != "parked":
+            self.ask("park")
+            self.until("parked seats", lambda: self.state() == "parked", 60)
+        for words in (["preflight"], ["load", "waves"], ["arm"], ["go"]):
+            self.ask(*words)
         self.until("show", lambda: self.state() == "playing", 60)
-
-    def post(self, path):
-        request = (
-            f"POST {path} HTTP/1.1\r\n{attacks.HOST}Content-Type: application/json\r\nContent-Length: 2\r\n"
-            "Connection: close\r\n\r\n{}"
-        )
-        with attacks.connect({"socket": str(self.socket)}, 30.0) as peer:
-            peer.sendall(request.encode())
-            answer = b"".join(iter(lambda: peer.recv(1 << 20), b""))
-        if b" 200 " not in answer.split(b"\r\n", 1)[0]:
-            sys.exit(f"{path}: {answer.decode(errors='replace')[:2000]}")
 
     def lines(self):
         return (self.folder / "serve.log").read_text(errors="replace").count("\n")

@@ -34,7 +34,7 @@ impl Hunger {
         Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: now }
     }
 
-    /// Whether all goes on: to be asked [`LOOKS`] times within the interval. Where there is no counter, because a hall closes
+    /// Whether all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
     /// or opens, that is as good for ten seconds.
     #[must_use]
     pub fn feed(&mut self, beats: Option<u64>, now: MonoTime) -> bool {
@@ -54,7 +54,7 @@ pub struct Feeder {
 }
 
 impl Feeder {
-    /// Feeds the service manager that waits `interval` long ([`super::watchdog`]) while `beats` counts ticks, which come
+    /// Feeds the service manager that waits `interval` long ([`watchdog()`](super::watchdog())) while `beats` counts ticks, which come
     /// every `period`, in every state of the hall; it gives none while no hall is open. To be started by a thread of ordinary
     /// priority.
     ///

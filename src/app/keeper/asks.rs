@@ -23,10 +23,7 @@ impl Keeper {
             Ask::Home => self.request(Request::Home),
             Ask::Arm => self.request(Request::Arm),
             Ask::Disarm => self.request(Request::Disarm),
-            Ask::Go => {
-                self.begin_record(&who.to_string(), who.surface);
-                self.request(Request::Go).inspect_err(|_| self.end_record(self.ended))
-            }
+            Ask::Go => self.request(Request::Go).inspect(|()| self.begin_record(&who.to_string(), who.surface)),
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
             Ask::Park => self.request(Request::Park),

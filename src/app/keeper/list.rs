@@ -179,8 +179,8 @@ impl Keeper {
         if self.known.state == State::Homing {
             return Err(Problem::new(Code::State, "the seats have to be homed first", "arm, and go"));
         }
-        self.begin_record("the playlist", Surface::Schedule);
         self.command(Command::Request(Request::Go))
+            .inspect(|()| self.begin_record("the playlist", Surface::Schedule))
     }
 
     /// A show is over: the next entry is loaded, and starts where the one before says so and came to its end.

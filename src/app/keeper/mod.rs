@@ -169,6 +169,7 @@ impl Keeper {
             show_over: false,
             ended: Cause::Started,
         };
+        keeper.examine_library();
         if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
             keeper.fetch(cue, None);
         }
@@ -208,6 +209,7 @@ impl Keeper {
             self.told = now;
             let table = self.reins.live.table();
             self.rates.note(&table, now);
+            self.say_journal();
             self.publish();
         }
     }

@@ -50,6 +50,11 @@ impl Records {
         self.journal.trouble()
     }
 
+    /// What has become worse or better in writing it.
+    pub(super) fn news(&mut self) -> Vec<String> {
+        self.journal.news()
+    }
+
     /// The journal, for the next keeper.
     pub(super) fn into_journal(self) -> Journal {
         self.journal
@@ -80,7 +85,7 @@ impl Keeper {
         self.record.journal.note(&Action { at, who, what, result, state });
     }
 
-    /// A show is about to begin, and who lets it go.
+    /// A show has just begun, and who let it go. What was counted is as the ack thread told it last, before it began.
     pub(super) fn begin_record(&mut self, who: &str, surface: Surface) {
         let Some(cued) = &self.cued else { return };
         let (now, config) = (Zoned::now(), &self.reins.config);
@@ -120,7 +125,7 @@ impl Keeper {
         }));
     }
 
-    /// A show is over, or did not begin; the counts of its last second are still on their way, so a frame under way counts as
+    /// A show is over; the counts of its last second are still on their way, so a frame under way counts as
     /// what it was when the show began.
     pub(super) fn end_record(&mut self, ended: Cause) {
         let Some(open) = self.record.open.take() else { return };

@@ -114,6 +114,18 @@ impl Keeper {
         self.fetch(id, Some(asked));
     }
 
+    /// Has every cue of the library checked that nobody has checked for this hall, one after the other, by processes of the
+    /// lowest priority.
+    pub(super) fn examine_library(&self) {
+        let library = self.library.clone();
+        let thread = std::thread::Builder::new().name("library".to_owned());
+        // Where there is no thread for it, each cue is checked when it is asked for.
+        let _ = thread.spawn(move || {
+            let _ = crate::sys::realtime::normal_priority();
+            library.examine_all();
+        });
+    }
+
     /// Has a cue read and proved.
     pub(super) fn fetch(&mut self, id: CueId, asked: Option<Asked>) {
         let (library, config) = (self.library.clone(), self.reins.config.clone());

@@ -79,6 +79,13 @@ impl Keeper {
         }
     }
 
+    /// Says how the journal goes.
+    pub(super) fn say_journal(&mut self) {
+        for news in self.record.news() {
+            self.ends.voice.log.say(Line::new(Priority::Warning, "journal", news));
+        }
+    }
+
     /// Says that the hall is in another state.
     pub(super) fn say_state(&self, state: State, cause: &str) {
         let priority = match state {
