@@ -119,7 +119,8 @@ fn the_escape_key_stops_wherever_the_focus_is_and_a_pulled_plug_is_named_first()
     hall.pull(1);
     let took = browser.reads("warnings", "B1");
     browser.wait("document.querySelector('[data-controller=B1]').classList.contains('look-bad')");
-    browser.wait("!document.getElementById('gravest').hidden"); // the list itself is scrolled away
+    browser.reads("gravest", "B1"); // the list itself is scrolled away
+    browser.wait("!document.getElementById('gravest').hidden");
     browser.shot("10-plug-pulled");
     assert!(took < Duration::from_secs(3), "{took:?}");
 

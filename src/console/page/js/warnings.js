@@ -42,12 +42,15 @@ export function showWarnings(status) {
   setText(byId('warnings-more'), all ? 'Only the gravest' : `Show ${warnings.length - FIRST} more`);
   const shown = all ? warnings : warnings.slice(0, FIRST);
   layOut(shown.map(({ id, severity, controller }) => ({ id, severity, controller })));
-  for (const [index, { text, remedy }] of shown.entries()) {
-    setText(lines[index].text, ` ${sentence(text)}`);
-    setText(lines[index].remedy, sentence(remedy));
+  for (const [index, warning] of shown.entries()) {
+    setText(lines[index].text, ` ${matter(warning)}`);
+    setText(lines[index].remedy, sentence(warning.remedy));
   }
   showGravest(warnings);
 }
+
+/** What is the matter, beginning with whose it is. */
+const matter = ({ controller, text }) => (controller ? `${controller}: ${text}` : sentence(text));
 
 function showGravest(warnings) {
   const grave = warnings.filter(({ severity }) => severity !== 'info');
@@ -57,7 +60,7 @@ function showGravest(warnings) {
   const { look, mark: name, word } = SEVERITIES[grave[0].severity] ?? SEVERITIES.warning;
   setProperty(byId('gravest'), 'className', `gravest live look-${look}`);
   showMark(name);
-  setText(byId('gravest-words'), `${word}: ${grave[0].text}`);
+  setText(byId('gravest-words'), `${word}: ${matter(grave[0])}`);
   setText(byId('gravest-more'), grave.length > 1 ? `and ${grave.length - 1} more` : '');
 }
 
