@@ -22,7 +22,9 @@ use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
-use crate::rt::{AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Planning, Watch, mailboxes};
+use crate::rt::{
+    AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Planning, Watch, mailboxes,
+};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -226,8 +228,7 @@ impl Play {
         };
         let attended = lead(Reins { commands, news });
         let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
-        let about =
-            About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
+        let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
         Ok(sum_up(about, &self.config.controllers, &prepared, &run))
     }
 }

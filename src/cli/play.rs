@@ -109,13 +109,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// Plays what is proved to fit, and prints the report.
-fn play(
-    config: Config,
-    timeline: Timeline,
-    show: Show,
-    manner: Manner,
-    json: bool,
-) -> Result<Exit, Failure> {
+fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bool) -> Result<Exit, Failure> {
     let cue = timeline.cue().path().to_path_buf();
     let length = timeline.duration();
     let for_ever = show.plays == 0;

@@ -24,8 +24,8 @@ use crate::net::{DrainGrid, NetError};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Command, Conductor, Desk, Line, Live, MailEnds, News, Order, PlanLoop,
-    Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Command, Conductor, Desk, Line, Live, MailEnds, News, Order, PlanLoop, Planning, Spinning,
+    Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -216,7 +216,10 @@ impl House {
             let numbers = addresses.zip(ticks.lanes.iter().map(next)).collect();
             let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
             let spun = clock.spun();
-            Ok(Closed { run: Run { ended, accounts, granted, spun, refusals, clamps, origin, closed_at }, numbers })
+            Ok(Closed {
+                run: Run { ended, accounts, granted, spun, refusals, clamps, origin, closed_at },
+                numbers,
+            })
         })
     }
 }

@@ -18,9 +18,9 @@ mod warnings;
 
 pub use voice::Voice;
 
-use std::sync::Arc;
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
@@ -278,7 +278,7 @@ impl Keeper {
             if Monotonic.now() >= until {
                 return Err(known::no_answer(ANSWER));
             }
-            std::thread::sleep(Duration::from_micros(200));
+            Monotonic.sleep_until(Monotonic.now() + Duration::from_micros(200));
         }
     }
 
