@@ -272,7 +272,7 @@ fn a_cue_that_does_not_pass_is_told_with_every_fault() {
 #[test]
 fn the_library_and_the_playlist_are_listed() {
     let cues = json!([{"id": "coaster", "title": "Coaster", "length_s": 60.0, "axes": 3, "effects": ["air"], "size": 9,
-        "sha256": null, "proved": {"state": "passed"}}]);
+        "sha256": null, "proof": {"state": "passed"}}]);
     let run = Daemon::start(move |_, _| Answer::Reply(200, cues.clone())).run(&["cues"]);
     assert!(squeezed(&run.stdout).contains("coaster Coaster 01:00.000 3 air passed"), "{run:?}");
     let mut status = hall("parked");

@@ -60,7 +60,7 @@ struct Cue {
     length_s: Option<f64>,
     axes: Option<usize>,
     effects: Vec<String>,
-    proved: Proved,
+    proof: Proved,
 }
 
 /// Whether it keeps the limits of the hall.
@@ -99,7 +99,7 @@ impl Cue {
             or(self.length_s.map(view::time)),
             or(self.axes.map(|axes| axes.to_string())),
             self.effects.join(" "),
-            self.proved.state.clone(),
+            self.proof.state.clone(),
         ]
     }
 }
