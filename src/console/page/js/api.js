@@ -5,6 +5,14 @@ import { askForAnother, askForToken, token } from './token.js';
 
 const PATIENCE_MS = 65_000; // the hall may take 60 s over a cue of two hours
 const ROOT = '/api/v1/';
+/**
+ * Changes under way at once at the most. A browser has six connections to a server, the stream of statuses has one: of the
+ * rest some must always be free for STOP.
+ */
+const CHANGES = 3;
+
+let changing = 0;
+let reading = Promise.resolve();
 
 /** Why something was not done, as the server or the browser says. */
 export class Problem extends Error {
@@ -32,11 +40,30 @@ export function key() {
   return Array.from(octets, (octet) => octet.toString(16).padStart(2, '0')).join('');
 }
 
-/** Reads. */
-export const get = (path, patience = PATIENCE_MS) => request('GET', path, undefined, {}, patience);
+/** Reads, one after the other. */
+export function get(path) {
+  const reply = reading.then(() => request('GET', path, undefined, {}, PATIENCE_MS));
+  reading = reply.catch(() => {});
+  return reply;
+}
 
 /** Asks for a change; the reply is the status that it led to. */
-export function change(method, path, body = {}, { repeatOf = key(), patience = PATIENCE_MS } = {}) {
+export async function change(method, path, body = {}) {
+  if (changing >= CHANGES) {
+    throw new Problem({ detail: `${CHANGES} things are under way already`, remedy: 'wait until they are done' });
+  }
+  changing += 1;
+  try {
+    return await send(method, path, body, key(), PATIENCE_MS);
+  } finally {
+    changing -= 1;
+  }
+}
+
+/** Sends a stop, which waits behind nothing. Repeats of one have the same key: the server does it once. */
+export const sendStop = (repeatOf, patience) => send('POST', 'show/stop', {}, repeatOf, patience);
+
+function send(method, path, body, repeatOf, patience) {
   const more = {
     'Content-Type': 'application/json',
     'Idempotency-Key': repeatOf,

@@ -2,7 +2,7 @@
 // server. It is never asked twice whether it is meant. A script of its own, so that a fault elsewhere in the page leaves it be.
 
 import { byId, setProperty, setText } from './dom.js';
-import { change, key } from './api.js';
+import { key, sendStop } from './api.js';
 import { hall, linkState, watch } from './state.js';
 
 const TRIES = 4;
@@ -37,7 +37,7 @@ async function stop() {
   let problem = null;
   for (let attempt = 0; attempt < TRIES; attempt += 1) {
     try {
-      const status = await change('POST', 'show/stop', {}, { repeatOf, patience: PATIENCE_MS });
+      const status = await sendStop(repeatOf, PATIENCE_MS);
       problem = null;
       tell(`STOP was received: the hall is ${status.state ?? 'stopping'}. ${sentenceOf(status.next)}`, 'received');
       break;
