@@ -13,7 +13,8 @@ use kinocue::engine::{Ending, Rate, Show, TickGrid};
 use kinocue::fanout::{Lane, Manner};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Planning, Sent, Task, TickLoop, TickReport, mailboxes,
+    Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Planning, Sent, Task, TickLoop, TickReport,
+    mailboxes,
 };
 use kinocue::time::{Clock, MonoTime, ShowTime};
 use kinocue::timeline::Timeline;
@@ -60,8 +61,7 @@ impl Run {
         let (engine, lanes, planner, timeline) = staged.split();
         let lanes: Vec<Lane> = lanes.into_iter().map(|lane| lane.starting_at(self.first)).collect();
         let live = Arc::new(Live::default());
-        let (mail, MailEnds { sent, ticks, tasks, answers, .. }) =
-            mailboxes(1, rate, Arc::clone(&live));
+        let (mail, MailEnds { sent, ticks, tasks, answers, .. }) = mailboxes(1, rate, Arc::clone(&live));
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let stop = AtomicBool::new(false);
         let books = Books { sent, ticks, tracker: Tracker::starting_at(&[self.first], 1) };

@@ -42,7 +42,7 @@ fn files(pattern: &str) -> Vec<PathBuf> {
     let (folder, name) = pattern.rsplit_once('/').unwrap_or((".", pattern));
     let Some((front, back)) = name.split_once('*') else { return vec![root().join(pattern)] };
     let entries = fs::read_dir(root().join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
-    let paths = entries.map(|entry| entry.unwrap().path());
+    let paths = entries.map(|entry| entry.expect("the folder can be read").path());
     let fits = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         path.is_file() && name.starts_with(front) && name.ends_with(back)

@@ -162,9 +162,7 @@ impl Drop for Running {
 pub fn start(setup: Setup) -> Result<Running, ApiError> {
     let Setup { config, socket, handle, library, playlists, journal, pages, log } = setup;
     let (local, file) = socket::unix(&socket)?;
-    let tcp = config.listen.iter().map(|&address| port(address)).collect::<Result<Vec<_>, _>>()?;
-    let addresses: Vec<_> =
-        tcp.iter().map(TcpListener::local_addr).collect::<Result<_, _>>().map_err(ApiError::System)?;
+    let (tcp, addresses) = ports(&config.listen)?;
     let (closing, closed) = watch::channel(false);
     let (router, document) = routes::routes();
     let shared = Shared {
@@ -226,6 +224,13 @@ fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Ro
         let _ = tokio::time::timeout(LAST_WORDS, all_gone.recv()).await;
     });
     runtime.shutdown_timeout(LAST_WORDS);
+}
+
+/// Listens on all of them, and says where that is, with the ports that the system chose.
+fn ports(addresses: &[SocketAddr]) -> Result<(Vec<TcpListener>, Vec<SocketAddr>), ApiError> {
+    let listeners = addresses.iter().map(|&address| port(address)).collect::<Result<Vec<_>, _>>()?;
+    let bound = listeners.iter().map(TcpListener::local_addr).collect::<Result<_, _>>();
+    Ok((listeners, bound.map_err(ApiError::System)?))
 }
 
 fn port(address: SocketAddr) -> Result<TcpListener, ApiError> {

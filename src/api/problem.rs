@@ -57,7 +57,7 @@ impl<'p> From<&'p Status> for Hall<'p> {
 }
 
 impl IntoResponse for Problem {
-    /// A reply without its body, which [`render`] gives it.
+    /// A reply without its body, which `render` gives it.
     fn into_response(self) -> Response {
         let mut response = StatusCode::INTERNAL_SERVER_ERROR.into_response();
         response.extensions_mut().insert(self);

@@ -68,12 +68,17 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(cues::one, cues::upload))
         .routes(routes!(cues::curve))
         .routes(routes!(reports::one));
-    let (router, mut document) = router.split_for_parts();
+    let (router, document) = router.split_for_parts();
+    (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), completed(document))
+}
+
+/// Adds what holds of every route.
+fn completed(mut document: OpenApi) -> OpenApi {
     document.paths.paths.values_mut().for_each(describe);
     let token = SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer));
     document.components.get_or_insert_default().add_security_scheme("token", token);
     document.security = Some(vec![SecurityRequirement::new("token", [""; 0])]);
-    (router.fallback(service::page).method_not_allowed_fallback(service::wrong_method), document)
+    document
 }
 
 /// The whole: routes behind the gate.
@@ -81,7 +86,6 @@ pub(super) fn guarded(router: axum::Router<Arc<Shared>>, shared: Arc<Shared>) ->
     router.layer(from_fn_with_state(Arc::clone(&shared), gate::gate)).with_state(shared)
 }
 
-/// Adds what holds of every path.
 fn describe(path: &mut PathItem) {
     let changes = [&mut path.post, &mut path.put].into_iter().flatten();
     changes.for_each(|operation| {

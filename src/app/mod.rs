@@ -5,6 +5,7 @@ pub mod keeper;
 mod play;
 mod prepare;
 mod report;
+mod run;
 pub mod serve;
 mod stage;
 pub mod staged;
@@ -15,4 +16,5 @@ pub use play::{Control, Play, PlayError, Played, Reins};
 pub use report::{
     ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, SpinReport, StateReport,
 };
+pub use run::Run;
 pub use staged::Staged;

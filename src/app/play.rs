@@ -12,7 +12,7 @@ use super::prepare::Preparation;
 use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
-use super::sum_up::sum_up;
+use super::sum_up::{About, sum_up};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::{Rate, Show};
@@ -22,7 +22,9 @@ use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
-use crate::rt::{AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Planning, Watch, mailboxes};
+use crate::rt::{
+    AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Planning, Watch, mailboxes,
+};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::timeline::Timeline;
@@ -226,7 +228,8 @@ impl Play {
         };
         let attended = lead(Reins { commands, news });
         let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
-        Ok(sum_up(cue, &self.config.controllers, &show, self.manner.silent, &prepared, &run))
+        let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
+        Ok(sum_up(about, &self.config.controllers, &prepared, &run))
     }
 }
 

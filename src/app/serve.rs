@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::io;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::channel;
@@ -12,14 +13,17 @@ use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use super::house::{House, HouseError, Numbers, Reins};
+use super::house::{Closed, House, HouseError, Numbers, Reins};
 use super::keeper::{Ends, Keeper, Left, Memory, Signals, Voice};
+use super::play::Played;
+use super::prepare::Prepared;
+use super::sum_up::{About, sum_up};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
-use crate::config::Config;
-use crate::engine::Rate;
 use crate::api::Pages;
-use crate::hall::{Status, handle};
-use crate::journal::{Journal, Limits};
+use crate::config::Config;
+use crate::engine::{Ending, Rate};
+use crate::hall::{Handle, Status, handle};
+use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
@@ -83,42 +87,81 @@ impl Mark {
     }
 }
 
-/// Runs the daemon until it is told to end. `tell` writes a line for people where there is no journal; `pages` is the console.
+/// What a daemon is made of.
+#[derive(Debug)]
+pub struct Parts {
+    /// Its first configuration.
+    pub config: Config,
+    /// Where it has its files.
+    pub places: Places,
+    /// The console.
+    pub pages: Pages,
+    /// What tells it to end, and to read its configuration anew.
+    pub signals: Signals,
+    /// Where it says what happens.
+    pub log: Log,
+}
+
+/// What a daemon came to.
+#[derive(Debug)]
+pub struct Served {
+    config: Arc<Config>,
+    closed: Box<Closed>,
+    ended: journal::Ending,
+}
+
+impl Served {
+    /// Sums it up as a play of `cue`: all that was sent since the configuration was last read, with the end of the last show.
+    #[must_use]
+    pub fn sum_up(self, cue: String) -> Played {
+        let Self { config, closed, ended } = self;
+        let ending = match ended {
+            journal::Ending::Completed => Ending::Completed,
+            journal::Ending::Stopped => Ending::Stopped,
+            journal::Ending::Fault => Ending::Fault,
+        };
+        let about = About { cue, rate: Rate::from_hz(config.show.rate_hz), ending, silent: false };
+        // A hall brings its seats to park by frames like any other.
+        let prepared = Prepared::nothing(config.controllers.len());
+        sum_up(about, &config.controllers, &prepared, &closed.run)
+    }
+}
+
+/// Runs the daemon until it is told to end. Once all surfaces are open, and before the first tick, `up` gets the way to the
+/// hall, and where the API listens over TCP.
 ///
 /// # Errors
 /// [`ServeError`]; nothing has moved then, or all of it is parked or at rest.
 ///
 /// # Panics
 /// Where one of its threads panicked.
-pub fn serve(
-    config: Config,
-    places: &Places,
-    pages: Pages,
-    tell: impl FnMut(&str) + Send + 'static,
-) -> Result<(), ServeError> {
+pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
+    let Parts { config, places, pages, signals, log } = parts;
     let mut config = Arc::new(config);
-    let signals = signals().map_err(ServeError::System)?;
     let (mark, crashed) = Mark::leave(&places.state)?;
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new())?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
-    let log = Log::start(tell).map_err(ServeError::System)?;
     let voice = Voice::new(log.clone());
-    let mut ends = Ends { inbox, source, config: places.config.clone(), signals, voice, memory: Memory::default() };
+    let mut ends = Ends { inbox, source, config: places.config, signals, voice, memory: Memory::default() };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
+    up(handle, surfaces.addresses());
     let mut feeder = None;
-    loop {
+    let served = loop {
         let left = keep(house, ends, library.clone(), journal, &mut feeder)?;
-        let Some(next) = left.reload else { break };
+        let Some(next) = left.reload else {
+            break Served { config, closed: left.closed, ended: left.ended };
+        };
         // The seats are parked or at rest, so nothing tells of a crash.
         config = next;
         house = House::open(Arc::clone(&config), false, &left.closed.numbers)?;
         (ends, journal) = (left.ends, left.journal);
-    }
+    };
     surfaces.close();
     log.close();
-    mark.take_away()
+    mark.take_away()?;
+    Ok(served)
 }
 
 /// Runs one hall on this thread, with a keeper beside it.
@@ -165,11 +208,15 @@ fn feed_watchdog(reins: &Reins) -> Option<Feeder> {
     sd::watchdog().and_then(|interval| Feeder::start(interval, period, move || live.pulse()).ok())
 }
 
-fn signals() -> io::Result<Signals> {
+/// The signals of a service: SIGTERM and SIGINT end it, SIGHUP has it read its configuration anew.
+///
+/// # Errors
+/// [`ServeError::System`] where they cannot be handled.
+pub fn signals() -> Result<Signals, ServeError> {
     let signals = Signals::default();
-    for signal in [SIGTERM, SIGINT] {
-        flag::register(signal, Arc::clone(&signals.leave))?;
-    }
-    flag::register(SIGHUP, Arc::clone(&signals.reload))?;
+    let on = |signal, flag: &Arc<_>| flag::register(signal, Arc::clone(flag)).map_err(ServeError::System);
+    on(SIGTERM, &signals.leave)?;
+    on(SIGINT, &signals.leave)?;
+    on(SIGHUP, &signals.reload)?;
     Ok(signals)
 }

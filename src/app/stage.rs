@@ -6,15 +6,14 @@ use std::thread::{self, Builder};
 use std::time::Duration;
 
 use super::play::Control;
+use super::run::Run;
 use crate::engine::{Engine, Rate, TickGrid};
 use crate::fanout::Lane;
-use crate::gate::Counts;
 use crate::net::{DrainGrid, Sender};
-use crate::plan::PlanError;
-use crate::rt::{Accounts, AckLoop, Conductor, Ended, Mail, PlanLoop, Spinning, Spun, TickLoop};
+use crate::rt::{AckLoop, Conductor, Mail, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime::{self, RealTime};
-use crate::time::{Clock, MonoTime};
+use crate::sys::realtime;
+use crate::time::Clock;
 
 /// From the end of preparing to tick 0: time to start the other threads.
 const RUN_UP: Duration = Duration::from_millis(20);
@@ -30,28 +29,6 @@ pub(super) struct Stage {
     pub(super) lanes: Vec<Lane>,
     pub(super) sender: Sender,
     pub(super) mail: Mail,
-}
-
-/// What the threads of a play came back with.
-pub(super) struct Run {
-    pub(super) ended: Ended,
-    pub(super) accounts: Accounts,
-    pub(super) granted: RealTime,
-    pub(super) spun: Spun,
-    pub(super) refusals: Vec<PlanError>,
-    /// What the last gate had to do, lane by lane.
-    pub(super) clamps: Vec<Counts>,
-    /// The instant of tick 0.
-    pub(super) origin: MonoTime,
-    /// The instant at which the accounts were closed.
-    pub(super) closed_at: MonoTime,
-}
-
-impl Run {
-    /// Seconds from tick 0, below zero before it.
-    pub(super) fn seconds_from_origin(&self, at: MonoTime) -> f64 {
-        at.since(self.origin).as_secs_f64() - self.origin.since(at).as_secs_f64()
-    }
 }
 
 impl Stage {

@@ -3,9 +3,9 @@
 use super::play::Played;
 use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
-use super::stage::Run;
+use super::run::Run;
 use crate::config::Controller;
-use crate::engine::{Ending, Show};
+use crate::engine::{Ending, Rate};
 use crate::gate::Clamp;
 use crate::health::Groups;
 
@@ -30,25 +30,30 @@ fn events(controllers: &[Controller], run: &Run) -> Vec<EventReport> {
     events
 }
 
-/// Sums up a play of these controllers, whose accounts are closed; `silent` where no frame asked for a reply.
-pub(super) fn sum_up(
-    cue: String,
-    controllers: &[Controller],
-    show: &Show,
-    silent: bool,
-    prepared: &Prepared,
-    run: &Run,
-) -> Played {
+/// What is summed up.
+pub(super) struct About {
+    /// What was played, as people know it.
+    pub(super) cue: String,
+    pub(super) rate: Rate,
+    /// How it ended.
+    pub(super) ending: Ending,
+    /// Whether no frame asked for a reply.
+    pub(super) silent: bool,
+}
+
+/// Sums up what was played to these controllers, whose accounts are closed.
+pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepared, run: &Run) -> Played {
+    let About { cue, rate, ending, silent } = about;
     let report = Report {
         cue,
-        result: match run.ended.ending {
+        result: match ending {
             Ending::Completed => "completed",
             Ending::Stopped => "stopped",
             Ending::Fault => "fault",
         },
         ticks: run.ended.ticks,
         missed_ticks: run.ended.missed,
-        rate_hz: show.rate.hz(),
+        rate_hz: rate.hz(),
         lateness_us: LatencyReport::of(&run.accounts.lateness),
         realtime: RealTimeReport::of(&run.granted, run.spun),
         strangers: run.accounts.strangers,

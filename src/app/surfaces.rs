@@ -84,12 +84,10 @@ impl Surfaces {
             pages,
             log: log.clone(),
         })?;
-        for address in api.addresses() {
-            log.say(Line::new(Priority::Info, "listening", format!("the API and the console: http://{address}/")));
-        }
         let osc = config.osc.as_ref().map(|osc| osc::open(osc, handle.clone())).transpose()?;
         let text = config.text.as_ref().map(|text| text_port::open(text, handle.clone())).transpose()?;
-        let ports = if osc.is_some() || text.is_some() { Some(Ports::start(osc, text, log.clone())?) } else { None };
+        let ports =
+            if osc.is_some() || text.is_some() { Some(Ports::start(osc, text, log.clone())?) } else { None };
         Ok(Self { ports, api, stop })
     }
 
@@ -120,12 +118,18 @@ impl Ports {
                     log.say(Line::new(Priority::Error, "port", text));
                 };
                 let osc = async {
-                    if let Some(Err(error)) = match osc { Some(osc) => Some(osc.serve().await), None => None } {
+                    if let Some(Err(error)) = match osc {
+                        Some(osc) => Some(osc.serve().await),
+                        None => None,
+                    } {
                         fail("OSC", error);
                     }
                 };
                 let text = async {
-                    if let Some(Err(error)) = match text { Some(text) => Some(text.serve().await), None => None } {
+                    if let Some(Err(error)) = match text {
+                        Some(text) => Some(text.serve().await),
+                        None => None,
+                    } {
                         fail("text", error);
                     }
                 };

@@ -40,7 +40,7 @@ pub(super) struct Args {
     /// Nobody sits on the seats and nothing lies on or under them: do not ask.
     #[arg(long)]
     seats_empty: bool,
-    /// How long each may take, seconds, 1 to 3600.
+    /// How long each may take, seconds, 1 to 3600; the daemon has its own limit.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     timeout: u64,
     #[command(flatten)]

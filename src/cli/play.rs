@@ -108,14 +108,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     play(config, timeline, show, manner, args.json)
 }
 
-/// Plays what is proved to fit, and prints the report; `demo` does the same with controllers of its own.
-pub(super) fn play(
-    config: Config,
-    timeline: Timeline,
-    show: Show,
-    manner: Manner,
-    json: bool,
-) -> Result<Exit, Failure> {
+/// Plays what is proved to fit, and prints the report.
+fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bool) -> Result<Exit, Failure> {
     let cue = timeline.cue().path().to_path_buf();
     let length = timeline.duration();
     let for_ever = show.plays == 0;
@@ -222,7 +216,8 @@ pub(super) fn leave_on_signals(leave: &Arc<AtomicBool>) -> std::io::Result<CtrlC
     Ok(ctrl_c)
 }
 
-fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
+/// Prints the report, and says how the program ends; `demo` does the same.
+pub(super) fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
     for line in played.refusals.iter().chain(&played.notes) {
         print::tell(&format!("kinocue: {line}"));
     }

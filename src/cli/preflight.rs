@@ -75,6 +75,11 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     if !args.targets.are_named() {
         args.targets.refuse_choice(&args.names)?;
+        if args.cue.is_some() || args.rate.is_some() {
+            let why = "the daemon checks for what it has loaded, at its own rate; leave --cue and --rate out, or name \
+                       controllers with --to or --config";
+            return Err(anyhow!(why)).or_exit(Exit::Usage);
+        }
         return client::preflight(&args.server);
     }
     let cue =

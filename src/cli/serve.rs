@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::house::HouseError;
-use crate::app::serve::{Places, ServeError, serve};
+use crate::app::serve::{Parts, Places, ServeError, serve, signals};
 use crate::app::surfaces::Sockets;
-use crate::{config, console};
+use crate::log::{Line, Log, Priority};
 use crate::net::NetError;
+use crate::{config, console};
 
 /// Runs a hall: keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
 ///
@@ -45,13 +46,15 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let sockets =
         Sockets { control: args.socket.clone(), stop: args.stop_socket.clone().unwrap_or_else(beside) };
     let places = Places { config: args.config.clone(), state: args.state.clone(), sockets };
-    serve(config, &places, pages, print::tell)?;
+    let log = Log::start(print::tell).or_exit(Exit::System)?;
+    let parts = Parts { config, places, pages: console::page, signals: signals()?, log: log.clone() };
+    serve(parts, |_, addresses| {
+        for address in addresses {
+            let text = format!("the API and the console: http://{address}/");
+            log.say(Line::new(Priority::Info, "listening", text));
+        }
+    })?;
     Ok(Exit::Done)
-}
-
-/// The console, as the API takes it.
-fn pages(path: &str) -> Option<(&'static str, &'static [u8])> {
-    console::asset(path).map(|asset| (asset.content_type, asset.body))
 }
 
 impl From<ServeError> for Failure {

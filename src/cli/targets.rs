@@ -61,13 +61,14 @@ impl TargetArgs {
         self.config.is_some() || !self.to.is_empty()
     }
 
-    /// Wrong use where some are chosen of a hall that is the daemon's: that does all or none.
+    /// Wrong use where some are chosen, or a port is, of a hall that is the daemon's: that does all or none, by its own.
     pub(super) fn refuse_choice(&self, names: &[String]) -> Result<(), Failure> {
-        let Some(name) = names.first() else { return Ok(()) };
-        let why = anyhow!(
-            "the daemon does this for its whole hall; name {name} with --to or --config, or leave it out"
-        );
-        Err(why).or_exit(Exit::Usage)
+        if names.is_empty() && self.bind.is_none() {
+            return Ok(());
+        }
+        let why = "the daemon does this for its whole hall, by its own frame port; leave names and --bind out, or name \
+                   controllers with --to or --config";
+        Err(anyhow!(why)).or_exit(Exit::Usage)
     }
 
     /// Whether a configuration names them.

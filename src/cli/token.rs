@@ -56,12 +56,13 @@ impl From<RoleArg> for Role {
 
 /// What was made.
 #[derive(Debug, Serialize)]
-struct Token<'n> {
+pub(super) struct Token<'n> {
     name: &'n str,
     role: Role,
-    token: String,
+    pub(super) token: String,
     sha256: String,
-    config: String,
+    /// Its lines of the configuration.
+    pub(super) config: String,
 }
 
 fn parse_name(name: &str) -> Result<String, String> {
@@ -74,7 +75,7 @@ fn parse_name(name: &str) -> Result<String, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let token = Token::of(&args.name, args.role.into(), &chance().or_exit(Exit::System)?);
+    let token = Token::new(&args.name, args.role.into()).or_exit(Exit::System)?;
     if args.json {
         print::json(&token)?;
     } else {
@@ -94,6 +95,14 @@ fn chance() -> io::Result<[u8; OCTETS]> {
 }
 
 impl<'n> Token<'n> {
+    /// One that nobody guesses.
+    ///
+    /// # Errors
+    /// Where the kernel gives no chance.
+    pub(super) fn new(name: &'n str, role: Role) -> io::Result<Self> {
+        Ok(Self::of(name, role, &chance()?))
+    }
+
     fn of(name: &'n str, role: Role, octets: &[u8; OCTETS]) -> Self {
         let token = URL_SAFE_NO_PAD.encode(octets);
         let sha256: String = Sha256::digest(&token).iter().map(|octet| format!("{octet:02x}")).collect();

@@ -72,3 +72,9 @@ pub fn asset(path: &str) -> Option<Asset> {
     let path = if path == "/" { "/index.html" } else { path };
     PAGE.iter().chain(VENDOR).find(|(at, _)| *at == path).map(|(_, asset)| *asset)
 }
+
+/// The content type and the octets of what is at a path, as a server hands them out.
+#[must_use]
+pub fn page(path: &str) -> Option<(&'static str, &'static [u8])> {
+    asset(path).map(|asset| (asset.content_type, asset.body))
+}

@@ -17,7 +17,9 @@ fn between<'t>(text: &'t str, before: &str, after: &str) -> Vec<&'t str> {
 }
 
 fn ours(content_type: &str) -> impl Iterator<Item = (&'static str, &'static str)> {
-    PAGE.iter().filter(move |(_, asset)| asset.content_type == content_type).map(|(path, asset)| (*path, text(asset)))
+    PAGE.iter()
+        .filter(move |(_, asset)| asset.content_type == content_type)
+        .map(|(path, asset)| (*path, text(asset)))
 }
 
 #[test]
@@ -25,7 +27,17 @@ fn the_page_is_at_the_root_and_nothing_is_beside_it() {
     assert_eq!(asset("/").unwrap().content_type, HTML);
     assert_eq!(asset("/"), asset("/index.html"));
     assert_eq!(asset("/js/main.js").unwrap().content_type, JS);
-    for nothing in ["", "/js", "/js/", "/../mod.rs", "/tests.rs", "/vendor/README.md", "//", "/INDEX.HTML", "/style.css?x"] {
+    for nothing in [
+        "",
+        "/js",
+        "/js/",
+        "/../mod.rs",
+        "/tests.rs",
+        "/vendor/README.md",
+        "//",
+        "/INDEX.HTML",
+        "/style.css?x",
+    ] {
         assert_eq!(asset(nothing), None, "{nothing}");
     }
 }
@@ -72,7 +84,9 @@ fn every_element_that_a_script_asks_for_is_on_the_page() {
             assert!(ids.contains(id), "{path} asks for {id}");
         }
     }
-    for id in between(html, "data-reply=\"", "\"").into_iter().chain(between(html, "aria-labelledby=\"", "\"")) {
+    for id in
+        between(html, "data-reply=\"", "\"").into_iter().chain(between(html, "aria-labelledby=\"", "\""))
+    {
         assert!(ids.contains(id), "there is no {id}");
     }
 }
@@ -95,12 +109,21 @@ fn nothing_refers_to_another_origin() {
 fn nothing_is_inline_and_no_data_becomes_markup() {
     for (path, html) in ours(HTML) {
         assert!(!html.contains("<style") && !html.contains("style=\""), "{path}");
-        let handler = |after: &&str| after.trim_start_matches(|c: char| c.is_ascii_lowercase()).starts_with('=');
+        let handler =
+            |after: &&str| after.trim_start_matches(|c: char| c.is_ascii_lowercase()).starts_with('=');
         assert_eq!(html.split(" on").skip(1).find(handler), None, "{path}");
         assert!(between(html, "<script", ">").iter().all(|script| script.contains(" src=\"/")), "{path}");
     }
     for (path, js) in ours(JS) {
-        for word in ["innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function", "cssText"] {
+        for word in [
+            "innerHTML",
+            "outerHTML",
+            "insertAdjacentHTML",
+            "document.write",
+            "eval(",
+            "new Function",
+            "cssText",
+        ] {
             assert!(!js.contains(word), "{path} holds {word}");
         }
     }

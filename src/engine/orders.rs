@@ -124,7 +124,9 @@ impl Engine {
             self.stamps.break_off();
         } else if self.phase == Phase::Resting(Rest::Stopped) && self.switch.is_none() {
             rider.come_back(pose);
-        } else if matches!(self.phase, Phase::Waiting | Phase::Done) && !is_at(&rider.window, &pose, rider.pose()) {
+        } else if matches!(self.phase, Phase::Waiting | Phase::Done)
+            && !is_at(&rider.window, &pose, rider.pose())
+        {
             // Somebody moved it, or it was homed.
             rider.come_back(pose);
         }

@@ -32,6 +32,8 @@ pub enum Surface {
     Schedule,
     /// A signal to the process.
     Signal,
+    /// The program by itself, as it does in `kinocue demo`.
+    Program,
 }
 
 /// Who asks: for the journal, and for what they may do.
@@ -64,6 +66,7 @@ impl fmt::Display for Who {
             Surface::Text => "text",
             Surface::Schedule => "schedule",
             Surface::Signal => "signal",
+            Surface::Program => "program",
         };
         write!(f, "{} ({surface}, {})", self.name, self.role)
     }

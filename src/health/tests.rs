@@ -333,6 +333,7 @@ fn with_no_frames_on_their_way_a_controller_is_lost_that_answers_no_beat() {
     };
     beats(&mut hall, true);
     assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    hall.silence(&[2]);
     beats(&mut hall, false);
     assert_eq!(hall.standings(), [Standing::Ok, Standing::Lost, Standing::Ok]);
 }

@@ -172,7 +172,8 @@ impl AckLoop {
                     books.on_reply(reply, &mut records);
                 }
                 Err(_) if observer.hear(controller, octets, at) => {}
-                Err(_) if watch.as_mut().is_some_and(|watch| hear(watch, observer, controller, octets, at)) => {}
+                Err(_)
+                    if watch.as_mut().is_some_and(|watch| hear(watch, observer, controller, octets, at)) => {}
                 Err(_) if other(controller, octets) => {}
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
@@ -212,13 +213,7 @@ impl AckLoop {
 }
 
 /// Has the watch hear what is no reply to a frame; says whether it was an answer to something asked.
-fn hear(
-    watch: &mut Watch,
-    observer: &mut Observer,
-    controller: usize,
-    octets: &[u8],
-    at: MonoTime,
-) -> bool {
+fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &[u8], at: MonoTime) -> bool {
     // One answer may be waited for by several.
     let beat = watch.hear_beat(controller, octets, at);
     if let Some(positions) = beat {

@@ -142,10 +142,12 @@ impl Looker {
 
     /// Whether a seat in that pose stands at park, to a pulse.
     pub(super) fn is_parked(&self, pose: &Pose) -> bool {
-        (0..self.seat.axes).map(|axis| self.first_slot + axis).take_while(|slot| *slot < MAX_AXES).all(|slot| {
-            let apart = self.seat.pulses(pose[slot]).0.abs_diff(self.seat.pulses(self.park[slot]).0);
-            apart <= 1
-        })
+        (0..self.seat.axes).map(|axis| self.first_slot + axis).take_while(|slot| *slot < MAX_AXES).all(
+            |slot| {
+                let apart = self.seat.pulses(pose[slot]).0.abs_diff(self.seat.pulses(self.park[slot]).0);
+                apart <= 1
+            },
+        )
     }
 
     /// Axes past the sixth have no position register: they count as parked.

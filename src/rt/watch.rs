@@ -283,7 +283,9 @@ impl Watch {
         }
         // A group that was found at park is where the others are.
         for group in 0..health.groups().len() {
-            if health.standing(group) == Standing::Rejoining && standby.is_at_park(health.groups().members(group)) {
+            if health.standing(group) == Standing::Rejoining
+                && standby.is_at_park(health.groups().members(group))
+            {
                 health.on_joined(group);
             }
         }

@@ -19,12 +19,11 @@ mod tests;
 use std::convert::Infallible;
 use std::io;
 use std::net::{SocketAddr, SocketAddrV4, TcpListener};
-use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::TcpStream;
-use tokio::sync::Semaphore;
+use tokio::task::JoinSet;
 
 use crate::config::TextPort;
 use crate::hall::{Code, Handle, Problem, Role, Surface, Who};
@@ -80,14 +79,15 @@ impl Text {
         self.listener.local_addr()
     }
 
-    /// Serves the port until its future is dropped; connections outlive it by one line at the most. To be awaited within
-    /// a tokio runtime with time and network.
+    /// Serves the port, and its connections, until its future is dropped. To be awaited within a tokio runtime with time
+    /// and network.
     ///
     /// # Errors
     /// Where the socket cannot be served; it never ends otherwise.
     pub async fn serve(self) -> io::Result<Infallible> {
-        let listener = tokio::net::TcpListener::from_std(self.listener)?;
-        let room = Arc::new(Semaphore::new(CONNECTIONS));
+        let Self { listener, config, hall, idle } = self;
+        let listener = tokio::net::TcpListener::from_std(listener)?;
+        let mut talks = JoinSet::new();
         loop {
             let Ok((stream, from)) = listener.accept().await else {
                 // Too many files are open, or the peer left at once.
@@ -95,19 +95,17 @@ impl Text {
                 continue;
             };
             let SocketAddr::V4(from) = from else { continue };
-            if !self.config.sources.contains(from.ip()) {
+            if !config.sources.contains(from.ip()) {
                 continue; // no word to strangers
             }
-            let Ok(place) = Arc::clone(&room).try_acquire_owned() else {
+            while talks.try_join_next().is_some() {} // those that are over make room
+            if talks.len() >= CONNECTIONS {
                 tokio::spawn(turn_away(stream));
                 continue;
-            };
+            }
             let who = Who { role: Role::Operate, surface: Surface::Text, name: from.ip().to_string() };
-            let talk = Talk { hall: self.hall.clone(), who, idle: self.idle };
-            tokio::spawn(async move {
-                talk.run(stream).await;
-                drop(place);
-            });
+            let talk = Talk { hall: hall.clone(), who, idle };
+            talks.spawn(async move { talk.run(stream).await });
         }
     }
 }

@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use tokio::time::timeout;
 
 use super::line::{Order, order};
-use crate::hall::{Ask, Code, Handle, Posted, Problem, Status, Who};
+use crate::hall::{Code, Handle, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
 /// Octets of a line at the most, its end included.
@@ -76,18 +76,13 @@ impl Talk {
     fn take(&self, line: &[u8]) -> Read {
         match order(line) {
             Ok(Order::Status) => Read::Answered(Ok(self.hall.status())),
-            Ok(Order::Ask(ask)) => self.ask(ask),
+            // A stop is done with this; its answer is for the journal and the peer.
+            Ok(Order::Ask(ask)) => match self.hall.post(self.who.clone(), ask) {
+                Ok(posted) => Read::Posted(posted),
+                Err(problem) => Read::Answered(Err(problem)),
+            },
             Err(problem) => Read::Answered(Err(problem)),
         }
-    }
-
-    fn ask(&self, ask: Ask) -> Read {
-        if ask == Ask::Stop {
-            self.hall.stop();
-        }
-        self.hall
-            .post(self.who.clone(), ask)
-            .map_or_else(|problem| Read::Answered(Err(problem)), Read::Posted)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Events: the whole status at once, then at each change.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::sync::atomic::Ordering;
 
 use serde_json::Value;
 
@@ -53,7 +52,7 @@ fn of_many_changes_no_more_than_ten_a_second_are_pushed() {
     }
     let fifth = events.next();
     assert!(uptime(&second) > uptime(&first), "the newest, not all of them");
-    assert!(uptime(&fifth) - uptime(&first) >= 25, "the double makes one every 5 ms or so: {first} {fifth}");
+    assert!(uptime(&fifth) - uptime(&first) >= 12, "the double makes one every 5 ms or so: {first} {fifth}");
 }
 
 #[test]
@@ -93,7 +92,7 @@ fn streams_end_with_the_server() {
     let mut hall = Hall::open();
     let mut events = Events::open(&hall.socket());
     events.next();
-    hall.awake.store(false, Ordering::Relaxed);
+    hall.sleep();
     hall.close();
     let mut rest = String::new();
     events.0.read_to_string(&mut rest).unwrap();

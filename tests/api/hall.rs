@@ -37,8 +37,8 @@ pub struct Hall {
     pub handle: Handle,
     pub desk: Arc<Desk>,
     pub asked: Arc<Mutex<Vec<Desired>>>,
-    /// Turned off, nothing that is asked is taken.
-    pub awake: Arc<AtomicBool>,
+    awake: Arc<AtomicBool>,
+    asleep: Arc<AtomicBool>,
     running: Option<Running>,
     _stop: StopSocket,
     ends: Arc<AtomicBool>,
@@ -74,17 +74,18 @@ impl Hall {
         };
         let running = api::start(setup).unwrap();
         let stop = api::stop_socket(&dir.path().join("stop.sock"), handle.clone()).unwrap();
-        let [ends, awake] = [false, true].map(|flag| Arc::new(AtomicBool::new(flag)));
+        let [ends, asleep, awake] = [false, false, true].map(|flag| Arc::new(AtomicBool::new(flag)));
         let asked = Arc::<Mutex<Vec<Desired>>>::default();
         let keeper = Keeper { inbox, source, handle: handle.clone(), asked: Arc::clone(&asked) };
-        let (of_ends, of_awake) = (Arc::clone(&ends), Arc::clone(&awake));
-        let keeper = thread::spawn(move || keeper.keep(&of_ends, &of_awake));
+        let [of_ends, of_awake, of_asleep] = [&ends, &awake, &asleep].map(Arc::clone);
+        let keeper = thread::spawn(move || keeper.keep(&of_ends, &of_awake, &of_asleep));
         Self {
             dir,
             handle,
             desk,
             asked,
             awake,
+            asleep,
             running: Some(running),
             _stop: stop,
             ends,
@@ -116,6 +117,18 @@ impl Hall {
         self.asked.lock().unwrap().iter().map(|desired| desired.ask.clone()).collect()
     }
 
+    /// From now on nothing that is asked is taken.
+    pub fn sleep(&self) {
+        self.awake.store(false, Ordering::Relaxed);
+        while !self.asleep.load(Ordering::Relaxed) {
+            thread::yield_now();
+        }
+    }
+
+    pub fn wake(&self) {
+        self.awake.store(true, Ordering::Relaxed);
+    }
+
     /// Ends the API.
     pub fn close(&mut self) {
         drop(self.running.take());
@@ -139,12 +152,13 @@ struct Keeper {
 }
 
 impl Keeper {
-    fn keep(self, ends: &AtomicBool, awake: &AtomicBool) {
+    fn keep(self, ends: &AtomicBool, awake: &AtomicBool, asleep: &AtomicBool) {
         while !ends.load(Ordering::Relaxed) {
             let mut status = Status::clone(&self.handle.status());
             status.ticks += 1;
             self.source.put(Arc::new(status));
             if !awake.load(Ordering::Relaxed) {
+                asleep.store(true, Ordering::Relaxed);
                 thread::park_timeout(Duration::from_millis(5));
                 continue;
             }

@@ -2,7 +2,6 @@
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
-use std::sync::atomic::Ordering;
 use std::thread;
 
 use kinocue::hall::{Ask, Role};
@@ -94,7 +93,7 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
         open_role: Some(Role::View),
         ..api
     });
-    hall.awake.store(false, Ordering::Relaxed); // nothing that is asked is taken any more
+    hall.sleep();
     thread::scope(|scope| {
         // One after the other asks, until nothing more fits into the queue.
         let stuffed: Vec<_> = (0..64).map(|_| hall.handle.post(engineer(), Ask::Pause).unwrap()).collect();
@@ -111,7 +110,7 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
         // And by HTTP, though the hall does not answer.
         assert_eq!(hall.port().post("/api/v1/show/stop").state(), "parked");
         assert!(hall.desk.take_stop());
-        hall.awake.store(true, Ordering::Relaxed);
+        hall.wake();
         drop(stuffed);
     });
 }

@@ -1,6 +1,12 @@
 //! The HTTP API and the stop socket, served for real on a socket in a folder of their own and on a loopback port, before a
 //! hall that is a double: a thread that takes what is asked, notes it, and answers.
 
+#![allow(
+    unreachable_pub,
+    clippy::unwrap_used,
+    reason = "a program of its own; whatever fails here fails the test"
+)]
+
 mod access;
 mod client;
 mod cues;

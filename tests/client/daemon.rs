@@ -39,6 +39,8 @@ pub(crate) enum Answer {
     Reply(u16, Value),
     /// These events, and then the end.
     Events(Vec<Value>),
+    /// These events, and then nothing.
+    EventsAndSilence(Vec<Value>),
     /// Nothing, ever.
     Silence,
 }
@@ -62,9 +64,9 @@ impl Daemon {
                 let Some(request) = read(&stream) else { continue };
                 let answer = script(count, &request);
                 let _ = seen.send(request); // the test may be over
-                match answer {
-                    Answer::Silence => held.push(stream),
-                    answer => write(stream, &answer),
+                write(&stream, &answer);
+                if matches!(answer, Answer::Silence | Answer::EventsAndSilence(_)) {
+                    held.push(stream);
                 }
             }
         });
@@ -156,14 +158,14 @@ fn read(stream: &UnixStream) -> Option<Request> {
     Some(Request { method, path, headers, body })
 }
 
-fn write(mut stream: UnixStream, answer: &Answer) {
+fn write(mut stream: &UnixStream, answer: &Answer) {
     let text = match answer {
         Answer::Reply(status, body) => {
             let body = body.to_string();
             let length = body.len();
             format!("HTTP/1.1 {status} As It Is\r\nContent-Length: {length}\r\n\r\n{body}")
         }
-        Answer::Events(events) => {
+        Answer::Events(events) | Answer::EventsAndSilence(events) => {
             let head =
                 "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nConnection: close\r\n\r\n: hello\n\n";
             let events = events.iter().map(|event| format!("event: status\ndata: {event}\n\n"));

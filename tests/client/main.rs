@@ -172,6 +172,7 @@ fn wrong_use_asks_nothing() {
         vec!["effects", "maybe"],
         vec!["home"],
         vec!["home", "A1", "--seats-empty"],
+        vec!["preflight", "--rate", "250"],
         vec!["test", "sweep", "--rows", "C-A", "--seats-empty"],
         vec!["test", "sweep"],
     ] {
@@ -236,7 +237,7 @@ fn a_stop_that_nobody_takes_points_at_the_emergency_stop() {
     let daemon = Daemon::refusing(503, "timeout");
     let run = daemon.run(&["stop"]);
     assert_eq!(run.code, Some(75));
-    told(&run, "NOT STOPPED by kinocue; use the hard-wired emergency stop");
+    told(&run, "THE STOP IS NOT CONFIRMED; use the hard-wired emergency stop");
 }
 
 #[test]
@@ -305,6 +306,15 @@ fn watch_writes_a_line_a_change_and_says_at_once_when_the_daemon_is_gone_and_bac
         said.contains("is gone: it closed the connection; waiting for it\nkinocue: the daemon is back\n"),
         "{said}"
     );
+}
+
+#[test]
+fn watch_says_when_what_it_shows_is_old() {
+    let daemon = Daemon::start(|_, _| Answer::EventsAndSilence(vec![hall("playing")]));
+    let mut watch = Running(daemon.command(&["watch"]).spawn().expect("it starts"));
+    let mut said = BufReader::new(watch.0.stderr.take().expect("piped")).lines();
+    let line = said.next().expect("a line").expect("text");
+    assert_eq!(line, "kinocue: the daemon has said nothing for 2 s: what is shown is old");
 }
 
 #[test]

@@ -19,7 +19,8 @@ use kinocue::gate::Counts;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, Planning, TickLoop, mailboxes,
+    Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, Planning, TickLoop,
+    mailboxes,
 };
 use kinocue::state::Request;
 use kinocue::time::{Clock, MonoTime, ShowTime};
@@ -114,8 +115,7 @@ impl Virtual {
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
-        let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } =
-            ends;
+        let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
         let planning = Box::new(Planning { planner, timeline: Arc::clone(&timeline) });
         let plans = PlanLoop { planning, tasks, answers };
         let leave = AtomicBool::new(false);

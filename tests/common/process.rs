@@ -48,14 +48,14 @@ impl From<Output> for Run {
 }
 
 /// A child that is killed when it is dropped, or has lived too long.
-struct Guarded {
+pub(crate) struct Guarded {
     child: Option<Child>,
     handle: Arc<OwnedFd>,
     _ended: Sender<()>,
 }
 
 impl Guarded {
-    fn start(args: &[&str]) -> Self {
+    pub(crate) fn start(args: &[&str]) -> Self {
         Self::start_with(args, Stdio::null(), Stdio::piped())
     }
 
@@ -73,6 +73,12 @@ impl Guarded {
             }
         });
         Self { child: Some(child), handle, _ended: ended }
+    }
+
+    /// What it says on its standard error, which is taken once.
+    pub(crate) fn stderr(&mut self) -> BufReader<ChildStderr> {
+        let child = self.child.as_mut().expect("it was not taken");
+        BufReader::new(child.stderr.take().expect("piped"))
     }
 
     fn signal(&self, signal: Signal) {
@@ -143,34 +149,6 @@ pub(crate) fn play(cue: &Path, to: &[String], more: &[&str]) -> Run {
     Playing::start(cue, to, more).finish()
 }
 
-/// A `kinocue serve` at work; dropped, it is killed as by a crash.
-pub(crate) struct Serving {
-    _guarded: Guarded,
-    /// Where it serves HTTP.
-    pub(crate) address: SocketAddr,
-}
-
-impl Serving {
-    /// Serves the hall of `hall.toml` in a folder, with its sockets and its state there, and waits until it listens.
-    pub(crate) fn start(dir: &Path) -> Self {
-        let path = |name: &str| dir.join(name).to_str().expect("text").to_owned();
-        let (config, socket, state) = (path("hall.toml"), path("control.sock"), path("state"));
-        let args = ["serve", "--config", &config, "--socket", &socket, "--state", &state];
-        let mut guarded = Guarded::start(&args);
-        let child = guarded.child.as_mut().expect("it was not taken");
-        let mut lines = BufReader::new(child.stderr.take().expect("piped")).lines().map_while(Result::ok);
-        let mut said = Vec::new();
-        let address = lines.by_ref().find_map(|line| {
-            let address = line.split("http://").nth(1).and_then(|rest| rest.split('/').next()?.parse().ok());
-            said.push(line);
-            address
-        });
-        // Whatever else it says is taken, so that it never waits for us.
-        std::thread::spawn(move || lines.for_each(drop));
-        Self { _guarded: guarded, address: address.unwrap_or_else(|| panic!("it does not serve: {said:?}")) }
-    }
-}
-
 /// A `kinocue sim` at work: controllers at free ports of 127.0.0.1 that take frames from any port.
 pub(crate) struct Sim {
     guarded: Guarded,
@@ -194,8 +172,7 @@ impl Sim {
         args.extend(["--count", &number]);
         args.extend(more);
         let mut guarded = Guarded::start(&args);
-        let child = guarded.child.as_mut().expect("it was not taken");
-        let mut stderr = BufReader::new(child.stderr.take().expect("piped"));
+        let mut stderr = guarded.stderr();
         let mut addresses = Vec::new();
         while addresses.len() < count {
             let mut line = String::new();

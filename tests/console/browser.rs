@@ -17,13 +17,13 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// The key of an element in replies, as the standard has it.
 const ELEMENT: &str = "element-6066-11e4-a52e-4f735466cecf";
 /// The code of the Escape key.
-pub const ESCAPE: &str = "\u{e00c}";
+pub(crate) const ESCAPE: &str = "\u{e00c}";
 
 /// One browser at a time is work enough for a small machine.
 static ONE: Mutex<()> = Mutex::new(());
 
 /// A browser with one page; it ends with its test.
-pub struct Browser {
+pub(crate) struct Browser {
     driver: Child,
     port: u16,
     session: String,
@@ -33,7 +33,7 @@ pub struct Browser {
 
 impl Browser {
     /// A browser, or none where it is not installed, which it says.
-    pub fn start() -> Option<Self> {
+    pub(crate) fn start() -> Option<Self> {
         for program in ["chromium", "chromedriver"] {
             let paths = std::env::var_os("PATH").unwrap_or_default();
             if !std::env::split_paths(&paths).any(|folder| folder.join(program).is_file()) {
@@ -57,7 +57,8 @@ impl Browser {
             .expect("it says on which port it listens");
         // Whatever else it says is taken, so that it never waits for us.
         std::thread::spawn(move || lines.for_each(drop));
-        let shots = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target").join("console-shots");
+        let shots =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("it is in target").join("console-shots");
         std::fs::create_dir_all(&shots).expect("a folder for the pictures");
         let mut browser = Self { driver, port, session: String::new(), shots, _only: only };
         let arguments = [
@@ -81,12 +82,12 @@ impl Browser {
     }
 
     /// Opens a page.
-    pub fn open(&self, url: &str) {
+    pub(crate) fn open(&self, url: &str) {
         self.command("/url", &json!({"url": url}));
     }
 
     /// Gives the page that size, px.
-    pub fn resize(&self, width: u32, height: u32) {
+    pub(crate) fn resize(&self, width: u32, height: u32) {
         let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
         self.command(
             "/goog/cdp/execute",
@@ -95,7 +96,7 @@ impl Browser {
     }
 
     /// What a script returns.
-    pub fn eval(&self, script: &str) -> Value {
+    pub(crate) fn eval(&self, script: &str) -> Value {
         self.command("/execute/sync", &json!({"script": script, "args": []}))
     }
 
@@ -103,7 +104,7 @@ impl Browser {
     ///
     /// # Panics
     /// Where it does not become true; the page's text says why.
-    pub fn wait(&self, expression: &str) -> Duration {
+    pub(crate) fn wait(&self, expression: &str) -> Duration {
         let most = PATIENCE.as_millis() - 2000;
         let script = format!(
             "const done = arguments[0], begun = performance.now();
@@ -125,45 +126,48 @@ impl Browser {
     }
 
     /// Waits until an element shows a text that contains this, whatever the case.
-    pub fn reads(&self, id: &str, text: &str) -> Duration {
+    pub(crate) fn reads(&self, id: &str, text: &str) -> Duration {
         let text = json!(text.to_lowercase());
         self.wait(&format!("document.getElementById('{id}').textContent.toLowerCase().includes({text})"))
     }
 
     /// Presses an element, wherever on the page it is, once it can be pressed.
-    pub fn press(&self, selector: &str) {
+    pub(crate) fn press(&self, selector: &str) {
         self.wait(&format!("document.querySelector({}).matches(':enabled')", json!(selector)));
         let element = self.find(selector);
         self.command(&format!("/element/{element}/click"), &json!({}));
     }
 
     /// Puts a finger on an element, and leaves it there.
-    pub fn touch(&self, selector: &str) {
+    pub(crate) fn touch(&self, selector: &str) {
         let element = self.find(selector);
-        let there = json!({"type": "pointerMove", "duration": 0, "origin": {ELEMENT: element}, "x": 0, "y": 0});
+        let there =
+            json!({"type": "pointerMove", "duration": 0, "origin": {ELEMENT: element}, "x": 0, "y": 0});
         let finger = json!({"type": "pointer", "id": "finger", "parameters": {"pointerType": "touch"},
             "actions": [there, {"type": "pointerDown", "button": 0}]});
         self.command("/actions", &json!({"actions": [finger]}));
     }
 
     /// Types into what has the focus.
-    pub fn type_text(&self, text: &str) {
+    pub(crate) fn type_text(&self, text: &str) {
         let keys: Vec<Value> = text
             .chars()
-            .flat_map(|key| [json!({"type": "keyDown", "value": key}), json!({"type": "keyUp", "value": key})])
+            .flat_map(|key| {
+                [json!({"type": "keyDown", "value": key}), json!({"type": "keyUp", "value": key})]
+            })
             .collect();
         self.command("/actions", &json!({"actions": [{"type": "key", "id": "keys", "actions": keys}]}));
     }
 
     /// Keeps a picture of the page in `target/console-shots`.
-    pub fn shot(&self, name: &str) {
+    pub(crate) fn shot(&self, name: &str) {
         let picture = self.ask("GET", &format!("{}/screenshot", self.session), &Value::Null);
         let octets = STANDARD.decode(picture.as_str().expect("a picture")).expect("base64");
         std::fs::write(self.shots.join(format!("{name}.png")), octets).expect("it can be written");
     }
 
     /// What the browser complains of, replies of the server that are errors left out.
-    pub fn complaints(&self) -> Vec<String> {
+    pub(crate) fn complaints(&self) -> Vec<String> {
         let log = self.command("/se/log", &json!({"type": "browser"}));
         let messages = log.as_array().expect("a list").iter().filter(|line| line["level"] == "SEVERE");
         messages

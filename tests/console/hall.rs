@@ -2,14 +2,17 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::io::BufRead as _;
+use std::net::SocketAddr;
+use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
-use crate::process::{Serving, Sim};
+use crate::process::{Guarded, Sim};
 
 /// What lets the page in; an engineer's, who alone may arm over TCP.
-pub const TOKEN: &str = "booth-token";
+pub(crate) const TOKEN: &str = "booth-token";
 /// Controllers in each row.
 const SEATS: usize = 2;
 
@@ -49,7 +52,7 @@ effects = { water = false }
 ";
 
 /// Two rows of two seats, each row by a simulator of its own.
-pub struct Hall {
+pub(crate) struct Hall {
     dir: TempDir,
     sims: Vec<Option<Sim>>,
     serving: Option<Serving>,
@@ -57,13 +60,18 @@ pub struct Hall {
 }
 
 impl Hall {
-    /// Open, with the cue `swell` in its library.
-    pub fn open() -> Self {
+    /// Open, with the cue `swell` in its library, to nobody without a token.
+    pub(crate) fn open() -> Self {
+        Self::open_to("none")
+    }
+
+    /// The same, with that role for whoever comes without a token.
+    pub(crate) fn open_to(role: &str) -> Self {
         let dir = tempfile::tempdir().expect("a folder");
         let sims: Vec<Sim> = (0..2).map(|_| Sim::start(SEATS, &["--safe"])).collect();
         let path = |text: &str| format!("\"{}/{text}\"", dir.path().display());
         let mut config = CONFIG.replace("\"cues\"", &path("cues")).replace("\"log\"", &path("log"));
-        write_api(&mut config);
+        write_api(&mut config, role);
         for (row, sim) in ["A", "B"].iter().zip(&sims) {
             for (seat, address) in sim.addresses.iter().enumerate() {
                 let name = format!("{row}{}", seat + 1);
@@ -83,12 +91,12 @@ impl Hall {
     }
 
     /// Where the console is.
-    pub fn url(&self) -> &str {
+    pub(crate) fn url(&self) -> &str {
         &self.url
     }
 
     /// Starts the server again, where the page looks for it.
-    pub fn start_again(&mut self) {
+    pub(crate) fn start_again(&mut self) {
         let path = self.dir.path().join("hall.toml");
         let config = fs::read_to_string(&path).expect("it was written");
         let address = self.url.trim_start_matches("http://").trim_end_matches('/');
@@ -98,12 +106,12 @@ impl Hall {
     }
 
     /// Kills the server, as a crash would.
-    pub fn kill(&mut self) {
+    pub(crate) fn kill(&mut self) {
         self.serving = None;
     }
 
     /// Pulls the plugs of a row's controllers.
-    pub fn pull(&mut self, row: usize) {
+    pub(crate) fn pull(&mut self, row: usize) {
         self.sims[row] = None;
     }
 }
@@ -118,12 +126,39 @@ fn swell() -> String {
     cue
 }
 
-fn write_api(config: &mut String) {
+fn write_api(config: &mut String, open_role: &str) {
     let sha256: String = Sha256::digest(TOKEN).iter().map(|octet| format!("{octet:02x}")).collect();
     write!(
         config,
-        "[api]\nlisten = [\"127.0.0.1:0\"]\n\n\
+        "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"{open_role}\"\n\n\
          [[api.token]]\nname = \"booth\"\nrole = \"engineer\"\nsha256 = \"{sha256}\"\n\n"
     )
     .expect("memory");
+}
+
+/// A `kinocue serve` at work; dropped, it is killed as by a crash.
+struct Serving {
+    _guarded: Guarded,
+    /// Where it serves HTTP.
+    address: SocketAddr,
+}
+
+impl Serving {
+    /// Serves the hall of `hall.toml` in a folder, with its sockets and its state there, and waits until it listens.
+    fn start(dir: &Path) -> Self {
+        let path = |name: &str| dir.join(name).to_str().expect("text").to_owned();
+        let (config, socket, state) = (path("hall.toml"), path("control.sock"), path("state"));
+        let args = ["serve", "--config", &config, "--socket", &socket, "--state", &state];
+        let mut guarded = Guarded::start(&args);
+        let mut lines = guarded.stderr().lines().map_while(Result::ok);
+        let mut said = Vec::new();
+        let address = lines.by_ref().find_map(|line| {
+            let address = line.split("http://").nth(1).and_then(|rest| rest.split('/').next()?.parse().ok());
+            said.push(line);
+            address
+        });
+        // Whatever else it says is taken, so that it never waits for us.
+        std::thread::spawn(move || lines.for_each(drop));
+        Self { _guarded: guarded, address: address.unwrap_or_else(|| panic!("it does not serve: {said:?}")) }
+    }
 }

@@ -16,8 +16,8 @@ use kinocue::fanout::{Lane, Manner};
 use kinocue::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::observe::Watched;
 use kinocue::rt::{
-    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News, PlanLoop, Planning,
-    Spinning, TickLoop, mailboxes,
+    Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
+    PlanLoop, Planning, Spinning, TickLoop, mailboxes,
 };
 use kinocue::state::Request;
 use kinocue::sys::clock::Monotonic;

@@ -47,8 +47,7 @@ pub(super) fn open(config: &Config, numbers: &Numbers) -> Result<Opened, HouseEr
     };
     // At level 0 the cue has no part in the pose.
     let manner = Manner { level: 0.0, silent: false };
-    let staged =
-        Staged::new(config, Timeline::new(rest(config)), show, manner).map_err(HouseError::Plan)?;
+    let staged = Staged::new(config, Timeline::new(rest(config)), show, manner).map_err(HouseError::Plan)?;
     let (engine, mut lanes, planner, timeline) = staged.split();
     for (lane, controller) in lanes.iter_mut().zip(&config.controllers) {
         if let Some(next) = numbers.get(&controller.address) {

@@ -15,6 +15,7 @@ use std::{collections::BTreeMap, io};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::run::Run;
 use crate::config::Config;
 use crate::engine::{Rate, TickGrid};
 use crate::fanout::Lane;
@@ -23,8 +24,8 @@ use crate::net::{DrainGrid, NetError};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    Accounts, AckLoop, Command, Conductor, Desk, Ended, Line, Live, MailEnds, News, Order, PlanLoop,
-    Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Command, Conductor, Desk, Line, Live, MailEnds, News, Order, PlanLoop, Planning, Spinning,
+    Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -93,10 +94,8 @@ pub struct Reins {
 /// What a hall came to when it closed.
 #[derive(Debug)]
 pub struct Closed {
-    /// What the tick loop did.
-    pub ended: Ended,
-    /// Everything that was counted.
-    pub accounts: Accounts,
+    /// What its threads came back with.
+    pub run: Run,
     /// From where frame numbers go on.
     pub numbers: Numbers,
 }
@@ -200,7 +199,7 @@ impl House {
                 commands,
                 news,
                 orders,
-                granted,
+                granted: granted.clone(),
             };
             lead(reins, line);
             let ended = ticks.run();
@@ -208,13 +207,19 @@ impl House {
             over.store(true, Ordering::Release);
             done.store(true, Ordering::Release);
             planner.thread().unpark();
-            planner.join().expect("the planner does not panic");
+            let refusals = planner.join().expect("the planner does not panic");
             let mut accounts = ack_thread.join().expect("the ack thread does not panic");
-            accounts.close(ticks.lanes.iter().map(Lane::last_frame), Monotonic.now());
+            let closed_at = Monotonic.now();
+            accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
             let next = |lane: &Lane| lane.last_frame().next();
             let addresses = config.controllers.iter().map(|one| one.address);
             let numbers = addresses.zip(ticks.lanes.iter().map(next)).collect();
-            Ok(Closed { ended, accounts, numbers })
+            let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
+            let spun = clock.spun();
+            Ok(Closed {
+                run: Run { ended, accounts, granted, spun, refusals, clamps, origin, closed_at },
+                numbers,
+            })
         })
     }
 }

@@ -7,7 +7,8 @@ use crate::engine::TRIM_MS;
 use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem};
 use crate::rt::Command;
 use crate::state::{Request, State};
-use crate::time::ShowTime;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, ShowTime};
 
 impl Keeper {
     /// Does it, and answers.
@@ -23,7 +24,9 @@ impl Keeper {
             Ask::Home => self.request(Request::Home),
             Ask::Arm => self.request(Request::Arm),
             Ask::Disarm => self.request(Request::Disarm),
-            Ask::Go => self.request(Request::Go).inspect(|()| self.begin_record(&who.to_string(), who.surface)),
+            Ask::Go => {
+                self.request(Request::Go).inspect(|()| self.begin_record(&who.to_string(), who.surface))
+            }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
             Ask::Park => self.request(Request::Park),
@@ -61,7 +64,7 @@ impl Keeper {
             if matches!(self.known.state, State::Stopping | State::Stopped | State::Fault) {
                 return;
             }
-            std::thread::sleep(Duration::from_millis(1));
+            Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(1));
         }
     }
 

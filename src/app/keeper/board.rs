@@ -29,7 +29,8 @@ struct Strip {
 impl Board {
     /// All of everything.
     pub(super) fn new(config: &Config) -> Self {
-        let strip = |one: &crate::config::Controller| Strip { row: one.row.clone(), group: one.group.clone() };
+        let strip =
+            |one: &crate::config::Controller| Strip { row: one.row.clone(), group: one.group.clone() };
         let lanes: Vec<Strip> = config.controllers.iter().map(strip).collect();
         let rows: BTreeMap<String, f64> =
             lanes.iter().filter_map(|lane| Some((lane.row.clone()?, 1.0))).collect();
@@ -49,7 +50,12 @@ impl Board {
             *level = before.levels.rows.get(row).copied().unwrap_or(*level);
         }
         self.trim_ms = before.trim_ms;
-        self.out = before.out.iter().filter(|group| self.lanes.iter().any(|lane| lane.group == **group)).cloned().collect();
+        self.out = before
+            .out
+            .iter()
+            .filter(|group| self.lanes.iter().any(|lane| lane.group == **group))
+            .cloned()
+            .collect();
     }
 
     /// Changes levels and effects; nothing is changed where one of them is not known or not within 0 to 1.

@@ -41,9 +41,11 @@ impl Keeper {
     pub(super) fn is_free(&self) -> Result<(), Problem> {
         match &self.errand {
             None => Ok(()),
-            Some(errand) => {
-                Err(Problem::new(Code::Busy, format!("{} is under way", errand.word), "ask again when it is done"))
-            }
+            Some(errand) => Err(Problem::new(
+                Code::Busy,
+                format!("{} is under way", errand.word),
+                "ask again when it is done",
+            )),
         }
     }
 

@@ -20,13 +20,7 @@ pub(super) struct Known {
 
 impl Known {
     pub(super) const fn new(now: MonoTime) -> Self {
-        Self {
-            state: State::Boot,
-            cause: Cause::Started,
-            next: Next::AwaitAnswers,
-            since: now,
-            answer: None,
-        }
+        Self { state: State::Boot, cause: Cause::Started, next: Next::AwaitAnswers, since: now, answer: None }
     }
 
     /// Takes news; says from which state to which the hall went, where it did.

@@ -43,8 +43,9 @@ impl List {
         if !faults.is_empty() {
             let faults = faults.iter().map(ToString::to_string).collect();
             let detail = format!("the playlist {id} cannot be played");
-            return Err(Problem::new(Code::Check, detail, "put right what is named, and load it again")
-                .with(faults));
+            return Err(
+                Problem::new(Code::Check, detail, "put right what is named, and load it again").with(faults)
+            );
         }
         let about = |entry: &Entry| {
             library.get(&entry.cue).map_or((None, 0.0), |info| (info.title, info.length_s.unwrap_or(0.0)))
@@ -94,7 +95,8 @@ impl Keeper {
                 return self.answer(asked, Ok(()));
             }
             (Ok(()), Some(Err(error))) => {
-                let problem = Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them");
+                let problem =
+                    Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them");
                 return self.answer(asked, Err(problem));
             }
             (Ok(()), Some(Ok(id))) => id,
@@ -140,18 +142,11 @@ impl Keeper {
         let Some(list) = &self.list else { return };
         let cue = list.playlist.entries[entry].cue.clone();
         let (library, config) = (self.library.clone(), self.reins.config.clone());
-        self.send("loading", asked, move || {
-            Done::Entry(entry, onward, read(&library, &config, &cue))
-        });
+        self.send("loading", asked, move || Done::Entry(entry, onward, read(&library, &config, &cue)));
     }
 
     /// Takes up the cue of an entry, and starts it where that is due.
-    pub(super) fn take_up_entry(
-        &mut self,
-        entry: usize,
-        onward: Onward,
-        cued: Cued,
-    ) -> Result<(), Problem> {
+    pub(super) fn take_up_entry(&mut self, entry: usize, onward: Onward, cued: Cued) -> Result<(), Problem> {
         let Some(list) = &mut self.list else { return Ok(()) };
         list.current = entry;
         self.set_entry()?;

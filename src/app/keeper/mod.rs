@@ -18,9 +18,9 @@ mod warnings;
 
 pub use voice::Voice;
 
-use std::sync::Arc;
 use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
@@ -28,7 +28,7 @@ use std::time::Duration;
 use super::house::{Closed, Reins};
 use crate::config::{self, Config};
 use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
-use crate::journal::Journal;
+use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::{Command, Line};
 use crate::state::{Cause, State};
@@ -101,6 +101,8 @@ pub struct Left {
     pub closed: Box<Closed>,
     /// The configuration to open the next hall with; none where the program ends.
     pub reload: Option<Arc<Config>>,
+    /// How its last show ended; stopped where there was none.
+    pub ended: Ending,
     /// The journal, still open.
     pub journal: Journal,
 }
@@ -189,7 +191,8 @@ impl Keeper {
                 let cue = self.cued.map(|cued| cued.id);
                 self.ends.memory = Memory { board: Some(self.board), cue };
                 let journal = self.record.into_journal();
-                return Left { ends: self.ends, closed, reload: self.reload, journal };
+                let ended = record::ending(self.ended);
+                return Left { ends: self.ends, closed, reload: self.reload, ended, journal };
             }
         }
     }
@@ -275,7 +278,7 @@ impl Keeper {
             if Monotonic.now() >= until {
                 return Err(known::no_answer(ANSWER));
             }
-            std::thread::sleep(Duration::from_micros(200));
+            Monotonic.sleep_until(Monotonic.now() + Duration::from_micros(200));
         }
     }
 

@@ -41,8 +41,7 @@ impl Preflighted {
                 survey: Some(survey),
             })
             .collect();
-        let terms =
-            Terms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue };
+        let terms = Terms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue };
         let found = judge(&subjects, &terms, &config.show.accept_findings);
         let passed = found.iter().map(|found| !found.iter().any(preflight::Finding::fails)).collect();
         let mut findings = Vec::new();
@@ -99,7 +98,8 @@ impl Keeper {
             return self.answer(asked, Err(problem));
         }
         let Some(mut line) = self.line.take() else {
-            let problem = Problem::new(Code::Busy, "the controllers are being asked", "ask again in a minute");
+            let problem =
+                Problem::new(Code::Busy, "the controllers are being asked", "ask again in a minute");
             return self.answer(asked, Err(problem));
         };
         let config = self.reins.config.clone();
@@ -130,4 +130,3 @@ impl Keeper {
         }
     }
 }
-

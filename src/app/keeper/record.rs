@@ -79,7 +79,8 @@ impl Keeper {
         };
         let state = self.known.state.to_string();
         self.say_ask(&who, &what, &result, desired.ask.word());
-        let line = JournalLine { at: at.clone(), who: who.clone(), what: what.clone(), result: result.clone() };
+        let line =
+            JournalLine { at: at.clone(), who: who.clone(), what: what.clone(), result: result.clone() };
         self.record.newest.push_front(line);
         self.record.newest.truncate(NEWEST);
         self.record.journal.note(&Action { at, who, what, result, state });
@@ -90,9 +91,8 @@ impl Keeper {
         let Some(cued) = &self.cued else { return };
         let (now, config) = (Zoned::now(), &self.reins.config);
         let table = self.reins.live.table();
-        let available = table.iter().enumerate().filter(|(lane, row)| {
-            self.board.is_on(*lane) && row.standing.may_move()
-        });
+        let available =
+            table.iter().enumerate().filter(|(lane, row)| self.board.is_on(*lane) && row.standing.may_move());
         let levels = &self.board.levels;
         let off = levels.effects.iter().filter(|(_, on)| !**on);
         let record = ShowRecord {
@@ -137,15 +137,10 @@ impl Keeper {
             let before: u64 = table.iter().map(|row| of(&row.counts)).sum();
             after.saturating_sub(before)
         };
-        let result = match ended {
-            Cause::CueEnded => Ending::Completed,
-            Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
-            _ => Ending::Stopped,
-        };
         let after = live.times();
         record.outcome = Some(Outcome {
             end: stamp(&Zoned::now()),
-            result,
+            result: ending(ended),
             events,
             ticks: live.ticks().saturating_sub(ticks),
             missed_ticks: live.missed().saturating_sub(missed),
@@ -159,6 +154,15 @@ impl Keeper {
             ack: percentiles(after.acks, &times.acks),
         });
         self.record.journal.show(&record);
+    }
+}
+
+/// How a show ended for that cause.
+pub(super) const fn ending(cause: Cause) -> Ending {
+    match cause {
+        Cause::CueEnded => Ending::Completed,
+        Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
+        _ => Ending::Stopped,
     }
 }
 

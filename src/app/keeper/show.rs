@@ -43,7 +43,8 @@ impl Cued {
     ) -> Result<Self, Problem> {
         let refused = |faults: Vec<String>| {
             let detail = format!("the cue {id} does not fit this hall");
-            Problem::new(Code::Check, detail, "correct it, or `kinocue fit` it, and load it again").with(faults)
+            Problem::new(Code::Check, detail, "correct it, or `kinocue fit` it, and load it again")
+                .with(faults)
         };
         let rate = Rate::from_hz(config.show.rate_hz);
         let misfits = config.misfits(&timeline);

@@ -16,8 +16,22 @@ use crate::tracker;
 const RATED: Duration = Duration::from_secs(1);
 /// The least and the greatest bound of the buckets, µs.
 const BOUNDS_US: [f64; 16] = [
-    5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 350.0, 500.0, 750.0, 1_000.0, 2_000.0, 5_000.0, 10_000.0, 50_000.0,
-    200_000.0, 1_000_000.0,
+    5.0,
+    10.0,
+    20.0,
+    50.0,
+    100.0,
+    200.0,
+    350.0,
+    500.0,
+    750.0,
+    1_000.0,
+    2_000.0,
+    5_000.0,
+    10_000.0,
+    50_000.0,
+    200_000.0,
+    1_000_000.0,
 ];
 
 /// What was counted of the last second.

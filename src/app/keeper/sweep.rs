@@ -54,9 +54,12 @@ fn script(config: &Config) -> (Vec<Part>, String) {
     let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
     let effects: Vec<&str> = config.effects.iter().map(|effect| effect.name.as_str()).collect();
     let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
-    let columns = (1..=axes).map(|axis| format!("a{axis}")).chain(effects.iter().map(|name| format!("fx_{name}")));
-    let mut text =
-        format!("# title: test of empty seats\n# interpolation: monotone\ntime_ms,{}\n", columns.collect::<Vec<_>>().join(","));
+    let columns =
+        (1..=axes).map(|axis| format!("a{axis}")).chain(effects.iter().map(|name| format!("fx_{name}")));
+    let mut text = format!(
+        "# title: test of empty seats\n# interpolation: monotone\ntime_ms,{}\n",
+        columns.collect::<Vec<_>>().join(",")
+    );
     let mut row = |at_ms: u32, moved: Option<usize>, on: Option<usize>| {
         let _ = write!(text, "{at_ms}");
         for (axis, park) in park.iter().enumerate() {
@@ -75,7 +78,12 @@ fn script(config: &Config) -> (Vec<Part>, String) {
         row(at, None, None);
         row(at + AXIS_MS * 5 / 12, Some(axis), None);
         row(at + AXIS_MS * 7 / 12, Some(axis), None);
-        parts.push(Part { name: format!("a{}", axis + 1), from: time(at), to: time(at + AXIS_MS), axis: Some(axis) });
+        parts.push(Part {
+            name: format!("a{}", axis + 1),
+            from: time(at),
+            to: time(at + AXIS_MS),
+            axis: Some(axis),
+        });
         at += AXIS_MS;
     }
     for (effect, name) in effects.iter().enumerate() {
@@ -101,7 +109,11 @@ impl Keeper {
         let unknown: Vec<&String> = rows.iter().filter(|row| !known(row)).collect();
         let problem = if self.known.state != State::Armed {
             let detail = format!("cannot test while {}", self.known.state);
-            Some(Problem::new(Code::State, detail, "load any cue and arm, with nobody on the seats, then test"))
+            Some(Problem::new(
+                Code::State,
+                detail,
+                "load any cue and arm, with nobody on the seats, then test",
+            ))
         } else if let Some(row) = unknown.first() {
             Some(Problem::new(Code::Unknown, format!("there is no row {row}"), "the status names the rows"))
         } else {
@@ -119,9 +131,8 @@ impl Keeper {
                 Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
                     .with(faults.to_string().lines().map(str::to_owned).collect())
             });
-            let cued = cued.and_then(|cue| {
-                Cued::prove("test".to_owned(), &config, Timeline::new(cue), String::new())
-            });
+            let cued = cued
+                .and_then(|cue| Cued::prove("test".to_owned(), &config, Timeline::new(cue), String::new()));
             let status = TestStatus {
                 running: true,
                 step: "begins".to_owned(),
@@ -161,9 +172,11 @@ impl Keeper {
         if let Some((done, before)) = sweep.now.take() {
             let part = &sweep.parts[done];
             let board = &self.board;
-            let tested = config.controllers.iter().enumerate().filter(|(lane, one)| {
-                board.is_on(*lane) && part.axis.is_none_or(|axis| one.takes(axis))
-            });
+            let tested = config
+                .controllers
+                .iter()
+                .enumerate()
+                .filter(|(lane, one)| board.is_on(*lane) && part.axis.is_none_or(|axis| one.takes(axis)));
             for (lane, controller) in tested {
                 let (Some(now), Some(then)) = (table.get(lane), before.get(lane)) else { continue };
                 let row = row_of(&controller.name, &part.name, then, now);

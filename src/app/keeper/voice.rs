@@ -100,6 +100,9 @@ impl Keeper {
     /// Says what somebody asked, and what came of it.
     pub(super) fn say_ask(&self, who: &str, what: &str, result: &str, word: &str) {
         let text = format!("{who}: {what}: {result}");
-        self.ends.voice.log.say(Line::new(Priority::Notice, format!("ask-{word}"), text).with("operator", who));
+        self.ends
+            .voice
+            .log
+            .say(Line::new(Priority::Notice, format!("ask-{word}"), text).with("operator", who));
     }
 }

@@ -79,7 +79,9 @@ impl Keeper {
     fn of_preflight(&self) -> Option<Warning> {
         let (text, severity) = match &self.preflighted {
             None => ("preflight was not run since the program started", Severity::Info),
-            Some(it) if !it.has_passed(|lane| self.board.is_on(lane)) => ("preflight failed", Severity::Error),
+            Some(it) if !it.has_passed(|lane| self.board.is_on(lane)) => {
+                ("preflight failed", Severity::Error)
+            }
             Some(_) => return None,
         };
         Some(Warning {

@@ -13,8 +13,8 @@ use super::http::{Reply, request, send};
 use super::reply;
 use crate::cli::{Exit, Failure, OrExit as _};
 
-/// A daemon that has not even sent a comment for so long hangs.
-const SILENCE: Duration = Duration::from_secs(10);
+/// Statuses come ten times a second; without one for so long, what was last heard is old.
+pub(super) const QUIET: Duration = Duration::from_secs(2);
 /// How long it may take to begin.
 const BEGINNING: Duration = Duration::from_secs(5);
 /// The longest event, octets.
@@ -45,16 +45,19 @@ impl Events {
         Ok(Self { body: response.into_body(), lines: Lines::default() })
     }
 
-    /// The data of the next event; why there is none any more otherwise.
-    pub(super) async fn next(&mut self) -> Result<String, &'static str> {
+    /// The data of the next event; nothing where none came for [`QUIET`]. Why there will be none any more otherwise.
+    pub(super) async fn next(&mut self) -> Result<Option<String>, &'static str> {
+        timeout(QUIET, self.event()).await.map_or(Ok(None), |event| event.map(Some))
+    }
+
+    /// Given up while it waits, it has lost nothing.
+    async fn event(&mut self) -> Result<String, &'static str> {
         loop {
             if let Some(data) = self.lines.event() {
                 return Ok(data);
             }
-            let frame =
-                timeout(SILENCE, self.body.frame()).await.map_err(|_| "it hangs: nothing comes any more")?;
-            let frame = frame.ok_or("it closed the connection")?.map_err(|_| "the connection broke")?;
-            if let Ok(piece) = frame.into_data() {
+            let frame = self.body.frame().await.ok_or("it closed the connection")?;
+            if let Ok(piece) = frame.map_err(|_| "the connection broke")?.into_data() {
                 self.lines.take(&piece)?;
             }
         }

@@ -19,7 +19,9 @@ pub(in crate::cli) enum Command {
     #[command(after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0")]
     Trim(TrimArgs),
     /// Sets how much of the motion and the vibration the seats make.
-    #[command(after_help = "\
+    #[command(
+        override_usage = "kinocue level [motion|vibration] <LEVEL> [OPTIONS]",
+        after_help = "\
 Examples:
   kinocue level 60%                     motion and vibration
   kinocue level motion 60%
@@ -27,7 +29,8 @@ Examples:
   kinocue level 50% --row A             motion and vibration of row A, on top of the hall's
   kinocue level -6dB --row A-C
 
-A row has one level for its motion and its vibration together.")]
+A row has one level for its motion and its vibration together."
+    )]
     Level(LevelArgs),
     /// Lets effects be on, or keeps them off: those that are named, or all.
     #[command(after_help = "\

@@ -20,8 +20,7 @@ const SOCKET: &str = "/run/kinocue/control.sock";
 /// How long an answer may take: the daemon itself gives up after a minute.
 const PATIENCE: Duration = Duration::from_secs(65);
 
-// A comment, because clap would make help of documentation.
-// Where the daemon is, and how its replies are shown.
+// Where the daemon is, and how its replies are shown. No documentation: clap would show it as the help of `arm` and others.
 #[derive(Debug, Clone, clap::Args)]
 pub(in crate::cli) struct ServerArgs {
     /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
@@ -52,17 +51,27 @@ impl ServerArgs {
 
     /// Has something done by POST, and gives the state that it led to.
     pub(super) fn post(&self, path: &str, body: &Value) -> Result<Status, Failure> {
-        http::block_on(self.change(Method::POST, path, body))
+        self.post_within(path, body, PATIENCE)
+    }
+
+    /// The same, for whoever cannot wait.
+    pub(super) fn post_within(
+        &self,
+        path: &str,
+        body: &Value,
+        patience: Duration,
+    ) -> Result<Status, Failure> {
+        http::block_on(self.change(Method::POST, path, body, patience))
     }
 
     /// The same for whoever has a runtime already.
     pub(super) async fn post_now(&self, path: &str, body: &Value) -> Result<Status, Failure> {
-        self.change(Method::POST, path, body).await
+        self.change(Method::POST, path, body, PATIENCE).await
     }
 
     /// Has something done by PUT, and gives the state that it led to.
     pub(super) fn put(&self, path: &str, body: &Value) -> Result<Status, Failure> {
-        http::block_on(self.change(Method::PUT, path, body))
+        http::block_on(self.change(Method::PUT, path, body, PATIENCE))
     }
 
     /// Has something done by POST that is all there is to the command.
@@ -76,10 +85,16 @@ impl ServerArgs {
         Exit::Done
     }
 
-    async fn change(&self, method: Method, path: &str, body: &Value) -> Result<Status, Failure> {
+    async fn change(
+        &self,
+        method: Method,
+        path: &str,
+        body: &Value,
+        patience: Duration,
+    ) -> Result<Status, Failure> {
         let body = Full::new(Bytes::from(body.to_string()));
         let request = http::request(method, path, Some("application/json"), body)?;
-        let reply = http::exchange(&self.socket(), request, PATIENCE).await?;
+        let reply = http::exchange(&self.socket(), request, patience).await?;
         self.show(&reply)?;
         reply::status(&reply)
     }

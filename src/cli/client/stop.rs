@@ -14,6 +14,8 @@ use crate::cli::{Exit, Failure, print};
 
 /// How long the stop socket may take: its thread does nothing else.
 const PATIENCE: Duration = Duration::from_millis(500);
+/// How long the control socket may take after that.
+const LAST_PATIENCE: Duration = Duration::from_secs(3);
 /// What this stop is not.
 const NO_EMERGENCY: &str = "this is a soft stop; the emergency stop is hard-wired";
 
@@ -74,9 +76,10 @@ async fn say_stop(socket: &Path) -> io::Result<()> {
 }
 
 fn by_control_socket(server: &ServerArgs) -> Result<Exit, Failure> {
-    let status = server.post("/api/v1/show/stop", &json!({})).map_err(|mut failure| {
-        failure.error = failure.error.context("NOT STOPPED by kinocue; use the hard-wired emergency stop");
-        failure
+    let stopped = server.post_within("/api/v1/show/stop", &json!({}), LAST_PATIENCE);
+    let status = stopped.map_err(|failure| {
+        let error = failure.error.context("THE STOP IS NOT CONFIRMED; use the hard-wired emergency stop");
+        Failure { error, ..failure }
     })?;
     let (line, socket) = (status.line(), server.socket());
     print::tell(&format!("kinocue: {line}; by {}; {NO_EMERGENCY}", socket.display()));

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use tokio::time::sleep;
 
-use super::events::Events;
+use super::events::{Events, QUIET};
 use super::http::block_on;
 use super::panel::Panel;
 use super::server::ServerArgs;
@@ -44,12 +44,9 @@ async fn follow(server: &ServerArgs, shown: &mut Shown) -> Result<Exit, Failure>
     // A daemon that is not there at all is a fault; one that goes is waited for.
     let mut events = Events::open(&server.socket()).await?;
     loop {
-        let why = loop {
-            match events.next().await {
-                Ok(data) if shown.show(&data)? => {}
-                Ok(_) => return Ok(Exit::Done),
-                Err(why) => break why,
-            }
+        let why = match listen(&mut events, shown).await? {
+            Some(why) => why,
+            None => return Ok(Exit::Done),
         };
         shown.gone(&format!("the daemon at {} is gone: {why}; waiting for it", server.socket().display()));
         events = loop {
@@ -61,6 +58,30 @@ async fn follow(server: &ServerArgs, shown: &mut Shown) -> Result<Exit, Failure>
             }
         };
         shown.back();
+    }
+}
+
+/// Shows what comes until it ends, and why it ended; nothing where nobody reads any more.
+async fn listen(events: &mut Events, shown: &mut Shown) -> Result<Option<&'static str>, Failure> {
+    let mut is_old = false;
+    loop {
+        match events.next().await {
+            Ok(Some(data)) => {
+                if std::mem::take(&mut is_old) {
+                    shown.back();
+                }
+                if !shown.show(&data)? {
+                    return Ok(None);
+                }
+            }
+            Ok(None) if is_old => {}
+            Ok(None) => {
+                is_old = true;
+                let seconds = QUIET.as_secs();
+                shown.gone(&format!("the daemon has said nothing for {seconds} s: what is shown is old"));
+            }
+            Err(why) => return Ok(Some(why)),
+        }
     }
 }
 

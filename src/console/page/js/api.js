@@ -1,7 +1,7 @@
 // Requests to the server: with token, key against repeats, and the time at which they were sent.
 
 import { sentAt, hear } from './clock.js';
-import { token, askForToken } from './token.js';
+import { askForAnother, askForToken, token } from './token.js';
 
 const PATIENCE_MS = 65_000; // the hall may take 60 s over a cue of two hours
 const ROOT = '/api/v1/';
@@ -64,9 +64,10 @@ async function request(method, path, body, more, patience) {
   } catch (error) {
     throw unreachable(error, patience);
   }
-  if (response.status === 401) askForToken();
   const reply = parsed(text);
   if (response.ok) return reply;
+  if (response.status === 401) askForToken({ pressed: method !== 'GET' });
+  if (reply.code === 'role') askForAnother();
   throw new Problem({
     status: response.status,
     detail: `the server said ${response.status}`,

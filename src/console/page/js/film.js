@@ -46,7 +46,7 @@ function leave() {
 export function showFilm(status) {
   if (!status) return;
   const show = status.show;
-  setText(byId('film-title'), show ? show.title ?? show.cue : 'Nothing is loaded');
+  setText(byId('film-title'), show ? titleOf(show, status.state) : 'Nothing is loaded');
   setText(byId('position'), show ? clock(show.position_s) : '–');
   setText(byId('length'), show ? ` / ${clock(show.length_s, 0)}` : '');
   const maySeek = show !== null && MAY_SEEK.includes(status.state);
@@ -57,6 +57,12 @@ export function showFilm(status) {
   showBar(show, maySeek);
   setProperty(byId('seek-ask'), 'hidden', chosen === null);
   if (chosen !== null) setText(byId('seek-go'), `Seek ${clock(chosen)}`);
+}
+
+/** What is loaded; before it starts, with how long the seats take to get onto it. */
+function titleOf(show, state) {
+  const first = state === 'armed' && show.join_s > 0 ? `, first move ${show.join_s.toFixed(1)} s` : '';
+  return `${show.title ?? show.cue}${first}`;
 }
 
 function showBar(show, maySeek) {

@@ -3,7 +3,7 @@
 import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { hasSpoken, refusal, silence } from './stream.js';
 import { linkState } from './state.js';
-import { lasting, sentence } from './words.js';
+import { lasting, sentence, timeOfDay } from './words.js';
 
 const BLINK_MS = 250;
 let spoken = '';
@@ -40,7 +40,9 @@ function showStatus(status, link) {
   setText(byId('cause'), sentence(status.cause));
   setText(byId('since'), times(status));
   setText(byId('next'), sentence(status.next));
-  badge('moving', status.moving, 'seats in motion', 'frames leave for the seats');
+  badge('moving', status.moving, status.state === 'paused' ? 'seats are held' : 'seats in motion', 'frames leave for the seats');
+  const start = status.state === 'armed' ? status.playlist?.next_start : null;
+  badge('starts', Boolean(start), `starts by itself at ${timeOfDay(start ?? '')}`, 'disarm, and it does not');
   badge('realtime', status.realtime.refusals.length > 0, 'not real-time', status.realtime.refusals.join('; '));
   setProperty(document, 'title', `${status.state} – ${status.hall} – kinocue`);
   const now = `${status.state}. ${sentence(status.cause)}. Next: ${status.next}.`;

@@ -28,9 +28,6 @@ export function setLost() {
   changed();
 }
 
-/** The seats move, or may at any moment without a person. */
-export const inMotion = (state) => ['homing', 'joining', 'playing', 'freewheeling', 'parking', 'stopping'].includes(state);
-
 function changed() {
   if (due) return;
   due = true;

@@ -77,7 +77,7 @@ async function read() {
 
 async function refusalOf(response) {
   if (response.status === 401) {
-    askForToken();
+    askForToken({ pressed: false });
     return 'it wants a token';
   }
   const problem = await response.json().catch(() => ({}));

@@ -1,9 +1,12 @@
-// The token by which the server knows who asks: kept while the page is open, asked for when the server wants one.
+// The token by which the server knows who asks: kept while the page is open, asked for when the server wants one. A link may
+// bring it as `#token=…`: what is behind the # is never sent to a server, and it is taken out of the address bar at once.
 
 import { byId, setProperty, setText } from './dom.js';
 
 const KEY = 'kinocue-token';
+const IN_LINK = /^#token=([\w.~-]{1,256})$/;
 const given = [];
+let left = false;
 
 /** The token; null where none was given. */
 export const token = () => sessionStorage.getItem(KEY);
@@ -11,11 +14,31 @@ export const token = () => sessionStorage.getItem(KEY);
 /** Calls back when a token was given. */
 export const onToken = (listener) => given.push(listener);
 
+/** The server does not know who asks. Whoever left the dialog is asked again only when they press something. */
+export function askForToken({ pressed }) {
+  if (left && !pressed) return;
+  open(token() ? 'The server does not know that token, or has forgotten it.' : 'This server wants a token.');
+}
+
+/** The server knows who asks, and they may not. */
+export const askForAnother = () => open('That needs a token of somebody who may do more.');
+
+/** Takes the token of the link that led here; says whether there was one. */
+function takeFromLink() {
+  const found = IN_LINK.exec(location.hash);
+  if (!found) return false;
+  history.replaceState(history.state, '', location.pathname + location.search);
+  sessionStorage.setItem(KEY, found[1]);
+  return true;
+}
+
+// Before anything is asked: whoever asks imports this.
+takeFromLink();
+
 /** Opens the dialog. It leaves the rest of the page usable: STOP must stay in reach. */
-export function askForToken() {
+function open(why) {
   const form = byId('token');
-  const why = token() ? 'The server does not know that token, or has forgotten it.' : 'This server wants a token.';
-  setText(byId('token-why'), `${why} Its engineer has one for you.`);
+  setText(byId('token-why'), `${why} The engineer of this hall has one for you.`);
   if (!form.hidden) return;
   setProperty(form, 'hidden', false);
   byId('token-text').focus();
@@ -24,12 +47,21 @@ export function askForToken() {
 /** Makes the dialog work. */
 export function startToken() {
   const form = byId('token');
+  const use = () => {
+    form.hidden = true;
+    left = false;
+    for (const listener of given) listener();
+  };
   form.addEventListener('submit', (event) => {
     event.preventDefault();
     const text = byId('token-text');
     sessionStorage.setItem(KEY, text.value.trim());
     text.value = '';
-    form.hidden = true;
-    for (const listener of given) listener();
+    use();
   });
+  byId('token-leave').addEventListener('click', () => {
+    form.hidden = true;
+    left = true;
+  });
+  addEventListener('hashchange', () => takeFromLink() && use());
 }

@@ -15,9 +15,17 @@ export const SEVERITIES = {
 
 const FIRST = 4;
 let all = false;
+let lines = [];
+let inView = true;
 
-/** Makes the rest of a long list appear, and go. */
+/** Makes the rest of a long list appear, and go; keeps the gravest warning in view where the list is not. */
 export function startWarnings() {
+  const panel = byId('warnings-panel');
+  new IntersectionObserver(([{ isIntersecting }]) => {
+    inView = isIntersecting;
+    showGravest(hall()?.warnings ?? []);
+  }, { root: byId('main') }).observe(panel);
+  byId('gravest').addEventListener('click', () => panel.scrollIntoView());
   byId('warnings-more').addEventListener('click', () => {
     all = !all;
     showWarnings(hall());
@@ -32,21 +40,50 @@ export function showWarnings(status) {
   setText(byId('warnings-title'), warnings.length === 1 ? '1 warning' : `${warnings.length} warnings`);
   setProperty(byId('warnings-more'), 'hidden', warnings.length <= FIRST);
   setText(byId('warnings-more'), all ? 'Only the gravest' : `Show ${warnings.length - FIRST} more`);
-  show(all ? warnings : warnings.slice(0, FIRST));
+  const shown = all ? warnings : warnings.slice(0, FIRST);
+  layOut(shown.map(({ id, severity, controller }) => ({ id, severity, controller })));
+  for (const [index, warning] of shown.entries()) {
+    setText(lines[index].text, ` ${matter(warning)}`);
+    setText(lines[index].remedy, sentence(warning.remedy));
+  }
+  showGravest(warnings);
 }
 
-const show = onChange((warnings) => byId('warnings').replaceChildren(...warnings.map(line)));
+/** What is the matter, beginning with whose it is. */
+const matter = ({ controller, text }) => (controller ? `${controller}: ${text}` : sentence(text));
 
-function line({ severity, controller, text, remedy }) {
+function showGravest(warnings) {
+  const grave = warnings.filter(({ severity }) => severity !== 'info');
+  const shown = grave.length > 0 && !inView;
+  setProperty(byId('gravest'), 'hidden', !shown);
+  if (!shown) return;
+  const { look, mark: name, word } = SEVERITIES[grave[0].severity] ?? SEVERITIES.warning;
+  setProperty(byId('gravest'), 'className', `gravest live look-${look}`);
+  showMark(name);
+  setText(byId('gravest-words'), `${word}: ${matter(grave[0])}`);
+  setText(byId('gravest-more'), grave.length > 1 ? `and ${grave.length - 1} more` : '');
+}
+
+const showMark = onChange((name) => byId('gravest-mark').replaceChildren(mark(name)));
+
+// Words that change, as seconds do, are changed in place: a line made anew would go from under a finger.
+const layOut = onChange((warnings) => {
+  lines = warnings.map(line);
+  byId('warnings').replaceChildren(...lines.map(({ item }) => item));
+});
+
+function line({ severity, controller }) {
   const look = SEVERITIES[severity] ?? SEVERITIES.warning;
+  const text = make('span');
+  const remedy = make('span');
   const words = make('div', { className: 'warning-words' },
-    make('p', {}, make('b', { className: 'severity' }, look.word), ` ${sentence(text)}`),
-    make('p', { className: 'remedy' }, make('span', { className: 'off-screen' }, 'What to do: '), sentence(remedy)));
+    make('p', {}, make('b', { className: 'severity' }, look.word), text),
+    make('p', { className: 'remedy' }, make('span', { className: 'off-screen' }, 'What to do: '), remedy));
   const item = make('li', { className: `warning look-${look.look}` }, mark(look.mark), words);
   if (controller) {
     const button = make('button', { type: 'button' }, `Show ${controller}`);
     button.addEventListener('click', () => select(controller));
     item.append(button);
   }
-  return item;
+  return { item, text, remedy };
 }

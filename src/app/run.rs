@@ -1,0 +1,35 @@
+//! What the threads of a play or of a hall come back with.
+
+use crate::gate::Counts;
+use crate::plan::PlanError;
+use crate::rt::{Accounts, Ended, Spun};
+use crate::sys::realtime::RealTime;
+use crate::time::MonoTime;
+
+/// What the threads of a play, or of a hall with all its shows, came back with.
+#[derive(Debug)]
+pub struct Run {
+    /// What the tick loop did.
+    pub ended: Ended,
+    /// Everything that was counted.
+    pub accounts: Accounts,
+    /// What the system granted the tick thread.
+    pub granted: RealTime,
+    /// How long it spun before its deadlines.
+    pub spun: Spun,
+    /// Moves that the planner did not find.
+    pub refusals: Vec<PlanError>,
+    /// What the last gate had to do, lane by lane.
+    pub clamps: Vec<Counts>,
+    /// The instant of tick 0.
+    pub origin: MonoTime,
+    /// The instant at which the accounts were closed.
+    pub closed_at: MonoTime,
+}
+
+impl Run {
+    /// Seconds from tick 0, below zero before it.
+    pub(super) fn seconds_from_origin(&self, at: MonoTime) -> f64 {
+        at.since(self.origin).as_secs_f64() - self.origin.since(at).as_secs_f64()
+    }
+}

@@ -1,0 +1,92 @@
+//! A folder of one's own for as long as the program runs.
+
+use std::fs::{self, DirBuilder};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::DirBuilderExt as _;
+use std::path::{Path, PathBuf};
+
+/// Names that are tried.
+const TRIES: u32 = 100;
+
+/// A folder that nobody else may look into; removed with all that is in it when this is dropped.
+#[derive(Debug)]
+pub(super) struct Folder(PathBuf);
+
+impl Folder {
+    /// One where temporary files belong.
+    ///
+    /// # Errors
+    /// Where none can be made; [`ErrorKind::InvalidInput`] where its name could not stand in a configuration.
+    pub(super) fn make() -> io::Result<Self> {
+        let parent = std::env::temp_dir();
+        if parent.to_str().is_none() {
+            let why = format!("{} is no UTF-8; set TMPDIR to another", parent.display());
+            return Err(io::Error::new(ErrorKind::InvalidInput, why));
+        }
+        let own = |attempt: u32| parent.join(format!("kinocue-demo-{}-{attempt}", std::process::id()));
+        // What is there already is never taken for ours: it may belong to somebody who waits for us to write into it.
+        let made = (0..TRIES).map(own).find_map(|path| match DirBuilder::new().mode(0o700).create(&path) {
+            Ok(()) => Some(Ok(Self(path))),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => None,
+            Err(error) => Some(Err(error)),
+        });
+        made.unwrap_or_else(|| Err(ErrorKind::AlreadyExists.into()))
+    }
+
+    /// Where something of that name is in it.
+    pub(super) fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// Writes a file, and makes the folders that it lies in.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub(super) fn write(&self, name: &str, octets: &[u8]) -> io::Result<PathBuf> {
+        let path = self.path(name);
+        if let Some(parent) = path.parent() {
+            fs::create_dir_all(parent)?;
+        }
+        fs::write(&path, octets)?;
+        Ok(path)
+    }
+
+    /// Removes it.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub(super) fn remove(mut self) -> io::Result<()> {
+        let path = std::mem::take(&mut self.0);
+        fs::remove_dir_all(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if !self.0.as_os_str().is_empty() {
+            let _ = fs::remove_dir_all(&self.0); // another error is on its way
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use super::*;
+
+    #[test]
+    fn it_is_for_its_owner_alone_and_goes_with_all_that_is_in_it() {
+        let (folder, other) = (Folder::make().unwrap(), Folder::make().unwrap());
+        assert_ne!(folder.0, other.0);
+        assert_eq!(fs::metadata(&folder.0).unwrap().permissions().mode() & 0o777, 0o700);
+        let file = folder.write("cues/one.csv", b"x").unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"x");
+        let path = folder.0.clone();
+        folder.remove().unwrap();
+        assert!(!path.exists());
+        let path = other.0.clone();
+        drop(other);
+        assert!(!path.exists());
+    }
+}
