@@ -105,11 +105,7 @@ async fn reach(handle: &Handle, is_there: impl Fn(&Status) -> bool) -> Result<()
 }
 
 fn not_parked(status: &Status) -> Problem {
-    let detail = format!(
-        "after {} s the hall is {}, not parked: {}",
-        PATIENCE.as_secs(),
-        status.state,
-        status.cause
-    );
+    let detail =
+        format!("after {} s the hall is {}, not parked: {}", PATIENCE.as_secs(), status.state, status.cause);
     Problem::new(Code::Timeout, detail, "is this machine under heavy load?")
 }

@@ -10,6 +10,7 @@ use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::keeper::Signals;
 use crate::app::serve::{Parts, Places, serve};
+use crate::app::surfaces::Sockets;
 use crate::hall::Role;
 use crate::log::Log;
 use crate::sim::{Farm, Options};
@@ -97,12 +98,14 @@ fn welcome(controllers: &[SocketAddrV4], console: &str) {
 /// Puts everything that the daemon reads where it reads it.
 fn furnish(folder: &Folder, hall: &str) -> Result<Places, Failure> {
     let put = |name: &str, octets: &[u8]| {
-        folder.write(name, octets).with_context(|| format!("cannot write {name} of the demo")).or_exit(Exit::Io)
+        folder
+            .write(name, octets)
+            .with_context(|| format!("cannot write {name} of the demo"))
+            .or_exit(Exit::Io)
     };
     put(&format!("cues/{CUE_ID}.csv"), CUE)?;
     let config = put("demo.toml", hall.as_bytes())?;
-    let sockets =
-        crate::app::surfaces::Sockets { control: folder.path("control.sock"), stop: folder.path("stop.sock") };
+    let sockets = Sockets { control: folder.path("control.sock"), stop: folder.path("stop.sock") };
     Ok(Places { config, state: folder.path("state"), sockets })
 }
 

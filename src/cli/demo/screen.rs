@@ -49,7 +49,11 @@ impl Screen {
 
 fn draw(bar: &ProgressBar, status: &Status) {
     let Some(show) = &status.show else { return };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cue is never below 0, and hours long")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cue is never below 0, and hours long"
+    )]
     let ms = |seconds: f64| (seconds.max(0.0) * 1e3) as u64;
     bar.set_length(ms(show.length_s));
     bar.set_position(ms(show.position_s).min(ms(show.length_s)));
