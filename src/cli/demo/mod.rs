@@ -11,7 +11,6 @@ use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::keeper::Signals;
 use crate::app::serve::{Parts, Places, serve};
-use crate::app::surfaces::Sockets;
 use crate::hall::Role;
 use crate::log::Log;
 use crate::sim::{Farm, Options};
@@ -108,7 +107,10 @@ fn furnish(folder: &Folder, hall: &str) -> Result<Places, Failure> {
     };
     put(&format!("cues/{CUE_ID}.csv"), CUE)?;
     let config = put("demo.toml", hall.as_bytes())?;
-    let sockets = Sockets { control: folder.path("control.sock"), stop: folder.path("stop.sock") };
+    let sockets = crate::app::surfaces::Sockets {
+        control: folder.path("control.sock"),
+        stop: folder.path("stop.sock"),
+    };
     Ok(Places { config, state: folder.path("state"), sockets })
 }
 

@@ -13,14 +13,12 @@ export const token = () => sessionStorage.getItem(KEY);
 /** Calls back when a token was given. */
 export const onToken = (listener) => given.push(listener);
 
-/**
- * Takes the token of the link that led here; says whether it counts. One that is there already, and that the server knows, is
- * not given up for it: no page of others may break the STOP of this one by a link.
- */
+/** Takes the token of the link that led here; says whether there was one. */
 function takeFromLink() {
   const found = IN_LINK.exec(location.hash);
   if (!found) return false;
   history.replaceState(history.state, '', location.pathname + location.search);
+  // One that serves is kept: no page of others may break the STOP of this one by a link.
   if (token() && byId('token').hidden) return false;
   sessionStorage.setItem(KEY, found[1]);
   return true;
