@@ -1,6 +1,7 @@
 //! The daemon: a hall that is opened, kept and closed, as often as its configuration is read anew, and the surfaces that
 //! outlive it.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::net::SocketAddr;
@@ -23,6 +24,7 @@ use crate::api::Pages;
 use crate::config::Config;
 use crate::engine::{Ending, Rate};
 use crate::hall::{Handle, Status, handle};
+use crate::health::Why;
 use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
@@ -114,7 +116,10 @@ impl Served {
     /// Sums it up as a play of `cue`: all that was sent since the configuration was last read, with the end of the last show.
     #[must_use]
     pub fn sum_up(self, cue: String) -> Played {
-        let Self { config, closed, ended } = self;
+        let Self { config, mut closed, ended } = self;
+        // That a group is there when the hall opens is no change worth telling.
+        let mut seen = BTreeSet::new();
+        closed.run.accounts.changes.retain(|one| !seen.insert(one.group) || one.why != Why::SeenAgain);
         let ending = match ended {
             journal::Ending::Completed => Ending::Completed,
             journal::Ending::Stopped => Ending::Stopped,

@@ -60,8 +60,11 @@ impl Guarded {
     }
 
     fn start_with(args: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
-        command.current_dir(env!("CARGO_MANIFEST_DIR")).args(args);
+        Self::spawn(Command::new(env!("CARGO_BIN_EXE_kinocue")).args(args), stdin, stderr)
+    }
+
+    fn spawn(command: &mut Command, stdin: Stdio, stderr: Stdio) -> Self {
+        command.current_dir(env!("CARGO_MANIFEST_DIR"));
         command.stdin(stdin).stdout(Stdio::piped()).stderr(stderr);
         let child = command.spawn().expect("the program starts");
         let handle = Arc::new(pidfd_open(Pid::from_child(&child), PidfdFlags::empty()).expect("it is ours"));
@@ -105,7 +108,7 @@ pub(crate) fn kinocue(args: &[&str]) -> Run {
     Guarded::start(args).finish()
 }
 
-/// A `kinocue play` at work.
+/// A `kinocue play`, or a `kinocue demo`, at work.
 pub(crate) struct Playing(Guarded);
 
 impl Playing {
@@ -123,12 +126,19 @@ impl Playing {
         Self(Guarded::start_with(&args, stdin, stderr))
     }
 
+    /// The demo, with its temporary files in `folder`.
+    pub(crate) fn demo(folder: &Path, args: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command.arg("demo").args(args).env("TMPDIR", folder);
+        Self(Guarded::spawn(&mut command, stdin, stderr))
+    }
+
     pub(crate) fn signal(&self, signal: Signal) {
         self.0.signal(signal);
     }
 
-    /// Waits until it says that on the standard error; what it said up to there is not in its [`Run`].
-    pub(crate) fn wait_for(&mut self, text: &str) {
+    /// Waits until it says that on the standard error; what it said up to there is not in its [`Run`], but here.
+    pub(crate) fn wait_for(&mut self, text: &str) -> String {
         let child = self.0.child.as_mut().expect("it was not taken");
         let stderr = child.stderr.as_mut().expect("piped");
         let (mut said, mut octet) = (String::new(), [0]);
@@ -136,6 +146,7 @@ impl Playing {
             assert_eq!(stderr.read(&mut octet).expect("it can be read"), 1, "it ended: {said}");
             said.push(char::from(octet[0]));
         }
+        said
     }
 
     /// Waits for its end.

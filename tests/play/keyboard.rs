@@ -33,14 +33,8 @@ struct Terminal {
 impl Terminal {
     /// Plays a minute in which the seat stands 45 mm above its park pose, and waits until it is there.
     fn playing() -> Self {
-        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
-        let ours = openpt(flags).expect("a terminal");
-        grantpt(&ours).and_then(|()| unlockpt(&ours)).expect("it is ours");
-        let theirs = ioctl_tiocgptpeer(&ours, flags).expect("its other end");
-        let size = Winsize { ws_row: 24, ws_col: 80, ws_xpixel: 0, ws_ypixel: 0 };
-        tcsetwinsize(&ours, size).expect("it takes any");
+        let (ours, theirs) = terminal(80);
         let before = tcgetattr(&theirs).expect("it is a terminal");
-        let ours = File::from(ours);
         let (closed, open) = pipe().expect("a pipe");
         let written = read_all(ours.try_clone().expect("a handle"), closed);
         let (folder, sim) = (Folder::new(), Sim::one(&[]));
@@ -81,8 +75,19 @@ impl Terminal {
     }
 }
 
+/// A terminal so many characters wide: our end, and the program's.
+pub(super) fn terminal(columns: u16) -> (File, OwnedFd) {
+    let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+    let ours = openpt(flags).expect("a terminal");
+    grantpt(&ours).and_then(|()| unlockpt(&ours)).expect("it is ours");
+    let theirs = ioctl_tiocgptpeer(&ours, flags).expect("its other end");
+    let size = Winsize { ws_row: 24, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
+    tcsetwinsize(&ours, size).expect("it takes any");
+    (File::from(ours), theirs)
+}
+
 /// What comes out of a terminal, until nobody writes to it any more, or the other end of `open` is closed.
-fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String> {
+pub(super) fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String> {
     let (written, read) = channel();
     std::thread::spawn(move || {
         let mut octets = [0; 4096];

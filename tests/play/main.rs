@@ -5,6 +5,7 @@ mod process;
 
 mod controllers;
 mod cue_files;
+mod demo;
 mod frames;
 mod keyboard;
 mod loss;

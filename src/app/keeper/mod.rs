@@ -248,6 +248,10 @@ impl Keeper {
         }
         let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
         self.end_record(self.ended);
+        if self.reins.leave.load(Ordering::Acquire) {
+            // There is no next show in this hall, and soon no tick thread to take it.
+            return;
+        }
         if self.end_sweep(how) {
             self.rewind();
         } else {

@@ -13,15 +13,13 @@ const TRIES: u32 = 100;
 pub(super) struct Folder(PathBuf);
 
 impl Folder {
-    /// One where temporary files belong.
+    /// One in `parent`.
     ///
     /// # Errors
-    /// Where none can be made; [`ErrorKind::InvalidInput`] where its name could not stand in a configuration.
-    pub(super) fn make() -> io::Result<Self> {
-        let parent = std::env::temp_dir();
+    /// Those of the system; [`ErrorKind::InvalidFilename`] where its name could not stand in a configuration.
+    pub(super) fn make(parent: &Path) -> io::Result<Self> {
         if parent.to_str().is_none() {
-            let why = format!("{} is no UTF-8; set TMPDIR to another", parent.display());
-            return Err(io::Error::new(ErrorKind::InvalidInput, why));
+            return Err(ErrorKind::InvalidFilename.into());
         }
         let own = |attempt: u32| parent.join(format!("kinocue-demo-{}-{attempt}", std::process::id()));
         // What is there already is never taken for ours: it may belong to somebody who waits for us to write into it.
@@ -77,7 +75,9 @@ mod tests {
 
     #[test]
     fn it_is_for_its_owner_alone_and_goes_with_all_that_is_in_it() {
-        let (folder, other) = (Folder::make().unwrap(), Folder::make().unwrap());
+        let parent = tempfile::tempdir().unwrap();
+        let make = || Folder::make(parent.path()).unwrap();
+        let (folder, other) = (make(), make());
         assert_ne!(folder.0, other.0);
         assert_eq!(fs::metadata(&folder.0).unwrap().permissions().mode() & 0o777, 0o700);
         let file = folder.write("cues/one.csv", b"x").unwrap();

@@ -1,5 +1,6 @@
 //! `kinocue demo`: the main job with nothing to set up: the daemon with its console, over virtual controllers.
 
+use std::env;
 use std::io::{IsTerminal as _, stderr, stdin};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 
@@ -50,7 +51,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let signals = Signals::default();
     play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let folder = Folder::make().context("no folder for the demo; is TMPDIR full?").or_exit(Exit::Io)?;
+    let temporary = env::temp_dir();
+    let no_folder = || format!("cannot make a folder in {}; set TMPDIR to another", temporary.display());
+    let folder = Folder::make(&temporary).with_context(no_folder).or_exit(Exit::Io)?;
     let port = FreePort::find().context("no port for the frames").or_exit(Exit::System)?;
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port.number);
     let setups = SEATS.iter().map(|seat| seat.setup(host)).collect();

@@ -23,7 +23,7 @@ impl Screen {
         let bar = std::io::stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template("{msg} [{wide_bar}]\n{prefix}");
             let style = style.expect("the template is fixed").progress_chars("=> ");
-            ProgressBar::new(0).with_style(style)
+            ProgressBar::new(1).with_style(style)
         });
         Self { bar }
     }

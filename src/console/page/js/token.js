@@ -28,6 +28,8 @@ function takeFromLink() {
   const found = IN_LINK.exec(location.hash);
   if (!found) return false;
   history.replaceState(history.state, '', location.pathname + location.search);
+  // One that serves is kept: no page of others may break the STOP of this one by a link.
+  if (token() && byId('token').hidden) return false;
   sessionStorage.setItem(KEY, found[1]);
   return true;
 }

@@ -1,0 +1,171 @@
+//! The demo: the daemon at work with its console, for as long as a ride takes, and nothing left of it.
+
+use std::io::{Read as _, Write as _, pipe};
+use std::net::TcpStream;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use super::Folder;
+use super::keyboard::{read_all, terminal};
+use super::process::{PATIENCE, Playing};
+use super::report::assert_sound;
+
+/// The console of a demo, and whoever has its link.
+struct Console {
+    address: String,
+    token: String,
+}
+
+impl Console {
+    /// The one that the demo says is its own.
+    fn told(said: &str) -> Self {
+        let link = said.lines().find_map(|line| line.strip_prefix("the console: http://")).expect("a link");
+        let (address, token) = link.split_once("/#token=").expect("a token");
+        Self { address: address.to_owned(), token: token.to_owned() }
+    }
+
+    /// The status and the body of a reply.
+    fn ask(&self, head: &str, headers: &str, body: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(&self.address).expect("it listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("it takes any");
+        let (address, length) = (&self.address, body.len());
+        let request = format!(
+            "{head} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\nContent-Type: application/json\r\n\
+             Content-Length: {length}\r\n{headers}\r\n{body}"
+        );
+        stream.write_all(request.as_bytes()).expect("it reads");
+        let mut reply = String::new();
+        stream.read_to_string(&mut reply).expect("it replies");
+        let (head, body) = reply.split_once("\r\n\r\n").expect("a head");
+        (head.split(' ').nth(1).and_then(|status| status.parse().ok()).expect("a status"), body.to_owned())
+    }
+
+    fn get(&self, path: &str) -> (u16, String) {
+        self.ask(&format!("GET {path}"), "", "")
+    }
+
+    /// The status is made anew ten times a second.
+    fn status_once_it_plays(&self) -> Value {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            let (status, hall) = self.get("/api/v1/status");
+            let hall: Value = serde_json::from_str(&hall).unwrap_or_else(|error| panic!("{error}: {hall}"));
+            assert!(status == 200 && Instant::now() < until, "{status}: {hall}");
+            if hall["state"] == "playing" && hall["moving"] == true {
+                return hall;
+            }
+        }
+    }
+
+    fn trim(&self, headers: &str) -> u16 {
+        self.ask("PUT /api/v1/trim", headers, r#"{"offset_s": 0.01}"#).0
+    }
+
+    /// The header of whoever has the link.
+    fn by_link(&self) -> String {
+        format!("Authorization: Bearer {}\r\n", self.token)
+    }
+}
+
+/// The one folder that the demo has made.
+fn only(folder: &Path) -> std::fs::DirEntry {
+    let mut entries = std::fs::read_dir(folder).expect("it is ours");
+    let only = entries.next().expect("it has one").expect("it is ours");
+    assert!(entries.next().is_none());
+    only
+}
+
+fn is_empty(folder: &Path) -> bool {
+    std::fs::read_dir(folder).expect("it is ours").next().is_none()
+}
+
+fn demo(folder: &Folder) -> Playing {
+    Playing::demo(&folder.path(""), &["--json"], Stdio::null(), Stdio::piped())
+}
+
+/// Asserts that four controllers got every frame and acked it, but for those that a busy machine kept from answering for so
+/// long that they were lost, and got no frames for a while.
+fn assert_all_acked(report: &Value) {
+    let events: Vec<&str> =
+        report["events"].as_array().expect("a list").iter().filter_map(|one| one["what"].as_str()).collect();
+    assert!(events.first().is_none_or(|what| !what.starts_with("rejoining")), "nobody was away: {report}");
+    if !events.iter().any(|what| what.starts_with("lost")) {
+        assert_sound(report);
+    }
+    let controllers = report["controllers"].as_array().expect("a list");
+    assert_eq!(controllers.len(), 4);
+    for one in controllers {
+        assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()), "{one}");
+    }
+}
+
+#[test]
+fn the_demo_serves_the_console_while_it_plays_and_ends_by_itself_with_every_frame_acked() {
+    let folder = Folder::new();
+    let mut demo = demo(&folder);
+    let console = Console::told(&demo.wait_for("playing: the seats are on the cue"));
+    let files = only(&folder.path("")).metadata().expect("it is ours");
+    assert_eq!(files.permissions().mode() & 0o777, 0o700, "others may not look into it");
+
+    let (status, page) = console.get("/");
+    assert!(status == 200 && page.to_lowercase().contains("<!doctype html"), "{status}: {page}");
+    let hall = console.status_once_it_plays();
+    assert_eq!(hall["controllers"].as_array().map(Vec::len), Some(4), "{hall}");
+
+    assert_eq!(console.trim(""), 403, "without the link one may look, and stop");
+    assert_eq!(console.trim(&console.by_link()), 200);
+
+    let run = demo.finish();
+    let report = run.report_of(0);
+    assert_eq!((&report["result"], &report["rate_hz"]), (&"completed".into(), &100.0.into()));
+    assert!(report["ticks"].as_u64() > Some(1_700), "the whole cue: {report}");
+    assert_all_acked(&report);
+    assert!(is_empty(&folder.path("")), "it leaves no file behind");
+}
+
+#[test]
+fn ctrl_c_parks_the_seats_of_the_demo_and_ends_it_with_the_report() {
+    let folder = Folder::new();
+    let mut demo = demo(&folder);
+    demo.wait_for("playing: the seats are on the cue");
+    demo.signal(Signal::INT);
+    demo.wait_for("parked: the seats have parked");
+    let report = demo.finish().report_of(0);
+    assert_eq!(report["result"], "stopped");
+    assert_all_acked(&report);
+    assert!(is_empty(&folder.path("")));
+}
+
+#[test]
+fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
+    let folder = Folder::new();
+    let (ours, theirs) = terminal(200);
+    let (closed, _open) = pipe().expect("a pipe");
+    let written = read_all(ours, closed);
+    let end = || Stdio::from(theirs.try_clone().expect("a handle"));
+    let demo = Playing::demo(&folder.path(""), &["--json"], end(), end());
+    let mut said = String::new();
+    while !said.contains("the console stays up; arm and go again there, Ctrl-C ends: http://") {
+        said += &written.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("it is silent: {said}"));
+    }
+    assert!(said.contains("parked: the seats have parked"), "{said}");
+    let console = Console::told(&said);
+    for step in ["arm", "go"] {
+        let sent = SystemTime::now().duration_since(UNIX_EPOCH).expect("it is later").as_millis();
+        let headers = format!("{}X-Kinocue-Sent: {sent}\r\n", console.by_link());
+        let (status, reply) = console.ask(&format!("POST /api/v1/show/{step}"), &headers, "{}");
+        assert_eq!(status, 200, "{step}: {reply}");
+    }
+    console.status_once_it_plays();
+    demo.signal(Signal::INT);
+    let report = demo.finish().report_of(0);
+    assert_eq!(report["result"], "stopped", "the second ride");
+    assert!(report["ticks"].as_u64() > Some(1_700), "the first ride counts too: {report}");
+    assert_all_acked(&report);
+    assert!(is_empty(&folder.path("")));
+}
