@@ -5,8 +5,9 @@ use std::net::TcpStream;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Stdio;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
+use kinocue::sys::clock::{Monotonic, wall_now_ns};
+use kinocue::time::Clock as _;
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -51,11 +52,11 @@ impl Console {
 
     /// The status is made anew ten times a second.
     fn status_once_it_plays(&self) -> Value {
-        let until = Instant::now() + PATIENCE;
+        let until = Monotonic.now() + PATIENCE;
         loop {
             let (status, hall) = self.get("/api/v1/status");
             let hall: Value = serde_json::from_str(&hall).unwrap_or_else(|error| panic!("{error}: {hall}"));
-            assert!(status == 200 && Instant::now() < until, "{status}: {hall}");
+            assert!(status == 200 && Monotonic.now() < until, "{status}: {hall}");
             if hall["state"] == "playing" && hall["moving"] == true {
                 return hall;
             }
@@ -156,7 +157,7 @@ fn on_a_terminal_the_console_stays_after_the_ride_to_go_again_until_ctrl_c() {
     assert!(said.contains("parked: the seats have parked"), "{said}");
     let console = Console::told(&said);
     for step in ["arm", "go"] {
-        let sent = SystemTime::now().duration_since(UNIX_EPOCH).expect("it is later").as_millis();
+        let sent = wall_now_ns() / 1_000_000;
         let headers = format!("{}X-Kinocue-Sent: {sent}\r\n", console.by_link());
         let (status, reply) = console.ask(&format!("POST /api/v1/show/{step}"), &headers, "{}");
         assert_eq!(status, 200, "{step}: {reply}");
