@@ -53,6 +53,10 @@ pub(super) struct Member {
     refusing: bool,
     /// What went wrong first since it was cleared.
     pub(super) ailed: Option<Why>,
+    /// Its seat was found elsewhere than frames left it.
+    pub(super) moved: bool,
+    /// Another master was found, and nobody was told yet.
+    crowd_untold: bool,
 }
 
 impl Member {
@@ -79,6 +83,8 @@ impl Member {
             drives: [0; MAX_AXES],
             refusing: false,
             ailed: None,
+            moved: false,
+            crowd_untold: false,
         }
     }
 
@@ -142,6 +148,7 @@ impl Member {
         self.on_error(sighting.error);
         self.refusing &= sighting.error != 0;
         if let Some(why) = self.against(sighting) {
+            self.crowd_untold |= self.outcast.is_none() && matches!(why, Why::Crowded(_));
             self.outcast.get_or_insert(why);
         } else {
             self.baseline = Some(Baseline::of(sighting, self.traffic));
@@ -162,6 +169,7 @@ impl Member {
             Verdict::Other => Some(Why::Other(controller)),
             Verdict::NotHome => Some(Why::NotHome(controller)),
             Verdict::Rebooted => Some(Why::Rebooted(controller)),
+            Verdict::Crowded => Some(Why::Crowded(controller)),
             Verdict::Unproved => Some(Why::Unproved(controller)),
         }
     }
@@ -195,6 +203,11 @@ impl Member {
     /// Whether an emergency stop began since this was last asked.
     pub(super) const fn take_press(&mut self) -> bool {
         std::mem::replace(&mut self.press_untold, false)
+    }
+
+    /// Whether another master was found since this was last asked.
+    pub(super) const fn take_crowd(&mut self) -> bool {
+        std::mem::replace(&mut self.crowd_untold, false)
     }
 
     /// It was homed: its position is known, and what it counts from here on is the new measure.
@@ -245,6 +258,7 @@ impl Member {
     /// Whatever was on its way, or was seen, does not count from here on.
     pub(super) fn forget(&mut self) {
         self.seen = None;
+        self.moved = false;
         self.reading = false;
         self.next_read = None;
         self.rest();

@@ -141,6 +141,11 @@ impl Health {
         self.members[controller].on_sighting(sighting, at);
     }
 
+    /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
+    pub fn on_moved(&mut self, controller: usize) {
+        self.members[controller].moved = true;
+    }
+
     /// A controller is home; a person homes one only while the hall is paused or parked. Where that was all its group was
     /// out for, the group is looked at next.
     pub fn on_homed(&mut self, controller: usize) {

@@ -2,7 +2,8 @@
 //!
 //! DP34 counts the datagrams that a controller received, round after 65,535. Since it was last read, it must have grown
 //! by at least the frames that were acked and at most by all that was sent; whether reads count is left open. A
-//! controller that rebooted began at 0 and hardly ever meets that.
+//! controller that rebooted began at 0 and hardly ever meets that; where it counts more than it could since, somebody else
+//! sent to it.
 
 /// What was read of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +63,7 @@ pub(super) enum Verdict {
     Other,
     NotHome,
     Rebooted,
+    Crowded,
     Unproved,
 }
 
@@ -85,7 +87,11 @@ impl Baseline {
         }
         let acked = traffic.acked - self.traffic.acked;
         let grown = u64::from(now).wrapping_sub(u64::from(then)).wrapping_sub(acked);
-        if grown.wrapping_add(UNDER_WAY) % (1 << 16) <= doubt { Verdict::Same } else { Verdict::Rebooted }
+        if grown.wrapping_add(UNDER_WAY) % (1 << 16) <= doubt {
+            return Verdict::Same;
+        }
+        let counted_since = traffic.sent - self.traffic.sent + UNDER_WAY;
+        if u64::from(now) <= counted_since { Verdict::Rebooted } else { Verdict::Crowded }
     }
 
     /// Whether the counter should be read again while all is well.
@@ -120,7 +126,13 @@ mod tests {
     fn a_counter_that_began_anew_is_a_reboot() {
         assert_eq!(after(40_000, 500, 470, 12), Verdict::Rebooted);
         assert_eq!(after(40_000, 500, 470, 40_480), Verdict::Same);
-        assert_eq!(after(40_000, 500, 470, 41_000), Verdict::Rebooted, "more than was sent");
+    }
+
+    #[test]
+    fn a_counter_of_more_than_was_sent_since_any_reboot_tells_of_another_master() {
+        assert_eq!(after(40_000, 500, 470, 41_000), Verdict::Crowded);
+        assert_eq!(after(40_000, 500, 470, 700), Verdict::Crowded);
+        assert_eq!(after(40_000, 500, 470, 500), Verdict::Rebooted, "of all that was sent since");
     }
 
     #[test]

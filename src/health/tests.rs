@@ -4,7 +4,7 @@ mod latched;
 
 use super::*;
 use crate::observe::What;
-use crate::state::Event;
+use crate::state::{Event, Trouble};
 
 const TICK: Duration = Duration::from_millis(10);
 const IDENTITY: Identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };

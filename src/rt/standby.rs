@@ -72,9 +72,18 @@ impl Standby {
         self.line.hear(controller, octets, at)
     }
 
-    /// The positions that an answer to a beat tells.
-    pub(super) fn beat_of(&self, controller: usize, octets: &[u8]) -> Option<PerAxis<Pulses>> {
+    /// Where the axes stand by an answer to a beat; none where it is none.
+    pub(super) fn beat_of(&mut self, controller: usize, octets: &[u8]) -> Option<PerAxis<Pulses>> {
         self.beats.hear(controller, octets)
+    }
+
+    /// Whether a seat is surely elsewhere than where it rests; to be asked with every answer to a beat.
+    pub(super) fn is_away(
+        &mut self,
+        controller: usize,
+        rests: impl FnOnce(&[Option<Pulses>]) -> bool,
+    ) -> bool {
+        self.beats.is_away(controller, rests)
     }
 
     /// Notes what was read of a controller.
@@ -107,7 +116,11 @@ impl Standby {
             health.on_other_sent(controller, self.line.take_sent(controller));
         }
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if moving || self.line.is_open() || !self.beats.take(now) {
+        if moving || self.line.is_open() {
+            self.beats.forget();
+            return;
+        }
+        if !self.beats.take(now) {
             return;
         }
         for controller in 0..self.seen.len() {

@@ -173,9 +173,26 @@ impl Watch {
         octets: &[u8],
         at: MonoTime,
     ) -> Option<PerAxis<Pulses>> {
-        let positions = self.standby.as_ref()?.beat_of(controller, octets)?;
+        let positions = self.standby.as_mut()?.beat_of(controller, octets)?;
         self.health.on_status(controller, at);
+        self.mind_rest(controller);
         Some(positions)
+    }
+
+    /// The next show begins where the last one left the seats. One that somebody has moved since is found first, or it would
+    /// jump.
+    fn mind_rest(&mut self, controller: usize) {
+        let standing = self.health.standing(self.health.groups().group_of(controller));
+        let is_set = matches!(self.phase, Phase::Parking | Phase::Joining) && !self.live.is_moving();
+        if !is_set || !standing.may_move() {
+            return;
+        }
+        let Self { standby: Some(standby), lookers, poses, health, .. } = self else { return };
+        let looker = &lookers[controller];
+        let rest = if standing == Standing::Rejoining { &poses[controller] } else { looker.park() };
+        if standby.is_away(controller, |places| looker.rests_at(places, rest)) {
+            health.on_moved(controller);
+        }
     }
 
     /// Tells whoever looks how the controllers stand.

@@ -12,6 +12,7 @@ mod ready;
 mod record;
 mod show;
 mod status;
+mod strangers;
 mod sweep;
 mod voice;
 mod warnings;
@@ -41,6 +42,7 @@ use ready::Preflighted;
 use record::Records;
 use show::Cued;
 use status::Rates;
+use strangers::Strangers;
 
 /// How long an ask is waited for before the keeper looks after everything else.
 const LOOK: Duration = Duration::from_millis(10);
@@ -122,6 +124,7 @@ pub struct Keeper {
     /// What the tick thread was told of readiness.
     readiness: Option<crate::state::Readiness>,
     rates: Rates,
+    strangers: Strangers,
     told: MonoTime,
     /// The way to the controllers' registers; none while an errand has it.
     line: Option<Line>,
@@ -160,6 +163,7 @@ impl Keeper {
             homing: None,
             readiness: None,
             rates: Rates::default(),
+            strangers: Strangers::default(),
             told: now,
             line: Some(line),
             library,
@@ -212,6 +216,7 @@ impl Keeper {
             self.told = now;
             let table = self.reins.live.table();
             self.rates.note(&table, now);
+            self.strangers.note(&table, now);
             self.say_journal();
             self.publish();
         }
