@@ -18,20 +18,24 @@ export function startPlaylist() {
   onPress(byId('cue-load'), (button) => {
     const cue = byId('cues').value;
     // Only reading a cue shows its title and length, or its faults.
-    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(readLists);
+    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(() => readLists());
   });
-  onPress(byId('lists-again'), readLists);
+  onPress(byId('lists-again'), () => readLists());
   byId('cues').addEventListener('change', showCueNote);
-  onToken(readLists);
+  onToken(() => readLists());
 }
 
-/** Reads what playlists and cues there are. */
-export async function readLists() {
+/** Whether the library has a cue of that id, as far as is known. */
+export const holds = (id) => cues.some((cue) => cue.id === id);
+
+/** Reads what playlists and cues there are, and chooses a cue where one is named. */
+export async function readLists(cue) {
   try {
     const [playlists, library] = await Promise.all([get('playlists'), get('cues')]);
     cues = library;
     fill(byId('playlists'), playlists);
     fill(byId('cues'), cues);
+    if (holds(cue)) byId('cues').value = cue;
     showCueNote();
   } catch (error) {
     say(byId('cues'), `The lists cannot be read: ${error.words ?? error.message}`, true);
