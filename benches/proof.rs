@@ -11,9 +11,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use kinocue::cue::{self, Source};
-use kinocue::engine::Rate;
 use kinocue::motion::SeatType;
 use kinocue::proof::{Digest, Terms, prove};
+use kinocue::time::Rate;
 use kinocue::timeline::Timeline;
 
 const ROWS: u32 = 720_000;

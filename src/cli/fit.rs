@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::convert;
 use super::figures::{self, AxisReport};
 use super::load::{self, SeatArgs, SourceArgs};
-use super::times::parse_level;
 use super::{Exit, Failure, OrExit as _, print};
+use crate::config::parse_level;
 use crate::proof::{self, Fitted, Manner};
 use crate::timeline::Timeline;
 

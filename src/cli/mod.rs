@@ -32,7 +32,6 @@ mod report;
 mod serve;
 mod sim;
 mod targets;
-pub mod times;
 mod token;
 
 pub use exit::{Exit, Failure, OrExit};

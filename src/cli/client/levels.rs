@@ -8,9 +8,10 @@ use serde_json::json;
 use super::rows::parse_rows;
 use super::server::{ServerArgs, in_path};
 use super::view::Status;
-use crate::cli::times::{parse_level, parse_trim};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::config::parse_level;
 use crate::hall::LevelsChange;
+use crate::time::parse_trim;
 
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]

@@ -5,9 +5,8 @@ use serde_json::json;
 use super::server::ServerArgs;
 use super::table::table;
 use super::view::{Preflight, Warning};
-use crate::cli::times::parse_time;
 use crate::cli::{Exit, Failure, ask, print};
-use crate::time::ShowTime;
+use crate::time::{ShowTime, parse_time};
 
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
