@@ -33,7 +33,8 @@ Examples:
   tcpdump -i eth0 -w - udp port 7408 | kinocue decode
   xxd -p -c 256 frame.bin | kinocue decode -
 
-Exit codes: 0 all of it was read, 64 the hex is none, 65 something is malformed, cut short or no capture, 66 no such file")]
+Exit codes: 0 all of it was read, 64 the hex is none, 65 something is malformed, cut short or
+no capture, 66 no such file")]
 pub(super) struct Args {
     /// Hex, a capture, or - for the standard input
     ///

@@ -32,7 +32,7 @@ const VIRTUAL: u16 = 4;
 /// Axes of a controller whose `--to` says nothing of them.
 const AXES: &str = "axes=3";
 
-/// Measures how late frames leave and how soon their acks come, as cyclictest does for timers.
+/// Measures how late frames leave and how soon their acks come.
 ///
 /// It sends as `play` does, from the same loop, and moves nothing: each frame holds the seat where it stands, effects off.
 /// Where each seat stands is read first, twice, and again just before the first frame. A controller is left out unless its
@@ -41,18 +41,22 @@ const AXES: &str = "axes=3";
 /// own.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel; ack latency from that
-instant, of each frame, to the kernel's receive time of its ack. The first tells of this machine, the second of the network
-and the controllers too; with virtual controllers, of this machine twice.
+Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel;
+ack latency from that instant, of each frame, to the kernel's receive time of its ack. The first
+tells of this machine, the second of the network and the controllers too; with virtual
+controllers, of this machine twice.
 
---out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of the tags lateness and
-ack_latency. Any program that reads such logs can plot it.
+--out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of
+the tags lateness and ack_latency. Any program that reads such logs can plot it.
 
-Exit codes: 0 measured, 69 a controller did not answer, 75 a seat did not stay where it stood or the frame port is taken,
-76 a controller refused or was left out
+Exit codes:
+  0   measured
+  69  a controller did not answer
+  75  a seat did not stay where it stood, or the frame port is taken
+  76  a controller refused, or was left out
 
 Examples:
-  kinocue latency                                                    this machine, 1,000 ticks a second to four virtual ones
+  kinocue latency                                                    to four virtual controllers
   kinocue latency --count 64 --seconds 60 --out before.hlog          sixty-four of them, kept
   kinocue latency --count 64 --seconds 60 --spin-us 100 --out after.hlog
   kinocue latency --compare before.hlog after.hlog                   what the spin has brought

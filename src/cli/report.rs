@@ -13,7 +13,9 @@ use crate::sys::clock::local_now;
 mod csv;
 mod table;
 
-/// Says what was played: every show of a day with its cue, levels, seats, frames and end, and all together.
+/// Says what was played, or what was asked.
+///
+/// Every show of a day with its cue, levels, seats, frames and end, and all together.
 ///
 /// Reads the journal that `kinocue serve` writes, also while it does. A show that neither ended nor goes on is named as
 /// interrupted. Lines of the journal that were cut short are passed over with a note.

@@ -32,20 +32,20 @@ const HOST_PORT: u16 = 8410;
 #[command(after_help = "\
 Examples:
   kinocue sim                                        one controller of three axes at 127.0.0.1:7408
-  kinocue sim --count 4 --axes 6 --json              four of six axes at ports 7408 to 7411, counts at the end
-  kinocue sim --loss 0.05 --delay 80ms --seed 7      one frame in twenty unanswered, the other answers late
-  kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame, and logs it
-  kinocue sim --pa 06=0 --moves moves.csv            never hurries after frames, and logs how its motors moved
-  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      somebody presses the emergency stop, and releases it
+  kinocue sim --count 4 --axes 6 --json              four of six axes, ports 7408 to 7411
+  kinocue sim --loss 0.05 --delay 80ms --seed 7      one in twenty unanswered, the others late
+  kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame
+  kinocue sim --pa 06=0 --moves moves.csv            never hurries; logs how motors moved
+  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      an emergency stop comes and goes
   kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
 
 Commands of --script, each with TIME: before it (seconds from the start), and of --control:
-  X1=1, X1=0     the switch at input X01 closes, which pulls it low (active with PA04 = 1), or opens; X1 to X12
+  X1=1, X1=0     the switch at input X01 closes (active with PA04 = 1), or opens; X1 to X12
   err=12, err=0  an error comes (1 to 7, 10 to 15, 17, 20, 21), or all go with their causes
   reboot         the power goes and comes back
   estop=1        an emergency stop comes that no input asks for; estop=0: it goes
   mute=1         obeys, but says nothing; mute=0: speaks again
-  pa95=3         somebody sets a parameter at the controller's keys: register in hex, value decimal or 0x
+  pa95=3         somebody sets a parameter at its keys: register in hex, value decimal or 0x
   loss=0.1, duplicate=0.1, delay=50ms   what the network does from now on
 A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.")]
 pub(super) struct Args {
