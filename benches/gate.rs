@@ -21,11 +21,10 @@ use asked::sound::{self, Sound};
 use asked::trial::Trial;
 use asked::wild::{self, Wild};
 use common::spread::{Spread, verdict};
-use kinocue::engine::Rate;
 use kinocue::gate::{Asked, Gate, Verdict};
 use kinocue::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::sys::clock::Monotonic;
-use kinocue::time::Clock as _;
+use kinocue::time::{Clock as _, Rate};
 
 /// What an axis may cost in a tick, ns.
 const GOAL_NS: f64 = 25.0;

@@ -3,6 +3,10 @@
 //!
 //! `cargo bench --bench load`
 
+mod common {
+    pub(crate) mod spread;
+}
+
 use std::fs::{self, File};
 use std::hint::black_box;
 use std::io::{self, BufWriter, Write};
@@ -12,6 +16,8 @@ use std::time::{Duration, Instant};
 
 use kinocue::cue::{self, Source};
 use kinocue::timeline::Timeline;
+
+use common::spread::{Spread, verdict};
 
 const ROWS: u32 = 720_000;
 const AXES: u32 = 6;
@@ -59,12 +65,11 @@ fn compare_times(path: &Path) -> Outcome<()> {
         theirs.push(timed(|| parse_cells(path))?);
         ours.push(timed(|| load(path))?);
     }
-    let ratios: Vec<_> = ours.iter().zip(&theirs).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()).collect();
-    println!("loading {ROWS} rows of {AXES} axes, {ROUNDS} rounds       median      min      max");
+    let ratios = Spread::of(ours.iter().zip(&theirs).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()));
+    println!("loading {ROWS} rows of {AXES} axes, {ROUNDS} rounds: median (least..greatest)");
     print_times("cue::load and Timeline::new", &ours);
     print_times("csv ByteRecords, cells as f64", &theirs);
-    let (low, middle, high) = spread(&ratios);
-    println!("{:<42} {middle:>8.2} {low:>8.2} {high:>8.2}   {}", "ratio", verdict(middle, TIME_GOAL));
+    println!("{:<42} {ratios:.2}   goal {TIME_GOAL:.1}: {}", "ratio", verdict(ratios, TIME_GOAL));
     Ok(())
 }
 
@@ -75,12 +80,9 @@ fn compare_memory(path: &Path) -> Outcome<()> {
     let samples = f64::from(ROWS * 8 * (1 + AXES)) / 1e6;
     let (rise, most) = (rise_kb * 1024.0 / 1e6, 2.0 * samples + file);
     println!("\nmemory: rise of the peak {rise:.1} MB; samples {samples:.1} MB, file {file:.1} MB");
-    println!(
-        "{:<42} {:>8.2}   {}",
-        "rise / (2 x samples + file)",
-        rise / most,
-        verdict(rise / most, MEMORY_GOAL)
-    );
+    let part = Spread::of([rise / most]);
+    let judged = verdict(part, MEMORY_GOAL);
+    println!("{:<42} {:>8.2}   goal {MEMORY_GOAL:.1}: {judged}", "rise / (2 x samples + file)", part.median);
     println!("{:<42} {:>8.2}", "rise / samples", rise / samples);
     Ok(())
 }
@@ -127,18 +129,5 @@ fn peak_kb() -> Outcome<u64> {
 }
 
 fn print_times(what: &str, times: &[Duration]) {
-    let ms: Vec<_> = times.iter().map(|time| time.as_secs_f64() * 1e3).collect();
-    let (low, middle, high) = spread(&ms);
-    println!("{what:<42} {middle:>5.0} ms {low:>5.0} ms {high:>5.0} ms");
-}
-
-/// Least, median and greatest.
-fn spread(values: &[f64]) -> (f64, f64, f64) {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    (sorted[0], sorted[sorted.len() / 2], sorted[sorted.len() - 1])
-}
-
-fn verdict(ratio: f64, goal: f64) -> String {
-    format!("goal {goal:.1}: {}", if ratio <= goal { "met" } else { "MISSED" })
+    println!("{what:<42} {:.0} ms", Spread::of(times.iter().map(|time| time.as_secs_f64() * 1e3)));
 }

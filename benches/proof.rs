@@ -3,6 +3,10 @@
 //!
 //! `cargo bench --bench proof`, and with `-- --quick` for the smooth cue at 100 frames a second alone.
 
+mod common {
+    pub(crate) mod spread;
+}
+
 use std::fs::File;
 use std::hint::black_box;
 use std::io::{self, BufWriter, Write};
@@ -11,10 +15,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use kinocue::cue::{self, Source};
-use kinocue::engine::Rate;
 use kinocue::motion::SeatType;
 use kinocue::proof::{Digest, Terms, prove};
+use kinocue::time::Rate;
 use kinocue::timeline::Timeline;
+
+use common::spread::{Spread, verdict};
 
 const ROWS: u32 = 720_000;
 const AXES: usize = 6;
@@ -28,7 +34,7 @@ type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 fn main() -> Outcome<()> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("two-hours.csv");
-    println!("{ROWS} rows of {AXES} axes, {ROUNDS} rounds                  median      min      max");
+    println!("{ROWS} rows of {AXES} axes, {ROUNDS} rounds: median (least..greatest)");
     let quick = std::env::args().any(|arg| arg == "--quick");
     let (noises, rates) = if quick { (1, 1) } else { (2, 3) };
     for (what, noise) in [("smooth", 0.0), ("noisy", 2e-5)].into_iter().take(noises) {
@@ -71,16 +77,15 @@ fn compare(path: &Path, what: &str, rate: f64) -> Outcome<()> {
         loads.push(load);
         proofs.push(proof);
     }
-    let ratios: Vec<_> = proofs.iter().zip(&loads).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()).collect();
+    let ratios = Spread::of(proofs.iter().zip(&loads).map(|(a, b)| a.as_secs_f64() / b.as_secs_f64()));
     println!("{what}, {rate} frames a second");
     print_times("  cue::load and Timeline::new", &loads);
     print_times("  digest and proof", &proofs);
-    let (low, middle, high) = spread(&ratios);
     let verdict = match rate {
-        GOAL_RATE => format!("goal {GOAL:.1}: {}", if middle <= GOAL { "met" } else { "MISSED" }),
+        GOAL_RATE => format!("goal {GOAL:.1}: {}", verdict(ratios, GOAL)),
         _ => String::new(),
     };
-    println!("{:<42} {middle:>8.2} {low:>8.2} {high:>8.2}   {verdict}", "  ratio");
+    println!("{:<42} {ratios:.2}   {verdict}", "  ratio");
     Ok(())
 }
 
@@ -92,14 +97,5 @@ fn timed<T>(work: impl FnOnce() -> Outcome<T>) -> Outcome<(T, Duration)> {
 }
 
 fn print_times(what: &str, times: &[Duration]) {
-    let ms: Vec<_> = times.iter().map(|time| time.as_secs_f64() * 1e3).collect();
-    let (low, middle, high) = spread(&ms);
-    println!("{what:<42} {middle:>5.0} ms {low:>5.0} ms {high:>5.0} ms");
-}
-
-/// Least, median and greatest.
-fn spread(values: &[f64]) -> (f64, f64, f64) {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    (sorted[0], sorted[sorted.len() / 2], sorted[sorted.len() - 1])
+    println!("{what:<42} {:.0} ms", Spread::of(times.iter().map(|time| time.as_secs_f64() * 1e3)));
 }

@@ -12,7 +12,8 @@
 //!       report, progress <----- tracker (latency, loss, silence) <---- net <---+
 //! ```
 //!
-//! The rooms, in the order a motion value passes through them; ARCHITECTURE.md walks through each.
+//! The rooms: first those that a motion value passes through, in their order, then what surrounds them. ARCHITECTURE.md walks
+//! through each.
 
 #![deny(
     clippy::print_stdout,
@@ -20,56 +21,50 @@
     reason = "a closed pipe must not end a show: `cli::print`"
 )]
 
-pub mod time;
-
 pub mod motion;
-
+pub mod time;
 pub mod wire;
-
-pub mod capture;
 
 pub mod cue;
 pub mod timeline;
 
-pub mod plan;
-
-pub mod engine;
-
-pub mod state;
-
+pub mod checks;
 pub mod config;
-
-pub mod fanout;
-pub mod gate;
-pub mod rt;
-
 pub mod proof;
 
-pub mod sim;
+pub mod engine;
+pub mod fanout;
+pub mod gate;
+pub mod plan;
+pub mod rt;
+pub mod state;
+
+pub mod health;
+pub mod net;
+pub mod observe;
+pub mod tracker;
 
 pub mod device;
 pub mod preflight;
 
-pub mod app;
-pub mod doctor;
-pub mod latency;
-
-pub mod api;
 pub mod hall;
-pub mod health;
 pub mod journal;
 pub mod library;
+pub mod playlist;
+
+pub mod api;
+pub mod console;
 pub mod log;
 pub mod metrics;
-pub mod net;
-pub mod observe;
 pub mod osc;
-pub mod playlist;
 pub mod sd;
 pub mod text_port;
-pub mod tracker;
 
-pub mod sys;
+pub mod capture;
+pub mod doctor;
+pub mod latency;
+pub mod sim;
 
+pub mod app;
 pub mod cli;
-pub mod console;
+pub mod sys;

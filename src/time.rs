@@ -1,6 +1,12 @@
-//! Machine time and show time, which cannot be mixed by accident.
+//! Machine time and show time, which cannot be mixed by accident; the grid of ticks; times as a person types them.
 //!
 //! Pure code is told the time; only `rt`, `net` and `sim` ask for it, through [`Clock`].
+
+mod grid;
+mod typed;
+
+pub use grid::{Rate, Tick, TickGrid};
+pub use typed::{TRIM_MS, parse_duration, parse_time, parse_trim};
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Sub};

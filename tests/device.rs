@@ -1,5 +1,8 @@
 //! Registers and homing over real sockets of 127.0.0.1, in the library and as the program.
 
+#[path = "common/said.rs"]
+mod said;
+
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::{Duration, Instant};
 
@@ -8,7 +11,7 @@ use kinocue::config::{Controller, from_to_args};
 use kinocue::device::{Address, Patience, Talk, reads, table};
 use kinocue::sim::{Farm, Options, Setup};
 use kinocue::wire::Dialect;
-use serde_json::Value;
+use said::Said;
 
 const LOOPBACK: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
 
@@ -16,19 +19,6 @@ const LOOPBACK: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
 fn farm(setups: Vec<Setup>) -> Farm {
     let setups = setups.into_iter().map(|setup| Setup { host_port: 0, ..setup }).collect();
     Farm::start(Options::loopback(setups)).expect("free ports")
-}
-
-/// What the program ended with, and said.
-struct Said {
-    exit: i32,
-    out: String,
-    err: String,
-}
-
-impl Said {
-    fn json(&self) -> Value {
-        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error}: {}\n{}", self.out, self.err))
-    }
 }
 
 /// Runs the program on all controllers of a farm, named c1, c2 …
@@ -40,12 +30,7 @@ fn run(farm: &Farm, args: &[&str]) -> Said {
 fn said(args: &[&str], more: Vec<String>) -> Said {
     let mut command = Command::cargo_bin("kinocue").expect("it is built");
     let output = command.args(args).args(more).args(["--bind", "127.0.0.1:0"]).output().expect("it runs");
-    let text = |octets: Vec<u8>| String::from_utf8(octets).expect("text");
-    Said {
-        exit: output.status.code().expect("it ends by itself"),
-        out: text(output.stdout),
-        err: text(output.stderr),
-    }
+    Said::of(output)
 }
 
 fn controllers(farm: &Farm) -> Vec<Controller> {

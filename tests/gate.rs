@@ -12,9 +12,9 @@ mod trial;
 #[path = "../benches/asked/wild.rs"]
 mod wild;
 
-use kinocue::engine::Rate;
 use kinocue::gate::{Asked, Gate, Limit, Verdict};
 use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType};
+use kinocue::time::Rate;
 use sound::Sound;
 use trial::{Trial, window};
 use wild::Wild;

@@ -9,14 +9,14 @@ use std::time::Duration;
 use kinocue::app::Staged;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
-use kinocue::engine::{Ending, Rate, Show, TickGrid};
+use kinocue::engine::{Ending, Show};
 use kinocue::fanout::{Lane, Manner};
 use kinocue::net::Delivery;
 use kinocue::rt::{
     Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Planning, Sent, Task, TickLoop, TickReport,
     mailboxes,
 };
-use kinocue::time::{Clock, MonoTime, ShowTime};
+use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::tracker::Tracker;
 use kinocue::wire::{FrameNo, MotionRequest, ReplyCode, Timing};

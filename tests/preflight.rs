@@ -2,6 +2,9 @@
 //!
 //! Each test has an address of its own there, so that all can hold frame port 8410 at once.
 
+#[path = "common/said.rs"]
+mod said;
+
 use std::io::{BufRead as _, BufReader};
 use std::net::{SocketAddrV4, UdpSocket};
 use std::path::PathBuf;
@@ -9,6 +12,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use said::Said;
 use serde_json::Value;
 
 /// Settings that pass, but for the address of the host.
@@ -59,19 +63,6 @@ impl Drop for Sim {
     }
 }
 
-/// What the program ended with, and said.
-struct Said {
-    exit: i32,
-    out: String,
-    err: String,
-}
-
-impl Said {
-    fn json(&self) -> Value {
-        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error}: {}\n{}", self.out, self.err))
-    }
-}
-
 /// Runs preflight from 127.83.0.`host`, port 8410.
 fn preflight(host: u8, args: &[&str]) -> Said {
     let output = Command::new(env!("CARGO_BIN_EXE_kinocue"))
@@ -80,12 +71,7 @@ fn preflight(host: u8, args: &[&str]) -> Said {
         .args(["--bind", &format!("127.83.0.{host}:8410")])
         .output()
         .expect("it runs");
-    let text = |octets: Vec<u8>| String::from_utf8(octets).expect("text");
-    Said {
-        exit: output.status.code().expect("it ends by itself"),
-        out: text(output.stdout),
-        err: text(output.stderr),
-    }
+    Said::of(output)
 }
 
 /// The checks that a controller of a report fails.

@@ -4,11 +4,11 @@
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 
-use kinocue::engine::Rate;
 use kinocue::motion::Pulses;
 use kinocue::net::Ports;
 use kinocue::observe::Watched;
 use kinocue::rt::{Accounts, AckLoop, Live, MailEnds, mailboxes};
+use kinocue::time::Rate;
 use kinocue::wire::{Code, Dialect, MAX_LEN, PerAxis, Status};
 
 const ANY: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);

@@ -1,7 +1,7 @@
 //! Judges what was sent, from the definition of the measure alone, frame by frame and with all its multiplications.
 
-use kinocue::engine::Rate;
 use kinocue::motion::Limits;
+use kinocue::time::Rate;
 
 /// What frames of a rate make of an axis that stood still before.
 pub(crate) struct Judge {

@@ -7,9 +7,8 @@ use std::path::Path;
 use super::chance::Chance;
 use super::judge::Judge;
 use kinocue::cue::{Source, read};
-use kinocue::engine::Rate;
 use kinocue::motion::{Limits, SeatType};
-use kinocue::time::ShowTime;
+use kinocue::time::{Rate, ShowTime};
 use kinocue::timeline::{Hint, Timeline};
 
 /// Rates that are tried more often than others.

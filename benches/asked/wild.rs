@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use super::chance::Chance;
 use super::judge::Judge;
-use kinocue::engine::Rate;
 use kinocue::motion::{Limits, SeatType};
+use kinocue::time::Rate;
 
 /// Rates that are tried more often than others.
 const RATES: [f64; 10] = [50.0, 60.0, 100.0, 120.0, 200.0, 250.0, 333.0, 500.0, 700.0, 1000.0];

@@ -7,10 +7,10 @@ use std::path::Path;
 use kinocue::app::Staged;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
-use kinocue::engine::{Rate, Show};
+use kinocue::engine::Show;
 use kinocue::fanout::Manner;
 use kinocue::observe::Watched;
-use kinocue::time::ShowTime;
+use kinocue::time::{Rate, ShowTime};
 use kinocue::timeline::Timeline;
 use kinocue::wire::Timing;
 

@@ -7,13 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::engine::TickGrid;
 use kinocue::fanout::Lane;
 use kinocue::net::{DrainGrid, Ports, Sender};
 use kinocue::rt::{Accounts, AckLoop, Conductor, Live, MailEnds, PlanLoop, Planning, TickLoop, mailboxes};
 use kinocue::sys::clock::{Monotonic, thread_cpu_time};
 use kinocue::sys::realtime::{RealTime, normal_priority, request};
-use kinocue::time::Clock;
+use kinocue::time::{Clock, TickGrid};
 use kinocue::tracker::histogram;
 
 use super::outcome::{Outcome, Quantiles, each};

@@ -6,12 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::engine::TickGrid;
 use kinocue::net::{DrainGrid, Ports};
 use kinocue::rt::{AckLoop, Conductor, Desk, Live, MailEnds, PlanLoop, Planning, TickLoop, mailboxes};
 use kinocue::sys::clock::Monotonic;
 use kinocue::sys::realtime;
-use kinocue::time::{Clock as _, MonoTime};
+use kinocue::time::{Clock as _, MonoTime, TickGrid};
 
 use super::flood::{self, Flood};
 use super::watch::{Seen, Watch};

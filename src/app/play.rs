@@ -15,7 +15,7 @@ use super::staged::Staged;
 use super::sum_up::{About, sum_up};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
-use crate::engine::{Rate, Show};
+use crate::engine::Show;
 use crate::fanout::{Lane, Manner};
 use crate::health::{Groups, Health};
 use crate::net::{NetError, Ports, Sender};
@@ -27,6 +27,7 @@ use crate::rt::{
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
+use crate::time::Rate;
 use crate::timeline::Timeline;
 
 /// Why nothing was played. Nothing has moved then.

@@ -22,7 +22,7 @@ use super::sum_up::{About, sum_up};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
 use crate::config::Config;
-use crate::engine::{Ending, Rate};
+use crate::engine::Ending;
 use crate::hall::{Handle, Status, handle};
 use crate::health::Why;
 use crate::journal::{self, Journal, Limits};
@@ -30,6 +30,7 @@ use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
 use crate::sys::realtime;
+use crate::time::Rate;
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]

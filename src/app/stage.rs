@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use super::play::Control;
 use super::run::Run;
-use crate::engine::{Engine, Rate, TickGrid};
+use crate::engine::Engine;
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
 use crate::rt::{AckLoop, Conductor, Mail, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
-use crate::time::Clock;
+use crate::time::{Clock, Rate, TickGrid};
 
 /// From the end of preparing to tick 0: time to start the other threads.
 const RUN_UP: Duration = Duration::from_millis(20);

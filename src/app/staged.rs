@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::config::Config;
-use crate::engine::{Engine, Headroom, Mix, Rate, Show};
+use crate::engine::{Engine, Headroom, Mix, Show};
 use crate::fanout::{Lane, Manner, lanes};
 use crate::motion::Window;
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
 use crate::rt::{Desk, Loaded, Planning};
+use crate::time::Rate;
 use crate::timeline::{Hint, Timeline};
 
 /// A show with its lanes and its first course; nothing is open yet, and nothing moves.

@@ -5,9 +5,10 @@ use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
 use crate::config::Controller;
-use crate::engine::{Ending, Rate};
+use crate::engine::Ending;
 use crate::gate::Clamp;
 use crate::health::Groups;
+use crate::time::Rate;
 
 /// What happened to controllers and to groups, in the order of time.
 fn events(controllers: &[Controller], run: &Run) -> Vec<EventReport> {

@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
-use super::times::{parse_level, parse_trim};
 use super::{Exit, Failure, print};
-use crate::config::{self, Config, ConfigFault, ConfigFaults};
+use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place, Source};
 use crate::proof::{Proof, Violation, prove};
+use crate::time::parse_trim;
 use crate::timeline::Timeline;
 
 /// The codes of bad files, the one that counts most first.

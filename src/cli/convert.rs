@@ -21,30 +21,30 @@ Examples:
 
 A cue may have {}.", limits::IN_WORDS))]
 pub(super) struct Args {
-    /// The cue to read, CSV or MCAP, or a file of the format given with --from
+    /// The cue to read, CSV or MCAP, or a file of the format given with --from.
     input: PathBuf,
-    /// The file to write; its name ends in .csv or .mcap
+    /// The file to write; its name ends in .csv or .mcap.
     output: PathBuf,
     /// Format of the field to read: rows are line,time_ms,x,y,z,u,v,w, where time_ms is how long a row takes; u8 are
-    /// raw octets, one an axis, 0 to 255 over the stroke
+    /// raw octets, one an axis, 0 to 255 over the stroke.
     #[arg(long, value_enum, value_name = "FORMAT")]
     from: Option<Format>,
-    /// Unit of the positions in rows: mm, percent, fraction or pulse
+    /// Unit of the positions in rows: mm, percent, fraction or pulse.
     #[arg(long, value_name = "UNIT", requires = "from", required_if_eq("from", "rows"))]
     units: Option<DeclaredUnit>,
-    /// Axes in u8, 1 to 12
+    /// Axes in u8, 1 to 12.
     #[arg(long, value_name = "N", requires = "from", required_if_eq("from", "u8"))]
     axes: Option<usize>,
-    /// Rows a second in u8
+    /// Rows a second in u8.
     #[arg(long, value_name = "HZ", requires = "from", required_if_eq("from", "u8"))]
     rate: Option<f64>,
-    /// Save the complete messages of an MCAP that is cut short or damaged
+    /// Save the complete messages of an MCAP that is cut short or damaged.
     #[arg(long, conflicts_with = "from")]
     recover: bool,
-    /// Give the cue this title
+    /// Give the cue this title.
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
-    /// Replace OUTPUT where it exists
+    /// Replace OUTPUT where it exists.
     #[arg(long)]
     force: bool,
 }

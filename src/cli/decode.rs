@@ -33,8 +33,8 @@ Examples:
   tcpdump -i eth0 -w - udp port 7408 | kinocue decode
   xxd -p -c 256 frame.bin | kinocue decode -
 
-Ends with 0, with 65 where anything was malformed, cut short or no capture, with 66 where the file is missing, and with
-64 where the hex is none.")]
+Exit codes: 0 all of it was read, 64 the hex is none, 65 something is malformed, cut short or
+no capture, 66 no such file")]
 pub(super) struct Args {
     /// Hex, a capture, or - for the standard input
     ///
@@ -45,23 +45,23 @@ pub(super) struct Args {
     input: Vec<OsString>,
 
     /// Which family's manual messages are read by: imax is the layout as its manual prints it, which no known program
-    /// sends
+    /// sends.
     #[arg(long, value_enum, default_value_t = Reading::Smc)]
     dialect: Reading,
 
-    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; may be given several times
+    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; may be given several times.
     #[arg(long, value_name = "N", conflicts_with = "all")]
     port: Vec<u16>,
 
-    /// Of a capture, read the datagrams of all ports that open like a message
+    /// Of a capture, read the datagrams of all ports that open like a message.
     #[arg(long)]
     all: bool,
 
-    /// All fields of each message of a file or of the standard input, rather than one line
+    /// All fields of each message of a file or of the standard input, rather than one line.
     #[arg(short, long)]
     verbose: bool,
 
-    /// One JSON object a line on the standard output; after a file or the standard input one with the counts
+    /// One JSON object a line on the standard output; after a file or the standard input one with the counts.
     #[arg(long)]
     json: bool,
 }

@@ -39,7 +39,7 @@ Verdicts of a measured run, by how late the loop woke after each tick's deadline
         The work of a tick and the way to the seat need the other half, so frames begin to meet
         the next ones; and a seat shows ticks that are missed this often.
 
-Exit code: 0 ready, 1 not ready: something is bad.
+Exit codes: 0 ready, 1 not ready: something is bad
 
 Examples:
   kinocue doctor                                 looks, and measures for 10 s
@@ -47,23 +47,23 @@ Examples:
   kinocue doctor --config hall.toml --seconds 0  looks only, for the controllers of a hall
   kinocue doctor --json | jq '.lines[] | select(.verdict != \"ok\")'")]
 pub(super) struct Args {
-    /// How long each run takes, in seconds, at most an hour; 0 runs none
+    /// How long each run takes, in seconds, at most an hour; 0 runs none.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=3600))]
     seconds: u64,
 
-    /// Measure a second time, with a busy thread of ordinary priority on each processor
+    /// Measure a second time, with a busy thread of ordinary priority on each processor.
     #[arg(long)]
     load: bool,
 
-    /// How many controllers it is to play to
+    /// How many controllers it is to play to.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "config", value_parser = clap::value_parser!(u32).range(1..=65535))]
     controllers: u32,
 
-    /// The configuration whose controllers it is to play to
+    /// The configuration whose controllers it is to play to.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 
-    /// Print one JSON object
+    /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }

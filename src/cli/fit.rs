@@ -9,14 +9,14 @@ use serde::Serialize;
 use super::convert;
 use super::figures::{self, AxisReport};
 use super::load::{self, SeatArgs, SourceArgs};
-use super::times::parse_level;
 use super::{Exit, Failure, OrExit as _, print};
+use crate::config::parse_level;
 use crate::proof::{self, Fitted, Manner};
 use crate::timeline::Timeline;
 
-/// Makes a cue keep the limits of its seats: lowers its amplitude about the neutral pose just as far as needed, never its
-/// time.
+/// Makes a cue keep the limits of its seats.
 ///
+/// Lowers its amplitude about the neutral pose just as far as needed, and never its time.
 /// What amplitude cannot cure, as the steps of coarse sources and the corners of straight lines, --smooth takes out with a
 /// low-pass that moves nothing in time; of low-pass and amplitude it takes the pair that changes the cue least. Vibration
 /// that would leave the stroke is lowered too. What is written passes `kinocue check` on the same terms.

@@ -14,7 +14,9 @@ use crate::config::Controller;
 use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
 use crate::device::{Outcome, Patience, Request, Talk, table};
 
-/// Homes seats: has their controllers find zero (DPF0) and waits until each is there.
+/// Homes empty seats.
+///
+/// Has their controllers find zero (DPF0), and waits until each is there.
 ///
 /// Without --to and --config the daemon homes all seats of its hall; see `kinocue watch` for how far they are.
 ///

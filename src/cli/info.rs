@@ -14,7 +14,9 @@ use crate::timeline::{AxisFigures, EffectUse, Held, Hint, Timeline};
 /// How many marks a curve is drawn with.
 const DRAWN: u32 = 64;
 
-/// Shows what a cue holds: length, axes, effects, and the extremes of each axis with their times.
+/// Shows what a cue holds, and what it asks of a seat.
+///
+/// Length, axes, effects, and the extremes of each axis with their times.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue info cues/coaster.csv",

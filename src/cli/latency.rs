@@ -13,12 +13,12 @@ use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::device::stand::stand;
-use crate::engine::{Rate, Show};
+use crate::engine::Show;
 use crate::latency::{cue, held};
 use crate::motion::{MAX_AXES, Pulses};
 use crate::rt::Times;
 use crate::sim::{Farm, Options, Setup};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 
 mod compare;
 mod report;
@@ -32,7 +32,7 @@ const VIRTUAL: u16 = 4;
 /// Axes of a controller whose `--to` says nothing of them.
 const AXES: &str = "axes=3";
 
-/// Measures how late frames leave and how soon their acks come, as cyclictest does for timers.
+/// Measures how late frames leave and how soon their acks come.
 ///
 /// It sends as `play` does, from the same loop, and moves nothing: each frame holds the seat where it stands, effects off.
 /// Where each seat stands is read first, twice, and again just before the first frame. A controller is left out unless its
@@ -41,18 +41,22 @@ const AXES: &str = "axes=3";
 /// own.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel; ack latency from that
-instant, of each frame, to the kernel's receive time of its ack. The first tells of this machine, the second of the network
-and the controllers too; with virtual controllers, of this machine twice.
+Lateness is from a tick's deadline to the instant before its first frame is handed to the kernel;
+ack latency from that instant, of each frame, to the kernel's receive time of its ack. The first
+tells of this machine, the second of the network and the controllers too; with virtual
+controllers, of this machine twice.
 
---out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of the tags lateness and
-ack_latency. Any program that reads such logs can plot it.
+--out writes an interval log of HdrHistogram (format 1.3, nanoseconds): a line a second for each of
+the tags lateness and ack_latency. Any program that reads such logs can plot it.
 
-Exit code: 0 measured, 69 a controller did not answer, 75 a seat did not stay where it stood or the frame port is taken,
-76 a controller refused or was left out.
+Exit codes:
+  0   measured
+  69  a controller did not answer
+  75  a seat did not stay where it stood, or the frame port is taken
+  76  a controller refused, or was left out
 
 Examples:
-  kinocue latency                                                    this machine, 1,000 ticks a second to four virtual ones
+  kinocue latency                                                    to four virtual controllers
   kinocue latency --count 64 --seconds 60 --out before.hlog          sixty-four of them, kept
   kinocue latency --count 64 --seconds 60 --spin-us 100 --out after.hlog
   kinocue latency --compare before.hlog after.hlog                   what the spin has brought
@@ -60,11 +64,11 @@ Examples:
   kinocue latency --config hall.toml --ack-every 10 --json | jq .lateness_us")]
 pub(super) struct Args {
     /// A controller: HOST:PORT, and after commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or mbox;
-    /// repeatable
+    /// repeatable.
     #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,
 
-    /// Controllers, seats and show settings from a file
+    /// Controllers, seats and show settings from a file.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 
@@ -72,15 +76,15 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", conflicts_with_all = ["to", "config"], value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: Option<u16>,
 
-    /// Ticks per second, 1 to 1000
+    /// Ticks per second, 1 to 1000.
     #[arg(long, value_name = "HZ", value_parser = parse_rate, default_value = "1000")]
     rate: f64,
 
-    /// How long, in seconds, at most an hour
+    /// How long, in seconds, at most an hour.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
 
-    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any
+    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
 
@@ -88,7 +92,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
 
-    /// Ask for no replies to frames, and measure lateness alone
+    /// Ask for no replies to frames, and measure lateness alone.
     #[arg(long)]
     no_acks: bool,
 
@@ -96,15 +100,15 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,
 
-    /// Write the histograms of each second to a file
+    /// Write the histograms of each second to a file.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Measure nothing: hold two files of --out against each other
+    /// Measure nothing: hold two files of --out against each other.
     #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["to", "config", "count", "out"])]
     compare: Vec<PathBuf>,
 
-    /// Print the report as one JSON object on stdout
+    /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
 }

@@ -9,9 +9,9 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use super::{Exit, Failure};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
-use crate::engine::Rate;
 use crate::motion::SeatType;
 use crate::proof::{Digest, Terms};
+use crate::time::Rate;
 use crate::timeline::Timeline;
 
 /// What stands behind the options in the help of a command that reads cues.

@@ -11,7 +11,7 @@ use super::{Cli, Exit, Failure, OrExit as _};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  mkdir man && kinocue man man && man man/kinocue-play.1")]
 pub(super) struct Args {
-    /// The folder to write them into; it has to exist
+    /// The folder to write them into; it has to exist.
     dir: PathBuf,
 }
 

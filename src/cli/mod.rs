@@ -32,16 +32,32 @@ mod report;
 mod serve;
 mod sim;
 mod targets;
-pub mod times;
 mod token;
 
 pub use exit::{Exit, Failure, OrExit};
+
+const AFTER: &str = "\
+Examples:
+  kinocue demo                                  everything at work, with nothing to set up
+  kinocue check hall.toml                       every fault of a configuration
+  kinocue play ride.csv --config hall.toml      one cue, led by keys
+  kinocue serve --config hall.toml              the service, led by the commands from status to test
+
+kinocue COMMAND --help has the options of each, with examples.
+
+Exit codes:
+  0   done                        70  a fault of kinocue       76   a controller refused
+  1   a check failed              71  the system refused       77   not allowed
+  64  usage                       74  input or output failed   78   bad configuration
+  65  bad cue                     75  not ready, try again     130  a second Ctrl-C
+  66  no such file or name
+  69  no daemon, or no controller, answered";
 
 /// Plays motion cues to the seats of a theatre, in time with a film.
 ///
 /// Not a safety device: the protocol has no stop command, so the emergency stop is hard-wired.
 #[derive(Debug, Parser)]
-#[command(name = "kinocue", version, max_term_width = 100)]
+#[command(name = "kinocue", version, max_term_width = 100, after_help = AFTER)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -9,15 +9,14 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::load::{self, SourceArgs, after_help, parse_rate};
-use super::times::{parse_level, parse_time};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::{Play, PlayError, Played};
-use crate::config::{Config, from_to_args};
-use crate::engine::{Rate, Show};
+use crate::config::{Config, from_to_args, parse_level};
+use crate::engine::Show;
 use crate::fanout::Manner;
 use crate::health::ACKS_OFF;
 use crate::sys::{signal, terminal};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime, parse_time};
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 

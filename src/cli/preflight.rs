@@ -24,7 +24,9 @@ mod report;
 
 use report::Report;
 
-/// Checks every controller before anyone sits down: who answers, how fast, and whether its settings are right and safe.
+/// Checks every controller before anyone sits down.
+///
+/// Who answers, how fast, and whether its settings are right and safe.
 ///
 /// Reads only; nothing moves and nothing is changed. Controllers are asked side by side: 64 of them take seconds, also
 /// where some are dead. Ends with 0 only where nothing fails. Without --to and --config the daemon checks its own hall.

@@ -11,12 +11,12 @@ use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::Staged;
 use crate::config::Config;
 use crate::cue::{self, Cue, CueFaults, Source};
-use crate::engine::{Rate, Show};
+use crate::engine::Show;
 use crate::fanout::Manner;
 use crate::library::Verdict;
 use crate::proof::{Digest, Terms, prove};
 use crate::sys::humble::{self, Bounds};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
 #[derive(Debug, clap::Args)]

@@ -13,7 +13,9 @@ use crate::sys::clock::local_now;
 mod csv;
 mod table;
 
-/// Says what was played: every show of a day with its cue, levels, seats, frames and end, and all together.
+/// Says what was played, or what was asked.
+///
+/// Every show of a day with its cue, levels, seats, frames and end, and all together.
 ///
 /// Reads the journal that `kinocue serve` writes, also while it does. A show that neither ended nor goes on is named as
 /// interrupted. Lines of the journal that were cut short are passed over with a note.
@@ -25,7 +27,7 @@ Examples:
   kinocue report --from 2026-11-01 --to 2026-11-30 --csv > november.csv
   kinocue report --day today --actions
 
-Ends with 0 also where nothing was played, with 66 where there is no journal, with 77 where it may not be read.")]
+Exit codes: 0 shown, also where nothing was played, 66 there is no journal, 77 it may not be read")]
 pub(super) struct Args {
     /// The day: today, yesterday, or a date as 2026-11-21 [default: today].
     #[arg(long, value_name = "DAY", value_parser = parse_day, conflicts_with_all = ["from", "to"])]

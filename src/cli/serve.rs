@@ -10,7 +10,9 @@ use crate::log::{Line, Log, Priority};
 use crate::net::NetError;
 use crate::{config, console};
 
-/// Runs a hall: keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
+/// Runs the service of a hall.
+///
+/// Keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
 ///
 /// Nothing moves until somebody asks for it, by the client commands, the web console or any other surface. SIGTERM parks the
 /// seats and ends with 0; SIGHUP reads the configuration anew where nothing is armed.

@@ -11,8 +11,9 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::print::{self, tell};
-use super::{Exit, Failure, OrExit as _, times};
+use super::{Exit, Failure, OrExit as _};
 use crate::sim::{Command, Farm, FarmError, LinkFaults, Options, Outcome, Setup};
+use crate::time::parse_duration;
 use crate::wire::Dialect;
 
 mod control;
@@ -31,60 +32,60 @@ const HOST_PORT: u16 = 8410;
 #[command(after_help = "\
 Examples:
   kinocue sim                                        one controller of three axes at 127.0.0.1:7408
-  kinocue sim --count 4 --axes 6 --json              four of six axes at ports 7408 to 7411, counts at the end
-  kinocue sim --loss 0.05 --delay 80ms --seed 7      one frame in twenty unanswered, the other answers late
-  kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame, and logs it
-  kinocue sim --pa 06=0 --moves moves.csv            never hurries after frames, and logs how its motors moved
-  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      somebody presses the emergency stop, and releases it
+  kinocue sim --count 4 --axes 6 --json              four of six axes, ports 7408 to 7411
+  kinocue sim --loss 0.05 --delay 80ms --seed 7      one in twenty unanswered, the others late
+  kinocue sim --axes 6 --pa 95=6 --log frames.csv    takes axes 7 to 12 of a shared frame
+  kinocue sim --pa 06=0 --moves moves.csv            never hurries; logs how motors moved
+  kinocue sim --safe --script \"2:X1=1, 3:X1=0\"      an emergency stop comes and goes
   kinocue sim --count 8 --script \"5:3@err=12\"        the third has an alarm of the drive of axis 3
 
 Commands of --script, each with TIME: before it (seconds from the start), and of --control:
-  X1=1, X1=0     the switch at input X01 closes, which pulls it low (active with PA04 = 1), or opens; X1 to X12
+  X1=1, X1=0     the switch at input X01 closes (active with PA04 = 1), or opens; X1 to X12
   err=12, err=0  an error comes (1 to 7, 10 to 15, 17, 20, 21), or all go with their causes
   reboot         the power goes and comes back
   estop=1        an emergency stop comes that no input asks for; estop=0: it goes
   mute=1         obeys, but says nothing; mute=0: speaks again
-  pa95=3         somebody sets a parameter at the controller's keys: register in hex, value decimal or 0x
+  pa95=3         somebody sets a parameter at its keys: register in hex, value decimal or 0x
   loss=0.1, duplicate=0.1, delay=50ms   what the network does from now on
 A number or name and @ before a command means that controller alone: 2@err=12, c2@err=12.")]
 pub(super) struct Args {
-    /// Where the first controller listens; with port 0 each gets a free one
+    /// Where the first controller listens; with port 0 each gets a free one.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408")]
     listen: SocketAddrV4,
 
-    /// How many controllers, at consecutive ports
+    /// How many controllers, at consecutive ports.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: u16,
 
-    /// Working axes of each (PA02), 1 to 12
+    /// Working axes of each (PA02), 1 to 12.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=12))]
     axes: u16,
 
-    /// A parameter: register in hex, value decimal or 0x; may be given again
+    /// A parameter: register in hex, value decimal or 0x; may be given again.
     #[arg(long = "pa", value_name = "HEX=VALUE", value_parser = parse::parameter)]
     parameters: Vec<(u8, u16)>,
 
-    /// Which family they belong to
+    /// Which family they belong to.
     #[arg(long, value_enum, default_value_t = Family::Smc)]
     dialect: Family,
 
-    /// Chance that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost
+    /// Chance that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance)]
     loss: f64,
 
-    /// Chance that an answer comes twice, 0..1
+    /// Chance that an answer comes twice, 0..1.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance)]
     duplicate: f64,
 
-    /// How much later answers leave: 80ms, 1.5s
-    #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = times::parse_duration)]
+    /// How much later answers leave: 80ms, 1.5s.
+    #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = parse_duration)]
     delay: Duration,
 
-    /// Obey, but never answer
+    /// Obey, but never answer.
     #[arg(long)]
     mute: bool,
 
-    /// An emergency stop is in effect from then on, counted from the start: SS[.mmm], MM:SS, HH:MM:SS
+    /// An emergency stop is in effect from then on, counted from the start: SS[.mmm], MM:SS, HH:MM:SS.
     #[arg(long, value_name = "TIME", value_parser = parse::time)]
     estop_at: Option<Duration>,
 
@@ -92,36 +93,36 @@ pub(super) struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
-    /// The port that frames must come from (PA24); 0 takes any
+    /// The port that frames must come from (PA24); 0 takes any.
     #[arg(long, value_name = "PORT", default_value_t = HOST_PORT)]
     host_port: u16,
 
-    /// Start with settings that are safe for people and pass preflight, reports go to this machine; --pa changes them
+    /// Start with settings that are safe for people and pass preflight, reports go to this machine; --pa changes them.
     #[arg(long)]
     safe: bool,
 
-    /// What happens when, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below
+    /// What happens when, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below.
     #[arg(long, value_name = "TIME:COMMAND, …", value_parser = script, default_value = "", hide_default_value = true)]
     script: Script,
 
-    /// Take commands at a Unix socket, one per line, each answered with ok or error and why
+    /// Take commands at a Unix socket, one per line, each answered with ok or error and why.
     #[arg(long, value_name = "PATH")]
     control: Option<PathBuf>,
 
-    /// Write a CSV row for each motion frame: what was commanded, and where the motors were
+    /// Write a CSV row for each motion frame: what was commanded, and where the motors were.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
 
     /// Write a CSV row for each move the motors ran: when it began, how long it took, from where to where, in pulses
-    /// and without vibration; a move begins with its frame, or where the one before it ends
+    /// and without vibration; a move begins with its frame, or where the one before it ends.
     #[arg(long, value_name = "FILE")]
     moves: Option<PathBuf>,
 
-    /// At the end, one JSON object with all counts on the standard output
+    /// At the end, one JSON object with all counts on the standard output.
     #[arg(long)]
     json: bool,
 
-    /// Listen on addresses that other machines reach, too
+    /// Listen on addresses that other machines reach, too.
     #[arg(long)]
     allow_lan: bool,
 

@@ -16,7 +16,9 @@ const OCTETS: usize = 32;
 /// The longest name.
 const MAX_NAME: usize = 64;
 
-/// Makes a token with which somebody comes in over HTTP, and the lines of the configuration that let them in.
+/// Makes a token with which somebody comes in over HTTP.
+///
+/// The lines of the configuration that let them in come with it.
 ///
 /// The token is shown this once, on standard output, and is kept nowhere: the configuration holds its SHA-256 alone. Hand it
 /// over as you would a key. Taking its lines out of the configuration, and starting the service again, takes it back.

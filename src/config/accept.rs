@@ -2,7 +2,7 @@
 
 use super::Acceptance;
 use super::section::{Entry, Section, did_you_mean};
-use crate::preflight::{Check, Severity};
+use crate::checks::{Check, Severity};
 
 /// Reads `accept_findings = [{ check = "…", why = "…" }]`; empty where there is none.
 pub(super) fn acceptances(section: &mut Section<'_, '_, '_>) -> Vec<Acceptance> {
@@ -55,8 +55,8 @@ fn check(section: &mut Section<'_, '_, '_>) -> Option<Check> {
 mod tests {
     use std::path::Path;
 
+    use crate::checks::Check;
     use crate::config::{Config, ConfigFaults, read};
-    use crate::preflight::Check;
 
     fn hall(in_show: &str, in_controller: &str) -> Result<Config, String> {
         let text = format!(

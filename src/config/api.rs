@@ -1,10 +1,12 @@
 //! `[api]`: where HTTP is served besides the control socket, to whom, and who they are.
 
+use std::fmt;
 use std::net::SocketAddr;
+
+use serde::{Deserialize, Serialize};
 
 use super::fault::Faults;
 use super::section::{Entry, Section};
-use crate::hall::Role;
 
 /// HTTP over TCP. By default there is none: the control socket alone is served.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -30,6 +32,28 @@ pub struct ApiToken {
     pub role: Role,
     /// SHA-256 of the token; the token itself stands nowhere.
     pub sha256: [u8; 32],
+}
+
+/// What somebody may do; each role may do all that those before it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// Look, and stop.
+    View,
+    /// Run a show that is armed: load, go, pause, seek, park, levels, trim, seats, preflight.
+    Operate,
+    /// Home, clear, test seats, reload and change the library; over TCP arm as well.
+    Engineer,
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::View => "view",
+            Self::Operate => "operate",
+            Self::Engineer => "engineer",
+        })
+    }
 }
 
 /// Reads the table.

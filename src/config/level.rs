@@ -5,9 +5,7 @@ use std::collections::BTreeMap;
 use super::Effect;
 use super::fault::Faults;
 use super::section::{Entry, Section, did_you_mean};
-
-/// How far the motion may be moved against the film, ms, either way.
-const MAX_TRIM_MS: i32 = 500;
+use crate::time::TRIM_MS;
 
 /// An intensity, 0 to 1: `60%`, or `-6dB` for 10^(-6/20).
 ///
@@ -38,7 +36,7 @@ pub(crate) fn level(section: &mut Section<'_, '_, '_>, key: &'static str) -> Opt
 
 /// A trim, -500 to 500 ms.
 pub(crate) fn trim(section: &mut Section<'_, '_, '_>, key: &'static str) -> Option<i32> {
-    section.whole_in(key, -MAX_TRIM_MS..=MAX_TRIM_MS)
+    section.whole_in(key, -TRIM_MS..=TRIM_MS)
 }
 
 /// Effects that may be on or not: `{ water = false }`. Where the site's effects are given, others are faults.
@@ -61,4 +59,20 @@ pub(crate) fn switches(
         }
     }
     switches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_is_a_part_of_the_whole() {
+        assert_eq!(parse_level("60%"), Ok(0.6));
+        assert_eq!(parse_level("0dB"), Ok(1.0));
+        assert!((parse_level("-6dB").unwrap() - 0.501).abs() < 1e-3);
+        for text in ["60", "0.6", "101%", "1dB", "-1%", "nan%", "inf%", "NaNdB", "%", "é%"] {
+            assert!(parse_level(text).is_err(), "{text}");
+        }
+        assert_eq!(parse_level("-infdB"), Ok(0.0));
+    }
 }

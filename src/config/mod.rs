@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::checks::Check;
 use crate::motion::{MAX_AXES, SeatType};
-use crate::preflight::Check;
 
 mod accept;
 mod api;
@@ -28,7 +28,7 @@ mod tests;
 mod text;
 
 pub use crate::wire::{Dialect, Timing};
-pub use api::{Api, ApiToken};
+pub use api::{Api, ApiToken, Role};
 pub use effect_limits::EffectLimit;
 pub(crate) use fault::Faults;
 pub use fault::{ConfigFault, ConfigFaults};

@@ -55,6 +55,7 @@ const PAGE: &[(&str, Asset)] = files!("page/":
     "js/token.js" JS,
     "js/transport.js" JS,
     "js/trim.js" JS,
+    "js/upload.js" JS,
     "js/warnings.js" JS,
     "js/words.js" JS,
 );

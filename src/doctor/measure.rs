@@ -7,10 +7,9 @@ use std::thread;
 use std::time::Duration;
 
 use super::lateness::{Load, RATE_HZ, Run};
-use crate::engine::{Rate, TickGrid};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
-use crate::time::{Clock, MonoTime, nanos};
+use crate::time::{Clock, MonoTime, Rate, TickGrid, nanos};
 use crate::tracker::{Histogram, histogram};
 
 /// From the request to the first tick: time for the busy threads to start.

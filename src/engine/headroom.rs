@@ -3,10 +3,9 @@
 
 use super::fader::{GATHER, RATE};
 use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
-use crate::engine::Rate;
 use crate::motion::{Limits, Measure, Reading, Readings, Slot, Spacing, Window};
 use crate::plan::Curve;
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 
 /// Show time of one entry, nanoseconds.
 const SPAN: i64 = 100_000_000;

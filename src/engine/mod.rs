@@ -2,7 +2,6 @@
 //! Tick thread; told the time, never asks; allocates nothing.
 
 mod fader;
-mod grid;
 mod headroom;
 mod mix;
 mod orders;
@@ -15,10 +14,8 @@ mod trail;
 mod turn;
 mod wait;
 
-pub use grid::{Rate, Tick, TickGrid};
 pub use headroom::Headroom;
 pub use mix::Mix;
-pub use orders::TRIM_MS;
 pub use slew::MAX_SPEED_UP;
 
 use std::sync::Arc;
@@ -28,7 +25,7 @@ use crate::cue::Vibration;
 use crate::gate::Counts;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::plan::{Course, Scene};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::{EffectSet, Hint, Timeline};
 use crate::wire::Timing;
 use rest::Holds;

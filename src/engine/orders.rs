@@ -3,10 +3,7 @@
 use super::wait::is_at;
 use super::{Ending, Engine, Mix, Part, Phase, Rest};
 use crate::motion::Pose;
-use crate::time::ShowTime;
-
-/// The furthest trim, milliseconds.
-pub const TRIM_MS: i32 = 500;
+use crate::time::{ShowTime, TRIM_MS};
 
 impl Engine {
     /// Parks, three hold frames, and the end. Asking again changes nothing.

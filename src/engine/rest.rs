@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::{Beat, Engine, HOLD_FRAMES, Part, Phase, Rate, Rest, Rider, Step};
+use super::{Beat, Engine, HOLD_FRAMES, Part, Phase, Rest, Rider, Step};
 use crate::plan::{Curve, Scene};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Hint;
 
 /// Hold frames of a pause, per second.

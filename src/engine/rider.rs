@@ -2,14 +2,13 @@
 
 use std::time::Duration;
 
-use super::Rate;
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
 use crate::gate::{Asked, Counts, Gate, Verdict};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 
 /// Hold frames that end a lane's motion.
 pub(super) const HOLD_FRAMES: u8 = 3;

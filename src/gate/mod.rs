@@ -26,8 +26,8 @@ use limits::{AxisLimits, Next, SLACK};
 use outlook::Outlook;
 use times::Times;
 
-use crate::engine::Rate;
 use crate::motion::{Pose, Spacing, Window};
+use crate::time::Rate;
 
 /// What became of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

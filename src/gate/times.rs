@@ -1,6 +1,6 @@
 //! The Times of the frames of a rate, without a division for each.
 
-use crate::engine::Rate;
+use crate::time::Rate;
 
 /// Where a frame is on the grid of its rate.
 #[derive(Debug, Clone, Copy)]

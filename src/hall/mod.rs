@@ -8,6 +8,7 @@ mod problem;
 mod status;
 mod who;
 
+pub use crate::config::Role;
 pub use ask::{Ask, Levels, LevelsChange};
 pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle};
 pub use problem::{Code, Problem};
@@ -15,4 +16,4 @@ pub use status::{
     ControllerStatus, EntryStatus, Histogram, JournalLine, Percentiles, PlaylistStatus, PreflightStatus,
     RealTimeStatus, Severity, ShowStatus, Status, TestRow, TestStatus, Warning,
 };
-pub use who::{Role, Surface, Who};
+pub use who::{Surface, Who};

@@ -144,7 +144,9 @@ pub struct EntryStatus {
     pub title: Option<String>,
     /// How long it is, s.
     pub length_s: f64,
-    /// The level of its motion, 0 to 1; null where the hall's stays.
+    /// The preset that is set before its own levels; null where there is none.
+    pub preset: Option<String>,
+    /// The level of its motion, 0 to 1; null where the preset's or the hall's stays.
     pub level: Option<f64>,
     /// Its trim, ms; null where the hall's stays.
     pub trim_ms: Option<i32>,

@@ -4,17 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// What somebody may do; each role may do all that those before it may.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Role {
-    /// Look.
-    View,
-    /// Run the show.
-    Operate,
-    /// Home, arm, clear, load and change the library.
-    Engineer,
-}
+use super::Role;
 
 /// Which way somebody came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -45,16 +35,6 @@ pub struct Who {
     pub surface: Surface,
     /// Their name, as well as it is known: the user of the socket's peer, the name of a token, an address.
     pub name: String,
-}
-
-impl fmt::Display for Role {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::View => "view",
-            Self::Operate => "operate",
-            Self::Engineer => "engineer",
-        })
-    }
 }
 
 impl fmt::Display for Who {

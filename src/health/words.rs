@@ -59,7 +59,7 @@ impl fmt::Display for Why {
     /// The reason, without the name of the controller.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Acked => "its acks come",
+            Self::Acked => "it answers",
             Self::AcksOff => "acks are off",
             Self::AcksMissing(_) => "acks are missing or late",
             Self::Silent(_) => "no ack and no report for too long",

@@ -25,7 +25,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         group: name.to_owned(),
         enabled: true,
         standing: "ok",
-        why: "its acks come".to_owned(),
+        why: "it answers".to_owned(),
         heard_s: Some(0.25),
         ack_rate: Some(1.0),
         ack_p50_us: Some(40.0),

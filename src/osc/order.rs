@@ -23,7 +23,7 @@ pub(super) enum Order {
 /// Why a message is not obeyed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(super) enum Fault {
-    #[error("{0:?} is no address of kinocue; the README lists them")]
+    #[error("{0:?} is no address of kinocue; docs/show-control.md lists them")]
     Unknown(String),
     #[error("OSC may never {0}; a person does that on the console or with `kinocue {0}`")]
     Forbidden(&'static str),

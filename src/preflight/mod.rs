@@ -4,14 +4,13 @@
 //! ```text
 //!  device::survey --+
 //!  net::route ------+--> Subject --> answers, identity, network, motion, speed, estop, status --> Finding
-//!  configuration ---+                                      check: the one table of what there is to find
+//!  configuration ---+                                      `checks`: the one table of what there is to find
 //! ```
 //!
 //! One file for each family of checks. A finding has a name that never changes, so that a configuration can accept it for
 //! good, with its reason.
 
 mod answers;
-mod check;
 mod estop;
 mod identity;
 mod motion;
@@ -26,8 +25,8 @@ use serde::Serialize;
 
 use crate::config::Acceptance;
 
+pub use crate::checks::{Check, Family, Severity, UnknownCheck};
 pub use answers::round_trip;
-pub use check::{Check, Family, Severity, UnknownCheck};
 pub use subject::{Subject, Terms, wanted};
 
 /// One thing that was found.

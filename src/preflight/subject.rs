@@ -5,9 +5,9 @@ use std::net::Ipv4Addr;
 use crate::config::{Controller, FanOut};
 use crate::device::survey::Survey;
 use crate::device::{Address, table};
-use crate::engine::Rate;
 use crate::motion::MAX_AXES;
 use crate::net::Route;
+use crate::time::Rate;
 use crate::wire::{Dialect, motion_channel_and_slots, motion_len};
 
 /// Octets of the longest register message that preflight itself exchanges: a read of 32 registers answered.

@@ -29,9 +29,8 @@ use std::sync::Arc;
 use std::{iter, thread};
 
 use crate::cue::{FAULTS_TOLD, Place};
-use crate::engine::Rate;
 use crate::motion::{SeatType, Slot};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 use axis::Subject;
 use stencil::Stencils;

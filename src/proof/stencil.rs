@@ -3,8 +3,8 @@
 //! Times are whole milliseconds. Where the period is not, the poses of some frames are a millisecond farther apart than
 //! those of others; each arrangement that there is has its own stencil.
 
-use crate::engine::Rate;
 use crate::motion::Spacing;
+use crate::time::Rate;
 
 /// The shortest time over which the change of velocity from frame to frame is judged, seconds.
 const LEAST_STEP_S: f64 = 0.005;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::Digest;
 use crate::config::{Config, Controller, EffectLimit};
-use crate::engine::Rate;
 use crate::motion::SeatType;
+use crate::time::Rate;
 
 /// Axes of the cue, and the seat type that takes them.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,12 +6,12 @@ use std::thread::Thread;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::live::Live;
-use crate::engine::{Engine, Rate};
+use crate::engine::Engine;
 use crate::fanout::Lane;
 use crate::motion::Pose;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
 use crate::state::{Cause, Event, Next, Refusal, Request, State};
-use crate::time::{MonoTime, ShowTime};
+use crate::time::{MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
 use crate::wire::FrameNo;
 

@@ -33,11 +33,11 @@ pub use watch::Watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::engine::{Beat, Ending, Engine, Step, Tick, TickGrid};
+use crate::engine::{Beat, Ending, Engine, Step};
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
 use crate::state::{Refusal, State};
-use crate::time::{Clock, MonoTime, nanos};
+use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
 
 /// Where the frames of a tick go.

@@ -1,7 +1,8 @@
 //! A line of text into what it asks.
 
-use crate::cli::times::{parse_level, parse_time, parse_trim};
+use crate::config::parse_level;
 use crate::hall::{Ask, Code, LevelsChange, Problem};
+use crate::time::{parse_time, parse_trim};
 
 /// The lines that there are, as a refusal lists them.
 const LINES: &str = "go, pause, resume, stop, park, status, seek 12:30, trim +80ms, level 60%, level motion 60%, effect \

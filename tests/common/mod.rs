@@ -13,7 +13,7 @@ use std::time::Duration;
 use kinocue::app::Staged;
 use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
-use kinocue::engine::{Mix, Rate, Show, TickGrid};
+use kinocue::engine::{Mix, Show};
 use kinocue::fanout::Manner;
 use kinocue::gate::Counts;
 use kinocue::motion::{Measure, SeatType, Spacing};
@@ -23,7 +23,7 @@ use kinocue::rt::{
     mailboxes,
 };
 use kinocue::state::Request;
-use kinocue::time::{Clock, MonoTime, ShowTime};
+use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
 use rtrb::Producer;

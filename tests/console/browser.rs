@@ -148,6 +148,12 @@ impl Browser {
         self.command("/actions", &json!({"actions": [finger]}));
     }
 
+    /// Chooses a file in a field for one.
+    pub(crate) fn choose(&self, selector: &str, file: &Path) {
+        let element = self.find(selector);
+        self.command(&format!("/element/{element}/value"), &json!({"text": file.to_str().expect("text")}));
+    }
+
     /// Types into what has the focus.
     pub(crate) fn type_text(&self, text: &str) {
         let keys: Vec<Value> = text

@@ -8,6 +8,7 @@ mod process;
 mod browser;
 mod hall;
 
+use std::path::Path;
 use std::time::Duration;
 
 use serde_json::json;
@@ -122,6 +123,8 @@ fn the_escape_key_stops_wherever_the_focus_is_and_a_pulled_plug_is_named_first()
     browser.reads("gravest", "B1"); // the list itself is scrolled away
     browser.wait("!document.getElementById('gravest').hidden");
     browser.shot("10-plug-pulled");
+    browser.eval("document.getElementById('journal').scrollIntoView()");
+    browser.wait("document.querySelector('.top').getBoundingClientRect().top === 0 && scrollY === 0");
     assert!(took < Duration::from_secs(3), "{took:?}");
 
     browser.press("#level-vibration");
@@ -149,6 +152,30 @@ fn the_page_says_at_once_that_the_server_is_gone_still_tries_to_stop_and_comes_b
     browser.reads("state", "recovering"); // nothing moves by itself
     browser.wait("document.getElementById('lost').hidden && !document.querySelector('main .live').inert");
     browser.shot("21-server-back");
+}
+
+#[test]
+fn a_cue_is_taken_in_from_the_page_or_refused_with_every_fault() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    let folder = tempfile::tempdir().expect("a folder");
+    let bad = folder.path().join("Too Far.csv");
+    std::fs::write(&bad, "time_ms,a1,a2,a3\n0,0,0,0\n500,1.4,0,0\n400,0,0,0\n").expect("it can be written");
+    browser.choose("#upload-file", &bad);
+    browser.reads("upload", "upload as too-far");
+    browser.press("#upload");
+    browser.reads("playlist-reply", "not done");
+    browser.reads("upload-faults", "1.4 is outside the stroke");
+    browser.reads("upload-faults", "400 does not come after");
+    browser.shot("50-upload-refused");
+
+    browser.choose("#upload-file", &Path::new(env!("CARGO_MANIFEST_DIR")).join("cues/bench-ride.csv"));
+    browser.reads("upload", "upload as bench-ride");
+    browser.press("#upload");
+    browser.reads("playlist-reply", "done");
+    browser.wait("document.getElementById('cues').value === 'bench-ride'");
+    browser.wait("document.getElementById('upload-faults').children.length === 0");
 }
 
 #[test]

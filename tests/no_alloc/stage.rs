@@ -11,7 +11,7 @@ use std::time::Duration;
 use kinocue::app::Staged;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
-use kinocue::engine::{Mix, Rate, Show, TickGrid};
+use kinocue::engine::{Mix, Show};
 use kinocue::fanout::{Lane, Manner};
 use kinocue::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::observe::Watched;
@@ -21,7 +21,7 @@ use kinocue::rt::{
 };
 use kinocue::state::Request;
 use kinocue::sys::clock::Monotonic;
-use kinocue::time::{Clock, MonoTime, ShowTime};
+use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing};
 use rtrb::Producer;

@@ -8,13 +8,13 @@ use super::super::Staged;
 use super::{HouseError, Numbers};
 use crate::config::Config;
 use crate::cue::{self, Cue, Source};
-use crate::engine::{Engine, Mix, Rate, Show};
+use crate::engine::{Engine, Mix, Show};
 use crate::fanout::{Lane, Manner};
 use crate::motion::MAX_AXES;
 use crate::net::{Ports, Receiver, Sender};
 use crate::plan::Planner;
 use crate::rt::Desk;
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
 /// What the threads of a hall begin with.

@@ -17,7 +17,6 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::run::Run;
 use crate::config::Config;
-use crate::engine::{Rate, TickGrid};
 use crate::fanout::Lane;
 use crate::health::{Groups, Health};
 use crate::net::{DrainGrid, NetError};
@@ -29,7 +28,7 @@ use crate::rt::{
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
-use crate::time::Clock as _;
+use crate::time::{Clock as _, Rate, TickGrid};
 use crate::wire::FrameNo;
 
 /// From the start of the threads to tick 0.

@@ -3,12 +3,11 @@
 use std::time::Duration;
 
 use super::Keeper;
-use crate::engine::TRIM_MS;
 use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem};
 use crate::rt::Command;
 use crate::state::{Request, State};
 use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, ShowTime};
+use crate::time::{Clock as _, ShowTime, TRIM_MS};
 
 impl Keeper {
     /// Does it, and answers.

@@ -69,6 +69,7 @@ impl List {
             cue: entry.cue.to_string(),
             title: title.clone(),
             length_s: *length_s,
+            preset: entry.preset.clone(),
             level: entry.level,
             trim_ms: entry.trim_ms,
             then: entry.then.word(),

@@ -7,13 +7,13 @@ use super::errand::Done;
 use crate::app::Staged;
 use crate::app::staged::headroom;
 use crate::config::Config;
-use crate::engine::{Headroom, Rate, Show};
+use crate::engine::{Headroom, Show};
 use crate::hall::{Asked, Code, Problem, ShowStatus};
 use crate::library::{CueId, Library};
 use crate::proof::{self, Digest, Terms};
 use crate::rt::Command;
 use crate::state::State;
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
 /// A cue that fits the hall and keeps its limits at full level.

@@ -28,7 +28,9 @@ pub(in crate::cli) enum Command {
     /// Lists the cues of the daemon's library.
     #[command(after_help = "Examples:\n  kinocue cues\n  kinocue cues --json")]
     Cues(ServerArgs),
-    /// Puts a cue file into the daemon's library, which checks it and proves its limits; a bad one is not taken.
+    /// Puts a cue file into the daemon's library.
+    ///
+    /// It is checked and its limits are proved first; a bad one is not taken.
     #[command(after_help = "\
 Examples:
   kinocue upload coaster.csv

@@ -8,14 +8,15 @@ use serde_json::json;
 use super::rows::parse_rows;
 use super::server::{ServerArgs, in_path};
 use super::view::Status;
-use crate::cli::times::{parse_level, parse_trim};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::config::parse_level;
 use crate::hall::LevelsChange;
+use crate::time::parse_trim;
 
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum Command {
-    /// Moves the motion against the film: later by so many milliseconds, earlier where it is negative.
+    /// Moves the motion against the film, later or earlier.
     #[command(after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0")]
     Trim(TrimArgs),
     /// Sets how much of the motion and the vibration the seats make.
@@ -32,7 +33,7 @@ Examples:
 A row has one level for its motion and its vibration together."
     )]
     Level(LevelArgs),
-    /// Lets effects be on, or keeps them off: those that are named, or all.
+    /// Lets effects be on, or keeps them off.
     #[command(after_help = "\
 Examples:
   kinocue effects off water
@@ -42,10 +43,14 @@ Examples:
     /// Sets levels and effects as a preset of the configuration says.
     #[command(after_help = "Example:\n  kinocue preset kids")]
     Preset(NameArgs),
-    /// Takes a controller in, with all that shares its seat; the seat joins by a move within its limits.
+    /// Takes the seat of a controller in.
+    ///
+    /// It joins by a move within its limits, with all controllers that share it.
     #[command(after_help = "Example:\n  kinocue enable F4")]
     Enable(NameArgs),
-    /// Takes a controller out, with all that shares its seat; the seat parks, the others play on.
+    /// Takes the seat of a controller out.
+    ///
+    /// It parks, with all controllers that share it; the others play on.
     #[command(after_help = "Example:\n  kinocue disable F4")]
     Disable(NameArgs),
 }
@@ -53,7 +58,7 @@ Examples:
 /// A trim.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct TrimArgs {
-    /// -500ms to 500ms.
+    /// -500ms to 500ms: the motion comes so much later than the film, or earlier where it is negative.
     #[arg(value_name = "TRIM", value_parser = parse_trim, allow_hyphen_values = true)]
     trim: i32,
     #[command(flatten)]

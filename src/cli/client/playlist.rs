@@ -10,7 +10,9 @@ use crate::cli::{Exit, Failure, print};
 /// The commands that choose what is played.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum Command {
-    /// Loads a cue of the daemon's library; it is read and proved before the command ends.
+    /// Loads a cue of the daemon's library.
+    ///
+    /// It is read and proved before the command ends.
     #[command(after_help = "\
 Examples:
   kinocue load coaster
@@ -25,7 +27,9 @@ Examples:
   kinocue playlist
   kinocue playlist --none")]
     Playlist(PlaylistArgs),
-    /// Makes an entry of the playlist the next to be played, counted from 1 as `kinocue playlist` shows it.
+    /// Makes an entry of the playlist the next to be played.
+    ///
+    /// Counted from 1, as `kinocue playlist` shows it.
     #[command(after_help = "Example:\n  kinocue select 2")]
     Select(SelectArgs),
 }

@@ -5,14 +5,15 @@ use serde_json::json;
 use super::server::ServerArgs;
 use super::table::table;
 use super::view::{Preflight, Warning};
-use crate::cli::times::parse_time;
 use crate::cli::{Exit, Failure, ask, print};
-use crate::time::ShowTime;
+use crate::time::{ShowTime, parse_time};
 
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum Command {
-    /// Gets the hall ready to go: cue loaded, limits proved, preflight passed. Lapses after ten minutes.
+    /// Gets the hall ready to go.
+    ///
+    /// A cue is loaded, its limits proved, preflight passed. It lapses after ten minutes.
     #[command(after_help = "\
 Examples:
   kinocue load coaster && kinocue arm
@@ -39,7 +40,9 @@ Exit codes: 0 it plays, 75 not armed or too late, 77 not allowed, 69 no daemon")
     /// Goes on from a pause.
     #[command(after_help = "Example:\n  kinocue resume")]
     Resume(ServerArgs),
-    /// Goes on elsewhere in the cue; the seats get there by a move within their limits.
+    /// Goes on elsewhere in the cue.
+    ///
+    /// The seats get there by a move within their limits.
     #[command(after_help = "\
 Examples:
   kinocue seek 12:30
@@ -56,7 +59,9 @@ Example:
 
 All positions are read anew before anything moves.")]
     Clear(ServerArgs),
-    /// Has the daemon read its configuration anew, which it does while nothing is armed; a bad one changes nothing.
+    /// Has the daemon read its configuration anew.
+    ///
+    /// It does so while nothing is armed; a bad one changes nothing.
     #[command(after_help = "Example:\n  kinocue check /etc/kinocue/kinocue.toml && kinocue reload")]
     Reload(ServerArgs),
 }

@@ -6,7 +6,9 @@ use super::table::table;
 use super::view::{Controller, Playlist, Show, Status, percent, time, us};
 use crate::cli::{Exit, Failure, print};
 
-/// Shows how the hall is: state with its cause and the next action, what is loaded, levels, controllers, warnings.
+/// Shows how the hall is.
+///
+/// State with its cause and the next action, what is loaded, levels, controllers, warnings.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

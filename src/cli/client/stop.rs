@@ -19,7 +19,7 @@ const LAST_PATIENCE: Duration = Duration::from_secs(3);
 /// What this stop is not.
 const NO_EMERGENCY: &str = "this is a soft stop; the emergency stop is hard-wired";
 
-/// Brings the seats to rest at once; they stay there until `kinocue clear`.
+/// Brings the seats to rest at once, until `kinocue clear`.
 ///
 /// Goes by the stop socket of the daemon, which a thread of its own reads, so that it works while anything else is stuck;
 /// by the control socket only where that fails. A soft stop: the emergency stop is hard-wired.

@@ -15,8 +15,9 @@ use super::view::{Status, Test, TestRow, us};
 use crate::cli::ask::agreed;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 
-/// Tests seats and effects.
+/// Tests empty seats and their effects.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kinocue test sweep --rows A-C")]
 pub(in crate::cli) struct Args {
     #[command(subcommand)]
     what: What,

@@ -16,7 +16,9 @@ use crate::cli::{Exit, Failure, OrExit as _, print};
 /// How often a daemon that is gone is looked for.
 const AGAIN: Duration = Duration::from_millis(500);
 
-/// Shows the hall live until Ctrl-C: state, position, levels, controllers, warnings.
+/// Shows the hall live, until Ctrl-C.
+///
+/// State, position, levels, controllers, warnings.
 ///
 /// On a terminal it is a panel; in a pipe one line for each change. When the daemon is gone it says so at once, and goes on
 /// as soon as it is back.

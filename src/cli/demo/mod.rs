@@ -32,7 +32,7 @@ const CUE_NAME: &str = "cues/bench-ride.csv";
 const CUE_ID: &str = "bench-ride";
 const CUE: &[u8] = include_bytes!("../../../cues/bench-ride.csv");
 
-/// Plays the bench ride to four virtual controllers, with nothing to set up, and reports what became of every frame.
+/// Plays the bench ride to four virtual controllers, with nothing to set up.
 ///
 /// It is the daemon at work, with its web console: the address is said at once. On a terminal the console stays up after the
 /// ride until Ctrl-C, to arm and go again there. Two of the controllers are a pair that shares one frame (PA95). Everything

@@ -12,12 +12,12 @@ use rtrb::Producer;
 
 use super::keys::{Action, Decoder, HELP};
 use crate::app::Control;
-use crate::engine::{Mix, TRIM_MS};
+use crate::engine::Mix;
 use crate::rt::{Command, Phase};
 use crate::state::Request;
 use crate::sys::clock::Monotonic;
 use crate::sys::terminal::Keyboard;
-use crate::time::{Clock as _, MonoTime, ShowTime};
+use crate::time::{Clock as _, MonoTime, ShowTime, TRIM_MS};
 
 /// How long a key is waited for before it is looked whether the play is over.
 const WAIT: Duration = Duration::from_millis(50);

@@ -3,46 +3,46 @@
 use std::time::Duration;
 
 use super::parse;
-use crate::cli::times;
 use crate::sim::{Commands, Invented};
+use crate::time::parse_duration;
 
-/// What the manuals leave open
+/// What the manuals leave open.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "What the manuals leave open")]
 pub(super) struct Leeway {
-    /// Commands that wait at most; one more is Err21
+    /// Commands that wait at most; one more is Err21.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..))]
     queue_depth: u16,
 
-    /// How long homing takes, ms
+    /// How long homing takes, ms.
     #[arg(long, value_name = "MS", default_value_t = 500)]
     homing_ms: u32,
 
-    /// How much of its time a command takes while more than two wait (PA06 = 1)
+    /// How much of its time a command takes while more than two wait (PA06 = 1).
     #[arg(long, value_enum, default_value_t = FastForward::Half)]
     fast_forward: FastForward,
 
-    /// The greatest Time of a first absolute frame, ms: a longer one is Err17 where PA0d = 0
+    /// The greatest Time of a first absolute frame, ms: a longer one is Err17 where PA0d = 0.
     #[arg(long, value_name = "MS", default_value_t = 30_000)]
     first_time_max_ms: u32,
 
-    /// Datagrams within 100 ms that fill the UDP memory; one more is Err20
+    /// Datagrams within 100 ms that fill the UDP memory; one more is Err20.
     #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..))]
     udp_memory: u32,
 
-    /// What the automatic reset (PA0d) counts in
-    #[arg(long, value_name = "SPAN", default_value = "1ms", value_parser = times::parse_duration)]
+    /// What the automatic reset (PA0d) counts in.
+    #[arg(long, value_name = "SPAN", default_value = "1ms", value_parser = parse_duration)]
     auto_reset_unit: Duration,
 
-    /// Which requests put off the automatic reset (PA0d)
+    /// Which requests put off the automatic reset (PA0d).
     #[arg(long, value_enum, default_value_t = Requests::Motion)]
     auto_reset_counts: Requests,
 
-    /// Whether registers that the manuals do not name read 0 or are refused
+    /// Whether registers that the manuals do not name read 0 or are refused.
     #[arg(long, value_enum, default_value_t = Unused::Zero)]
     unused_registers: Unused,
 
-    /// Pulses in one turn of a motor, for speeds in rpm
+    /// Pulses in one turn of a motor, for speeds in rpm.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u16).range(1..))]
     pulses_per_turn: u16,
 
@@ -50,19 +50,19 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "RPM", value_parser = clap::value_parser!(u16).range(1..))]
     release_rpm: Option<u16>,
 
-    /// Speed of jogging where PA70 to PA75 set none, rpm
+    /// Speed of jogging where PA70 to PA75 set none, rpm.
     #[arg(long, value_name = "RPM", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..))]
     jog_rpm: u16,
 
-    /// What a drive with an alarm (Err10 to 15) reports as its own error
+    /// What a drive with an alarm (Err10 to 15) reports as its own error.
     #[arg(long, value_name = "N", default_value_t = 1)]
     servo_alarm: u16,
 
-    /// Registers of a servo drive, from 0 on
+    /// Registers of a servo drive, from 0 on.
     #[arg(long, value_name = "N", default_value_t = 1_000)]
     servo_registers: u16,
 
-    /// Software version (DPFF and DPFE)
+    /// Software version (DPFF and DPFE).
     #[arg(long, value_name = "MAJOR.MINOR", default_value = "1.0", value_parser = parse::version)]
     software_version: [u16; 2],
 }

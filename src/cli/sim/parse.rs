@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use anyhow::{Context as _, anyhow, bail};
 
-use crate::cli::times;
 use crate::sim::{Action, Command};
+use crate::time::{parse_duration, parse_time};
 
 /// `HEX=VALUE`: a parameter register in hex, its value decimal or 0x.
 pub(super) fn parameter(text: &str) -> anyhow::Result<(u8, u16)> {
@@ -36,7 +36,7 @@ pub(super) fn chance(text: &str) -> anyhow::Result<f64> {
 
 /// A point in time, counted from the start.
 pub(super) fn time(text: &str) -> anyhow::Result<Duration> {
-    let nanos = times::parse_time(text).map_err(|why| anyhow!(why))?.as_nanos();
+    let nanos = parse_time(text).map_err(|why| anyhow!(why))?.as_nanos();
     Ok(Duration::from_nanos(u64::try_from(nanos).context("before the start")?))
 }
 
@@ -89,7 +89,7 @@ fn action(text: &str) -> anyhow::Result<Action> {
         ("mute", ..) => Action::Mute(switch(value)?),
         ("loss", ..) => Action::Loss(chance(value)?),
         ("duplicate", ..) => Action::Duplicate(chance(value)?),
-        ("delay", ..) => Action::Delay(times::parse_duration(value).map_err(|why| anyhow!(why))?),
+        ("delay", ..) => Action::Delay(parse_duration(value).map_err(|why| anyhow!(why))?),
         (_, Some(input), _) => {
             let input = input.parse().with_context(|| format!("{name:?} is no input; they are X1 to X12"))?;
             Action::Switch { input, closed: switch(value)? }

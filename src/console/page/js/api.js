@@ -4,6 +4,7 @@ import { sentAt, hear } from './clock.js';
 import { askForAnother, askForToken, token } from './token.js';
 
 const PATIENCE_MS = 65_000; // the hall may take 60 s over a cue of two hours
+const UPLOAD_MS = 600_000; // it is written, checked and proved, beside a show with what time that leaves
 const ROOT = '/api/v1/';
 /**
  * Changes under way at once at the most. A browser has six connections to a server, the stream of statuses has one: of the
@@ -48,13 +49,21 @@ export function get(path) {
 }
 
 /** Asks for a change; the reply is the status that it led to. */
-export async function change(method, path, body = {}) {
+export const change = (method, path, body = {}) => inTurn(() => send(method, path, body, key(), PATIENCE_MS));
+
+/** Sends a cue file to the library; the reply is what the library knows of it then. */
+export function upload(id, file) {
+  const type = { 'Content-Type': 'application/octet-stream' };
+  return inTurn(() => request('PUT', `cues/${id}`, file, type, UPLOAD_MS));
+}
+
+async function inTurn(request) {
   if (changing >= CHANGES) {
     throw new Problem({ detail: `${CHANGES} things are under way already`, remedy: 'wait until they are done' });
   }
   changing += 1;
   try {
-    return await send(method, path, body, key(), PATIENCE_MS);
+    return await request();
   } finally {
     changing -= 1;
   }

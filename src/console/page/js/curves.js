@@ -10,8 +10,8 @@ const HEIGHT = 240;
 const AGAIN_MS = 5000;
 const NEUTRAL = '#8d99a8';
 const GRID = '#222a33';
-/** Paul Tol's "bright" and "light" colours, told apart by the colour-blind; from the seventh axis on dashed. */
-const COLOURS = ['#66ccee', '#eedd88', '#ee6677', '#44bb99', '#aa7dc8', '#ffaabb'];
+/** Told apart by the colour-blind, and none of them red, which is STOP's; from the seventh axis on dashed. */
+const COLOURS = ['#56b4e9', '#eedd88', '#d58ab5', '#2fbf91', '#e69f00', '#d9dfe6'];
 
 let drawn = null;
 let plot = null;

@@ -47,7 +47,7 @@ export function showFilm(status) {
   if (!status) return;
   const show = status.show;
   setText(byId('film-title'), show ? titleOf(show, status.state) : 'Nothing is loaded');
-  setText(byId('position'), show ? clock(show.position_s) : '–');
+  setText(byId('position'), show ? clock(show.position_s, 1, show.length_s) : '–');
   setText(byId('length'), show ? ` / ${clock(show.length_s, 0)}` : '');
   const maySeek = show !== null && MAY_SEEK.includes(status.state);
   if (!maySeek && chosen !== null) {

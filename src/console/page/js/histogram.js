@@ -29,7 +29,7 @@ function framesOf(controllers) {
 }
 
 function showFigures(place, { p50_us: p50, p99_us: p99, p999_us: p999, max_us: max }) {
-  const figures = [['half', p50], ['99 %', p99], ['99.9 %', p999], ['worst', max]];
+  const figures = [['half within', p50], ['99 %', p99], ['99.9 %', p999], ['all', max]];
   if (place.children.length === 0) {
     place.append(...figures.map(([title]) => make('span', { className: 'figure-pair' }, make('span', { className: 'quiet' }, title), make('b'))));
   }

@@ -3,7 +3,7 @@
 import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress } from './press.js';
-import { percent, sentence } from './words.js';
+import { percent, titled } from './words.js';
 
 const STEP = 5;
 /** A level is sent when it has been left alone for so long, so that a drag is one change. */
@@ -17,10 +17,11 @@ const rulers = new Map();
 export function showLevels(status) {
   if (!status) return;
   const { levels, show, presets } = status;
-  showRulers(Object.keys(levels.rows));
+  showRulers([...new Set(status.controllers.map(({ row }) => row).filter((row) => row in levels.rows))]);
   rulers.get('motion').show(levels.motion);
   rulers.get('vibration').show(levels.vibration);
-  for (const [row, level] of Object.entries(levels.rows)) rulers.get(`row ${row}`).show(level);
+  for (const [row, level] of Object.entries(levels.rows)) rulers.get(`row ${row}`)?.show(level);
+  showRows(levels.rows);
   const used = show?.effects ?? [];
   showEffects([...new Set([...Object.keys(levels.effects), ...used])].sort());
   for (const button of byId('effects').children) {
@@ -34,13 +35,19 @@ export function showLevels(status) {
 
 const showRulers = onChange((rows) => {
   rulers.clear();
-  const made = [
+  byId('levels').replaceChildren(
     ruler('motion', 'Motion', (value) => ({ motion: value })),
     ruler('vibration', 'Vibration', (value) => ({ vibration: value })),
-    ...rows.map((row) => ruler(`row ${row}`, `Row ${row}`, (value) => ({ rows: { [row]: value } }))),
-  ];
-  byId('levels').replaceChildren(...made);
+  );
+  byId('row-levels').replaceChildren(...rows.map((row) => ruler(`row ${row}`, `Row ${row}`, (value) => ({ rows: { [row]: value } }))));
+  setProperty(byId('rows'), 'hidden', rows.length === 0);
 });
+
+/** The rows are folded away; which of them make less is in view all the same. */
+function showRows(levels) {
+  const less = Object.entries(levels).filter(([, level]) => level < 1).map(([row, level]) => `${row} ${percent(level)}`);
+  setText(byId('rows-words'), less.length > 0 ? less.join(', ') : 'all 100 %');
+}
 
 /** A slider with steps at its ends; it shows the hall's level, but never pulls away from under a finger. */
 function ruler(name, title, body) {
@@ -89,7 +96,7 @@ const showEffects = onChange((names) => {
   const buttons = names.map((name) => {
     const words = make('span', { className: 'switch-words' });
     const button = make('button', { type: 'button', role: 'switch', className: 'switch', 'aria-checked': 'false' },
-      make('span', { className: 'switch-light', 'aria-hidden': 'true' }), make('b', {}, sentence(name)), words);
+      make('span', { className: 'switch-light', 'aria-hidden': 'true' }), make('b', {}, titled(name)), words);
     button.dataset.effect = name;
     onPress(button, () => {
       const on = button.getAttribute('aria-checked') !== 'true';
@@ -102,7 +109,7 @@ const showEffects = onChange((names) => {
 
 const showPresets = onChange((names) => {
   const buttons = names.map((name) => {
-    const button = make('button', { type: 'button', className: 'preset' }, sentence(name));
+    const button = make('button', { type: 'button', className: 'preset' }, titled(name));
     onPress(button, () => ask(button, `preset ${name}`, () => change('POST', `presets/${encodeURIComponent(name)}`)));
     return button;
   });

@@ -14,11 +14,12 @@ import { showTrim, startTrim } from './trim.js';
 import { showWarnings, startWarnings } from './warnings.js';
 import { startStream } from './stream.js';
 import { startToken } from './token.js';
+import { startUpload } from './upload.js';
 import { watch } from './state.js';
 
 const STARTS = [
   startTransport, startToken, startHeadline, startFilm, startMap, startTrim, startPlaylist, startReports, startCurves,
-  startWarnings,
+  startUpload, startWarnings,
 ];
 const SHOWS = [
   showHeadline, showTransport, showFilm, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,

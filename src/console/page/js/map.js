@@ -1,12 +1,15 @@
 // The hall as a map: a line for each row, a field for each controller, coloured and marked by how it stands.
 
-import { byId, choice, make, setAttribute, setProperty, setText } from './dom.js';
+import { byId, choice, make, setAttribute, setProperty, setStyle, setText } from './dom.js';
 import { BANDS, STANDINGS, ackBand, latencyBand, mark, standingOf } from './marks.js';
 import { ackRate, micros } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
 
 const NO_ROW = 'no row';
+/** Names of rows up to so long stand beside their seats, longer ones above them; longer names of seats need wider fields. */
+const SHORT_ROW = 2;
+const SHORT_SEAT = 6;
 let by = 'standing';
 let drawn = '';
 let fields = new Map();
@@ -40,11 +43,14 @@ function layOut(controllers) {
     if (!rows.has(row)) rows.set(row, []);
     rows.get(row).push(makeField(controller));
   }
+  const widest = Math.max(...[...rows.values()].map((seats) => seats.length));
+  setStyle(byId('map'), '--widest', String(widest));
   const lines = [...rows].map(([row, seats]) => {
     const title = row === NO_ROW ? '' : row;
-    const line = make('div', { className: 'seats', role: 'group', 'aria-label': row === NO_ROW ? 'Seats without a row' : `Row ${row}` });
+    const isWide = seats.some((seat) => seat.dataset.controller.length > SHORT_SEAT);
+    const line = make('div', { className: isWide ? 'seats wide-names' : 'seats', role: 'group', 'aria-label': row === NO_ROW ? 'Seats without a row' : `Row ${row}` });
     line.append(...seats);
-    return make('div', { className: 'map-row' }, make('span', { className: 'row-name', 'aria-hidden': 'true' }, title), line);
+    return make('div', { className: title.length > SHORT_ROW ? 'map-row long' : 'map-row' }, make('span', { className: 'row-name', 'aria-hidden': 'true' }, title), line);
   });
   byId('map').replaceChildren(...lines);
 }
@@ -71,7 +77,7 @@ function showField(field, controller) {
     field.picture.replaceChildren(mark(look.mark));
   }
   setText(field.letters, look.letters);
-  setText(field.figure, by === 'latency' ? micros(controller.ack_p99_us) : ackRate(controller.ack_rate));
+  setText(field.figure, by === 'latency' ? micros(controller.ack_p99_us, 2) : ackRate(controller.ack_rate));
   setAttribute(field.button, 'aria-label', spoken(controller));
   setProperty(field.button, 'title', controller.why);
 }

@@ -4,7 +4,7 @@ import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { change, get } from './api.js';
 import { ask, onPress, say } from './press.js';
 import { onToken } from './token.js';
-import { clock, percent, timeOfDay } from './words.js';
+import { clock, percent, signed, timeOfDay } from './words.js';
 
 let cues = [];
 
@@ -18,20 +18,24 @@ export function startPlaylist() {
   onPress(byId('cue-load'), (button) => {
     const cue = byId('cues').value;
     // Only reading a cue shows its title and length, or its faults.
-    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(readLists);
+    if (cue) ask(button, `load ${cue}`, () => change('POST', 'show/load', { cue })).then(() => readLists());
   });
-  onPress(byId('lists-again'), readLists);
+  onPress(byId('lists-again'), () => readLists());
   byId('cues').addEventListener('change', showCueNote);
-  onToken(readLists);
+  onToken(() => readLists());
 }
 
-/** Reads what playlists and cues there are. */
-export async function readLists() {
+/** Whether the library has a cue of that id, as far as is known. */
+export const holds = (id) => cues.some((cue) => cue.id === id);
+
+/** Reads what playlists and cues there are, and chooses a cue where one is named. */
+export async function readLists(cue) {
   try {
     const [playlists, library] = await Promise.all([get('playlists'), get('cues')]);
     cues = library;
     fill(byId('playlists'), playlists);
     fill(byId('cues'), cues);
+    if (holds(cue)) byId('cues').value = cue;
     showCueNote();
   } catch (error) {
     say(byId('cues'), `The lists cannot be read: ${error.words ?? error.message}`, true);
@@ -65,24 +69,27 @@ export function showPlaylist(status) {
   const next = playlist?.next_start ? `Next start by itself at ${timeOfDay(playlist.next_start)}, while armed` : 'Nothing starts by itself';
   setText(byId('playlist-head'), playlist ? `${playlist.title}. ${next}.` : 'No playlist is loaded.');
   setProperty(byId('playlist-drop'), 'disabled', !playlist);
-  showEntries(playlist ? { entries: playlist.entries, current: playlist.current } : { entries: [], current: -1 });
+  showEntries(playlist ? { entries: playlist.entries, current: playlist.current, cue: status.show?.cue } : { entries: [], current: -1 });
 }
 
-const showEntries = onChange(({ entries, current }) => {
-  byId('entries').replaceChildren(...entries.map((entry, index) => entryLine(entry, index, index === current)));
+// Another cue may have been loaded by hand since.
+const showEntries = onChange(({ entries, current, cue }) => {
+  const isLoaded = (entry, index) => index === current && entry.cue === cue;
+  byId('entries').replaceChildren(...entries.map((entry, index) => entryLine(entry, index, isLoaded(entry, index))));
 });
 
-function entryLine(entry, index, isCurrent) {
+function entryLine(entry, index, isLoaded) {
   const title = entry.title ?? entry.cue;
   const facts = [
     clock(entry.length_s, 0),
     entry.at && `at ${entry.at}`,
+    entry.preset,
     entry.level !== null && `level ${percent(entry.level)}`,
-    entry.trim_ms !== null && `trim ${entry.trim_ms} ms`,
+    entry.trim_ms !== null && `trim ${signed(entry.trim_ms)}`,
     entry.then === 'go' ? 'then goes on by itself' : 'then waits for GO',
   ].filter(Boolean);
   const words = make('span', { className: 'entry-words' }, make('b', {}, title), make('span', { className: 'quiet' }, facts.join(', ')));
-  if (isCurrent) {
+  if (isLoaded) {
     return make('li', { className: 'entry current', 'aria-current': 'true' }, words, make('span', { className: 'now' }, 'loaded'));
   }
   const button = make('button', { type: 'button', 'aria-label': `Make ${title} the next` }, 'Select');

@@ -3,7 +3,7 @@
 import { byId, make, onChange, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress } from './press.js';
-import { SEVERITIES } from './warnings.js';
+import { SEVERITIES, alike } from './warnings.js';
 import { mark } from './marks.js';
 import { lasting, sentence, timeOfDay } from './words.js';
 
@@ -31,17 +31,22 @@ function showPreflight({ preflight, controllers }) {
   const outcome = preflight.passed ? 'PASSED' : 'NOT PASSED';
   const answered = `${preflight.answered} of ${controllers.length} controllers answered`;
   setText(verdict, `${outcome}: ${answered}, ${lasting(preflight.age_s)} ago`);
-  showFindings(preflight.findings);
+  showFindings({ findings: preflight.findings, all: controllers.length });
 }
 
-const showFindings = onChange((findings) => {
-  const lines = findings.map(({ severity, controller, text, remedy }) => {
+const showFindings = onChange(({ findings, all }) => {
+  const lines = alike(findings).map(({ severity, text, remedy, controllers }) => {
     const look = SEVERITIES[severity] ?? SEVERITIES.warning;
     const grave = make('span', { className: `grave look-${look.look}` }, mark(look.mark), look.word);
-    return row([grave, controller ?? 'hall', sentence(text), sentence(remedy)]);
+    return row([grave, whose(controllers, all), sentence(text), sentence(remedy)]);
   });
   byId('preflight').tBodies[0].replaceChildren(...lines);
 });
+
+function whose(controllers, all) {
+  if (controllers.length === 0) return 'hall';
+  return controllers.length === all && all > 1 ? `all ${all}` : controllers.join(', ');
+}
 
 const showJournal = onChange((journal) => {
   const lines = journal.map(({ at, who, what, result }) => {

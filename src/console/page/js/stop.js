@@ -37,9 +37,9 @@ async function stop() {
   let problem = null;
   for (let attempt = 0; attempt < TRIES; attempt += 1) {
     try {
-      const status = await sendStop(repeatOf, PATIENCE_MS);
+      await sendStop(repeatOf, PATIENCE_MS);
       problem = null;
-      tell(`STOP was received: the hall is ${status.state ?? 'stopping'}. ${sentenceOf(status.next)}`, 'received');
+      tell('STOP was received: the seats come to rest.', 'received');
       break;
     } catch (error) {
       problem = error;
@@ -52,8 +52,6 @@ async function stop() {
   byId('stop').classList.remove('pressed');
   sending = false;
 }
-
-const sentenceOf = (next) => (next ? `Next: ${next}.` : '');
 
 function tell(text, kind) {
   const place = byId('stop-reply');

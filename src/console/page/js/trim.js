@@ -4,6 +4,7 @@ import { byId, setText } from './dom.js';
 import { change } from './api.js';
 import { ask } from './press.js';
 import { hall } from './state.js';
+import { signed } from './words.js';
 
 const MOST_MS = 500;
 const SETTLE_MS = 400;
@@ -41,5 +42,3 @@ function show(ms) {
   const words = ms === 0 ? 'motion with the film' : `motion ${Math.abs(ms)} ms ${ms > 0 ? 'later' : 'earlier'} than the film`;
   setText(byId('trim-words'), words);
 }
-
-const signed = (ms) => `${ms > 0 ? '+' : ms < 0 ? '−' : ''}${Math.abs(ms)} ms`;

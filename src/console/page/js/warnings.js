@@ -14,6 +14,8 @@ export const SEVERITIES = {
 };
 
 const FIRST = 4;
+/** Controllers that a warning of several names. */
+const NAMED = 8;
 let all = false;
 let lines = [];
 let inView = true;
@@ -36,12 +38,13 @@ export function startWarnings() {
 export function showWarnings(status) {
   if (!status) return;
   const { warnings } = status;
-  setProperty(byId('warnings-panel'), 'hidden', warnings.length === 0);
-  setText(byId('warnings-title'), warnings.length === 1 ? '1 warning' : `${warnings.length} warnings`);
-  setProperty(byId('warnings-more'), 'hidden', warnings.length <= FIRST);
-  setText(byId('warnings-more'), all ? 'Only the gravest' : `Show ${warnings.length - FIRST} more`);
-  const shown = all ? warnings : warnings.slice(0, FIRST);
-  layOut(shown.map(({ id, severity, controller }) => ({ id, severity, controller })));
+  const told = alike(warnings);
+  setProperty(byId('warnings-panel'), 'hidden', told.length === 0);
+  setText(byId('warnings-title'), titleOf(warnings));
+  setProperty(byId('warnings-more'), 'hidden', told.length <= FIRST);
+  setText(byId('warnings-more'), all ? 'Only the gravest' : `Show ${told.length - FIRST} more`);
+  const shown = all ? told : told.slice(0, FIRST);
+  layOut(shown.map(({ id, severity, controllers: [first] }) => ({ id, severity, first })));
   for (const [index, warning] of shown.entries()) {
     setText(lines[index].text, ` ${matter(warning)}`);
     setText(lines[index].remedy, sentence(warning.remedy));
@@ -49,11 +52,32 @@ export function showWarnings(status) {
   showGravest(warnings);
 }
 
+/** What is the matter with several controllers in the same words is told once. */
+export function alike(warnings) {
+  const told = new Map();
+  for (const { controller = null, ...warning } of warnings) {
+    const words = JSON.stringify([warning.severity, warning.text, warning.remedy, controller === null]);
+    if (!told.has(words)) told.set(words, { ...warning, controllers: [] });
+    if (controller !== null) told.get(words).controllers.push(controller);
+  }
+  return [...told.values()];
+}
+
+/** How many there are; where none of them warns of anything, they are notes. */
+function titleOf(warnings) {
+  const word = warnings.every(({ severity }) => severity === 'info') ? 'note' : 'warning';
+  return `${warnings.length} ${word}${warnings.length === 1 ? '' : 's'}`;
+}
+
 /** What is the matter, beginning with whose it is. */
-const matter = ({ controller, text }) => (controller ? `${controller}: ${text}` : sentence(text));
+function matter({ controllers, text }) {
+  if (controllers.length === 0) return sentence(text);
+  const more = controllers.length > NAMED ? ` and ${controllers.length - NAMED} more` : '';
+  return `${controllers.slice(0, NAMED).join(', ')}${more}: ${text}`;
+}
 
 function showGravest(warnings) {
-  const grave = warnings.filter(({ severity }) => severity !== 'info');
+  const grave = alike(warnings).filter(({ severity }) => severity !== 'info');
   const shown = grave.length > 0 && !inView;
   setProperty(byId('gravest'), 'hidden', !shown);
   if (!shown) return;
@@ -72,7 +96,7 @@ const layOut = onChange((warnings) => {
   byId('warnings').replaceChildren(...lines.map(({ item }) => item));
 });
 
-function line({ severity, controller }) {
+function line({ severity, first }) {
   const look = SEVERITIES[severity] ?? SEVERITIES.warning;
   const text = make('span');
   const remedy = make('span');
@@ -80,9 +104,9 @@ function line({ severity, controller }) {
     make('p', {}, make('b', { className: 'severity' }, look.word), text),
     make('p', { className: 'remedy' }, make('span', { className: 'off-screen' }, 'What to do: '), remedy));
   const item = make('li', { className: `warning look-${look.look}` }, mark(look.mark), words);
-  if (controller) {
-    const button = make('button', { type: 'button' }, `Show ${controller}`);
-    button.addEventListener('click', () => select(controller));
+  if (first) {
+    const button = make('button', { type: 'button' }, `Show ${first}`);
+    button.addEventListener('click', () => select(first));
     item.append(button);
   }
   return { item, text, remedy };

@@ -2,8 +2,8 @@
 
 const two = (number) => String(number).padStart(2, '0');
 
-/** A position in the film: 1:02:33.4, or 02:33.4. */
-export function clock(seconds, decimals = 1) {
+/** A position in the film: 1:02:33.4, or 02:33.4 in the first hour of one that has no other. */
+export function clock(seconds, decimals = 1, length = 0) {
   if (seconds === null || seconds === undefined) return '–';
   const factor = 10 ** decimals;
   const whole = Math.round(Math.abs(seconds) * factor);
@@ -12,7 +12,7 @@ export function clock(seconds, decimals = 1) {
   const hours = Math.floor(all / 3600);
   const minutes = Math.floor(all / 60) % 60;
   const sign = seconds < 0 && whole > 0 ? '−' : '';
-  return `${sign}${hours > 0 ? `${hours}:` : ''}${two(minutes)}:${two(all % 60)}${fraction}`;
+  return `${sign}${hours > 0 || length >= 3600 ? `${hours}:` : ''}${two(minutes)}:${two(all % 60)}${fraction}`;
 }
 
 /** How long: 4 s, 3 min, 2 h 5 min. */
@@ -23,16 +23,21 @@ export function lasting(seconds) {
   return minutes < 120 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-/** Microseconds as a person reads them: 40 µs, 1.25 ms, 1.2 s. */
-export function micros(us) {
+/** Microseconds as a person reads them: 40 µs, 1.25 ms, 1.20 s; with as many digits. */
+export function micros(us, digits = 3) {
   if (us === null || us === undefined) return '–';
   if (us < 1000) return `${us < 10 ? us.toFixed(1) : Math.round(us)} µs`;
-  if (us < 1e6) return `${(us / 1000).toPrecision(3)} ms`;
-  return `${(us / 1e6).toPrecision(3)} s`;
+  if (us < 1e6) return `${rounded(us / 1000, digits)} ms`;
+  return `${rounded(us / 1e6, digits)} s`;
 }
+
+const rounded = (number, digits) => (number >= 10 ** digits ? String(Math.round(number)) : number.toPrecision(digits));
 
 /** A part of 1: 60 %. */
 export const percent = (part) => `${Math.round(part * 100)} %`;
+
+/** A trim: +10 ms, −40 ms. */
+export const signed = (ms) => `${ms > 0 ? '+' : ms < 0 ? '−' : ''}${Math.abs(ms)} ms`;
 
 /** Acks over frames: never rounded up to 100 %, because one lost frame is one lost frame. */
 export function ackRate(rate) {
@@ -53,6 +58,9 @@ export function bits(word, letter) {
   const set = Array.from({ length: 16 }, (_, bit) => bit).filter((bit) => word & (1 << bit));
   return set.length > 0 ? set.map((bit) => `${letter}${two(bit + 1)}`).join(' ') : 'none';
 }
+
+/** A name of the configuration as a title: kids_gentle becomes Kids gentle. */
+export const titled = (name) => sentence(name.replaceAll('_', ' '));
 
 /** The first letter large. */
 export const sentence = (text) => (text ? text[0].toUpperCase() + text.slice(1) : '');

@@ -1,4 +1,4 @@
-//! Every check there is: its name, how grave it is, and why it matters. One table; the judges, the configuration,
+//! Every check of preflight: its name, how grave it is, and why it matters. One table; the judges, the configuration,
 //! `--explain` and the reports all read it.
 
 use std::fmt;

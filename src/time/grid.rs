@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::time::MonoTime;
+use super::MonoTime;
 
 /// Frames per second to every controller, to a thousandth: 1 to 1,000 Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
