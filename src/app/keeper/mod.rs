@@ -188,6 +188,7 @@ impl Keeper {
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
                 self.end_record(self.ended);
+                self.close_record();
                 let cue = self.cued.map(|cued| cued.id);
                 self.ends.memory = Memory { board: Some(self.board), cue };
                 let journal = self.record.into_journal();
@@ -201,6 +202,7 @@ impl Keeper {
     fn look_after(&mut self) {
         self.take_news();
         self.end_show();
+        self.settle_record();
         self.follow_sweep();
         self.end_errand();
         self.heed_schedule();
