@@ -27,7 +27,7 @@ use std::time::Duration;
 
 use super::house::{Closed, Reins};
 use crate::config::{self, Config};
-use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::hall::{Ask, Asked, Code, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::{Command, Line};
@@ -261,8 +261,9 @@ impl Keeper {
         }
     }
 
-    /// Notes what no state says, for the warnings.
+    /// Notes what no state says, for the log and the warnings.
     fn note(&mut self, note: String) {
+        self.say_note(&note);
         self.notes.push_back(note);
         if self.notes.len() > NOTES {
             self.notes.pop_front();
@@ -308,10 +309,13 @@ impl Keeper {
             // Whatever moves parks first; the tick thread sees to that.
             self.reins.leave.store(true, Ordering::Release);
         }
-        if self.ends.signals.reload.swap(false, Ordering::AcqRel)
-            && let Err(problem) = self.reload()
-        {
-            self.note(problem.to_string());
+        if self.ends.signals.reload.swap(false, Ordering::AcqRel) {
+            let result = self.reload();
+            let who = Who { role: Role::Engineer, surface: Surface::Signal, name: "SIGHUP".to_owned() };
+            self.write_down(&Desired { ask: Ask::Reload, who }, &result);
+            if let Err(problem) = result {
+                self.note(problem.to_string());
+            }
         }
     }
 
