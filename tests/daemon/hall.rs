@@ -196,7 +196,9 @@ impl Hall {
 
     /// The status now, and each that comes.
     fn statuses(&self) -> impl Iterator<Item = Value> {
-        let mut stream = UnixStream::connect(self.path("control.sock")).expect("it listens");
+        let stream = UnixStream::connect(self.path("control.sock"));
+        let mut stream =
+            stream.unwrap_or_else(|error| panic!("it has ended: {error}: {:?}", self.serving().lines()));
         stream.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
         // HTTP/1.0 knows no chunks, so that lines are whole.
         let _ = stream.write_all(b"GET /api/v1/events HTTP/1.0\r\nHost: localhost\r\n\r\n"); // it may be closed again

@@ -123,3 +123,17 @@ fn a_controller_that_reboots_in_mid_show_is_out_until_a_person_homes_it() {
     hall.wait(|status| status["cause"] == "the seats have parked");
     assert!(hall.end().rest_in_park());
 }
+
+#[test]
+fn a_controller_that_reboots_between_shows_is_out_until_a_person_homes_it() {
+    let hall = Hall::open();
+    // A counter of a few datagrams looks the same after a reboot; so the controllers are asked for more.
+    (0..4).for_each(|_| drop(hall.done(&["preflight"])));
+    hall.lives_on(50);
+    hall.happens("1@reboot");
+    let out = hall.wait(|status| standing(status, 0) == "excluded");
+    assert_eq!((out["state"].as_str(), standing(&out, 1)), (Some("parked"), "ok"));
+    hall.done(&["home", "--seats-empty"]);
+    hall.wait(|status| status["state"] == "parked" && standing(status, 0) == "ok");
+    assert_eq!(hall.end().motion(), 0);
+}
