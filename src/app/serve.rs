@@ -70,23 +70,33 @@ pub enum ServeError {
     System(#[source] io::Error),
 }
 
-/// The mark that a start leaves and an orderly end takes away.
+/// The mark that a daemon leaves before its first tick, and an orderly end takes away.
 #[derive(Debug)]
 struct Mark(PathBuf);
 
 impl Mark {
-    /// Leaves it; says whether it was there.
-    fn leave(folder: &Path) -> Result<(Self, bool), ServeError> {
-        let path = folder.join("running");
-        let file = |cause| ServeError::File { path: path.clone(), cause };
-        fs::create_dir_all(folder).map_err(file)?;
-        let crashed = path.try_exists().map_err(file)?;
-        fs::write(&path, b"kinocue runs, or has crashed\n").map_err(file)?;
-        Ok((Self(path), crashed))
+    /// The one in that folder, which is made where it is missing.
+    fn of(folder: &Path) -> Result<Self, ServeError> {
+        let mark = Self(folder.join("running"));
+        fs::create_dir_all(folder).map_err(|cause| mark.failed(cause))?;
+        Ok(mark)
+    }
+
+    /// Whether the daemon before left it and did not take it away.
+    fn is_there(&self) -> Result<bool, ServeError> {
+        self.0.try_exists().map_err(|cause| self.failed(cause))
+    }
+
+    fn leave(&self) -> Result<(), ServeError> {
+        fs::write(&self.0, b"kinocue runs, or has crashed\n").map_err(|cause| self.failed(cause))
     }
 
     fn take_away(&self) -> Result<(), ServeError> {
-        fs::remove_file(&self.0).map_err(|cause| ServeError::File { path: self.0.clone(), cause })
+        fs::remove_file(&self.0).map_err(|cause| self.failed(cause))
+    }
+
+    fn failed(&self, cause: io::Error) -> ServeError {
+        ServeError::File { path: self.0.clone(), cause }
     }
 }
 
@@ -144,7 +154,8 @@ impl Served {
 pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
     let Parts { config, places, pages, signals, log } = parts;
     let mut config = Arc::new(config);
-    let (mark, crashed) = Mark::leave(&places.state)?;
+    let mark = Mark::of(&places.state)?;
+    let crashed = mark.is_there()?;
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new())?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
@@ -152,6 +163,8 @@ pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Ser
     let mut ends = Ends { inbox, source, config: places.config, signals, voice, memory: Memory::default() };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
+    // Not sooner: a start that is refused has moved nothing, and is no crash.
+    mark.leave()?;
     up(handle, surfaces.addresses());
     let mut feeder = None;
     let served = loop {

@@ -35,7 +35,7 @@ pub struct Identity {
 const UNDER_WAY: u64 = 64;
 /// With more datagrams than these in doubt the counter proves nothing.
 const PROVES: u64 = 1 << 15;
-/// With more than these in doubt it is time to read the counter again.
+/// With more than these in doubt it is time to read the counter again, or sooner where it has counted little.
 const REFRESH: u64 = 1 << 13;
 
 /// Datagrams to one controller.
@@ -94,9 +94,11 @@ impl Baseline {
         if u64::from(now) <= counted_since { Verdict::Rebooted } else { Verdict::Crowded }
     }
 
-    /// Whether the counter should be read again while all is well.
-    pub(super) const fn is_stale(&self, traffic: Traffic) -> bool {
-        self.packets.is_some() && self.doubt(traffic) > REFRESH
+    /// Whether the counter should be read again while all is well. One that began not long ago is hard to tell from one that
+    /// begins anew, so it is read again as soon as it may have counted twice as much.
+    pub(super) fn is_stale(&self, traffic: Traffic) -> bool {
+        let counted = |packets: u16| u64::from(packets).clamp(UNDER_WAY, REFRESH);
+        self.packets.is_some_and(|packets| self.doubt(traffic) > counted(packets))
     }
 
     /// Datagrams that it may have received or not.
@@ -133,6 +135,17 @@ mod tests {
         assert_eq!(after(40_000, 500, 470, 41_000), Verdict::Crowded);
         assert_eq!(after(40_000, 500, 470, 700), Verdict::Crowded);
         assert_eq!(after(40_000, 500, 470, 500), Verdict::Rebooted, "of all that was sent since");
+    }
+
+    #[test]
+    fn a_counter_is_read_again_when_it_may_have_doubled_but_not_seldom() {
+        let stale = |packets, sent| {
+            let traffic = |sent| Traffic { sent, acked: 0 };
+            Baseline::of(&sighting(packets), traffic(0)).is_stale(traffic(sent))
+        };
+        for (packets, doubt) in [(0, 64), (64, 64), (300, 300), (8_192, 8_192), (60_000, 8_192)] {
+            assert!(!stale(packets, doubt) && stale(packets, doubt + 1), "{packets}");
+        }
     }
 
     #[test]

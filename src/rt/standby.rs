@@ -101,6 +101,11 @@ impl Standby {
         members.all(|controller| self.seen[controller].is_some_and(|seen| seen.at_park))
     }
 
+    /// Whether the control plane holds a conversation with the controllers.
+    pub(super) fn is_asked_otherwise(&self) -> bool {
+        self.line.is_open()
+    }
+
     /// Takes orders, counts what the line sent, and beats while nothing moves.
     pub(super) fn serve(&mut self, health: &mut Health, sender: &Sender, moving: bool, now: MonoTime) {
         while let Ok(order) = self.orders.pop() {

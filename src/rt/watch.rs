@@ -245,6 +245,8 @@ impl Watch {
     fn tell(&mut self, notice: Notice) {
         match notice {
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
+            // Preflight counts every datagram that a controller received: what can wait does not come between.
+            Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
             Notice::Read(controller) => {
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
                 self.health.on_read_sent(controller, datagrams);
@@ -258,6 +260,15 @@ impl Watch {
                 }
             }
         }
+    }
+
+    /// Whether the control plane holds a conversation with the controllers.
+    fn is_asked_otherwise(&self) -> bool {
+        self.standby.as_ref().is_some_and(Standby::is_asked_otherwise)
+    }
+
+    fn stands(&self, controller: usize) -> Standing {
+        self.health.standing(self.health.groups().group_of(controller))
     }
 
     /// What a lane has to do because its group stands otherwise.

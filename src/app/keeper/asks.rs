@@ -24,7 +24,9 @@ impl Keeper {
             Ask::Arm => self.request(Request::Arm),
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
-                self.request(Request::Go).inspect(|()| self.begin_record(&who.to_string(), who.surface))
+                let before = self.count_before();
+                self.request(Request::Go)
+                    .inspect(|()| self.begin_record(&who.to_string(), who.surface, before))
             }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),

@@ -175,8 +175,9 @@ impl Keeper {
         if self.known.state == State::Homing {
             return Err(Problem::new(Code::State, "the seats have to be homed first", "arm, and go"));
         }
+        let before = self.count_before();
         self.command(Command::Request(Request::Go))
-            .inspect(|()| self.begin_record("the playlist", Surface::Schedule))
+            .inspect(|()| self.begin_record("the playlist", Surface::Schedule, before))
     }
 
     /// A show is over: the next entry is loaded, and starts where the one before says so and came to its end.

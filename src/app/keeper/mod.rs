@@ -28,7 +28,7 @@ use std::time::Duration;
 
 use super::house::{Closed, Reins};
 use crate::config::{self, Config};
-use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::hall::{Ask, Asked, Code, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::{Command, Line};
@@ -192,6 +192,7 @@ impl Keeper {
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
                 self.end_record(self.ended);
+                self.close_record();
                 let cue = self.cued.map(|cued| cued.id);
                 self.ends.memory = Memory { board: Some(self.board), cue };
                 let journal = self.record.into_journal();
@@ -205,6 +206,7 @@ impl Keeper {
     fn look_after(&mut self) {
         self.take_news();
         self.end_show();
+        self.settle_record();
         self.follow_sweep();
         self.end_errand();
         self.heed_schedule();
@@ -264,8 +266,9 @@ impl Keeper {
         }
     }
 
-    /// Notes what no state says, for the warnings.
+    /// Notes what no state says, for the log and the warnings.
     fn note(&mut self, note: String) {
+        self.say_note(&note);
         self.notes.push_back(note);
         if self.notes.len() > NOTES {
             self.notes.pop_front();
@@ -311,10 +314,13 @@ impl Keeper {
             // Whatever moves parks first; the tick thread sees to that.
             self.reins.leave.store(true, Ordering::Release);
         }
-        if self.ends.signals.reload.swap(false, Ordering::AcqRel)
-            && let Err(problem) = self.reload()
-        {
-            self.note(problem.to_string());
+        if self.ends.signals.reload.swap(false, Ordering::AcqRel) {
+            let result = self.reload();
+            let who = Who { role: Role::Engineer, surface: Surface::Signal, name: "SIGHUP".to_owned() };
+            self.write_down(&Desired { ask: Ask::Reload, who }, &result);
+            if let Err(problem) = result {
+                self.note(problem.to_string());
+            }
         }
     }
 

@@ -150,9 +150,10 @@ impl Keeper {
         self.board.only = sweep.only.take();
         sweep.before = self.cued.replace(cued).map(Box::new);
         self.sweep = Some(sweep);
+        let before = self.count_before();
         let begun = self.stage().and_then(|()| self.command(Command::Request(Request::Go)));
         if begun.is_ok() {
-            self.begin_record("a test of the seats", Surface::Socket);
+            self.begin_record("a test of the seats", Surface::Socket, before);
         }
         begun.inspect_err(|_| {
             self.end_sweep("did not begin");

@@ -5,6 +5,9 @@ use crate::hall::{Severity, Warning};
 use crate::health::{Standing, Why};
 use crate::rt::Row;
 
+/// What the warnings are called that say what no state says.
+pub(super) const NOTE: &str = "note";
+
 /// How a group stands, in one word.
 pub(super) const fn word(standing: Standing) -> &'static str {
     match standing {
@@ -34,7 +37,7 @@ impl Keeper {
             remedy: String::new(),
         }));
         warnings.extend(self.notes.iter().rev().map(|note| Warning {
-            id: "note".to_owned(),
+            id: NOTE.to_owned(),
             severity: Severity::Warning,
             controller: None,
             text: note.clone(),
