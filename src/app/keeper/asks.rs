@@ -22,7 +22,8 @@ impl Keeper {
             Ask::Test { rows } => return self.test(&rows, asked),
             Ask::Preflight => return self.preflight(asked),
             Ask::Home => self.request(Request::Home),
-            Ask::Arm => self.request(Request::Arm),
+            Ask::Arm { seats_empty: false } => self.request(Request::Arm),
+            Ask::Arm { seats_empty: true } => self.request(Request::HomeAndArm),
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
                 self.request(Request::Go).inspect(|()| self.begin_record(&who.to_string(), who.surface))
@@ -50,7 +51,7 @@ impl Keeper {
     }
 
     fn request(&mut self, request: Request) -> Result<(), Problem> {
-        if matches!(request, Request::Arm | Request::Home) {
+        if matches!(request, Request::Arm | Request::HomeAndArm | Request::Home) {
             // Both need the line, or a show that nobody is about to replace.
             self.is_free()?;
         }
