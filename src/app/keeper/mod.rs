@@ -8,11 +8,16 @@ mod errand;
 mod homing;
 mod known;
 mod list;
+mod party;
 mod ready;
 mod record;
 mod show;
 mod status;
 mod sweep;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 mod voice;
 mod warnings;
 
@@ -30,13 +35,14 @@ use crate::config::{self, Config};
 use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
-use crate::rt::{Command, Line};
+use crate::rt::Command;
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 use board::Board;
 use errand::Errand;
 use known::Known;
+use party::PartyLine;
 use ready::Preflighted;
 use record::Records;
 use show::Cued;
@@ -50,6 +56,8 @@ const TELL: Duration = Duration::from_millis(100);
 const NOTES: usize = 5;
 /// How long the tick thread has to answer a command; a tick takes a second at most.
 const ANSWER: Duration = Duration::from_secs(2);
+/// How often its answer is looked for.
+const LOOK_FOR_ANSWER: Duration = Duration::from_micros(200);
 
 /// What a keeper has whatever the configuration is.
 #[derive(Debug)]
@@ -73,6 +81,17 @@ pub struct Ends {
 pub struct Memory {
     board: Option<Board>,
     cue: Option<String>,
+    /// What was latched: another configuration clears nothing.
+    latched: bool,
+    /// What a person should know of the hall before.
+    notes: VecDeque<String>,
+}
+
+impl Memory {
+    /// Adds something that a person should know.
+    pub fn note(&mut self, note: String) {
+        self.notes.push_back(note);
+    }
 }
 
 /// What the system asks of the program; set by signals.
@@ -118,17 +137,17 @@ pub struct Keeper {
     cued: Option<Cued>,
     preflighted: Option<Preflighted>,
     errand: Option<Errand>,
-    homing: Option<homing::Settling>,
+    homing: Option<homing::Homing>,
     /// What the tick thread was told of readiness.
     readiness: Option<crate::state::Readiness>,
     rates: Rates,
     told: MonoTime,
-    /// The way to the controllers' registers; none while an errand has it.
-    line: Option<Line>,
+    line: PartyLine,
     library: Library,
     /// What went wrong lately and no state says, newest last.
     notes: VecDeque<String>,
     list: Option<list::List>,
+    onward: list::Onward,
     sweep: Option<sweep::Sweep>,
     record: Records,
     reload: Option<Arc<Config>>,
@@ -140,7 +159,13 @@ pub struct Keeper {
 impl Keeper {
     /// The keeper of a hall that has just opened.
     #[must_use]
-    pub fn new(mut ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
+    pub fn new(
+        mut ends: Ends,
+        reins: Reins,
+        line: crate::rt::Line,
+        library: Library,
+        journal: Journal,
+    ) -> Self {
         let now = Monotonic.now();
         let memory = std::mem::take(&mut ends.memory);
         let mut board = Board::new(&reins.config);
@@ -161,16 +186,22 @@ impl Keeper {
             readiness: None,
             rates: Rates::default(),
             told: now,
-            line: Some(line),
+            line: PartyLine::of(line),
             library,
-            notes: VecDeque::new(),
+            notes: memory.notes,
             list: None,
+            onward: list::Onward::default(),
             sweep: None,
             record: Records::new(journal),
             reload: None,
             show_over: false,
             ended: Cause::Started,
         };
+        // Before the first tick: a seat that is out is not waited for, and what was stopped stays so.
+        keeper.set_desk();
+        if memory.latched {
+            keeper.reins.desk.stop();
+        }
         keeper.examine_library();
         if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
             keeper.fetch(cue, None);
@@ -188,8 +219,7 @@ impl Keeper {
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
                 self.end_record(self.ended);
-                let cue = self.cued.map(|cued| cued.id);
-                self.ends.memory = Memory { board: Some(self.board), cue };
+                self.ends.memory = self.remember();
                 let journal = self.record.into_journal();
                 let ended = record::ending(self.ended);
                 return Left { ends: self.ends, closed, reload: self.reload, ended, journal };
@@ -197,16 +227,30 @@ impl Keeper {
         }
     }
 
+    /// What goes over to the next hall.
+    fn remember(&mut self) -> Memory {
+        let latched = self.known.state.is_latched();
+        if latched {
+            let (state, cause) = (self.known.state, self.cause());
+            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
+        }
+        if let Some(list) = self.list.take() {
+            self.note(format!("the playlist {} is no longer loaded; load it again", list.place().id));
+        }
+        let cue = self.cued.take().map(|cued| cued.id);
+        Memory { board: Some(self.board.clone()), cue, latched, notes: std::mem::take(&mut self.notes) }
+    }
+
     /// Everything that nobody has to ask for.
     fn look_after(&mut self) {
         self.take_news();
+        self.heed_signals();
         self.end_show();
         self.follow_sweep();
         self.end_errand();
         self.heed_schedule();
         self.settle_homing();
         self.tell_readiness();
-        self.heed_signals();
         let now = Monotonic.now();
         if now.since(self.told) >= TELL {
             self.told = now;
@@ -227,6 +271,8 @@ impl Keeper {
     }
 
     fn on_state(&mut self, from: State, to: State) {
+        self.forget_start();
+        self.call_off_homing();
         if to == State::Homing {
             self.begin_homing();
         }
@@ -269,6 +315,7 @@ impl Keeper {
 
     /// Gives the tick thread a command and waits for its answer, a tick or two.
     fn command(&mut self, command: Command) -> Result<(), Problem> {
+        self.take_news(); // so that there is room for the answer
         if self.reins.commands.push(command).is_err() {
             return Err(known::busy());
         }
@@ -282,7 +329,7 @@ impl Keeper {
             if Monotonic.now() >= until {
                 return Err(known::no_answer(ANSWER));
             }
-            Monotonic.sleep_until(Monotonic.now() + Duration::from_micros(200));
+            Monotonic.sleep_until(Monotonic.now() + LOOK_FOR_ANSWER);
         }
     }
 
@@ -305,8 +352,12 @@ impl Keeper {
         if self.ends.signals.is_leaving() {
             // Whatever moves parks first; the tick thread sees to that.
             self.reins.leave.store(true, Ordering::Release);
+            self.hold_back();
+            self.call_off_homing();
         }
-        if self.ends.signals.reload.swap(false, Ordering::AcqRel)
+        // An errand that is under way holds what the next hall needs: its end is waited for.
+        if self.is_free().is_ok()
+            && self.ends.signals.reload.swap(false, Ordering::AcqRel)
             && let Err(problem) = self.reload()
         {
             self.note(problem.to_string());
@@ -324,6 +375,7 @@ impl Keeper {
             let detail = format!("cannot read the configuration anew while {}", self.known.state);
             return Err(Problem::new(Code::State, detail, "park, and disarm first"));
         }
+        self.is_free()?;
         let config = config::load(&self.ends.config).map_err(|faults| {
             let detail = format!("{} is bad; the old configuration is kept", self.ends.config.display());
             let faults = faults.to_string().lines().map(str::to_owned).collect();
