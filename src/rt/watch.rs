@@ -227,6 +227,8 @@ impl Watch {
 
     fn tell(&mut self, notice: Notice) {
         match notice {
+            // One that is out may be at work on: it stays away until it was homed, and holds up nobody.
+            Notice::Hall(Event::Rebooted(controller)) if !self.takes_part(controller) => {}
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
             Notice::Read(controller) => {
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
@@ -241,6 +243,10 @@ impl Watch {
                 }
             }
         }
+    }
+
+    fn takes_part(&self, controller: usize) -> bool {
+        self.standby.as_ref().is_none_or(|standby| standby.takes_part(controller))
     }
 
     /// What a lane has to do because its group stands otherwise.
