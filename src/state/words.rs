@@ -53,7 +53,9 @@ impl fmt::Display for Request {
 impl fmt::Display for Next {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::AwaitAnswers => "wait until every controller has answered",
+            Self::AwaitAnswers => {
+                "wait until every controller has answered, or disable the one that does not"
+            }
             Self::AwaitPositions => "wait until the positions are read, then park",
             Self::AwaitHome => "wait until the seats are home, and keep clear of them",
             Self::AwaitRest => "wait until the seats are at rest",
@@ -191,7 +193,7 @@ impl Why {
     #[must_use]
     pub const fn remedy(self) -> &'static str {
         match self {
-            Self::NotIdentified => "wait until they answer, or take the missing one out of the configuration",
+            Self::NotIdentified => "wait until they answer, or disable the one that does not",
             Self::PositionsNotRead => "wait until the controllers have answered",
             Self::PositionUnknown => "home first, with nobody on the seats",
             Self::HomesFirst => {
