@@ -239,8 +239,18 @@ impl Rig {
     }
 
     /// Has all of that happen at the state machine at once.
-    pub(super) fn on_machine(&self, happen: impl FnOnce(&mut Machine)) {
-        happen(&mut self.double.machine.lock().unwrap());
+    pub(super) fn happens(&self, happen: impl FnOnce(&mut Machine, MonoTime)) {
+        happen(&mut self.double.machine.lock().unwrap(), Monotonic.now());
+    }
+
+    /// Has the keeper hear of a state, and look after nothing else.
+    pub(super) fn hear_of(&mut self, state: State) {
+        let until = Monotonic.now() + PATIENCE;
+        while self.keeper.known.state != state {
+            assert!(Monotonic.now() < until, "it is {}", self.state());
+            self.keeper.take_news();
+            thread::yield_now();
+        }
     }
 
     /// The state that the machine is in, be it that the keeper has not heard of it.

@@ -36,6 +36,14 @@ fn cue(rig: &Rig) -> Option<&str> {
     rig.keeper.cued.as_ref().map(|cued| cued.id.as_str())
 }
 
+/// The seats have parked, and the next cue is on its way.
+fn end_show(rig: &mut Rig) {
+    rig.happens(|machine, now| machine.event(Event::Parked, now));
+    rig.hear_of(State::Parked);
+    rig.keeper.end_show();
+    assert!(rig.keeper.errand.is_some());
+}
+
 /// Has something asked, with nothing looked after in between.
 fn ask_in_between(rig: &mut Rig, ask: Ask) {
     drop(rig.post(ask));
@@ -68,8 +76,7 @@ fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() 
     for ask in [Ask::Stop, Ask::Park, Ask::Disarm, Ask::Pause] {
         let mut rig = playing();
         rig.tell(Event::CueEnded);
-        rig.tell(Event::Parked);
-        assert!(rig.keeper.errand.is_some(), "the next cue is on its way");
+        end_show(&mut rig);
         ask_in_between(&mut rig, ask.clone());
         rig.settle();
         let rests = if ask == Ask::Stop { State::Stopped } else { State::Parked };
@@ -81,18 +88,20 @@ fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() 
 fn nothing_goes_on_after_a_stop_that_was_cleared_before_the_next_cue_was_loaded() {
     let mut rig = playing();
     rig.tell(Event::CueEnded);
-    rig.tell(Event::Parked);
-    for ask in [Ask::Stop, Ask::Clear] {
-        ask_in_between(&mut rig, ask);
-    }
-    let now = crate::time::Clock::now(&crate::sys::clock::Monotonic);
-    rig.on_machine(|machine| {
+    end_show(&mut rig);
+    // By the stop socket, of which no word may come.
+    rig.keeper.reins.desk.stop();
+    rig.hear_of(State::Stopped);
+    rig.happens(|machine, now| {
+        machine.request(Request::Clear, now).unwrap();
         machine.event(Event::PositionsRead, now);
         machine.request(Request::Park, now).unwrap();
-        machine.event(Event::Parked, now);
     });
+    rig.hear_of(State::Parking);
+    rig.happens(|machine, now| machine.event(Event::Parked, now));
+    rig.hear_of(State::Parked);
     rig.settle();
-    assert_eq!(rig.state(), State::Parked);
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
 }
 
 #[test]
@@ -131,6 +140,15 @@ fn an_entry_whose_time_has_come_arms_nothing_that_a_person_has_disarmed_meanwhil
         rig.settle();
         assert!(matches!(rig.state(), State::Parked | State::Stopped), "{ask}: {}", rig.state());
     }
+}
+
+#[test]
+fn an_entry_whose_time_has_come_does_not_start_where_arming_has_lapsed_meanwhile() {
+    let mut rig = due();
+    rig.happens(|machine, now| machine.tick(now + crate::state::ARMED_FOR));
+    rig.hear_of(State::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
 }
 
 #[test]
