@@ -1,5 +1,6 @@
 //! What takes long is done on a thread of its own, one thing at a time; whoever asked for it is answered when it is done.
 
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use super::Keeper;
@@ -36,8 +37,12 @@ pub(super) struct Errand {
 }
 
 impl Keeper {
-    /// Whether nothing long is under way; else why not.
+    /// Whether something long may begin; else why not. In a hall that closes nothing may: it would hold the port that the next
+    /// one opens.
     pub(super) fn is_free(&self) -> Result<(), Problem> {
+        if self.reins.leave.load(Ordering::Acquire) {
+            return Err(Problem::new(Code::Busy, "the hall is being closed", "ask again in a second"));
+        }
         match &self.errand {
             None => Ok(()),
             Some(errand) => Err(Problem::new(

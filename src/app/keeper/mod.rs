@@ -11,6 +11,7 @@ mod list;
 mod party;
 mod ready;
 mod record;
+mod reload;
 mod show;
 mod status;
 mod sweep;
@@ -21,18 +22,19 @@ mod tests;
 mod voice;
 mod warnings;
 
+pub use reload::{Memory, Signals};
 pub use voice::Voice;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use super::house::{Closed, Reins};
-use crate::config::{self, Config};
-use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::config::Config;
+use crate::hall::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::Command;
@@ -74,41 +76,6 @@ pub struct Ends {
     pub voice: Voice,
     /// What was set in the hall before; for a first one, nothing.
     pub memory: Memory,
-}
-
-/// What goes over from a hall to the one that is opened with another configuration.
-#[derive(Debug, Default)]
-pub struct Memory {
-    board: Option<Board>,
-    cue: Option<String>,
-    /// What was latched: another configuration clears nothing.
-    latched: bool,
-    /// What a person should know of the hall before.
-    notes: VecDeque<String>,
-}
-
-impl Memory {
-    /// Adds something that a person should know.
-    pub fn note(&mut self, note: String) {
-        self.notes.push_back(note);
-    }
-}
-
-/// What the system asks of the program; set by signals.
-#[derive(Debug, Clone, Default)]
-pub struct Signals {
-    /// Park, and end.
-    pub leave: Arc<AtomicBool>,
-    /// Read the configuration anew.
-    pub reload: Arc<AtomicBool>,
-}
-
-impl Signals {
-    /// Whether the program is to end.
-    #[must_use]
-    pub fn is_leaving(&self) -> bool {
-        self.leave.load(Ordering::Acquire)
-    }
 }
 
 /// What is left once the hall has closed.
@@ -197,15 +164,8 @@ impl Keeper {
             show_over: false,
             ended: Cause::Started,
         };
-        // Before the first tick: a seat that is out is not waited for, and what was stopped stays so.
-        keeper.set_desk();
-        if memory.latched {
-            keeper.reins.desk.stop();
-        }
         keeper.examine_library();
-        if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
-            keeper.fetch(cue, None);
-        }
+        keeper.begin(memory.cue, memory.latched);
         keeper
     }
 
@@ -225,20 +185,6 @@ impl Keeper {
                 return Left { ends: self.ends, closed, reload: self.reload, ended, journal };
             }
         }
-    }
-
-    /// What goes over to the next hall.
-    fn remember(&mut self) -> Memory {
-        let latched = self.known.state.is_latched();
-        if latched {
-            let (state, cause) = (self.known.state, self.cause());
-            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
-        }
-        if let Some(list) = self.list.take() {
-            self.note(format!("the playlist {} is no longer loaded; load it again", list.place().id));
-        }
-        let cue = self.cued.take().map(|cued| cued.id);
-        Memory { board: Some(self.board.clone()), cue, latched, notes: std::mem::take(&mut self.notes) }
     }
 
     /// Everything that nobody has to ask for.
@@ -346,43 +292,5 @@ impl Keeper {
         self.write_down(&asked.desired, &result);
         let status = self.publish();
         asked.answer(result.map(|()| status));
-    }
-
-    fn heed_signals(&mut self) {
-        if self.ends.signals.is_leaving() {
-            // Whatever moves parks first; the tick thread sees to that.
-            self.reins.leave.store(true, Ordering::Release);
-            self.hold_back();
-            self.call_off_homing();
-        }
-        // An errand that is under way holds what the next hall needs: its end is waited for.
-        if self.is_free().is_ok()
-            && self.ends.signals.reload.swap(false, Ordering::AcqRel)
-            && let Err(problem) = self.reload()
-        {
-            self.note(problem.to_string());
-        }
-    }
-
-    /// Reads the configuration anew, and has the hall opened with it. The old one is kept where the new one is bad, and while
-    /// anything is armed.
-    fn reload(&mut self) -> Result<(), Problem> {
-        let idle = matches!(
-            self.known.state,
-            State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
-        );
-        if !idle {
-            let detail = format!("cannot read the configuration anew while {}", self.known.state);
-            return Err(Problem::new(Code::State, detail, "park, and disarm first"));
-        }
-        self.is_free()?;
-        let config = config::load(&self.ends.config).map_err(|faults| {
-            let detail = format!("{} is bad; the old configuration is kept", self.ends.config.display());
-            let faults = faults.to_string().lines().map(str::to_owned).collect();
-            Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
-        })?;
-        self.reload = Some(Arc::new(config));
-        self.reins.leave.store(true, Ordering::Release);
-        Ok(())
     }
 }

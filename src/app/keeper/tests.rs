@@ -6,7 +6,7 @@ use std::sync::mpsc::channel;
 use super::errand::Done;
 use super::testing::Rig;
 use super::*;
-use crate::hall::Ask;
+use crate::hall::{Ask, Code};
 use crate::rt::News;
 use crate::state::{Event, Next};
 
@@ -62,6 +62,15 @@ fn a_configuration_is_read_anew_once_nobody_speaks_with_the_controllers_any_more
     drop(go_on);
     rig.wait_until(|keeper| keeper.reins.leave.load(Ordering::Acquire));
     assert!(rig.keeper.reload.is_some());
+}
+
+#[test]
+fn nothing_long_begins_in_a_hall_that_closes() {
+    let mut rig = Rig::parked();
+    rig.keeper.reins.leave.store(true, Ordering::Release);
+    for ask in [Ask::Preflight, Ask::Home, Ask::Load { cue: "two".to_owned() }] {
+        assert_eq!(rig.ask(ask).unwrap_err().code, Code::Busy);
+    }
 }
 
 #[test]
