@@ -157,7 +157,8 @@ pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Ser
     let mark = Mark::of(&places.state)?;
     let crashed = mark.is_there()?;
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
-    let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new())?;
+    let mut numbers = Numbers::new();
+    let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
     let mut ends = Ends { inbox, source, config: places.config, signals, voice, memory: Memory::default() };
@@ -169,18 +170,37 @@ pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Ser
     let mut feeder = None;
     let served = loop {
         let left = keep(house, ends, library.clone(), journal, &mut feeder)?;
+        (ends, journal) = (left.ends, left.journal);
         let Some(next) = left.reload else {
             break Served { config, closed: left.closed, ended: left.ended };
         };
-        // The seats are parked or at rest, so nothing tells of a crash.
-        config = next;
-        house = House::open(Arc::clone(&config), false, &left.closed.numbers)?;
-        (ends, journal) = (left.ends, left.journal);
+        // Also of controllers that come back with a later configuration.
+        numbers.extend(&left.closed.numbers);
+        (house, config) = reopen(next, config, &numbers, &mut ends.memory)?;
     };
     surfaces.close();
     log.close();
     mark.take_away()?;
     Ok(served)
+}
+
+/// Opens the hall with another configuration; where it does not open so, with the one before, which did.
+fn reopen(
+    next: Arc<Config>,
+    before: Arc<Config>,
+    numbers: &Numbers,
+    memory: &mut Memory,
+) -> Result<(House, Arc<Config>), HouseError> {
+    // The seats are parked or at rest, so nothing tells of a crash.
+    match House::open(Arc::clone(&next), false, numbers) {
+        Ok(house) => Ok((house, next)),
+        Err(error) => {
+            memory.note(format!(
+                "the hall does not open with the new configuration, and has the old one: {error}"
+            ));
+            Ok((House::open(Arc::clone(&before), false, numbers)?, before))
+        }
+    }
 }
 
 /// Runs one hall on this thread, with a keeper beside it.
@@ -238,4 +258,28 @@ pub fn signals() -> Result<Signals, ServeError> {
     on(SIGINT, &signals.leave)?;
     on(SIGHUP, &signals.reload)?;
     Ok(signals)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hall(bind: &str) -> Arc<Config> {
+        let mut config = crate::config::from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
+        config.show.bind = bind.parse().unwrap();
+        Arc::new(config)
+    }
+
+    #[test]
+    fn a_hall_that_does_not_open_with_another_configuration_has_the_old_one_and_says_why() {
+        // An address of documentation, which no machine has (RFC 5737).
+        let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
+        let mut memory = Memory::default();
+        let (_house, config) = reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory).unwrap();
+        assert!(Arc::ptr_eq(&config, &before));
+        assert!(format!("{memory:?}").contains("does not open with the new configuration"), "{memory:?}");
+        let next = hall("127.0.0.1:0");
+        let (_house, config) = reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory).unwrap();
+        assert!(Arc::ptr_eq(&config, &next));
+    }
 }

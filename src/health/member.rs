@@ -35,6 +35,8 @@ pub(super) struct Member {
     baseline: Option<Baseline>,
     /// Its position is known from homing or preflight, so that the next sighting needs no proof.
     trusted: bool,
+    /// It has to say that it knows its zero, however it came.
+    must_be_home: bool,
     /// When it was last seen as it was.
     seen: Option<MonoTime>,
     /// A read was sent that nothing came of yet.
@@ -72,6 +74,7 @@ impl Member {
             traffic: Traffic::default(),
             baseline: None,
             trusted: true,
+            must_be_home: false,
             seen: None,
             reading: false,
             next_read: None,
@@ -157,6 +160,11 @@ impl Member {
         }
     }
 
+    /// From now on it has to say that it knows its zero.
+    pub(super) const fn demand_home(&mut self) {
+        self.must_be_home = true;
+    }
+
     fn against(&self, sighting: &Sighting) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.baseline {
@@ -165,6 +173,7 @@ impl Member {
             None => Verdict::Unproved,
         };
         match verdict {
+            Verdict::Same if self.must_be_home && !sighting.homed => Some(Why::NotHome(controller)),
             Verdict::Same => None,
             Verdict::Other => Some(Why::Other(controller)),
             Verdict::NotHome => Some(Why::NotHome(controller)),

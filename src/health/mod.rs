@@ -70,6 +70,13 @@ impl Health {
         Self { groups, members, places, policy, watched, stop_told: false, errors_told: false }
     }
 
+    /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.
+    #[must_use]
+    pub fn of_a_hall(mut self) -> Self {
+        self.members.iter_mut().for_each(Member::demand_home);
+        self
+    }
+
     /// The groups.
     #[must_use]
     pub const fn groups(&self) -> &Groups {

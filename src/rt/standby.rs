@@ -96,6 +96,11 @@ impl Standby {
         self.seen[controller].map(|seen| seen.homed)
     }
 
+    /// Whether somebody wants a controller to take part.
+    pub(super) fn takes_part(&self, controller: usize) -> bool {
+        self.desk.mix(controller).on
+    }
+
     /// Whether all seats of a group stand at park, as they were seen last.
     pub(super) fn is_at_park(&self, mut members: impl Iterator<Item = usize>) -> bool {
         members.all(|controller| self.seen[controller].is_some_and(|seen| seen.at_park))
@@ -140,13 +145,12 @@ impl Standby {
     pub(super) fn take_finding(&mut self, health: &Health) -> Option<Finding> {
         let crashed = self.boot?;
         let groups = health.groups();
-        let takes_part = |controller: &usize| self.desk.mix(*controller).on;
         let known = |controller: usize| {
             let standing = health.standing(groups.group_of(controller));
             self.seen[controller].filter(|_| !standing.is_looked_at())
         };
         let mut finding = Finding { homed: true, at_park: true, crashed };
-        for controller in (0..self.seen.len()).filter(takes_part) {
+        for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {
             let seen = known(controller)?;
             finding.homed &= seen.homed;
             finding.at_park &= seen.at_park;

@@ -244,6 +244,8 @@ impl Watch {
 
     fn tell(&mut self, notice: Notice) {
         match notice {
+            // One that is out may be at work on: it stays away until it was homed, and holds up nobody.
+            Notice::Hall(Event::Rebooted(controller)) if !self.takes_part(controller) => {}
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
             // Preflight counts every datagram that a controller received: what can wait does not come between.
             Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
@@ -269,6 +271,10 @@ impl Watch {
 
     fn stands(&self, controller: usize) -> Standing {
         self.health.standing(self.health.groups().group_of(controller))
+    }
+
+    fn takes_part(&self, controller: usize) -> bool {
+        self.standby.as_ref().is_none_or(|standby| standby.takes_part(controller))
     }
 
     /// What a lane has to do because its group stands otherwise.

@@ -40,6 +40,7 @@ fn told(run: &Run, says: &str) {
 fn each_command_is_one_request_in_the_words_of_the_api() {
     for (args, method, path, body) in [
         (vec!["arm"], "POST", "/api/v1/show/arm", json!({})),
+        (vec!["arm", "--seats-empty"], "POST", "/api/v1/show/arm", json!({"seats_empty": true})),
         (vec!["disarm"], "POST", "/api/v1/show/disarm", json!({})),
         (vec!["go"], "POST", "/api/v1/show/go", json!({})),
         (vec!["pause"], "POST", "/api/v1/show/pause", json!({})),

@@ -17,10 +17,14 @@ pub(in crate::cli) enum Command {
     #[command(after_help = "\
 Examples:
   kinocue load coaster && kinocue arm
+  kinocue arm --seats-empty              where a controller does not know its position
   kinocue arm --json
 
-Exit codes: 0 armed, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
-    Arm(ServerArgs),
+Where a position is unknown, after a reboot of a controller, the seats have to home first. They move over their whole stroke
+by themselves then, so that is not done without --seats-empty.
+
+Exit codes: 0 armed, or homing first, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
+    Arm(ArmArgs),
     /// Stands down: nothing can start until a person arms again.
     #[command(after_help = "Example:\n  kinocue disarm")]
     Disarm(ServerArgs),
@@ -66,6 +70,16 @@ All positions are read anew before anything moves.")]
     Reload(ServerArgs),
 }
 
+/// Whether the seats may home first, and where the daemon is.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct ArmArgs {
+    /// Nobody sits on the seats and nothing lies on or under them: they may home first.
+    #[arg(long)]
+    seats_empty: bool,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
 /// The position, and where the daemon is.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SeekArgs {
@@ -78,7 +92,10 @@ pub(in crate::cli) struct SeekArgs {
 
 pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
     let (word, server) = match command {
-        Command::Arm(server) => ("arm", server),
+        Command::Arm(ArmArgs { seats_empty, server }) => {
+            let body = if *seats_empty { json!({ "seats_empty": true }) } else { json!({}) };
+            return server.act("/api/v1/show/arm", &body);
+        }
         Command::Disarm(server) => ("disarm", server),
         Command::Go(server) => ("go", server),
         Command::Pause(server) => ("pause", server),

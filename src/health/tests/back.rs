@@ -201,3 +201,18 @@ fn another_master_is_a_fault_of_the_hall_and_its_seat_has_to_be_homed() {
     assert_eq!(hall.changes(), [(Standing::Excluded, Why::Crowded(2))]);
     assert_eq!(hall.told_hall(), [Event::Rebooted(2)], "once cleared it is no fault any more");
 }
+
+#[test]
+fn a_hall_moves_no_controller_that_does_not_know_its_zero_whenever_it_is_first_seen() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.health =
+        Health::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
+    hall.homed = false;
+    hall.health.look_anew(1);
+    hall.run(2);
+    assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, Why::NotHome(2)));
+    hall.homed = true;
+    hall.health.on_homed(2);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}
