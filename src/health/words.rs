@@ -47,7 +47,7 @@ impl fmt::Display for Why {
             Self::AcksOff => "acks are off",
             Self::AcksMissing(_) => "acks are missing or late",
             Self::Silent(_) => "no ack and no report for too long",
-            Self::NotSeenYet => "not looked at yet",
+            Self::NotSeenYet => "no answer yet",
             Self::SeenAgain => "back as it was",
             Self::EmergencyStop(_) => "emergency stop",
             Self::Error { error, .. } => return write!(f, "{}", crate::wire::DeviceError(*error)),

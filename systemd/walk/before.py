@@ -42,7 +42,7 @@ def install(terminal, table):
     """The package: what it brings, and that nothing runs because of it."""
     said = terminal.run("apt install ./kinocue_*.deb")
     terminal.read_section()
-    terminal.left.remove("apt install ./kinocue_*.deb")
+    terminal.take("apt install ./kinocue_*.deb")
     active = subprocess.run(["systemctl", "is-active", "kinocue"], capture_output=True, text=True).stdout.strip()
     enabled = subprocess.run(["systemctl", "is-enabled", "kinocue"], capture_output=True, text=True).stdout.strip()
     table.saw(19, "installed the package", f"the service is {active} and {enabled}", (active, enabled) == ("inactive", "disabled"))
@@ -80,9 +80,9 @@ def configure(terminal):
     return Tablet(tokens["booth"]), Tablet(tokens["tablet"])
 
 
-def seats():
+def seats(terminal):
     """Simulated controllers, which log what they were sent and how their motors moved."""
-    command = ["kinocue", "sim", "--safe", "--count", "8", "--control", SIM_SOCKET]
+    command = terminal.take(f"kinocue sim --safe --count 8 --control {SIM_SOCKET} &").rstrip("& ").split()
     logs = ["--log", "/trial/frames.csv", "--moves", "/trial/moves.csv"]
     sim = subprocess.Popen([*command, *logs], stdout=subprocess.DEVNULL, stderr=open("/trial/sim.err", "w"))
     for _ in range(500):
@@ -111,15 +111,17 @@ def start(terminal, table):
     begin = time.monotonic()
     terminal.readme("systemctl enable --now kinocue")
     ready = time.monotonic() - begin
-    said = terminal.readme("systemctl status kinocue", fails=False)
+    said = terminal.readme("systemctl status kinocue")
     table.saw(19, "started the service", f"ready after {ready:.1f} s: {line_of('Status:', said)}", ready < 10)
     pid = main_pid()
     user = pwd.getpwuid(pathlib.Path(f"/proc/{pid}").stat().st_uid).pw_name
     policy = subprocess.run(["chrt", "-p", str(pid)], capture_output=True, text=True).stdout
     policy = line_of("policy:", policy)
     table.saw(19, "asked the system who runs it, and how", f"user {user}, {policy}", user == "kinocue" and "SCHED_FIFO" in policy)
-    said = terminal.run("kinocue doctor || true", user="anna")
-    table.saw(19, "kinocue doctor", said.strip().splitlines()[-1], "FIFO" in said or "real-time" in said)
+    said = terminal.run("chrt --fifo 50 kinocue doctor || true")
+    real_time = line_of("realtime_policy", said)
+    found = f"{real_time}; {line_of('lateness_idle', said)}"
+    table.saw(19, "kinocue doctor with the priority of the service", found, "FIFO" in real_time.upper())
 
 
 def library(terminal, table):
@@ -130,23 +132,41 @@ def library(terminal, table):
     terminal.readme("cp today.toml /var/lib/kinocue/playlists/today.toml", user="anna")
     pathlib.Path("/var/lib/kinocue/playlists/torn.toml").write_text(TODAY.replace("bench-ride", "no-such-cue"))
     said = terminal.run("kinocue playlist torn", user="anna", fails=True)
-    named = "no-such-cue" in said and re.search(r"torn\.toml:\d+", said)
-    table.saw(15, "loaded a list with a cue that is not there", said.strip().splitlines()[-1], named)
+    named = re.search(r"torn\.toml:\d+.*no-such-cue.*", said)
+    table.saw(15, "loaded a list with a cue that is not there", named[0] if named else said, named)
 
 
 def preflight(terminal, table, booth):
     """A dead controller is found while the hall is dark, and named; then all is well."""
+    named(table, booth, "while all seats rest")
+    booth.until("B4 back", lambda status: standing(status, "B4") == "ok", 10)
     plug("8@mute=1")
     begin = time.monotonic()
     said = terminal.run("kinocue preflight", user="anna", fails=True)
     took = time.monotonic() - begin
     line = next((line for line in said.splitlines() if "B4" in line), "B4 is not named")
-    named = "B4" in line and "127.0.0.1:7415" in said
-    table.saw(3, "preflight with B4 unplugged", f"failed after {took:.1f} s: {line.strip()}", named and took < 10)
+    found = all(word in line for word in ("row B", "127.0.0.1:7415"))
+    table.saw(3, "preflight with B4 unplugged", f"failed after {took:.1f} s: {line.strip()}", found and took < 10)
     plug("8@mute=0")
     booth.until("B4 back", lambda status: standing(status, "B4") == "ok", 10)
     said = terminal.readme("kinocue preflight", user="anna")
     table.saw(3, "preflight with it plugged in", said.strip().splitlines()[-1], "passed" in said)
+
+
+def named(table, tablet, when):
+    """B4's plug is pulled: how long until the status names it."""
+    pulled = plug("8@mute=1")
+
+    def is_named(status):
+        return standing(status, "B4") == "lost" and any(one["controller"] == "B4" for one in status["warnings"])
+
+    status, _ = tablet.until("B4 lost", is_named, 5)
+    took = time.time() - pulled
+    warning = next(one for one in status["warnings"] if one["controller"] == "B4")
+    others = [one["name"] for one in status["controllers"] if one["name"] != "B4" and one["standing"] != "ok"]
+    said = f"named after {1000 * took:.0f} ms ({warning['text']}); {status['state']}, others that suffer: {others or 'none'}"
+    table.saw(3, f"pulled B4's plug {when}", said, took < 1.0 and not others)
+    plug("8@mute=0")
 
 
 def guests(table, booth, tablet):

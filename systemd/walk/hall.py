@@ -34,12 +34,16 @@ class Terminal:
         lines = "".join(blocks).replace("\\\n", " ").splitlines()
         self.left = [re.sub(r"\s+#.*", "", line).strip() for line in lines if line.strip()]
 
-    def readme(self, command, user=None, **more):
-        """Runs a command that stands in the README."""
+    def take(self, command):
+        """A command that stands in the README, to be run once."""
         if command not in self.left:
             raise Failed(f"README, {SECTION}: there is no `{command}`, or it was run already")
         self.left.remove(command)
-        return self.run(command, user, **more)
+        return command
+
+    def readme(self, command, user=None):
+        """Runs a command that stands in the README."""
+        return self.run(self.take(command), user)
 
     def run(self, command, user=None, fails=False, seconds=60):
         """Runs a command in a shell, as somebody; returns what it wrote to both outputs."""

@@ -8,7 +8,7 @@ import subprocess
 import time
 
 import browser
-from before import main_pid, plug, standing
+from before import main_pid, named
 from hall import ADDRESS
 
 # Seat-demo lifts all seats from 0.5 s to 3.5 s of its film, and they gain speed until 2 s. Water is on from 5.2 s to 5.4 s.
@@ -61,23 +61,6 @@ def bench_ride(terminal, table, tablet, at):
     tablet.until_film("bench-ride", 12)
     at["row_a_end"] = time.time()
     named(table, tablet, "mid-show")
-
-
-def named(table, tablet, when):
-    """B4's plug is pulled: how long until the status names it."""
-    pulled = plug("8@mute=1")
-
-    def is_named(status):
-        warned = any(one["controller"] == "B4" for one in status["warnings"])
-        return warned and standing(status, "B4") == "lost"
-
-    status, _ = tablet.until("B4 lost", is_named, 5)
-    took = time.time() - pulled
-    warning = next(one for one in status["warnings"] if one["controller"] == "B4")
-    others = [one["name"] for one in status["controllers"] if one["name"] != "B4" and one["standing"] != "ok"]
-    said = f"named after {1000 * took:.0f} ms ({warning['text']}); {status['state']}, others that suffer: {others or 'none'}"
-    table.saw(3, f"pulled B4's plug {when}", said, took < 1.0 and not others)
-    plug("8@mute=0")
 
 
 def gear(table, tablet):
@@ -195,15 +178,15 @@ def crash(terminal, table, booth, tablet):
 
 def upgrade(terminal, table, booth, tablet):
     """The package is installed again while seats move, and then taken away."""
-    lift(booth, tablet)
+    terminal.readme("kinocue playlist today && kinocue arm", user="anna")
+    terminal.readme("kinocue go", user="anna")
+    tablet.until_film("seat-demo", LIFTING)
     before = main_pid()
     said = terminal.run("apt-get install --reinstall -y ./kinocue_*.deb")
     status = booth.status()
-    same = main_pid() == before and status["state"] in ("playing", "parking")
+    same = main_pid() == before and status["state"] == "playing"
     told = next((line for line in said.splitlines() if line.startswith("kinocue: ")), "nothing is said")
     table.saw(19, "installed the package again in mid-show", f"the show goes on ({status['state']}); {told}", same)
-    booth.until_state("parked", 30)
-    lift(booth, tablet)
     terminal.run("apt-get remove -y kinocue")
     active = subprocess.run(["systemctl", "is-active", "kinocue"], capture_output=True, text=True).stdout.strip()
     table.saw(19, "removed the package in mid-show", f"the service is {active}", active != "active")

@@ -19,7 +19,7 @@ def walk(table):
     tap = subprocess.Popen([sys.executable, "/trial/walk/wire.py", "/trial/loopback.pcap"], stdout=subprocess.PIPE, text=True)
     tap.stdout.readline()
     booth, tablet = before.configure(terminal)
-    sim = before.seats()
+    sim = before.seats(terminal)
     before.start(terminal, table)
     before.library(terminal, table)
     booth.until_state("parked")
@@ -31,6 +31,7 @@ def walk(table):
     after.reports(terminal, table, tablet, Tablet())
     removed = show.upgrade(terminal, table, booth, tablet)
     before.install_again(terminal, table)
+    terminal.run("journalctl --no-pager -q -o short-precise -u kinocue")
     for process in (sim, tap):
         process.terminate()
         if process.wait(10) != 0:
