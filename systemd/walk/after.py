@@ -47,14 +47,11 @@ def watched(terminal, table, tablet, guest):
     table.saw(22, "the log of one controller", said.strip(), "B4" in said)
 
 
-def frames(table, at, stops, crashed, parked, removed):
+def frames(table, log, at, stops, crashed, parked, removed):
     """The captured frames: what seats were told while all that happened."""
     by_port = wire.read("/trial/loopback.pcap")
-    count = sum(len(all_of) for all_of in by_port.values())
     felt(table, by_port, stops)
-    worst = {name: max(judge.worst(all_of, [crashed])[name] for all_of in by_port.values()) for name in judge.LIMITS}
-    said = ", ".join(f"{name} {100 * part:.0f} %" for name, part in worst.items())
-    table.saw(4, f"all {count} frames of the walk, of their limits at the most", said, all(part <= 1.01 for part in worst.values()))
+    smooth(table, by_port, log)
     still = [port for port, all_of in by_port.items() if judge.between(all_of, crashed + 0.1, parked)]
     table.saw(8, f"frames in the {parked - crashed:.1f} s until PARK", f"{len(still)} seats got any", not still)
     levels(table, by_port, at)
@@ -68,11 +65,23 @@ def frames(table, at, stops, crashed, parked, removed):
     table.saw(19, "where the seats are since the package was removed", f"{max(last.mm):.1f} mm", max(last.mm) < 0.1)
 
 
+def smooth(table, by_port, log):
+    """Whether limits were kept in every frame. A machine that slept through ticks says so, and cuts a move short as a crash does."""
+    count = sum(len(all_of) for all_of in by_port.values())
+    judged = [judge.worst(all_of) for all_of in by_port.values()]
+    worst = {name: max(found[name] for found, _ in judged) for name in judge.LIMITS}
+    said = ", ".join(f"{name} {100 * part:.0f} %" for name, part in worst.items())
+    table.saw(4, f"all {count} frames of the walk, of their limits at the most", said, all(part <= 1.01 for part in worst.values()))
+    slept = log.count("a frame came more than 50 ms late")
+    cuts = max(cuts for _, cuts in judged)
+    table.saw(4, "moves that were cut short", f"{cuts}: one by the crash, {slept} where this machine slept", cuts <= 1 + slept)
+
+
 def felt(table, by_port, stops):
     motors = wire.motor_ends(by_port, "/trial/frames.csv", "/trial/moves.csv")
-    ways = dict.fromkeys(how for how, _ in stops)
+    ways = dict.fromkeys(how for how, _, _ in stops)
     for way in ways:
-        felt_by = [judge.stop(by_port, motors, click) for how, click in stops if how == way]
+        felt_by = [judge.stop(by_port, motors, click, stopped) for how, click, stopped in stops if how == way]
         said = "; ".join(
             f"{what} {spread([getattr(stop, name) for stop in felt_by])}"
             for name, what in (("slower", "first slower frame after"), ("still", "last frame that moves ends after"),

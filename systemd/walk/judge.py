@@ -9,7 +9,7 @@ TICK = 0.010  # at 100 Hz
 STRIDE = 2  # ticks between the poses that acceleration and jerk are taken over: positions are whole pulses
 STILL = 1e-6  # mm
 REST = 8  # poses
-GAP = 0.5  # s without a frame: the seat has come to rest since
+SILENCE = 0.050  # s; a hall that was late by more holds the seats, and joins its film anew
 
 
 class Stop(NamedTuple):
@@ -32,60 +32,61 @@ def speeds(frames):
         yield frame, way / max(frame.over, TICK)
 
 
-def stop(frames, motors, click):
-    """How soon the seats felt a stop that was pressed while they gained speed."""
-    all_of = [of_seat(frames[port], motors[port], click) for port in frames]
+def stop(frames, motors, click, stopped):
+    """How soon the seats felt a stop that was pressed while they gained speed, and that was over some time later."""
+    all_of = [of_seat(frames[port], motors[port], click, stopped) for port in frames]
     return Stop(*(max(column) for column in zip(*all_of)))
 
 
-def of_seat(frames, motors, click):
-    near = list(speeds(between(frames, click - 0.5, click + 5.0)))
-    before = [speed for frame, speed in near if frame.at < click]
+def of_seat(frames, motors, click, stopped):
+    before = [speed for frame, speed in speeds(between(frames, click - 0.3, click))]
     if before[-1] <= before[-10]:
         raise ValueError(f"the seats did not gain speed before the click: {before[-10:]}")
     last, slower, still = before[-1], None, None
-    for frame, speed in near:
+    for frame, speed in speeds(between(frames, click - 2 * TICK, stopped)):
         if frame.at >= click:
             if slower is None and speed < last:
                 slower = frame.at
             if speed * TICK > STILL:
                 still = frame.at + frame.over
             last = speed
-    ended = max(end for end, moved in motors if moved and end < click + 5.0)
+    ended = max(end for end, moved in motors if moved and end < stopped)
     return tuple(1000 * (at - click) for at in (slower, still, ended)) + (before[-1],)
 
 
-def worst(frames, crashes):
-    """The greatest speed, acceleration and jerk of any axis in all frames of a seat, as parts of their limits."""
-    found = dict.fromkeys(LIMITS, 0.0)
-    for poses in runs(frames, crashes):
+def worst(frames):
+    """The greatest speed, acceleration and jerk of any axis in all frames of a seat, as parts of their limits; and how often
+    frames failed to come while it moved, as in a crash: its controller halts it then, whatever the hall would have done."""
+    found, cuts = dict.fromkeys(LIMITS, 0.0), 0
+    for poses, cut in runs(frames):
+        cuts += cut
         for axis in range(len(poses[0])):
             line = [pose[axis] for pose in poses]
             for order, name in enumerate(LIMITS, start=1):
                 stride = 1 if order == 1 else STRIDE
                 found[name] = max(found[name], derivative(line, order, stride) / LIMITS[name])
-    return found
+    return found, cuts
 
 
-def runs(frames, crashes):
-    """Poses tick by tick of each run of frames without a gap, from rest to rest; a crash leaves out the rest behind it."""
-    poses, last = [], None
+def runs(frames):
+    """Poses tick by tick of each run of frames without a silence, from rest on, and whether it was cut short of rest."""
+    poses, last, moved = [], None, False
     for frame in frames:
-        if last and frame.at - last.at > GAP:
-            crashed = any(last.at < crash < frame.at for crash in crashes)
-            yield poses + (0 if crashed else REST) * [last.mm]
+        if last and frame.at - last.at - last.over > SILENCE:
+            yield poses + (0 if moved else REST) * [last.mm], moved
             poses = []
         before = last.mm if last else frame.mm
+        moved = frame.mm != before
         if not poses:
             poses = REST * [before]
         ticks = max(1, round(frame.over / TICK))
-        if ticks == 1 or frame.mm == before:
+        if ticks == 1 or not moved:
             poses += ticks * [frame.mm]
         else:  # one slow frame that brings a seat to park, or one after a tick that was slept through
-            yield poses
+            yield poses, False
             poses = [frame.mm]
         last = frame
-    yield poses
+    yield poses, False
 
 
 def derivative(line, order, stride):

@@ -31,12 +31,12 @@ def walk(table):
     after.reports(terminal, table, tablet, Tablet())
     removed = show.upgrade(terminal, table, booth, tablet)
     before.install_again(terminal, table)
-    terminal.run("journalctl --no-pager -q -o short-precise -u kinocue")
+    log = terminal.run("journalctl --no-pager -q -o short-precise -u kinocue")
     for process in (sim, tap):
         process.terminate()
         if process.wait(10) != 0:
             raise RuntimeError(f"{process.args} ended with {process.returncode}")
-    after.frames(table, at, stops, crashed, parked, removed)
+    after.frames(table, log, at, stops, crashed, parked, removed)
     table.saw(19, "every command of the README's section", f"tried, but for {terminal.left or 'none'}", not terminal.left)
 
 
