@@ -146,7 +146,7 @@ def preflight(terminal, table, booth):
     took = time.monotonic() - begin
     line = next((line for line in said.splitlines() if "B4" in line), "B4 is not named")
     found = all(word in line for word in ("row B", "127.0.0.1:7415"))
-    table.saw(3, "preflight with B4 unplugged", f"failed after {took:.1f} s: {line.strip()}", found and took < 10)
+    table.saw(3, "preflight with B4 unplugged", f"failed after {took:.1f} s: {' '.join(line.split())}", found and took < 10)
     plug("8@mute=0")
     booth.until("B4 back", lambda status: standing(status, "B4") == "ok", 10)
     said = terminal.readme("kinocue preflight", user="anna")

@@ -194,6 +194,8 @@ def upgrade(terminal, table, booth, tablet):
     same = main_pid() == before and status["state"] in ("playing", "joining")
     told = next((line for line in said.splitlines() if line.startswith("kinocue: ")), "nothing is said")
     table.saw(19, "installed the package again in mid-show", f"the show goes on ({status['state']}); {told}", same)
+    said = terminal.run("kinocue upload /usr/share/kinocue/cues/seat-demo.csv --id after-upgrade", user="anna")
+    table.saw(19, "uploaded to the one that runs on", said.strip().splitlines()[-1], "is in the library" in said)
     terminal.run("apt-get remove -y kinocue")
     active = subprocess.run(["systemctl", "is-active", "kinocue"], capture_output=True, text=True).stdout.strip()
     table.saw(19, "removed the package in mid-show", f"the service is {active}", active != "active")

@@ -199,9 +199,7 @@ fn preflight_says_what_several_have_in_common_once_and_where_to_find_one_that_fa
     status["controllers"] = json!([
         {"name": "A1", "row": "A", "address": "10.0.0.1:7408"}, {"name": "B1", "row": "B", "address": "10.0.0.2:7408"}
     ]);
-    let finding = |severity: &str, id: &str, name: &str| {
-        json!({"id": id, "severity": severity, "controller": name, "text": "as it is", "remedy": "set it"})
-    };
+    let finding = |severity: &str, id: &str, name: &str| json!({"id": id, "severity": severity, "controller": name, "text": "as it is", "remedy": "set it"});
     let findings = [
         finding("error", "no-answer", "B1"),
         finding("warning", "slow-replies", "A1"),
