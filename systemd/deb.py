@@ -5,6 +5,7 @@ python3 systemd/deb.py FOLDER, from the root of the project, after everything th
 
 import glob
 import gzip
+import hashlib
 import os
 import pathlib
 import shutil
@@ -55,6 +56,27 @@ Description: {package["description"]}
 """
 
 
+def copyright_of(package, deb):
+    """What cargo-deb writes as well: whose it is, and its licence."""
+    licence = textwrap.indent(pathlib.Path(deb["license-file"][0]).read_text(), " ", lambda line: True)
+    licence = "\n".join(" ." if not line.strip() else line for line in licence.splitlines())
+    return f"""\
+Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
+Upstream-Name: {package["name"]}
+
+Files: *
+Copyright: {deb["copyright"]}
+License: {package["license"].replace(" OR ", " or ")}
+{licence}
+"""
+
+
+def sums(root):
+    """The checksum of every file, by which `dpkg --verify` finds what was changed since."""
+    files = sorted(file for file in root.rglob("*") if file.is_file())
+    return "".join(f"{hashlib.md5(file.read_bytes()).hexdigest()}  {file.relative_to(root)}\n" for file in files)
+
+
 def main():
     package = tomllib.loads(pathlib.Path("Cargo.toml").read_text())["package"]
     deb = package["metadata"]["deb"]
@@ -63,9 +85,13 @@ def main():
         root.chmod(0o755)
         for asset in deb["assets"]:
             place(root, *asset)
-        text = control(package, deb, root)
+        copyright_file = root / "usr/share/doc" / package["name"] / "copyright"
+        copyright_file.write_text(copyright_of(package, deb))
+        copyright_file.chmod(0o644)
+        text, checksums = control(package, deb, root), sums(root)
         (root / "DEBIAN").mkdir()
         (root / "DEBIAN/control").write_text(text)
+        (root / "DEBIAN/md5sums").write_text(checksums)
         for script in pathlib.Path(deb["maintainer-scripts"]).iterdir():
             shutil.copyfile(script, root / "DEBIAN" / script.name)
             (root / "DEBIAN" / script.name).chmod(0o755)

@@ -63,7 +63,7 @@ impl fmt::Display for Why {
             Self::AcksOff => "acks are off",
             Self::AcksMissing(_) => "acks are missing or late",
             Self::Silent(_) => "no ack and no report for too long",
-            Self::NotSeenYet => "not looked at yet",
+            Self::NotSeenYet => "no answer yet",
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::EmergencyStop(_) => "emergency stop",
