@@ -2,8 +2,10 @@
 
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
+use std::thread::{self, JoinHandle};
 
 use serde_json::Value;
 
@@ -11,6 +13,39 @@ use crate::hall::Hall;
 
 fn standing(status: &Value, controller: usize) -> &str {
     status["controllers"][controller]["standing"].as_str().expect("a word")
+}
+
+/// Connections that send half a request and stay, and are made anew when there are many, until this is dropped.
+struct Flood {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Flood {
+    fn of(socket: PathBuf) -> Self {
+        let over = Arc::<AtomicBool>::default();
+        let is_over = Arc::clone(&over);
+        let thread = thread::spawn(move || {
+            let mut held = Vec::new();
+            while !is_over.load(Ordering::Relaxed) {
+                if held.len() == 200 {
+                    held.clear();
+                }
+                if let Ok(mut stream) = UnixStream::connect(&socket) {
+                    let _ = stream.write_all(b"GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\n");
+                    held.push(stream);
+                }
+            }
+        });
+        Self { over, thread: Some(thread) }
+    }
+}
+
+impl Drop for Flood {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(JoinHandle::join); // what it did is no matter
+    }
 }
 
 /// The warning about a controller that is no more than news.
@@ -23,26 +58,11 @@ fn warning<'s>(status: &'s Value, controller: &str) -> Option<&'s Value> {
 fn the_stop_socket_brings_the_seats_to_rest_while_the_api_is_flooded() {
     let hall = Hall::open();
     hall.play("night");
-    let (flood, socket) = (AtomicBool::new(true), hall.path("control.sock"));
-    thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                let mut held = Vec::new();
-                while flood.load(Ordering::Relaxed) {
-                    if held.len() == 200 {
-                        held.clear();
-                    }
-                    if let Ok(mut stream) = UnixStream::connect(&socket) {
-                        let _ = stream.write_all(b"GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\n");
-                        held.push(stream);
-                    }
-                }
-            });
-        }
-        assert_eq!(hall.stop_socket("stop\n"), "stopping\n");
-        hall.serving().heard(|line| line.contains("stopped: ").then_some(()));
-        flood.store(false, Ordering::Relaxed);
-    });
+    let flood = [(); 2].map(|()| Flood::of(hall.path("control.sock")));
+    hall.serving().heard(|line| line.contains("no room for more connections").then_some(()));
+    assert_eq!(hall.stop_socket("stop\n"), "stopping\n");
+    hall.serving().heard(|line| line.contains("stopped: ").then_some(()));
+    drop(flood);
     let stopped = hall.comes_to("stopped");
     assert_eq!(stopped["next"], "clear, then park or home");
     let rest = hall.lives_on(20);
