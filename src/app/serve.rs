@@ -29,7 +29,9 @@ use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
+use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
+use crate::time::Clock as _;
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]
@@ -80,7 +82,8 @@ impl Mark {
         let file = |cause| ServeError::File { path: path.clone(), cause };
         fs::create_dir_all(folder).map_err(file)?;
         let crashed = path.try_exists().map_err(file)?;
-        fs::write(&path, b"kinocue runs, or has crashed\n").map_err(file)?;
+        // Without a word in it, so that a full disk keeps no hall shut.
+        fs::File::create(&path).map_err(file)?;
         Ok((Self(path), crashed))
     }
 
@@ -141,15 +144,31 @@ impl Served {
 /// # Panics
 /// Where one of its threads panicked.
 pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
+    let (mark, crashed) = Mark::leave(&parts.places.state)?;
+    let served = serve_halls(parts, crashed, up);
+    // An end with an error is none in the middle of a motion; what crashed before still has.
+    if served.is_ok() || !crashed {
+        mark.take_away()?;
+    }
+    served
+}
+
+/// Opens a hall, and keeps it; and again with each configuration that is read anew.
+fn serve_halls(
+    parts: Parts,
+    crashed: bool,
+    up: impl FnOnce(Handle, &[SocketAddr]),
+) -> Result<Served, ServeError> {
     let Parts { config, places, pages, signals, log } = parts;
+    let began = Monotonic.now();
     let mut config = Arc::new(config);
-    let (mark, crashed) = Mark::leave(&places.state)?;
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut numbers = Numbers::new();
     let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
-    let mut ends = Ends { inbox, source, config: places.config, signals, voice, memory: Memory::default() };
+    let memory = Memory::default();
+    let mut ends = Ends { inbox, source, config: places.config, began, signals, voice, memory };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     up(handle, surfaces.addresses());
@@ -166,7 +185,6 @@ pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Ser
     };
     surfaces.close();
     log.close();
-    mark.take_away()?;
     Ok(served)
 }
 
