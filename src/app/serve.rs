@@ -29,8 +29,9 @@ use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
+use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
-use crate::time::Rate;
+use crate::time::{Clock as _, Rate};
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]
@@ -88,11 +89,17 @@ impl Mark {
     }
 
     fn leave(&self) -> Result<(), ServeError> {
-        fs::write(&self.0, b"kinocue runs, or has crashed\n").map_err(|cause| self.failed(cause))
+        // Without a word in it, so that a full disk keeps no hall shut.
+        fs::File::create(&self.0).map_err(|cause| self.failed(cause))?;
+        Ok(())
     }
 
+    /// Takes it away, where it was left.
     fn take_away(&self) -> Result<(), ServeError> {
-        fs::remove_file(&self.0).map_err(|cause| self.failed(cause))
+        match fs::remove_file(&self.0) {
+            Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(self.failed(cause)),
+            _ => Ok(()),
+        }
     }
 
     fn failed(&self, cause: io::Error) -> ServeError {
@@ -152,16 +159,33 @@ impl Served {
 /// # Panics
 /// Where one of its threads panicked.
 pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
-    let Parts { config, places, pages, signals, log } = parts;
-    let mut config = Arc::new(config);
-    let mark = Mark::of(&places.state)?;
+    let mark = Mark::of(&parts.places.state)?;
     let crashed = mark.is_there()?;
+    let served = serve_halls(parts, &mark, crashed, up);
+    // An end with an error is none in the middle of a motion; what crashed before still has.
+    if served.is_ok() || !crashed {
+        mark.take_away()?;
+    }
+    served
+}
+
+/// Opens a hall, and keeps it; and again with each configuration that is read anew.
+fn serve_halls(
+    parts: Parts,
+    mark: &Mark,
+    crashed: bool,
+    up: impl FnOnce(Handle, &[SocketAddr]),
+) -> Result<Served, ServeError> {
+    let Parts { config, places, pages, signals, log } = parts;
+    let began = Monotonic.now();
+    let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut numbers = Numbers::new();
     let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
-    let mut ends = Ends { inbox, source, config: places.config, signals, voice, memory: Memory::default() };
+    let memory = Memory::default();
+    let mut ends = Ends { inbox, source, config: places.config, began, signals, voice, memory };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
@@ -180,7 +204,6 @@ pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Ser
     };
     surfaces.close();
     log.close();
-    mark.take_away()?;
     Ok(served)
 }
 

@@ -1,7 +1,7 @@
 //! What surfaces ask, and what is done for it.
 
 use super::{ANSWER, Keeper, LOOK_FOR_ANSWER};
-use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem};
+use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem, overtaken};
 use crate::rt::Command;
 use crate::state::{Request, State};
 use crate::sys::clock::Monotonic;
@@ -30,6 +30,8 @@ impl Keeper {
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
             Ask::Park => self.request(Request::Park),
+            // Whoever pressed it meant what was latched then.
+            Ask::Clear if asked.is_before(self.known.since) => Err(overtaken("clear", self.known.state)),
             Ask::Clear => self.request(Request::Clear),
             Ask::Stop => {
                 // The flag is set already where it came by a handle; the machine takes a stop in every state.

@@ -201,6 +201,20 @@ impl Keeper {
         self.begin_record(who, surface, before);
     }
 
+    /// Whether what is loaded is that entry of the playlist.
+    pub(super) fn is_entry(&self, entry: usize) -> bool {
+        let cue = self.cued.as_ref().map(|cued| cued.id.as_str());
+        self.list
+            .as_ref()
+            .is_some_and(|list| list.current == entry && cue == Some(&*list.entry().cue.to_string()))
+    }
+
+    /// Where the playlist is, where what is loaded is of it.
+    pub(super) fn place(&self) -> Option<PlaylistPlace> {
+        let list = self.list.as_ref().filter(|list| self.is_entry(list.current));
+        list.map(List::place)
+    }
+
     /// Whoever wants the hall to be at rest wants nothing to start by itself either, also where it is at rest already.
     pub(super) fn heed(&mut self, ask: &Ask) {
         let rests = !matches!(self.known.state, State::Playing(_) | State::Paused);
@@ -223,8 +237,9 @@ impl Keeper {
     pub(super) fn on_show_over(&mut self, ended: Cause) {
         let Some(list) = &self.list else { return self.rewind() };
         let completed = ended == Cause::CueEnded;
-        let next = list.current + 1;
-        if !completed || next >= list.playlist.entries.len() {
+        let (played, next) = (list.current, list.current + 1);
+        // A cue that a person loaded beside the playlist leads nowhere.
+        if !completed || !self.is_entry(played) || next >= list.playlist.entries.len() {
             return self.rewind();
         }
         let goes = list.entry().then == Then::Go && self.known.state == State::Parked && !self.onward.held;
@@ -248,7 +263,7 @@ impl Keeper {
         }
         let result = if let Err(problem) = self.is_free() {
             Err(problem)
-        } else if self.list.as_ref().is_some_and(|list| list.current == entry) {
+        } else if self.is_entry(entry) {
             self.start_entry(Start::Time)
         } else {
             self.fetch_entry(entry, Some(Start::Time), None);

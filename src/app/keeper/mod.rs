@@ -72,6 +72,8 @@ pub struct Ends {
     pub source: StatusSource,
     /// The file of the configuration.
     pub config: PathBuf,
+    /// When the program started.
+    pub began: MonoTime,
     /// What the system asks of the program.
     pub signals: Signals,
     /// Whom to tell what happens.

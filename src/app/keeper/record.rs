@@ -133,7 +133,7 @@ impl Keeper {
             cue: cued.id.clone(),
             sha256: cued.sha256.clone(),
             title: cued.title.clone(),
-            playlist: self.list.as_ref().map(super::list::List::place),
+            playlist: self.place(),
             level: levels.motion,
             vibration: levels.vibration,
             trim_ms: self.board.trim_ms,

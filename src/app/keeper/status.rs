@@ -74,7 +74,7 @@ impl Keeper {
         Status {
             hall: self.reins.config.show.name.clone(),
             version: env!("CARGO_PKG_VERSION"),
-            uptime_s: now.since(self.began).as_secs_f64(),
+            uptime_s: now.since(self.ends.began).as_secs_f64(),
             state: self.known.state.word(),
             cause: self.cause(),
             next: self.known.next.to_string(),

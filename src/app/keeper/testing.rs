@@ -282,5 +282,6 @@ fn ends(desk: &Arc<Desk>, folder: &Path, memory: Memory) -> (Handle, Ends) {
         handle(Arc::clone(desk), Status::starting("Hall 1"));
     let voice = Voice::new(Log::start(|_| {}).unwrap());
     let config = folder.join("hall.toml");
-    (handle, Ends { inbox, source, config, signals: Signals::default(), voice, memory })
+    let (began, signals) = (Monotonic.now(), Signals::default());
+    (handle, Ends { inbox, source, config, began, signals, voice, memory })
 }

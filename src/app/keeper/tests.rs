@@ -8,7 +8,7 @@ use super::testing::Rig;
 use super::*;
 use crate::hall::{Ask, Code};
 use crate::rt::News;
-use crate::state::{Event, Next};
+use crate::state::{Event, Next, Trouble};
 
 const ARM: Ask = Ask::Arm { seats_empty: false };
 
@@ -71,6 +71,19 @@ fn nothing_long_begins_in_a_hall_that_closes() {
     for ask in [Ask::Preflight, Ask::Home, Ask::Load { cue: "two".to_owned() }] {
         assert_eq!(rig.ask(ask).unwrap_err().code, Code::Busy);
     }
+}
+
+#[test]
+fn a_clear_that_was_asked_before_a_stop_clears_it_not() {
+    let mut rig = Rig::parked();
+    rig.tell(Event::Trouble(Trouble::Gate));
+    let clear = rig.post(Ask::Clear);
+    rig.keeper.reins.desk.stop();
+    rig.hear_of(State::Stopped);
+    rig.hear();
+    assert_eq!(clear.join().unwrap().unwrap_err().code, Code::Late);
+    assert_eq!(rig.state(), State::Stopped);
+    rig.ask(Ask::Clear).unwrap();
 }
 
 #[test]

@@ -60,6 +60,20 @@ fn an_entry_goes_on_to_the_next_once_its_cue_came_to_its_end() {
 }
 
 #[test]
+fn a_cue_that_a_person_loads_beside_the_playlist_goes_on_to_nothing() {
+    let mut rig = Rig::parked();
+    rig.keeper.list = Some(list());
+    rig.ask(Ask::Load { cue: "three".to_owned() }).unwrap();
+    rig.ask(Ask::Arm { seats_empty: false }).unwrap();
+    rig.ask(Ask::Go).unwrap();
+    assert_eq!(rig.keeper.place(), None);
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("three")));
+}
+
+#[test]
 fn nothing_goes_on_that_a_person_wanted_to_rest_before_the_seats_were_parked() {
     for ask in [Ask::Park, Ask::Disarm, Ask::Pause] {
         let mut rig = playing();
