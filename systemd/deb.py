@@ -63,6 +63,7 @@ def main():
         root.chmod(0o755)
         for asset in deb["assets"]:
             place(root, *asset)
+        place(root, deb["license-file"][0], f"usr/share/doc/{package['name']}/copyright", "644")
         text = control(package, deb, root)
         (root / "DEBIAN").mkdir()
         (root / "DEBIAN/control").write_text(text)
