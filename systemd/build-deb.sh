@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the Debian package into target/debian: the program, its manual pages and completions, and what Cargo.toml names under
-# [package.metadata.deb]. With cargo-deb where that is installed (`cargo install cargo-deb`), else with dpkg-deb and python3
-# (3.11 or later), which need no network. Debian or what comes from it; a release build takes some minutes.
+# [package.metadata.deb]. Needs python3 (3.11 or later), and no network; packs with cargo-deb where that is installed
+# (`cargo install cargo-deb`), else with dpkg-deb. Debian or what comes from it; a release build takes some minutes.
 #
 #   systemd/build-deb.sh [--no-build]      --no-build takes target/release/kinocue as it is
 set -euo pipefail
@@ -15,6 +15,7 @@ mkdir -p target/package/man target/debian
 "$kinocue" completions bash > target/package/kinocue.bash
 "$kinocue" completions zsh > target/package/_kinocue
 "$kinocue" completions fish > target/package/kinocue.fish
+python3 systemd/third_party.py target/package/third-party.txt
 
 if cargo deb --version > /dev/null 2>&1; then
   exec cargo deb --no-build --locked --output target/debian

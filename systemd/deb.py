@@ -56,21 +56,6 @@ Description: {package["description"]}
 """
 
 
-def copyright_of(package, deb):
-    """What cargo-deb writes as well: whose it is, and its licence."""
-    licence = textwrap.indent(pathlib.Path(deb["license-file"][0]).read_text(), " ", lambda line: True)
-    licence = "\n".join(" ." if not line.strip() else line for line in licence.splitlines())
-    return f"""\
-Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
-Upstream-Name: {package["name"]}
-
-Files: *
-Copyright: {deb["copyright"]}
-License: {package["license"].replace(" OR ", " or ")}
-{licence}
-"""
-
-
 def sums(root):
     """The checksum of every file, by which `dpkg --verify` finds what was changed since."""
     files = sorted(file for file in root.rglob("*") if file.is_file())
@@ -85,9 +70,7 @@ def main():
         root.chmod(0o755)
         for asset in deb["assets"]:
             place(root, *asset)
-        copyright_file = root / "usr/share/doc" / package["name"] / "copyright"
-        copyright_file.write_text(copyright_of(package, deb))
-        copyright_file.chmod(0o644)
+        place(root, deb["license-file"][0], f"usr/share/doc/{package['name']}/copyright", "644")
         text, checksums = control(package, deb, root), sums(root)
         (root / "DEBIAN").mkdir()
         (root / "DEBIAN/control").write_text(text)

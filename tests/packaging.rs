@@ -135,6 +135,16 @@ fn alerts_are_what_prometheus_takes() {
 }
 
 #[test]
+fn every_library_in_the_program_may_be_passed_on_with_its_licence() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = folder.path().join("third-party.txt");
+    if let Some(output) = tool("python3", &["systemd/third_party.py", list.to_str().unwrap()]) {
+        assert!(output.status.success(), "{}", said(&output));
+        assert!(fs::read_to_string(list).unwrap().contains("\nrustix "));
+    }
+}
+
+#[test]
 fn shell_scripts_are_shell_scripts() {
     let scripts = files("systemd/*.sh").into_iter().chain(files("systemd/debian/*"));
     for script in scripts {

@@ -262,10 +262,11 @@ impl Report {
 }
 
 fn hall_in_words(hall: &Config) -> String {
-    format!(
-        "{} controllers, {} seat types, {} effects",
-        hall.controllers.len(),
-        hall.seats.len(),
-        hall.effects.len()
-    )
+    let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
+    [
+        counted(hall.controllers.len(), "controller"),
+        counted(hall.seats.len(), "seat type"),
+        counted(hall.effects.len(), "effect"),
+    ]
+    .join(", ")
 }

@@ -178,7 +178,7 @@ impl fmt::Display for Ask {
             Self::Load { cue } => write!(f, " {cue}"),
             Self::Playlist { id: Some(id) } => write!(f, " {id}"),
             Self::Playlist { id: None } => f.write_str(" none"),
-            Self::Select { entry } => write!(f, " entry {entry}"),
+            Self::Select { entry } => write!(f, " entry {}", entry.saturating_add(1)), // as people count
             Self::Seek(film) => write!(f, " {film}"),
             Self::Trim(ms) => write!(f, " {ms} ms"),
             Self::Levels(change) => change.fmt(f),

@@ -138,8 +138,8 @@ impl Keeper {
         if entry >= count {
             let problem = Problem::new(
                 Code::Unknown,
-                format!("there is no entry {entry} in a playlist of {count}"),
-                "entries count from 0",
+                format!("there is no entry {} in a playlist of {count}", entry.saturating_add(1)),
+                "choose one that there is; the API counts them from 0",
             );
             return self.answer(asked, Err(problem));
         }
