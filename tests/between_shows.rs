@@ -233,7 +233,7 @@ fn whoever_hears_nothing_for_a_while_still_hears_where_the_hall_stands() {
     script.extend(
         (0..100).flat_map(|turn| [(10 + 2 * turn, Ask(Request::Arm)), (11 + 2 * turn, Ask(Request::Disarm))]),
     );
-    script.extend([(220, Ask(Request::Arm)), (230, Hear)]);
+    script.extend([(220, Stop), (230, Hear)]);
     let (_, states) = live_through(&script, 240);
-    assert_eq!(states.last(), Some(&State::Armed));
+    assert_eq!(states.last(), Some(&State::Stopped));
 }
