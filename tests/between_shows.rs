@@ -24,7 +24,7 @@ use kinocue::state::{Event, Finding, Readiness, Request, Ride, State};
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
-use rtrb::Producer;
+use rtrb::{Consumer, Producer};
 
 /// Something that happens between shows.
 #[derive(Debug, Clone, Copy)]
@@ -34,9 +34,11 @@ enum Deed {
     Tell(Event),
     See(Alarm),
     Stop,
+    /// Somebody hears what there is to hear.
+    Hear,
 }
 
-use Deed::{Ask, Load, See, Stop, Tell};
+use Deed::{Ask, Hear, Load, See, Stop, Tell};
 
 const PARKED: Pose = [0.0; MAX_AXES];
 const READY: Deed = Tell(Event::Readiness(Readiness::Ready));
@@ -67,6 +69,18 @@ struct Hands<'a> {
     commands: RefCell<Producer<Command>>,
     alarms: RefCell<Producer<Alarm>>,
     plans: RefCell<PlanLoop>,
+    news: RefCell<Consumer<News>>,
+    states: RefCell<Vec<State>>,
+}
+
+impl Hands<'_> {
+    fn hear(&self) {
+        while let Ok(news) = self.news.borrow_mut().pop() {
+            if let News::Entered { state, .. } = news {
+                self.states.borrow_mut().push(state);
+            }
+        }
+    }
 }
 
 impl Clock for Hands<'_> {
@@ -86,6 +100,7 @@ impl Clock for Hands<'_> {
                 Tell(event) => command(Command::Event(*event)),
                 See(alarm) => self.alarms.borrow_mut().push(*alarm).expect("there is room"),
                 Stop => self.desk.stop(),
+                Hear => self.hear(),
             }
         }
         if tick >= self.end {
@@ -117,7 +132,7 @@ fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State
     let (engine, lanes, planner, timeline) = staged().split();
     let (desk, leave) = (staged().desk(), AtomicBool::new(false));
     let (mail, ends) = mailboxes(1, Rate::from_hz(100.0), Arc::new(Live::default()));
-    let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, mut news } = ends;
+    let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
     let planning = Box::new(Planning { planner, timeline });
     let hands = Hands {
         now: Cell::new(ORIGIN),
@@ -129,6 +144,8 @@ fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State
         commands: RefCell::new(commands),
         alarms: RefCell::new(alarms),
         plans: RefCell::new(PlanLoop { planning, tasks, answers }),
+        news: RefCell::new(news),
+        states: RefCell::default(),
     };
     let mut ticks = TickLoop {
         clock: &hands,
@@ -143,9 +160,8 @@ fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State
     };
     ticks.run();
     let frames = ticks.sink.frames;
-    let state = |news| if let News::Entered { state, .. } = news { Some(state) } else { None };
-    let states = std::iter::from_fn(|| news.pop().ok()).filter_map(state).collect();
-    (frames, states)
+    hands.hear();
+    (frames, hands.states.take())
 }
 
 /// That the cue was played from `go` on: it was joined within three seconds, and the seat parked in the end.
@@ -208,4 +224,16 @@ fn a_hall_that_was_stopped_cleared_and_homed_plays_what_was_loaded_meanwhile() {
         (61, Ask(Request::Go)),
     ];
     assert_played(&script, 61);
+}
+
+#[test]
+fn whoever_hears_nothing_for_a_while_still_hears_where_the_hall_stands() {
+    let mut script = vec![(1, found(true, true)), (2, Load), (3, READY)];
+    // More news than find room.
+    script.extend(
+        (0..100).flat_map(|turn| [(10 + 2 * turn, Ask(Request::Arm)), (11 + 2 * turn, Ask(Request::Disarm))]),
+    );
+    script.extend([(220, Stop), (230, Hear)]);
+    let (_, states) = live_through(&script, 240);
+    assert_eq!(states.last(), Some(&State::Stopped));
 }

@@ -328,3 +328,34 @@ fn a_stall_in_the_middle_of_a_stop_leaves_the_seat_where_the_stall_left_it() {
     assert_eq!(frames.len(), 505 + 3, "three hold frames after the stall: {}", frames.len());
     assert!(frames[504..].iter().all(|pulses| *pulses == frames[504]));
 }
+
+#[test]
+fn a_seat_that_is_switched_off_while_its_controller_is_lost_parks_softly_once_it_is_back() {
+    let mut pose = [0.0; MAX_AXES];
+    pose[..3].copy_from_slice(&[0.2, 0.9, 0.5]);
+    let off = Mix { on: false, ..Mix::FULL };
+    for (switched, back_on) in [(700, 1_500), (1_010, 1_200)] {
+        let played = two_seats()
+            .with(500, Event::Alarm(Alarm::Leave(1)))
+            .with(switched, Event::Mix(1, off))
+            .with(1_000, Event::Alarm(Alarm::Found(1, pose)))
+            .with(back_on, Event::Mix(1, Mix::FULL))
+            .play();
+        assert_within(played.worst());
+        let gap = played.lane(1).position(|frame| pulses(frame) == 60_000).unwrap();
+        assert_within(played.worst_of_lane(1, gap..played.lane(1).count()));
+        let (first, second) = (played.lane(0).rev_pulses(50), played.lane(1).rev_pulses(50));
+        assert_eq!(first, second, "with the other again");
+    }
+}
+
+#[test]
+fn a_show_whose_seats_are_all_switched_off_parks_them_and_comes_to_its_end() {
+    let off = Mix { on: false, ..Mix::FULL };
+    let played = two_seats().with(500, Event::Mix(0, off)).with(500, Event::Mix(1, off)).play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+    for lane in 0..2 {
+        assert_within(played.worst_of_lane(lane, 0..played.lane(lane).count()));
+        assert_eq!(pulses(played.lane(lane).nth(1_200).unwrap()), 0, "parked");
+    }
+}

@@ -189,9 +189,10 @@ impl Hall {
 
     /// Waits until the hall has lived for so many ticks more.
     pub(crate) fn lives_on(&self, ticks: u64) -> Value {
-        let now = |status: &Value| status["ticks"].as_u64().expect("a count");
-        let until = now(&self.status()) + ticks;
-        self.wait(|status| now(status) >= until)
+        // None while there is no status to be had.
+        let now = |status: &Value| status["ticks"].as_u64();
+        let until = now(&self.wait(|status| now(status).is_some())).expect("a count") + ticks;
+        self.wait(|status| now(status).is_some_and(|now| now >= until))
     }
 
     /// The status now, and each that comes.

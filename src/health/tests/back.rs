@@ -110,7 +110,8 @@ fn a_counter_is_read_again_before_too_many_frames_that_did_not_ask_make_it_prove
     let mut hall = Hall::asking(LossPolicy::Continue, 10, period);
     (0..30_000).for_each(|_| hall.tick_after(period));
     let reads = hall.reads().into_iter().filter(|controller| *controller == 2).count();
-    assert!((2..=4).contains(&reads), "{reads} in 30 s");
+    // Sooner at first, while it has counted little.
+    assert!((2..=8).contains(&reads), "{reads} in 30 s");
     hall.silence(&[2]);
     (0..400).for_each(|_| hall.tick_after(period));
     hall.back();
