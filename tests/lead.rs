@@ -303,6 +303,45 @@ fn a_controller_that_is_back_joins_from_where_it_was_read() {
 }
 
 #[test]
+fn a_controller_that_is_heard_again_while_it_is_brought_to_rest_joins_from_where_that_ends() {
+    let smooth = two_seats().play();
+    let gone = two_seats().with(500, Event::Alarm(Alarm::Leave(1))).play().lane(1).count();
+    for back in 500..u64::try_from(gone).unwrap() {
+        let found = Alarm::Found(1, [0.5; MAX_AXES]);
+        let played =
+            two_seats().with(500, Event::Alarm(Alarm::Leave(1))).with(back, Event::Alarm(found)).play();
+        assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
+        let count = played.lane(1).count();
+        assert_within(played.worst_of_lane(1, 0..count));
+        assert_eq!(count, played.lane(0).count(), "{back}: it was never away");
+        let (first, second) = (played.lane(0).rev_pulses(600), played.lane(1).rev_pulses(600));
+        assert_eq!(first, second, "{back}: with the other again");
+    }
+}
+
+#[test]
+fn seats_that_are_all_heard_again_while_they_are_brought_to_rest_go_on_with_the_film() {
+    let smooth = two_seats().play();
+    let [found_0, found_1] = [0, 1].map(|lane| Event::Alarm(Alarm::Found(lane, [0.5; MAX_AXES])));
+    let leave = |show: Virtual, lane| show.with(500, Event::Alarm(Alarm::Leave(lane)));
+    let played = leave(leave(two_seats(), 0), 1).with(503, found_0).with(503, found_1).play();
+    assert_within(played.worst());
+    for lane in 0..2 {
+        assert_eq!(played.lane(lane).rev_pulses(600), smooth.lane(lane).rev_pulses(600));
+    }
+}
+
+#[test]
+fn a_controller_that_is_lost_once_more_before_it_rests_is_away() {
+    let played = two_seats()
+        .with(500, Event::Alarm(Alarm::Leave(1)))
+        .with(503, Event::Alarm(Alarm::Found(1, [0.5; MAX_AXES])))
+        .with(505, Event::Alarm(Alarm::Leave(1)))
+        .play();
+    assert!((503..=530).contains(&played.lane(1).count()));
+}
+
+#[test]
 fn a_controller_in_emergency_stop_gets_no_frame_from_the_next_tick_on() {
     let played = two_seats().with(500, Event::Alarm(Alarm::Cut(1))).play();
     assert_eq!(played.lane(1).count(), 500);

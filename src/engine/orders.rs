@@ -112,7 +112,7 @@ impl Engine {
     }
 
     /// A lane's controller was read: it is at rest in that pose. One that was away is there again, and joins the others where
-    /// they follow the cue; one that rests goes on from there.
+    /// they follow the cue; one that rests goes on from there; one that is still being brought to rest goes on from where that ends.
     pub fn found(&mut self, lane: usize, pose: Pose) {
         let rider = &mut self.riders[lane];
         if rider.part == Part::Away {
@@ -126,6 +126,8 @@ impl Engine {
         {
             // Somebody moved it, or it was homed.
             rider.come_back(pose);
+        } else if rider.is_leaving() {
+            rider.hear_again();
         }
     }
 

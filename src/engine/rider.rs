@@ -41,6 +41,8 @@ pub(super) struct Rider {
     pub(super) out: bool,
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
+    /// Whether its controller was heard again before it was away: it stays then, and comes back from where it rests.
+    heard_again: bool,
     /// Whether it was away, and is not where the others are yet.
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
@@ -66,6 +68,7 @@ impl Rider {
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             leaving: None,
+            heard_again: false,
             returning: false,
             refused: false,
             is_at_fault: false,
@@ -103,12 +106,23 @@ impl Rider {
     pub(super) fn leave(&mut self) {
         if self.part != Part::Away {
             self.leaving.get_or_insert(HOLD_FRAMES);
+            self.heard_again = false;
         }
+    }
+
+    /// Whether it is to be away, and is still being brought to rest.
+    pub(super) const fn is_leaving(&self) -> bool {
+        self.leaving.is_some()
+    }
+
+    /// It is there again before it was away: the frames that bring it to rest reach it, so that it goes on from their end.
+    pub(super) const fn hear_again(&mut self) {
+        self.heard_again = true;
     }
 
     /// Nothing goes to it from now on.
     pub(super) fn cut(&mut self) {
-        (self.part, self.leaving) = (Part::Away, None);
+        (self.part, self.leaving, self.heard_again) = (Part::Away, None, false);
     }
 
     /// It is there again, its moving slots at rest in that pose; the others are at park throughout.
@@ -116,7 +130,8 @@ impl Rider {
         let mut pose = self.window.park();
         self.window.moving().for_each(|(slot, _)| pose[slot] = found[slot]);
         self.rest_at(pose);
-        (self.part, self.leaving, self.refused, self.returning) = (Part::Still, None, false, true);
+        (self.part, self.leaving, self.heard_again) = (Part::Still, None, false);
+        (self.refused, self.returning) = (false, true);
     }
 
     /// Frames stopped: the controller reached the last pose and stands there.
@@ -175,7 +190,9 @@ impl Rider {
             Part::Still => {
                 if let Some(left) = &mut self.leaving {
                     *left -= 1;
-                    if *left == 0 {
+                    if *left == 0 && self.heard_again {
+                        self.come_back(*self.pose());
+                    } else if *left == 0 {
                         self.cut();
                     }
                 }

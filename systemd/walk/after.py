@@ -111,7 +111,6 @@ def out(table, by_port, at):
     table.saw(13, "B2 out in mid-show", f"at {where:.1f} mm, without output {sorted(judge.outputs(gone))}", where < 0.1)
     others = judge.standstill(by_port[B1], at["b2_out"], at["b2_in"])
     table.saw(13, "B1 meanwhile", "stands" if others else "plays on", not others)
-    joined = judge.between(by_port[B2], at["b2_in"] + 3, at["row_a_end"] + 2)
-    one = judge.between(by_port[B1], at["b2_in"] + 3, at["row_a_end"] + 2)
-    same = bool(joined) and {frame.mm for frame in joined[-50:]} == {frame.mm for frame in one[-50:]}
+    one, joined = (judge.between(by_port[port], at["row_a_end"] - 0.5, at["row_a_end"]) for port in (B1, B2))
+    same = len({frame.mm for frame in one}) > 10 and [frame.mm for frame in one] == [frame.mm for frame in joined]
     table.saw(13, "B2 in again", "moves as B1 does" if same else "elsewhere than B1", same)

@@ -16,7 +16,7 @@ LIFTING = 1.1
 ROUNDS = 3
 
 
-def playlist(terminal, table, booth, tablet):
+def playlist(terminal, table, sim, booth, tablet):
     """Two cues, one after the other: effects, levels, a seat out, gear that leads, a plug pulled."""
     at = {}
     booth.must("playlist", {"id": "today"}, "PUT")
@@ -35,14 +35,14 @@ def playlist(terminal, table, booth, tablet):
     terminal.run("kinocue effects off water && kinocue seek 0:04", user="anna")
     tablet.until_film("seat-demo", 4.6)
     at["home"] = time.time()
-    bench_ride(terminal, table, tablet, at)
+    bench_ride(terminal, table, sim, tablet, at)
     status, _ = tablet.until_state("parked", 30)
     at["end"] = time.time()
     table.saw(15, "let the list play", f"seat-demo, then bench-ride by itself, then {status['state']}", status["state"] == "parked")
     return at
 
 
-def bench_ride(terminal, table, tablet, at):
+def bench_ride(terminal, table, sim, tablet, at):
     """The second cue of the list, as the children's show."""
     status, _ = tablet.until_film("bench-ride", 0.5)
     at["kids"] = time.time()
@@ -58,9 +58,26 @@ def bench_ride(terminal, table, tablet, at):
     tablet.until_film("bench-ride", 9)
     terminal.readme("kinocue enable B2", user="anna")
     at["b2_in"] = time.time()
-    tablet.until_film("bench-ride", 12)
+    tablet.until_film("bench-ride", 11.5)
     at["row_a_end"] = time.time()
+    hold_up(table, sim, tablet)
+    tablet.until_film("bench-ride", 13.5)
     named(table, tablet, "mid-show")
+
+
+def hold_up(table, sim, tablet):
+    """All controllers answer late by more than it takes to be lost, and then at once, before their seats have come to rest."""
+    sim.send_signal(signal.SIGSTOP)
+    time.sleep(0.3)
+    sim.send_signal(signal.SIGCONT)
+
+    def are_well(status):
+        return all(one["standing"] == "ok" for one in status["controllers"])
+
+    time.sleep(0.3)
+    status, took = tablet.until("all back", are_well, 5)
+    said = f"all back on the cue {0.3 + took:.1f} s later, {status['state']}"
+    table.saw(13, "every answer held up for 0.3 s", said, status["state"] == "playing")
 
 
 def gear(table, tablet):

@@ -25,7 +25,7 @@ def walk(table):
     booth.until_state("parked")
     before.preflight(terminal, table, booth)
     before.guests(table, booth, tablet)
-    at = show.playlist(terminal, table, booth, tablet)
+    at = show.playlist(terminal, table, sim, booth, tablet)
     stops = show.stops(terminal, table, booth, tablet)
     crashed, parked = show.crash(terminal, table, booth, tablet)
     after.reports(terminal, table, tablet, Tablet())
