@@ -5,6 +5,7 @@ python3 systemd/deb.py FOLDER, from the root of the project, after everything th
 
 import glob
 import gzip
+import hashlib
 import os
 import pathlib
 import shutil
@@ -55,6 +56,12 @@ Description: {package["description"]}
 """
 
 
+def sums(root):
+    """The checksum of every file, by which `dpkg --verify` finds what was changed since."""
+    files = sorted(file for file in root.rglob("*") if file.is_file())
+    return "".join(f"{hashlib.md5(file.read_bytes()).hexdigest()}  {file.relative_to(root)}\n" for file in files)
+
+
 def main():
     package = tomllib.loads(pathlib.Path("Cargo.toml").read_text())["package"]
     deb = package["metadata"]["deb"]
@@ -64,9 +71,10 @@ def main():
         for asset in deb["assets"]:
             place(root, *asset)
         place(root, deb["license-file"][0], f"usr/share/doc/{package['name']}/copyright", "644")
-        text = control(package, deb, root)
+        text, checksums = control(package, deb, root), sums(root)
         (root / "DEBIAN").mkdir()
         (root / "DEBIAN/control").write_text(text)
+        (root / "DEBIAN/md5sums").write_text(checksums)
         for script in pathlib.Path(deb["maintainer-scripts"]).iterdir():
             shutil.copyfile(script, root / "DEBIAN" / script.name)
             (root / "DEBIAN" / script.name).chmod(0o755)

@@ -154,6 +154,17 @@ fn shell_scripts_are_shell_scripts() {
 }
 
 #[test]
+fn python_scripts_are_python_scripts() {
+    let read = "import ast, sys\nfor path in sys.argv[1:]: ast.parse(open(path).read(), path)";
+    let scripts = files("systemd/*.py").into_iter().chain(files("systemd/walk/*.py"));
+    let paths: Vec<String> = scripts.map(|path| path.display().to_string()).collect();
+    let args: Vec<&str> = ["-c", read].into_iter().chain(paths.iter().map(String::as_str)).collect();
+    if let Some(output) = tool("python3", &args) {
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
+#[test]
 fn every_command_has_its_manual_page() {
     let folder = tempfile::tempdir().unwrap();
     let output = kinocue(&["man", folder.path().to_str().unwrap()]);

@@ -3,7 +3,7 @@
 use super::shapes::Way::{Heave, Pitch, Roll, Surge, Sway, Yaw};
 use super::shapes::{Axis, Burst, Ride, Rumble, shift, wave};
 
-pub(crate) const ALL: [Ride; 4] = [BENCH_RIDE, COASTER, VOYAGE, STORM];
+pub(crate) const ALL: [Ride; 5] = [SEAT_DEMO, BENCH_RIDE, COASTER, VOYAGE, STORM];
 
 const fn axis(mix: [f64; 6], lag: f64) -> Axis {
     Axis { mix, lag }
@@ -46,6 +46,34 @@ const PAIR: [Axis; 12] = {
         front[0], front[1], front[2], front[3], front[4], front[5], back[0], back[1], back[2], back[3],
         back[4], back[5],
     ]
+};
+
+/// Three axes: what the seat can do, one thing after the other.
+const SEAT_DEMO: Ride = Ride {
+    file: "seat-demo.csv",
+    title: "Seat demo",
+    axes: &BENCH,
+    length: 11.0,
+    row_ms: 20,
+    beats: &[
+        // Up, a nod, a sway to either side, and down again.
+        shift(Heave, 0.5, 2.0, 0.75),
+        shift(Pitch, 3.0, 1.0, -0.2),
+        shift(Pitch, 4.0, 1.0, 0.2),
+        shift(Roll, 5.2, 0.8, 0.15),
+        shift(Roll, 6.0, 1.2, -0.3),
+        shift(Roll, 7.2, 0.8, 0.15),
+        shift(Heave, 8.0, 2.6, -0.75),
+    ],
+    rumbles: &[rumble(2.6, 3.0, 16.0, 0.0012)],
+    effects: &["air", "water", "wind", "leg", "light"],
+    bursts: &[
+        burst("light", 0.2, 0.5),
+        burst("air", 3.4, 3.7),
+        burst("water", 4.2, 4.4),
+        burst("wind", 5.2, 7.8),
+        burst("leg", 6.4, 6.7),
+    ],
 };
 
 /// Three axes: a lift hill, a drop, two turns, a splash and the brakes.

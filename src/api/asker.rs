@@ -71,7 +71,8 @@ impl Asker {
     /// Over TCP arming needs an engineer: whoever arms sees the seats.
     fn allow(&self, ask: &Ask) -> Result<(), Problem> {
         let local = self.who.surface == Surface::Socket;
-        if *ask == Ask::Arm && !local { self.least(Role::Engineer, "arming over TCP") } else { Ok(()) }
+        let arms = matches!(ask, Ask::Arm { .. });
+        if arms && !local { self.least(Role::Engineer, "arming over TCP") } else { Ok(()) }
     }
 
     fn least(&self, least: Role, what: &str) -> Result<(), Problem> {

@@ -28,6 +28,9 @@ pub(super) struct Json<T>(pub(super) T);
 /// No body, or an empty object.
 pub(super) struct Nothing;
 
+/// A JSON body; none is as good as an empty object.
+pub(super) struct OrNothing<T>(pub(super) T);
+
 /// A name in the path: of a controller, a preset.
 pub(super) struct Name(pub(super) String);
 
@@ -40,6 +43,20 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Json<T> {
     async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
         let headers = request.headers().clone();
         let body = whole(&headers, request.into_body()).await?;
+        json_only(&headers)?;
+        parse(&body).map(Self)
+    }
+}
+
+impl<T: DeserializeOwned + Default, S: Send + Sync> FromRequest<S> for OrNothing<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
+        let headers = request.headers().clone();
+        let body = whole(&headers, request.into_body()).await?;
+        if body.is_empty() {
+            return Ok(Self(T::default()));
+        }
         json_only(&headers)?;
         parse(&body).map(Self)
     }

@@ -137,7 +137,17 @@ impl Pulse {
 
     /// Whether it has moved of late.
     pub(super) fn beats(&self, now: MonoTime) -> bool {
-        now.since(MonoTime::from_nanos(self.moved_ns.load(Ordering::Relaxed))) < STILL
+        self.still(now) < STILL
+    }
+
+    /// For how long a counter that has moved before stands still; none where that is not long.
+    pub(super) fn stopped(&self, now: MonoTime) -> Option<Duration> {
+        let has_moved = self.moved_ns.load(Ordering::Relaxed) > 0;
+        Some(self.still(now)).filter(|still| has_moved && *still >= STILL)
+    }
+
+    fn still(&self, now: MonoTime) -> Duration {
+        now.since(MonoTime::from_nanos(self.moved_ns.load(Ordering::Relaxed)))
     }
 
     /// Notes every new status until there are none any more.
@@ -161,10 +171,11 @@ mod tests {
     fn a_pulse_is_a_counter_that_moves() {
         let at = |seconds| MonoTime::from_nanos(0) + Duration::from_secs(seconds);
         let pulse = Pulse::default();
-        assert!(!pulse.beats(at(100)), "before the first tick");
+        assert!(!pulse.beats(at(100)) && pulse.stopped(at(100)).is_none(), "before the first tick");
         pulse.note(7, at(100));
         pulse.note(7, at(101));
-        assert!(pulse.beats(at(101)));
+        assert!(pulse.beats(at(101)) && pulse.stopped(at(101)).is_none());
         assert!(!pulse.beats(at(102)), "the status is new, and the counter in it is not");
+        assert_eq!(pulse.stopped(at(103)), Some(Duration::from_secs(3)));
     }
 }

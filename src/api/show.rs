@@ -4,7 +4,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::asker::{Asker, StatusReply};
-use super::input::{Json, Nothing, id};
+use super::input::{Json, Nothing, OrNothing, id};
 use super::problem::bad_value;
 use crate::hall::{Ask, Problem, Status};
 use crate::time::ShowTime;
@@ -20,6 +20,15 @@ type Reply = Result<StatusReply, Problem>;
 pub(super) struct Load {
     /// Its id.
     cue: String,
+}
+
+/// Under which condition.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Arm {
+    /// Nobody sits on the seats and nothing lies on or under them. Where a position is unknown arming homes the seats first,
+    /// and is refused without this; for engineers.
+    seats_empty: bool,
 }
 
 /// Where to.
@@ -45,10 +54,12 @@ pub(super) async fn load(asker: Asker, Json(load): Json<Load>) -> Reply {
     asker.ask(Ask::Load { cue }).await
 }
 
-/// Gets ready to go. Over TCP for engineers.
-#[utoipa::path(post, path = "/api/v1/show/arm", tag = "show", responses((status = 200, body = Status)))]
-pub(super) async fn arm(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Arm).await
+/// Gets ready to go. Over TCP for engineers. Where `arm_homes` of the status is true the seats home first.
+#[utoipa::path(
+    post, path = "/api/v1/show/arm", tag = "show", request_body = Option<Arm>, responses((status = 200, body = Status))
+)]
+pub(super) async fn arm(asker: Asker, OrNothing(Arm { seats_empty }): OrNothing<Arm>) -> Reply {
+    asker.ask(Ask::Arm { seats_empty }).await
 }
 
 /// Stands down.

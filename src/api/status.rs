@@ -19,17 +19,23 @@ use super::asker::StatusReply;
 use super::peer::Peer;
 use super::shared::Shared;
 use super::slots::Slot;
-use crate::hall::{Problem, Status};
+use crate::hall::{Code, Problem, Status};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
 
 /// Between two events at the least.
 const PACE: Duration = Duration::from_millis(100);
 /// After how long without an event a comment says that the server lives.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 
-/// The whole state of the hall.
+/// The whole state of the hall; 503 where nothing new of it was heard for two seconds.
 #[utoipa::path(get, path = "/api/v1/status", tag = "hall", responses((status = 200, body = Status)))]
-pub(super) async fn status(State(shared): State<Arc<Shared>>) -> StatusReply {
-    StatusReply(shared.write(&shared.handle.status()))
+pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusReply, Problem> {
+    if let Some(still) = shared.pulse.stopped(Monotonic.now()) {
+        let detail = format!("nothing new of the hall was heard for {} s", still.as_secs());
+        return Err(Problem::new(Code::Timeout, detail, "look at the seats; a stop works all the same"));
+    }
+    Ok(StatusReply(shared.write(&shared.handle.status())))
 }
 
 /// Server-sent events named `status`, each the whole status: at once, then at each change, ten a second at the most. Between

@@ -29,8 +29,9 @@ use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
+use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
-use crate::time::Rate;
+use crate::time::{Clock as _, Rate};
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]
@@ -70,23 +71,39 @@ pub enum ServeError {
     System(#[source] io::Error),
 }
 
-/// The mark that a start leaves and an orderly end takes away.
+/// The mark that a daemon leaves before its first tick, and an orderly end takes away.
 #[derive(Debug)]
 struct Mark(PathBuf);
 
 impl Mark {
-    /// Leaves it; says whether it was there.
-    fn leave(folder: &Path) -> Result<(Self, bool), ServeError> {
-        let path = folder.join("running");
-        let file = |cause| ServeError::File { path: path.clone(), cause };
-        fs::create_dir_all(folder).map_err(file)?;
-        let crashed = path.try_exists().map_err(file)?;
-        fs::write(&path, b"kinocue runs, or has crashed\n").map_err(file)?;
-        Ok((Self(path), crashed))
+    /// The one in that folder, which is made where it is missing.
+    fn of(folder: &Path) -> Result<Self, ServeError> {
+        let mark = Self(folder.join("running"));
+        fs::create_dir_all(folder).map_err(|cause| mark.failed(cause))?;
+        Ok(mark)
     }
 
+    /// Whether the daemon before left it and did not take it away.
+    fn is_there(&self) -> Result<bool, ServeError> {
+        self.0.try_exists().map_err(|cause| self.failed(cause))
+    }
+
+    fn leave(&self) -> Result<(), ServeError> {
+        // Without a word in it, so that a full disk keeps no hall shut.
+        fs::File::create(&self.0).map_err(|cause| self.failed(cause))?;
+        Ok(())
+    }
+
+    /// Takes it away, where it was left.
     fn take_away(&self) -> Result<(), ServeError> {
-        fs::remove_file(&self.0).map_err(|cause| ServeError::File { path: self.0.clone(), cause })
+        match fs::remove_file(&self.0) {
+            Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(self.failed(cause)),
+            _ => Ok(()),
+        }
+    }
+
+    fn failed(&self, cause: io::Error) -> ServeError {
+        ServeError::File { path: self.0.clone(), cause }
     }
 }
 
@@ -142,32 +159,71 @@ impl Served {
 /// # Panics
 /// Where one of its threads panicked.
 pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
+    let mark = Mark::of(&parts.places.state)?;
+    let crashed = mark.is_there()?;
+    let served = serve_halls(parts, &mark, crashed, up);
+    // An end with an error is none in the middle of a motion; what crashed before still has.
+    if served.is_ok() || !crashed {
+        mark.take_away()?;
+    }
+    served
+}
+
+/// Opens a hall, and keeps it; and again with each configuration that is read anew.
+fn serve_halls(
+    parts: Parts,
+    mark: &Mark,
+    crashed: bool,
+    up: impl FnOnce(Handle, &[SocketAddr]),
+) -> Result<Served, ServeError> {
     let Parts { config, places, pages, signals, log } = parts;
+    let began = Monotonic.now();
     let mut config = Arc::new(config);
-    let (mark, crashed) = Mark::leave(&places.state)?;
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
-    let mut house = House::open(Arc::clone(&config), crashed, &Numbers::new())?;
+    let mut numbers = Numbers::new();
+    let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
-    let mut ends = Ends { inbox, source, config: places.config, signals, voice, memory: Memory::default() };
+    let memory = Memory::default();
+    let mut ends = Ends { inbox, source, config: places.config, began, signals, voice, memory };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
+    // Not sooner: a start that is refused has moved nothing, and is no crash.
+    mark.leave()?;
     up(handle, surfaces.addresses());
     let mut feeder = None;
     let served = loop {
         let left = keep(house, ends, library.clone(), journal, &mut feeder)?;
+        (ends, journal) = (left.ends, left.journal);
         let Some(next) = left.reload else {
             break Served { config, closed: left.closed, ended: left.ended };
         };
-        // The seats are parked or at rest, so nothing tells of a crash.
-        config = next;
-        house = House::open(Arc::clone(&config), false, &left.closed.numbers)?;
-        (ends, journal) = (left.ends, left.journal);
+        // Also of controllers that come back with a later configuration.
+        numbers.extend(&left.closed.numbers);
+        (house, config) = reopen(next, config, &numbers, &mut ends.memory)?;
     };
     surfaces.close();
     log.close();
-    mark.take_away()?;
     Ok(served)
+}
+
+/// Opens the hall with another configuration; where it does not open so, with the one before, which did.
+fn reopen(
+    next: Arc<Config>,
+    before: Arc<Config>,
+    numbers: &Numbers,
+    memory: &mut Memory,
+) -> Result<(House, Arc<Config>), HouseError> {
+    // The seats are parked or at rest, so nothing tells of a crash.
+    match House::open(Arc::clone(&next), false, numbers) {
+        Ok(house) => Ok((house, next)),
+        Err(error) => {
+            memory.note(format!(
+                "the hall does not open with the new configuration, and has the old one: {error}"
+            ));
+            Ok((House::open(Arc::clone(&before), false, numbers)?, before))
+        }
+    }
 }
 
 /// Runs one hall on this thread, with a keeper beside it.
@@ -225,4 +281,28 @@ pub fn signals() -> Result<Signals, ServeError> {
     on(SIGINT, &signals.leave)?;
     on(SIGHUP, &signals.reload)?;
     Ok(signals)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hall(bind: &str) -> Arc<Config> {
+        let mut config = crate::config::from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
+        config.show.bind = bind.parse().unwrap();
+        Arc::new(config)
+    }
+
+    #[test]
+    fn a_hall_that_does_not_open_with_another_configuration_has_the_old_one_and_says_why() {
+        // An address of documentation, which no machine has (RFC 5737).
+        let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
+        let mut memory = Memory::default();
+        let (_house, config) = reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory).unwrap();
+        assert!(Arc::ptr_eq(&config, &before));
+        assert!(format!("{memory:?}").contains("does not open with the new configuration"), "{memory:?}");
+        let next = hall("127.0.0.1:0");
+        let (_house, config) = reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory).unwrap();
+        assert!(Arc::ptr_eq(&config, &next));
+    }
 }

@@ -7,6 +7,7 @@ mod mix;
 mod orders;
 mod rest;
 mod rider;
+mod signs;
 mod slew;
 mod stamps;
 mod switch;
@@ -22,7 +23,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::cue::Vibration;
-use crate::gate::Counts;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::plan::{Course, Scene};
 use crate::time::{Rate, ShowTime};
@@ -144,6 +144,8 @@ pub struct Engine {
     retired: Retired,
     serial: u32,
     plays_left: Option<u32>,
+    /// Whether it has been let go, which one that waits has not.
+    begun: bool,
     /// Whether the lanes are to park, come what may.
     homeward: bool,
     /// Whether a person asked for the film to go on from a pause.
@@ -189,6 +191,7 @@ impl Engine {
             retired: Retired::default(),
             serial: course.serial,
             plays_left: show.plays.checked_sub(1),
+            begun: true,
             homeward: false,
             resuming: false,
             seeking: None,
@@ -268,47 +271,6 @@ impl Engine {
     #[must_use]
     pub fn is_on_cue(&self) -> bool {
         self.phase == Phase::Riding && !self.is_joining() && self.seeking.is_none()
-    }
-
-    /// What the gate had to do for a lane.
-    #[must_use]
-    pub fn clamps(&self, lane: usize) -> &Counts {
-        self.riders[lane].clamps()
-    }
-
-    /// Whether the gate has held a lane back three times within a second since this was asked last.
-    pub fn take_gate_fault(&mut self) -> bool {
-        self.riders.iter_mut().fold(false, |any, rider| any | rider.take_fault())
-    }
-
-    /// Whether a move that the show needs could not be planned since this was asked last.
-    pub fn take_planless(&mut self) -> bool {
-        std::mem::take(&mut self.planless)
-    }
-
-    /// A lane that was away and is where the others are again; each is said once.
-    pub fn take_joined(&mut self) -> Option<usize> {
-        let Self { riders, course, reached, .. } = self;
-        let mut lanes = riders.iter_mut().enumerate();
-        lanes.find_map(|(lane, rider)| rider.take_arrival(course.is_settled(lane, *reached)).then_some(lane))
-    }
-
-    /// How far missed ticks have put the show behind its grid.
-    #[must_use]
-    pub fn lag(&self) -> Duration {
-        self.slew.lag()
-    }
-
-    /// The level of a lane's motion as it is now.
-    #[must_use]
-    pub fn level(&self, lane: usize) -> f64 {
-        self.riders[lane].fader.level()
-    }
-
-    /// How the play ended; none while it lasts.
-    #[must_use]
-    pub fn ending(&self) -> Option<Ending> {
-        (self.phase == Phase::Done).then_some(self.ending)
     }
 
     /// Serves one tick: sets the poses and says what their frames carry.

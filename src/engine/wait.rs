@@ -12,6 +12,7 @@ impl Engine {
     /// The same, waiting for [`Engine::go`].
     #[must_use]
     pub fn waiting(mut self) -> Self {
+        self.begun = false;
         self.phase = Phase::Waiting;
         self
     }
@@ -37,7 +38,16 @@ impl Engine {
     /// Begins, where it waits.
     pub fn go(&mut self) {
         if self.phase == Phase::Waiting {
+            self.begun = true;
             self.phase = first_phase(&self.show);
+        }
+    }
+
+    /// The hall is ready to play: what was loaded before it was, and rests so far, waits to be let go. Its lanes go on from
+    /// where they stand.
+    pub fn stand_by(&mut self) {
+        if !self.begun && self.phase == Phase::Resting(Rest::Stopped) && !self.homeward {
+            self.phase = Phase::Waiting;
         }
     }
 

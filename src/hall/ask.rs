@@ -31,7 +31,11 @@ pub enum Ask {
         entry: usize,
     },
     /// Get ready to go.
-    Arm,
+    Arm {
+        /// Whoever asks says that nobody sits on the seats: where a position is unknown they are homed first. Else arming is
+        /// refused then.
+        seats_empty: bool,
+    },
     /// Stand down.
     Disarm,
     /// Start what is loaded.
@@ -109,7 +113,7 @@ impl Ask {
             Self::Load { .. } => "load",
             Self::Playlist { .. } => "playlist",
             Self::Select { .. } => "select",
-            Self::Arm => "arm",
+            Self::Arm { .. } => "arm",
             Self::Disarm => "disarm",
             Self::Go => "go",
             Self::Pause => "pause",
@@ -136,11 +140,12 @@ impl Ask {
         matches!(
             self,
             Self::Home
-                | Self::Arm
+                | Self::Arm { .. }
                 | Self::Go
                 | Self::Resume
                 | Self::Seek(_)
                 | Self::Clear
+                | Self::Enable(_)
                 | Self::Test { .. }
         )
     }
@@ -150,7 +155,9 @@ impl Ask {
     pub const fn least_role(&self) -> Role {
         match self {
             Self::Stop => Role::View,
-            Self::Home | Self::Clear | Self::Test { .. } | Self::Reload => Role::Engineer,
+            Self::Home | Self::Arm { seats_empty: true } | Self::Clear | Self::Test { .. } | Self::Reload => {
+                Role::Engineer
+            }
             _ => Role::Operate,
         }
     }
@@ -176,6 +183,7 @@ impl fmt::Display for Ask {
             Self::Trim(ms) => write!(f, " {ms} ms"),
             Self::Levels(change) => change.fmt(f),
             Self::Preset(name) | Self::Enable(name) | Self::Disable(name) => write!(f, " {name}"),
+            Self::Arm { seats_empty: true } => f.write_str(" with empty seats"),
             Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
             Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),
             _ => Ok(()),

@@ -9,6 +9,7 @@ use tokio::sync::{oneshot, watch};
 
 use super::{Ask, Code, Problem, Status, Who};
 use crate::rt::Desk;
+use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -41,6 +42,12 @@ pub struct Asked {
 impl Asked {
     fn is_stale(&self, now: MonoTime) -> bool {
         self.desired.ask.goes_stale() && now.since(self.asked_at) > FRESH
+    }
+
+    /// Whether it was asked before that instant.
+    #[must_use]
+    pub fn is_before(&self, at: MonoTime) -> bool {
+        self.asked_at < at
     }
 
     /// Answers it: the state that it led to, or why it was not done.
@@ -168,13 +175,19 @@ impl Handle {
         if asked.is_stale(Monotonic.now()) {
             return Err(late(asked.desired.ask.word()));
         }
-        self.asks.try_send(asked).map_err(|error| match error {
-            TrySendError::Full(_) => {
-                Problem::new(Code::Busy, format!("{ASKS} requests wait already"), "ask again in a second")
+        match self.asks.try_send(asked) {
+            Ok(()) => Ok(Posted(answer)),
+            // It is done with its flag; what would follow is its line in the journal.
+            Err(TrySendError::Full(asked)) if asked.desired.ask == Ask::Stop => {
+                asked.answer(Ok(self.status()));
+                Ok(Posted(answer))
             }
-            TrySendError::Disconnected(_) => gone(),
-        })?;
-        Ok(Posted(answer))
+            Err(TrySendError::Full(_)) => {
+                let detail = format!("{ASKS} requests wait already");
+                Err(Problem::new(Code::Busy, detail, "ask again in a second"))
+            }
+            Err(TrySendError::Disconnected(_)) => Err(gone()),
+        }
     }
 }
 
@@ -197,6 +210,13 @@ impl Posted {
             )),
         }
     }
+}
+
+/// What was asked of a hall that is another since.
+#[must_use]
+pub fn overtaken(word: &str, state: State) -> Problem {
+    let detail = format!("{word} was asked before the hall was {state}");
+    Problem::new(Code::Late, detail, "look at the seats, then ask again")
 }
 
 fn late(word: &str) -> Problem {
@@ -247,6 +267,8 @@ mod tests {
         assert_eq!(handle.post(who(Role::Operate), Ask::Pause).unwrap_err().code, Code::Busy);
         handle.stop();
         handle.note_stop(who(Role::View));
+        assert!(desk.take_stop());
+        assert!(handle.post(who(Role::View), Ask::Stop).is_ok(), "a stop that is done is not refused");
         assert!(desk.take_stop());
         assert_eq!(inbox.next(NOW).unwrap().desired.ask, Ask::Pause);
         handle.note_stop(who(Role::View));

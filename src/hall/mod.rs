@@ -10,7 +10,7 @@ mod who;
 
 pub use crate::config::Role;
 pub use ask::{Ask, Levels, LevelsChange};
-pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle};
+pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle, overtaken};
 pub use problem::{Code, Problem};
 pub use status::{
     ControllerStatus, EntryStatus, Histogram, JournalLine, Percentiles, PlaylistStatus, PreflightStatus,

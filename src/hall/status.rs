@@ -25,6 +25,8 @@ pub struct Status {
     pub cause: String,
     /// What a person does next.
     pub next: String,
+    /// Whether arming homes the seats first, which is for empty seats alone.
+    pub arm_homes: bool,
     /// Seconds since it is in that state.
     pub since_s: f64,
     /// Seconds until that state ends by itself; null where it does not.
@@ -76,6 +78,7 @@ impl Status {
             state: State::Boot.word(),
             cause: Cause::Started.to_string(),
             next: Next::AwaitAnswers.to_string(),
+            arm_homes: false,
             since_s: 0.0,
             lapses_s: None,
             moving: false,

@@ -11,6 +11,7 @@ struct Findings {
     outcast: Option<Why>,
     silent: Option<Why>,
     poor: Option<Why>,
+    moved: Option<Why>,
     unseen: bool,
 }
 
@@ -48,6 +49,7 @@ impl Health {
             found.outcast = found.outcast.or(member.outcast);
             found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
             found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
+            found.moved = found.moved.or(when(member.moved, Why::Moved(controller)));
             found.unseen |= !member.is_seen(now);
         }
         found
@@ -76,11 +78,14 @@ impl Health {
         }
     }
 
-    /// Tells the hall of a new emergency stop, and when the last one is released.
+    /// Tells the hall of another master, of a new emergency stop, and when the last one is released.
     pub(super) fn tell_of_stops(&mut self, on: &mut dyn FnMut(Notice)) {
         let mut pressed = false;
         for (controller, member) in self.members.iter_mut().enumerate() {
             pressed |= member.pressed;
+            if member.take_crowd() {
+                on(Notice::Hall(state::Event::Trouble(state::Trouble::OtherMaster(controller))));
+            }
             if member.take_press() && !self.stop_told {
                 self.stop_told = true;
                 on(Notice::Hall(state::Event::EmergencyStop(controller)));
@@ -108,6 +113,16 @@ impl Health {
     }
 }
 
+impl Why {
+    /// Why a group that was out for this joins again. That somebody moved it goes on to be worth a word.
+    const fn once_seen(self) -> Self {
+        match self {
+            Self::Moved(_) => self,
+            _ => Self::SeenAgain,
+        }
+    }
+}
+
 impl Place {
     fn after(self, found: Findings, watched: bool, now: MonoTime) -> (Standing, Why) {
         let same = (self.standing, self.why);
@@ -122,8 +137,9 @@ impl Place {
             (Standing::Stopped | Standing::Error, _) => same,
             (_, Findings { outcast: Some(why), .. }) => (Standing::Excluded, why),
             (Standing::Excluded, _) => (Standing::Lost, Why::NotSeenYet),
-            (Standing::Lost, Findings { unseen: false, .. }) => (Standing::Rejoining, Why::SeenAgain),
+            (Standing::Lost, Findings { unseen: false, .. }) => (Standing::Rejoining, self.why.once_seen()),
             (Standing::Lost | Standing::Unwatched, _) => same,
+            (_, Findings { moved: Some(why), .. }) => (Standing::Lost, why),
             (_, Findings { silent: Some(why), .. }) if watched => (Standing::Lost, why),
             (Standing::Rejoining, _) => same,
             (_, Findings { poor: Some(why), .. }) => (Standing::Degraded, why),

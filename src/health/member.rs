@@ -35,6 +35,8 @@ pub(super) struct Member {
     baseline: Option<Baseline>,
     /// Its position is known from homing or preflight, so that the next sighting needs no proof.
     trusted: bool,
+    /// It has to say that it knows its zero, however it came.
+    must_be_home: bool,
     /// When it was last seen as it was.
     seen: Option<MonoTime>,
     /// A read was sent that nothing came of yet.
@@ -53,6 +55,10 @@ pub(super) struct Member {
     refusing: bool,
     /// What went wrong first since it was cleared.
     pub(super) ailed: Option<Why>,
+    /// Its seat was found elsewhere than frames left it.
+    pub(super) moved: bool,
+    /// Another master was found, and nobody was told yet.
+    crowd_untold: bool,
 }
 
 impl Member {
@@ -68,6 +74,7 @@ impl Member {
             traffic: Traffic::default(),
             baseline: None,
             trusted: true,
+            must_be_home: false,
             seen: None,
             reading: false,
             next_read: None,
@@ -79,6 +86,8 @@ impl Member {
             drives: [0; MAX_AXES],
             refusing: false,
             ailed: None,
+            moved: false,
+            crowd_untold: false,
         }
     }
 
@@ -142,12 +151,18 @@ impl Member {
         self.on_error(sighting.error);
         self.refusing &= sighting.error != 0;
         if let Some(why) = self.against(sighting) {
+            self.crowd_untold |= self.outcast.is_none() && matches!(why, Why::Crowded(_));
             self.outcast.get_or_insert(why);
         } else {
             self.baseline = Some(Baseline::of(sighting, self.traffic));
             self.trusted = false;
             self.seen = (sighting.error == 0).then_some(at);
         }
+    }
+
+    /// From now on it has to say that it knows its zero.
+    pub(super) const fn demand_home(&mut self) {
+        self.must_be_home = true;
     }
 
     fn against(&self, sighting: &Sighting) -> Option<Why> {
@@ -158,10 +173,12 @@ impl Member {
             None => Verdict::Unproved,
         };
         match verdict {
+            Verdict::Same if self.must_be_home && !sighting.homed => Some(Why::NotHome(controller)),
             Verdict::Same => None,
             Verdict::Other => Some(Why::Other(controller)),
             Verdict::NotHome => Some(Why::NotHome(controller)),
             Verdict::Rebooted => Some(Why::Rebooted(controller)),
+            Verdict::Crowded => Some(Why::Crowded(controller)),
             Verdict::Unproved => Some(Why::Unproved(controller)),
         }
     }
@@ -195,6 +212,11 @@ impl Member {
     /// Whether an emergency stop began since this was last asked.
     pub(super) const fn take_press(&mut self) -> bool {
         std::mem::replace(&mut self.press_untold, false)
+    }
+
+    /// Whether another master was found since this was last asked.
+    pub(super) const fn take_crowd(&mut self) -> bool {
+        std::mem::replace(&mut self.crowd_untold, false)
     }
 
     /// It was homed: its position is known, and what it counts from here on is the new measure.
@@ -245,6 +267,7 @@ impl Member {
     /// Whatever was on its way, or was seen, does not count from here on.
     pub(super) fn forget(&mut self) {
         self.seen = None;
+        self.moved = false;
         self.reading = false;
         self.next_read = None;
         self.rest();

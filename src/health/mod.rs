@@ -70,6 +70,13 @@ impl Health {
         Self { groups, members, places, policy, watched, stop_told: false, errors_told: false }
     }
 
+    /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.
+    #[must_use]
+    pub fn of_a_hall(mut self) -> Self {
+        self.members.iter_mut().for_each(Member::demand_home);
+        self
+    }
+
     /// The groups.
     #[must_use]
     pub const fn groups(&self) -> &Groups {
@@ -139,6 +146,11 @@ impl Health {
     /// What was read; of no account where no read was sent since the group was lost.
     pub fn on_sighting(&mut self, controller: usize, sighting: &Sighting, at: MonoTime) {
         self.members[controller].on_sighting(sighting, at);
+    }
+
+    /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
+    pub fn on_moved(&mut self, controller: usize) {
+        self.members[controller].moved = true;
     }
 
     /// A controller is home; a person homes one only while the hall is paused or parked. Where that was all its group was

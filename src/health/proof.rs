@@ -2,7 +2,8 @@
 //!
 //! DP34 counts the datagrams that a controller received, round after 65,535. Since it was last read, it must have grown
 //! by at least the frames that were acked and at most by all that was sent; whether reads count is left open. A
-//! controller that rebooted began at 0 and hardly ever meets that.
+//! controller that rebooted began at 0 and hardly ever meets that; where it counts more than it could since, somebody else
+//! sent to it.
 
 /// What was read of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +35,7 @@ pub struct Identity {
 const UNDER_WAY: u64 = 64;
 /// With more datagrams than these in doubt the counter proves nothing.
 const PROVES: u64 = 1 << 15;
-/// With more than these in doubt it is time to read the counter again.
+/// With more than these in doubt it is time to read the counter again, or sooner where it has counted little.
 const REFRESH: u64 = 1 << 13;
 
 /// Datagrams to one controller.
@@ -62,6 +63,7 @@ pub(super) enum Verdict {
     Other,
     NotHome,
     Rebooted,
+    Crowded,
     Unproved,
 }
 
@@ -85,12 +87,18 @@ impl Baseline {
         }
         let acked = traffic.acked - self.traffic.acked;
         let grown = u64::from(now).wrapping_sub(u64::from(then)).wrapping_sub(acked);
-        if grown.wrapping_add(UNDER_WAY) % (1 << 16) <= doubt { Verdict::Same } else { Verdict::Rebooted }
+        if grown.wrapping_add(UNDER_WAY) % (1 << 16) <= doubt {
+            return Verdict::Same;
+        }
+        let counted_since = traffic.sent - self.traffic.sent + UNDER_WAY;
+        if u64::from(now) <= counted_since { Verdict::Rebooted } else { Verdict::Crowded }
     }
 
-    /// Whether the counter should be read again while all is well.
-    pub(super) const fn is_stale(&self, traffic: Traffic) -> bool {
-        self.packets.is_some() && self.doubt(traffic) > REFRESH
+    /// Whether the counter should be read again while all is well. One that began not long ago is hard to tell from one that
+    /// begins anew, so it is read again as soon as it may have counted twice as much.
+    pub(super) fn is_stale(&self, traffic: Traffic) -> bool {
+        let counted = |packets: u16| u64::from(packets).clamp(UNDER_WAY, REFRESH);
+        self.packets.is_some_and(|packets| self.doubt(traffic) > counted(packets))
     }
 
     /// Datagrams that it may have received or not.
@@ -120,7 +128,24 @@ mod tests {
     fn a_counter_that_began_anew_is_a_reboot() {
         assert_eq!(after(40_000, 500, 470, 12), Verdict::Rebooted);
         assert_eq!(after(40_000, 500, 470, 40_480), Verdict::Same);
-        assert_eq!(after(40_000, 500, 470, 41_000), Verdict::Rebooted, "more than was sent");
+    }
+
+    #[test]
+    fn a_counter_of_more_than_was_sent_since_any_reboot_tells_of_another_master() {
+        assert_eq!(after(40_000, 500, 470, 41_000), Verdict::Crowded);
+        assert_eq!(after(40_000, 500, 470, 700), Verdict::Crowded);
+        assert_eq!(after(40_000, 500, 470, 500), Verdict::Rebooted, "of all that was sent since");
+    }
+
+    #[test]
+    fn a_counter_is_read_again_when_it_may_have_doubled_but_not_seldom() {
+        let stale = |packets, sent| {
+            let traffic = |sent| Traffic { sent, acked: 0 };
+            Baseline::of(&sighting(packets), traffic(0)).is_stale(traffic(sent))
+        };
+        for (packets, doubt) in [(0, 64), (64, 64), (300, 300), (8_192, 8_192), (60_000, 8_192)] {
+            assert!(!stale(packets, doubt) && stale(packets, doubt + 1), "{packets}");
+        }
     }
 
     #[test]

@@ -53,6 +53,8 @@ pub enum Why {
     NotSeenYet,
     /// It was seen as it was before.
     SeenAgain,
+    /// This controller's seat is elsewhere than frames left it.
+    Moved(usize),
     /// An emergency stop at this controller.
     EmergencyStop(usize),
     /// This controller has an error.
@@ -75,6 +77,8 @@ pub enum Why {
     Refuses(usize),
     /// This controller has rebooted: its packet counter began anew.
     Rebooted(usize),
+    /// This controller got more datagrams than were sent from here, and more than it can have got since a reboot.
+    Crowded(usize),
     /// This controller was reset: it is not home any more.
     NotHome(usize),
     /// Another controller, or another mode, is where this one was.
@@ -90,11 +94,13 @@ impl Why {
         match self {
             Self::AcksMissing(controller)
             | Self::Silent(controller)
+            | Self::Moved(controller)
             | Self::EmergencyStop(controller)
             | Self::Error { controller, .. }
             | Self::Drive { controller, .. }
             | Self::Refuses(controller)
             | Self::Rebooted(controller)
+            | Self::Crowded(controller)
             | Self::NotHome(controller)
             | Self::Other(controller)
             | Self::Unproved(controller) => Some(controller),

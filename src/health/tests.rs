@@ -4,7 +4,7 @@ mod latched;
 
 use super::*;
 use crate::observe::What;
-use crate::state::Event;
+use crate::state::{Event, Trouble};
 
 const TICK: Duration = Duration::from_millis(10);
 const IDENTITY: Identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
@@ -21,6 +21,7 @@ struct Hall {
     ack_every: u32,
     notices: Vec<(MonoTime, Notice)>,
     answers_reads: bool,
+    homed: bool,
 }
 
 impl Hall {
@@ -42,6 +43,7 @@ impl Hall {
             ack_every,
             notices: Vec::new(),
             answers_reads: true,
+            homed: true,
         };
         if ack_every > 0 {
             hall.look();
@@ -74,7 +76,7 @@ impl Hall {
     }
 
     fn sighting(&self, controller: usize) -> Sighting {
-        Sighting { identity: IDENTITY, error: 0, packets: Some(self.packets[controller]), homed: true }
+        Sighting { identity: IDENTITY, error: 0, packets: Some(self.packets[controller]), homed: self.homed }
     }
 
     fn tick(&mut self) {

@@ -39,6 +39,22 @@ impl Standing {
     }
 }
 
+impl Why {
+    /// What a person does about it before all else; none where the standing says enough.
+    #[must_use]
+    pub const fn next(self) -> Option<&'static str> {
+        match self {
+            Self::Moved(_) => {
+                Some("find out what moved it; with the next start it joins slowly from where it is")
+            }
+            Self::Crowded(_) => {
+                Some("stop the other machine; then park, and home it with nobody on the seat")
+            }
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for Why {
     /// The reason, without the name of the controller.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -47,13 +63,17 @@ impl fmt::Display for Why {
             Self::AcksOff => "acks are off",
             Self::AcksMissing(_) => "acks are missing or late",
             Self::Silent(_) => "no ack and no report for too long",
-            Self::NotSeenYet => "not looked at yet",
+            Self::NotSeenYet => "no answer yet",
             Self::SeenAgain => "back as it was",
+            Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::EmergencyStop(_) => "emergency stop",
             Self::Error { error, .. } => return write!(f, "{}", crate::wire::DeviceError(*error)),
             Self::Drive { axis, error, .. } => return write!(f, "drive of axis {axis}: error {error}"),
             Self::Refuses(_) => "it refuses frames",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
+            Self::Crowded(_) => {
+                "it got more datagrams (DP34) than were sent from here: another machine sends to it"
+            }
             Self::NotHome(_) => "it was reset: it is not home (DPF0)",
             Self::Other(_) => "another controller or another work mode (PA00) than before",
             Self::Unproved(_) => "whether it has rebooted cannot be told",

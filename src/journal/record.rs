@@ -54,7 +54,7 @@ pub struct ShowRecord {
     pub seats_available: usize,
     /// Who started it.
     pub operator: String,
-    /// Whether the playlist's time started it.
+    /// Whether the playlist started it: at its time, or because the entry before came to its end.
     pub scheduled: bool,
     /// Whether that was outside the hours of the house ([`crate::config::Hours`]).
     pub out_of_hours: bool,

@@ -64,6 +64,7 @@ fn playing() -> Status {
         state: "playing",
         cause: "somebody asked".to_owned(),
         next: "nothing".to_owned(),
+        arm_homes: false,
         since_s: 5.0,
         lapses_s: None,
         moving: true,

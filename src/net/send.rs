@@ -28,6 +28,9 @@ pub struct SendFault {
 }
 
 impl SendFault {
+    /// Kept back, because what it belongs to was called off.
+    pub const CALLED_OFF: Self = Self { errno: libc::ECANCELED };
+
     /// The system's error number.
     #[must_use]
     pub const fn errno(self) -> i32 {
@@ -51,6 +54,7 @@ impl SendFault {
             libc::ENETUNREACH | libc::EHOSTUNREACH | libc::ENETDOWN => {
                 "no way leads there: check the cable and this machine's address"
             }
+            libc::ECANCELED => "what it was for was called off",
             libc::EPERM | libc::EACCES => "a firewall of this machine keeps it back",
             _ => "the system is short of something; see its log",
         }

@@ -7,12 +7,15 @@ use std::time::Duration;
 
 use jiff::civil::Date;
 use jiff::tz::TimeZone;
-use jiff::{Timestamp, ToSpan as _, Zoned};
+use jiff::{SignedDuration, Timestamp, ToSpan as _, Zoned};
 
 use super::{At, Playlist};
 
 /// A start that is longer past is let go: after a sleep, a step of the clock or a restart nothing is caught up.
 pub const LATEST: Duration = Duration::from_secs(2);
+
+/// A clock is set back by less than that where it comes by the same times again; one that was further ahead was wrong.
+const WRONG: SignedDuration = SignedDuration::from_hours(24);
 
 /// Which starts have been seen, so that none comes twice, however the clock is set.
 #[derive(Debug, Clone, Default)]
@@ -30,7 +33,8 @@ impl Schedule {
         let asked = self.asked.replace(now.clone())?;
         let (entry, start) = find_due(playlist, &asked, now)?;
         // A clock that was set back comes by the same start again.
-        if self.started.is_some_and(|started| start <= started) {
+        let again = |started: Timestamp| start <= started && started.duration_since(start) < WRONG;
+        if self.started.is_some_and(again) {
             return None;
         }
         self.started = Some(start);

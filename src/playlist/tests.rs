@@ -223,6 +223,19 @@ fn a_start_seen_is_not_seen_again_when_the_clock_is_set_back() {
 }
 
 #[test]
+fn a_clock_that_was_years_ahead_takes_no_start_away_once_it_is_right() {
+    let day = list(&["at = \"19:00\""]);
+    let mut schedule = Schedule::default();
+    let mut due = |now: &str| schedule.due(&day, &at(now));
+    assert_eq!(due("2036-11-21T17:59:59Z"), None);
+    assert_eq!(due("2036-11-21T18:00:00Z"), Some(0));
+    assert_eq!(due("2026-11-21T17:59:59Z"), None);
+    assert_eq!(due("2026-11-21T18:00:00Z"), Some(0));
+    assert_eq!(due("2026-11-21T17:59:59Z"), None);
+    assert_eq!(due("2026-11-21T18:00:00Z"), None, "that one was seen");
+}
+
+#[test]
 fn a_time_that_is_skipped_comes_later_and_one_that_comes_twice_counts_once() {
     let day = list(&["at = \"02:30\""]);
     let start = |now: &str| next_start(&day, &at(now)).unwrap().1.timestamp().to_string();

@@ -3,7 +3,7 @@
 
 use super::mail::{Alarm, News};
 use crate::engine::{Ending, Engine, Rest};
-use crate::state::{Event, Finding, Machine, Next, Readiness, Refusal, Request, Ride, State, Trouble};
+use crate::state::{Cause, Event, Finding, Machine, Next, Readiness, Refusal, Request, Ride, State, Trouble};
 use crate::time::{MonoTime, ShowTime};
 
 /// The machine, and what was last done for it.
@@ -12,8 +12,8 @@ pub struct Conductor {
     machine: Machine,
     /// The state that the engine was told last.
     told: State,
-    /// The state that was made known last, since when it lasts, and what a person does next.
-    known: Option<(State, MonoTime, Next)>,
+    /// The state that was made known last, why, since when it lasts, and what a person does next.
+    known: Option<(State, Cause, MonoTime, Next)>,
     /// Whether a person is there to clear what is latched; else the play ends with it.
     attended: bool,
     /// Whether the hall lives on when its show is over.
@@ -135,7 +135,8 @@ impl Conductor {
             State::Paused => engine.pause(),
             State::Stopping | State::Stopped | State::Fault => engine.stop(),
             State::Parking => engine.park(),
-            State::Boot | State::Recovering | State::Parked | State::Homing | State::Armed => {}
+            State::Parked | State::Armed => engine.stand_by(),
+            State::Boot | State::Recovering | State::Homing => {}
         }
     }
 
@@ -174,12 +175,12 @@ impl Conductor {
 
     /// What is new since it was asked last.
     pub fn news(&mut self) -> Option<News> {
-        let known = (self.machine.state(), self.machine.since(), self.machine.next());
+        let known = (self.machine.state(), self.machine.cause(), self.machine.since(), self.machine.next());
         if self.known.replace(known) == Some(known) {
             return None;
         }
-        let (state, at, next) = known;
-        Some(News::Entered { state, cause: self.machine.cause(), next, at })
+        let (state, cause, at, next) = known;
+        Some(News::Entered { state, cause, next, at })
     }
 
     /// How the play ended.

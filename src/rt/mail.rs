@@ -273,6 +273,11 @@ impl Mail {
         self.alarms.pop().ok()
     }
 
+    /// Whether whoever leads the hall would hear something new.
+    pub(super) fn has_room_for_news(&self) -> bool {
+        !self.news.is_full()
+    }
+
     /// Where nobody reads it, news is lost; where the hall stands is in [`Live`] as well.
     pub(super) fn tell(&mut self, news: News) {
         let _ = self.news.push(news);

@@ -151,9 +151,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
                 }
             };
             // What it led to goes before the answer, so that whoever hears the answer knows it.
-            if let Some(entered) = conductor.news() {
-                mail.tell(entered);
-            }
+            tell_state(conductor, mail);
             mail.tell(news);
         }
         if self.leave.load(Ordering::Relaxed) {
@@ -190,9 +188,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
 
     fn hand_on(&mut self) {
         self.mail.look(self.conductor.machine().state());
-        if let Some(news) = self.conductor.news() {
-            self.mail.tell(news);
-        }
+        tell_state(&mut self.conductor, &mut self.mail);
         if let Some(request) = self.engine.take_request() {
             self.mail.task(Task::Plan(request));
         }
@@ -203,6 +199,15 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         while let Some(course) = self.engine.take_retired() {
             self.mail.task(Task::Retire(course));
         }
+    }
+}
+
+/// Makes known where the hall stands, once there is room for it: nobody asks for that again.
+fn tell_state(conductor: &mut Conductor, mail: &mut Mail) {
+    if mail.has_room_for_news()
+        && let Some(entered) = conductor.news()
+    {
+        mail.tell(entered);
     }
 }
 

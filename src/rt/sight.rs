@@ -23,6 +23,8 @@ const PACKETS: u16 = 0x34;
 /// DPF0: 2 once the controller knows its zero.
 const RESET: u16 = 0xf0;
 const RESET_DONE: u16 = 2;
+/// How far from where it rests a seat has to be found to have been moved, in strokes: 0.3 mm of 150.
+const NEAR: f64 = 0.002;
 /// DPFE and DPFF: versions.
 const VERSIONS: (u16, u16) = (0xfe, 2);
 
@@ -148,6 +150,18 @@ impl Looker {
                 apart <= 1
             },
         )
+    }
+
+    /// Whether a seat of which that is known by beats stands in a pose.
+    pub(super) fn rests_at(&self, places: &[Option<Pulses>], pose: &Pose) -> bool {
+        let own = self.first_slot..MAX_AXES;
+        let mut axes = places.iter().take(self.seat.axes).zip(own);
+        axes.all(|(place, slot)| place.is_none_or(|at| (self.seat.fraction(at) - pose[slot]).abs() <= NEAR))
+    }
+
+    /// The pose it is parked in.
+    pub(super) const fn park(&self) -> &Pose {
+        &self.park
     }
 
     /// Axes past the sixth have no position register: they count as parked.

@@ -72,9 +72,18 @@ impl Standby {
         self.line.hear(controller, octets, at)
     }
 
-    /// The positions that an answer to a beat tells.
-    pub(super) fn beat_of(&self, controller: usize, octets: &[u8]) -> Option<PerAxis<Pulses>> {
+    /// Where the axes stand by an answer to a beat; none where it is none.
+    pub(super) fn beat_of(&mut self, controller: usize, octets: &[u8]) -> Option<PerAxis<Pulses>> {
         self.beats.hear(controller, octets)
+    }
+
+    /// Whether a seat is surely elsewhere than where it rests; to be asked with every answer to a beat.
+    pub(super) fn is_away(
+        &mut self,
+        controller: usize,
+        rests: impl FnOnce(&[Option<Pulses>]) -> bool,
+    ) -> bool {
+        self.beats.is_away(controller, rests)
     }
 
     /// Notes what was read of a controller.
@@ -87,9 +96,19 @@ impl Standby {
         self.seen[controller].map(|seen| seen.homed)
     }
 
+    /// Whether somebody wants a controller to take part.
+    pub(super) fn takes_part(&self, controller: usize) -> bool {
+        self.desk.mix(controller).on
+    }
+
     /// Whether all seats of a group stand at park, as they were seen last.
     pub(super) fn is_at_park(&self, mut members: impl Iterator<Item = usize>) -> bool {
         members.all(|controller| self.seen[controller].is_some_and(|seen| seen.at_park))
+    }
+
+    /// Whether the control plane holds a conversation with the controllers.
+    pub(super) fn is_asked_otherwise(&self) -> bool {
+        self.line.is_open()
     }
 
     /// Takes orders, counts what the line sent, and beats while nothing moves.
@@ -107,7 +126,11 @@ impl Standby {
             health.on_other_sent(controller, self.line.take_sent(controller));
         }
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if moving || self.line.is_open() || !self.beats.take(now) {
+        if moving || self.line.is_open() {
+            self.beats.forget();
+            return;
+        }
+        if !self.beats.take(now) {
             return;
         }
         for controller in 0..self.seen.len() {
@@ -122,13 +145,12 @@ impl Standby {
     pub(super) fn take_finding(&mut self, health: &Health) -> Option<Finding> {
         let crashed = self.boot?;
         let groups = health.groups();
-        let takes_part = |controller: &usize| self.desk.mix(*controller).on;
         let known = |controller: usize| {
             let standing = health.standing(groups.group_of(controller));
             self.seen[controller].filter(|_| !standing.is_looked_at())
         };
         let mut finding = Finding { homed: true, at_park: true, crashed };
-        for controller in (0..self.seen.len()).filter(takes_part) {
+        for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {
             let seen = known(controller)?;
             finding.homed &= seen.homed;
             finding.at_park &= seen.at_park;

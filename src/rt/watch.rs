@@ -173,9 +173,26 @@ impl Watch {
         octets: &[u8],
         at: MonoTime,
     ) -> Option<PerAxis<Pulses>> {
-        let positions = self.standby.as_ref()?.beat_of(controller, octets)?;
+        let positions = self.standby.as_mut()?.beat_of(controller, octets)?;
         self.health.on_status(controller, at);
+        self.mind_rest(controller);
         Some(positions)
+    }
+
+    /// The next show begins where the last one left the seats. One that somebody has moved since is found first, or it would
+    /// jump.
+    fn mind_rest(&mut self, controller: usize) {
+        let standing = self.health.standing(self.health.groups().group_of(controller));
+        let is_set = matches!(self.phase, Phase::Parking | Phase::Joining) && !self.live.is_moving();
+        if !is_set || !standing.may_move() {
+            return;
+        }
+        let Self { standby: Some(standby), lookers, poses, health, .. } = self else { return };
+        let looker = &lookers[controller];
+        let rest = if standing == Standing::Rejoining { &poses[controller] } else { looker.park() };
+        if standby.is_away(controller, |places| looker.rests_at(places, rest)) {
+            health.on_moved(controller);
+        }
     }
 
     /// Tells whoever looks how the controllers stand.
@@ -227,7 +244,11 @@ impl Watch {
 
     fn tell(&mut self, notice: Notice) {
         match notice {
+            // One that is out may be at work on: it stays away until it was homed, and holds up nobody.
+            Notice::Hall(Event::Rebooted(controller)) if !self.takes_part(controller) => {}
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
+            // Preflight counts every datagram that a controller received: what can wait does not come between.
+            Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
             Notice::Read(controller) => {
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
                 self.health.on_read_sent(controller, datagrams);
@@ -241,6 +262,19 @@ impl Watch {
                 }
             }
         }
+    }
+
+    /// Whether the control plane holds a conversation with the controllers.
+    fn is_asked_otherwise(&self) -> bool {
+        self.standby.as_ref().is_some_and(Standby::is_asked_otherwise)
+    }
+
+    fn stands(&self, controller: usize) -> Standing {
+        self.health.standing(self.health.groups().group_of(controller))
+    }
+
+    fn takes_part(&self, controller: usize) -> bool {
+        self.standby.as_ref().is_none_or(|standby| standby.takes_part(controller))
     }
 
     /// What a lane has to do because its group stands otherwise.

@@ -13,7 +13,7 @@ impl Machine {
     pub fn request(&mut self, request: Request, now: MonoTime) -> Result<(), Refusal> {
         let taken = match request {
             Request::Home => self.home(now),
-            Request::Arm => self.arm(now),
+            Request::Arm | Request::HomeAndArm => self.arm(request, now),
             Request::Disarm => self.disarm(now),
             Request::Go => self.go(now),
             Request::Pause => self.pause(now),
@@ -47,7 +47,7 @@ impl Machine {
         self.enter(State::Homing, Cause::Asked(asked), now);
     }
 
-    fn arm(&mut self, now: MonoTime) -> Result<(), Why> {
+    fn arm(&mut self, asked: Request, now: MonoTime) -> Result<(), Why> {
         match self.state {
             State::Homing if self.goal == Goal::Armed => return Ok(()),
             State::Parked | State::Armed => {}
@@ -57,9 +57,11 @@ impl Machine {
             return Err(why);
         }
         if self.facts.homed {
-            self.enter(State::Armed, Cause::Asked(Request::Arm), now);
+            self.enter(State::Armed, Cause::Asked(asked), now);
+        } else if asked == Request::HomeAndArm {
+            self.begin_homing(Goal::Armed, asked, now);
         } else {
-            self.begin_homing(Goal::Armed, Request::Arm, now);
+            return Err(Why::HomesFirst);
         }
         Ok(())
     }

@@ -92,9 +92,11 @@ pub enum Request {
     /// Let the controllers find their zero. The seats move over their whole stroke by themselves: whoever asks has made
     /// sure that nobody sits on them.
     Home,
-    /// Make ready to go. Where the position is unknown the seats are homed first, as [`Request::Home`] does it and under
-    /// the same condition.
+    /// Make ready to go. Refused where a position is unknown: nothing moves by this.
     Arm,
+    /// The same, and where a position is unknown the seats are homed first, as [`Request::Home`] does it and under the same
+    /// condition.
+    HomeAndArm,
     /// No longer ready to go.
     Disarm,
     /// Start the cue.
@@ -115,9 +117,10 @@ pub enum Request {
 
 impl Request {
     /// Every request there is.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Home,
         Self::Arm,
+        Self::HomeAndArm,
         Self::Disarm,
         Self::Go,
         Self::Pause,

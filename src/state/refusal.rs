@@ -24,6 +24,8 @@ pub enum Why {
     PositionsNotRead,
     /// A controller does not know its position.
     PositionUnknown,
+    /// A controller does not know its position, and nobody said that the seats are empty.
+    HomesFirst,
     /// No cue is loaded.
     NoCue,
     /// The cue is not proved.

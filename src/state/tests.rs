@@ -138,20 +138,24 @@ fn a_cue_is_armed_only_when_all_is_ready() {
 }
 
 #[test]
-fn arming_homes_first_where_a_position_is_unknown_and_not_otherwise() {
+fn arming_homes_first_where_a_position_is_unknown_and_the_seats_are_empty_and_not_otherwise() {
     let mut hall = told(State::Parked, Event::Rebooted(2));
-    hall.request(Request::Arm, s(2)).unwrap();
+    assert_eq!(hall.request(Request::Arm, s(2)).unwrap_err().why, Why::HomesFirst);
+    assert_eq!(hall.state(), State::Parked, "somebody may sit there");
+    hall.request(Request::HomeAndArm, s(2)).unwrap();
     assert_eq!(hall.state(), State::Homing);
     hall.event(Event::Homed, s(20));
     assert_eq!((hall.state(), hall.cause()), (State::Armed, Cause::Homed));
-    assert_eq!(asked(State::Parked, Request::Arm).state(), State::Armed);
+    for request in [Request::Arm, Request::HomeAndArm] {
+        assert_eq!(asked(State::Parked, request).state(), State::Armed);
+    }
 }
 
 #[test]
 fn homing_by_itself_ends_in_parked_and_so_does_arming_that_is_taken_back() {
     assert_eq!(told(State::Homing, Event::Homed).state(), State::Parked);
     let mut hall = told(State::Parked, Event::Rebooted(2));
-    hall.request(Request::Arm, s(2)).unwrap();
+    hall.request(Request::HomeAndArm, s(2)).unwrap();
     hall.request(Request::Disarm, s(3)).unwrap();
     hall.event(Event::Homed, s(20));
     assert_eq!(hall.state(), State::Parked);

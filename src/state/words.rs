@@ -37,6 +37,7 @@ impl fmt::Display for Request {
         f.write_str(match self {
             Self::Home => "home",
             Self::Arm => "arm",
+            Self::HomeAndArm => "home and arm",
             Self::Disarm => "disarm",
             Self::Go => "go",
             Self::Pause => "pause",
@@ -52,7 +53,9 @@ impl fmt::Display for Request {
 impl fmt::Display for Next {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::AwaitAnswers => "wait until every controller has answered",
+            Self::AwaitAnswers => {
+                "wait until every controller has answered, or disable the one that does not"
+            }
             Self::AwaitPositions => "wait until the positions are read, then park",
             Self::AwaitHome => "wait until the seats are home, and keep clear of them",
             Self::AwaitRest => "wait until the seats are at rest",
@@ -139,7 +142,7 @@ impl Cause {
 const fn asked(request: Request) -> &'static str {
     match request {
         Request::Home => "homed by the operator",
-        Request::Arm => "armed by the operator",
+        Request::Arm | Request::HomeAndArm => "armed by the operator",
         Request::Disarm => "disarmed by the operator",
         Request::Go => "started by the operator",
         Request::Pause => "paused by the operator",
@@ -165,6 +168,7 @@ impl Why {
             Self::NotIdentified => "not every controller has said what it is",
             Self::PositionsNotRead => "where the seats stand has not been read since they stopped",
             Self::PositionUnknown => "a controller does not know its position",
+            Self::HomesFirst => "the seats have to home first, and move over their whole stroke",
             Self::NoCue => Readiness::NoCue.words(),
             Self::NotProved => Readiness::NotProved.words(),
             Self::NotPreflighted => Readiness::NotPreflighted.words(),
@@ -189,9 +193,12 @@ impl Why {
     #[must_use]
     pub const fn remedy(self) -> &'static str {
         match self {
-            Self::NotIdentified => "wait until they answer, or take the missing one out of the configuration",
+            Self::NotIdentified => "wait until they answer, or disable the one that does not",
             Self::PositionsNotRead => "wait until the controllers have answered",
             Self::PositionUnknown => "home first, with nobody on the seats",
+            Self::HomesFirst => {
+                "see that the seats are empty, then arm with --seats-empty (seats_empty in the API)"
+            }
             Self::NoCue => "load one",
             Self::NotProved => "check it against the seats",
             Self::NotPreflighted => "run it",

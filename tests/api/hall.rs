@@ -176,7 +176,7 @@ impl Keeper {
                 return Err(Problem::new(Code::Check, "the cue bad is refused", "mend it").with(faults));
             }
             Ask::Resume => return Err(Problem::new(Code::State, "cannot resume while armed", "arm and go")),
-            Ask::Arm => "armed",
+            Ask::Arm { .. } => "armed",
             Ask::Go => "joining",
             Ask::Stop => "stopping",
             _ => "parked",

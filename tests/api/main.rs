@@ -8,6 +8,7 @@
 )]
 
 mod access;
+#[path = "../common/http.rs"]
 mod client;
 mod cues;
 mod events;

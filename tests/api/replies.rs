@@ -29,7 +29,9 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
     let requests = [
         (plain("/api/v1/show/home"), Ask::Home),
         (post("/api/v1/show/load", r#"{"cue":"storm_2"}"#), Ask::Load { cue: "storm_2".to_owned() }),
-        (plain("/api/v1/show/arm"), Ask::Arm),
+        (plain("/api/v1/show/arm"), Ask::Arm { seats_empty: false }),
+        (post("/api/v1/show/arm", "{}"), Ask::Arm { seats_empty: false }),
+        (post("/api/v1/show/arm", r#"{"seats_empty":true}"#), Ask::Arm { seats_empty: true }),
         (plain("/api/v1/show/go"), Ask::Go),
         (post("/api/v1/show/pause", "{}"), Ask::Pause),
         (post("/api/v1/show/seek", r#"{"position_s":750.5}"#), Ask::Seek(ShowTime::from_millis(750_500))),

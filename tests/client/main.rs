@@ -40,6 +40,7 @@ fn told(run: &Run, says: &str) {
 fn each_command_is_one_request_in_the_words_of_the_api() {
     for (args, method, path, body) in [
         (vec!["arm"], "POST", "/api/v1/show/arm", json!({})),
+        (vec!["arm", "--seats-empty"], "POST", "/api/v1/show/arm", json!({"seats_empty": true})),
         (vec!["disarm"], "POST", "/api/v1/show/disarm", json!({})),
         (vec!["go"], "POST", "/api/v1/show/go", json!({})),
         (vec!["pause"], "POST", "/api/v1/show/pause", json!({})),
@@ -191,6 +192,24 @@ fn preflight_shows_what_was_found_and_fails_where_that_fails() {
     assert_eq!(run.code, Some(1));
     assert!(run.stdout.contains("amplitude") && run.stdout.contains("set it"), "{run:?}");
     told(&run, "preflight failed: 1 of 2 controllers answered");
+}
+
+#[test]
+fn preflight_says_what_several_have_in_common_once_and_where_to_find_one_that_fails() {
+    let mut status = hall("parked");
+    status["controllers"] = json!([
+        {"name": "A1", "row": "A", "address": "10.0.0.1:7408"}, {"name": "B1", "row": "B", "address": "10.0.0.2:7408"}
+    ]);
+    let finding = |severity: &str, id: &str, name: &str| json!({"id": id, "severity": severity, "controller": name, "text": "as it is", "remedy": "set it"});
+    let findings = [
+        finding("error", "no-answer", "B1"),
+        finding("warning", "slow-replies", "A1"),
+        finding("warning", "slow-replies", "B1"),
+    ];
+    status["preflight"] = json!({"passed": false, "answered": 1, "findings": findings});
+    let run = Daemon::with(status).run(&["preflight"]);
+    assert!(run.stdout.contains("B1 (row B, 10.0.0.2:7408)   no-answer"), "{}", run.stdout);
+    assert!(run.stdout.contains("A1, B1") && !run.stdout.contains("10.0.0.1"), "{}", run.stdout);
 }
 
 /// A thread that takes one connection to the stop socket, and answers its line.

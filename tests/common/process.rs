@@ -84,11 +84,12 @@ impl Guarded {
         BufReader::new(child.stderr.take().expect("piped"))
     }
 
-    fn signal(&self, signal: Signal) {
+    pub(crate) fn signal(&self, signal: Signal) {
         pidfd_send_signal(&*self.handle, signal).expect("it runs");
     }
 
-    fn finish(mut self) -> Run {
+    /// Waits for its end.
+    pub(crate) fn finish(mut self) -> Run {
         let child = self.child.take().expect("it is taken once");
         child.wait_with_output().expect("it can be waited for").into()
     }
@@ -271,10 +272,11 @@ impl Row {
     }
 }
 
-/// Stands between kinocue and a controller, and shows each motion frame that goes by.
+/// Stands between kinocue and a controller, shows each motion frame that goes by, and has a plug to pull.
 pub(crate) struct Relay {
     socket: UdpSocket,
     frames: Receiver<(SocketAddr, MotionRequest)>,
+    pulled: Arc<AtomicBool>,
     done: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -285,11 +287,11 @@ impl Relay {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
         let inner = socket.try_clone().expect("a handle");
         let controller = SocketAddr::V4(controller.parse().expect("an address"));
-        let done = Arc::new(AtomicBool::new(false));
-        let over = Arc::clone(&done);
+        let [pulled, done] = [false; 2].map(|flag| Arc::new(AtomicBool::new(flag)));
+        let (unplugged, over) = (Arc::clone(&pulled), Arc::clone(&done));
         let (seen, frames) = channel();
-        let thread = std::thread::spawn(move || relay(&inner, controller, &over, &seen));
-        Self { socket, frames, done, thread: Some(thread) }
+        let thread = std::thread::spawn(move || relay(&inner, controller, (&unplugged, &over), &seen));
+        Self { socket, frames, pulled, done, thread: Some(thread) }
     }
 
     /// Where kinocue plays to.
@@ -305,6 +307,21 @@ impl Relay {
                 return from;
             }
         }
+    }
+
+    /// How many frames have gone by since that was asked last.
+    pub(crate) fn count(&self) -> usize {
+        self.frames.try_iter().count()
+    }
+
+    /// Pulls the plug of the controller: nothing goes by any more.
+    pub(crate) fn pull(&self) {
+        self.pulled.store(true, Ordering::Release);
+    }
+
+    /// Puts the plug back.
+    pub(crate) fn put_back(&self) {
+        self.pulled.store(false, Ordering::Release);
     }
 
     /// Sends octets as if the controller had.
@@ -324,13 +341,16 @@ impl Drop for Relay {
 fn relay(
     socket: &UdpSocket,
     controller: SocketAddr,
-    over: &AtomicBool,
+    (pulled, over): (&AtomicBool, &AtomicBool),
     seen: &Sender<(SocketAddr, MotionRequest)>,
 ) {
     let mut host = None;
     let mut octets = [0; 2048];
     while !over.load(Ordering::Acquire) {
         let Ok((len, from)) = socket.recv_from(&mut octets) else { continue };
+        if pulled.load(Ordering::Acquire) {
+            continue;
+        }
         let answer = from == controller;
         if !answer {
             host = Some(from);

@@ -2,54 +2,18 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::BufRead as _;
 use std::net::SocketAddr;
-use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
-use crate::process::{Guarded, Sim};
+use crate::process::Sim;
+use crate::serving::{self, Serving};
 
 /// What lets the page in; an engineer's, who alone may arm over TCP.
 pub(crate) const TOKEN: &str = "booth-token";
 /// Controllers in each row.
 const SEATS: usize = 2;
-
-const CONFIG: &str = "\
-[show]
-name = \"Hall 1\"
-rate_hz = 100
-bind = \"127.0.0.1:0\"
-library = \"cues\"
-
-[log]
-dir = \"log\"
-
-[seat.bench3]
-axes = 3
-stroke_mm = 150.0
-lead_mm = 5.0
-pulses_per_rev = 10000
-max_velocity_mm_s = 240.0
-max_acceleration_mm_s2 = 3000.0
-max_jerk_mm_s3 = 60000.0
-park = [0.0, 0.0, 0.0]
-neutral = [0.5, 0.5, 0.5]
-
-[effects]
-air = 1
-water = 2
-wind = 3
-leg = 4
-smoke = 5
-light = 6
-
-[preset.kids]
-motion = \"60%\"
-vibration = \"50%\"
-effects = { water = false }
-";
 
 /// Two rows of two seats, each row by a simulator of its own.
 pub(crate) struct Hall {
@@ -69,24 +33,16 @@ impl Hall {
     pub(crate) fn open_to(role: &str) -> Self {
         let dir = tempfile::tempdir().expect("a folder");
         let sims: Vec<Sim> = (0..2).map(|_| Sim::start(SEATS, &["--safe"])).collect();
-        let path = |text: &str| format!("\"{}/{text}\"", dir.path().display());
-        let mut config = CONFIG.replace("\"cues\"", &path("cues")).replace("\"log\"", &path("log"));
+        let mut config = serving::hall(dir.path());
         write_api(&mut config, role);
         for (row, sim) in ["A", "B"].iter().zip(&sims) {
-            for (seat, address) in sim.addresses.iter().enumerate() {
-                let name = format!("{row}{}", seat + 1);
-                writeln!(
-                    config,
-                    "[[controller]]\nname = \"{name}\"\nrow = \"{row}\"\nseat = \"bench3\"\naddress = \"{address}\""
-                )
-                .expect("memory");
-            }
+            serving::write_row(&mut config, row, &sim.addresses);
         }
         fs::write(dir.path().join("hall.toml"), config).expect("it can be written");
         fs::create_dir(dir.path().join("cues")).expect("a folder");
         fs::write(dir.path().join("cues/swell.csv"), swell()).expect("it can be written");
         let serving = Serving::start(dir.path());
-        let url = format!("http://{}/", serving.address);
+        let url = format!("http://{}/", address_of(&serving));
         Self { dir, sims: sims.into_iter().map(Some).collect(), serving: Some(serving), url }
     }
 
@@ -102,7 +58,9 @@ impl Hall {
         let address = self.url.trim_start_matches("http://").trim_end_matches('/');
         let config = config.replace("listen = [\"127.0.0.1:0\"]", &format!("listen = [\"{address}\"]"));
         fs::write(path, config).expect("it can be written");
-        self.serving = Some(Serving::start(self.dir.path()));
+        let serving = Serving::start(self.dir.path());
+        address_of(&serving);
+        self.serving = Some(serving);
     }
 
     /// Kills the server, as a crash would.
@@ -114,6 +72,11 @@ impl Hall {
     pub(crate) fn pull(&mut self, row: usize) {
         self.sims[row] = None;
     }
+}
+
+/// Where it serves HTTP, once it does.
+fn address_of(serving: &Serving) -> SocketAddr {
+    serving.heard(|line| line.split("http://").nth(1)?.split('/').next()?.parse().ok())
 }
 
 /// A gentle cue, long enough for the slowest machine: three axes go up and down every ten seconds for two minutes.
@@ -134,31 +97,4 @@ fn write_api(config: &mut String, open_role: &str) {
          [[api.token]]\nname = \"booth\"\nrole = \"engineer\"\nsha256 = \"{sha256}\"\n\n"
     )
     .expect("memory");
-}
-
-/// A `kinocue serve` at work; dropped, it is killed as by a crash.
-struct Serving {
-    _guarded: Guarded,
-    /// Where it serves HTTP.
-    address: SocketAddr,
-}
-
-impl Serving {
-    /// Serves the hall of `hall.toml` in a folder, with its sockets and its state there, and waits until it listens.
-    fn start(dir: &Path) -> Self {
-        let path = |name: &str| dir.join(name).to_str().expect("text").to_owned();
-        let (config, socket, state) = (path("hall.toml"), path("control.sock"), path("state"));
-        let args = ["serve", "--config", &config, "--socket", &socket, "--state", &state];
-        let mut guarded = Guarded::start(&args);
-        let mut lines = guarded.stderr().lines().map_while(Result::ok);
-        let mut said = Vec::new();
-        let address = lines.by_ref().find_map(|line| {
-            let address = line.split("http://").nth(1).and_then(|rest| rest.split('/').next()?.parse().ok());
-            said.push(line);
-            address
-        });
-        // Whatever else it says is taken, so that it never waits for us.
-        std::thread::spawn(move || lines.for_each(drop));
-        Self { _guarded: guarded, address: address.unwrap_or_else(|| panic!("it does not serve: {said:?}")) }
-    }
 }

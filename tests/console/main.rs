@@ -4,6 +4,9 @@
 #[path = "../common/process.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod process;
+#[path = "../common/serving.rs"]
+#[expect(dead_code, reason = "each test uses its own part")]
+mod serving;
 
 mod browser;
 mod hall;

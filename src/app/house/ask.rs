@@ -1,6 +1,9 @@
 //! Asking the controllers of a hall for registers while nothing moves: the same conversations as `preflight` and `home` hold,
 //! over the hall's own frame port.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::config::Controller;
 use crate::device::home::{HomeError, Progress, TIMEOUT, home};
 use crate::device::survey::{Survey, survey};
@@ -9,15 +12,21 @@ use crate::net::{Origin, SendFault};
 use crate::preflight::wanted;
 use crate::rt::Line;
 use crate::sys::clock::Monotonic;
-use crate::wire::Dialect;
+use crate::wire::{Dialect, WriteRequest};
 
 /// What is asked.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub enum Inquiry {
     /// All that preflight judges, of all controllers.
     Survey,
-    /// These controllers, counted from 0, are to home.
-    Home(Vec<usize>),
+    /// Controllers are to home.
+    Home {
+        /// Which, counted from 0.
+        lanes: Vec<usize>,
+        /// Set once no more of them is to begin, be it that its order has to be repeated. Those that have begun go on by
+        /// themselves, and are watched until they are home.
+        called_off: Arc<AtomicBool>,
+    },
 }
 
 /// What came of it.
@@ -29,19 +38,26 @@ pub enum Finding {
     Homed(Vec<(usize, Result<(), HomeError>)>),
 }
 
-struct OverLine<'l>(&'l mut Line);
+/// The line as a conversation has it: once that is called off, no order goes out.
+struct OverLine<'l> {
+    line: &'l mut Line,
+    called_off: Arc<AtomicBool>,
+}
 
 impl Link for OverLine<'_> {
     fn send(&mut self, lane: usize, datagram: &[u8]) -> Result<(), SendFault> {
-        self.0.send(lane, datagram)
+        if self.called_off.load(Ordering::Acquire) && WriteRequest::parse(datagram).is_ok() {
+            return Err(SendFault::CALLED_OFF);
+        }
+        self.line.send(lane, datagram)
     }
 
     fn drain(&mut self, on: &mut Watch<'_>) {
-        self.0.drain(&mut |controller, octets, at| on(Origin::Controller(controller), octets, at));
+        self.line.drain(&mut |controller, octets, at| on(Origin::Controller(controller), octets, at));
     }
 
     fn port_closed(&self, lane: usize) -> u64 {
-        self.0.port_closed(lane)
+        self.line.port_closed(lane)
     }
 }
 
@@ -53,13 +69,17 @@ pub fn inquire(
     tell: &mut dyn FnMut(&str),
 ) -> Finding {
     line.open(true);
-    let mut talk = Talk::over(OverLine(line), Monotonic, &peers(controllers));
+    let called_off = match &inquiry {
+        Inquiry::Survey => Arc::default(),
+        Inquiry::Home { called_off, .. } => Arc::clone(called_off),
+    };
+    let mut talk = Talk::over(OverLine { line, called_off }, Monotonic, &peers(controllers));
     let finding = match inquiry {
         Inquiry::Survey => {
             let wanted: Vec<_> = controllers.iter().map(|one| wanted(one.dialect)).collect();
             Finding::Surveyed(survey(&mut talk, controllers, &wanted, tell))
         }
-        Inquiry::Home(lanes) => {
+        Inquiry::Home { lanes, .. } => {
             let seats: Vec<(usize, Dialect)> =
                 lanes.iter().map(|lane| (*lane, controllers[*lane].dialect)).collect();
             let results = home(&mut talk, &seats, TIMEOUT, &mut |lane, step| {
@@ -73,4 +93,36 @@ pub fn inquire(
     drop(talk);
     line.open(false);
     finding
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::UdpSocket;
+
+    use super::*;
+    use crate::net::Ports;
+    use crate::rt;
+    use crate::wire::{Code, MAX_LEN, ReadRequest};
+
+    #[test]
+    fn once_a_homing_is_called_off_no_order_goes_out_and_its_seats_are_still_watched() {
+        let controller = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = controller.local_addr().unwrap().to_string().parse().unwrap();
+        let (sender, _) = Ports::open("127.0.0.1:0".parse().unwrap(), &[address]).unwrap().split();
+        let (mut line, _) = rt::line(sender, 1);
+        let called_off = Arc::<AtomicBool>::default();
+        let mut link = OverLine { line: &mut line, called_off: Arc::clone(&called_off) };
+        let (mut order, mut look, mut heard) = ([0; MAX_LEN], [0; MAX_LEN], [0; MAX_LEN]);
+        let (accept, reply) = (Code(0xffff), Code(0xffff));
+        let order = WriteRequest { channel: 0, accept, reply, start: 0xf0, data: [0].as_slice().into() }
+            .emit(&mut order);
+        let look = ReadRequest { channel: 0, accept, reply, start: 0xf0, num: 1 }.emit(&mut look);
+        link.send(0, order).unwrap();
+        assert_eq!(controller.recv(&mut heard).unwrap(), order.len());
+        called_off.store(true, Ordering::Release);
+        assert_eq!(link.send(0, order), Err(SendFault::CALLED_OFF));
+        link.send(0, look).unwrap();
+        let length = controller.recv(&mut heard).unwrap();
+        assert_eq!(&heard[..length], look, "the order never came");
+    }
 }

@@ -151,7 +151,7 @@ impl House {
         let mut acks = AckLoop::going_on(receiver, watched, &firsts, ack_every, sent, ticks);
         acks.tell(Arc::clone(&live));
         let groups = Groups::of(&config.controllers);
-        let health = Health::new(groups, config.show.loss_policy, ack_every, rate.period());
+        let health = Health::new(groups, config.show.loss_policy, ack_every, rate.period()).of_a_hall();
         let watch =
             Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, Arc::clone(&live));
         acks.watched_by(watch.of_a_hall(standby));

@@ -1,9 +1,7 @@
 //! What surfaces ask, and what is done for it.
 
-use std::time::Duration;
-
-use super::Keeper;
-use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem};
+use super::{ANSWER, Keeper, LOOK_FOR_ANSWER};
+use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem, overtaken};
 use crate::rt::Command;
 use crate::state::{Request, State};
 use crate::sys::clock::Monotonic;
@@ -14,6 +12,7 @@ impl Keeper {
     pub(super) fn on_asked(&mut self, asked: Asked) {
         self.take_news();
         let Desired { ask, who } = asked.desired.clone();
+        self.heed(&ask);
         let result = match ask {
             Ask::Load { cue } => return self.load(&cue, asked),
             Ask::Playlist { id } => return self.playlist(id.as_deref(), asked),
@@ -21,14 +20,18 @@ impl Keeper {
             Ask::Test { rows } => return self.test(&rows, asked),
             Ask::Preflight => return self.preflight(asked),
             Ask::Home => self.request(Request::Home),
-            Ask::Arm => self.request(Request::Arm),
+            Ask::Arm { seats_empty: false } => self.request(Request::Arm),
+            Ask::Arm { seats_empty: true } => self.request(Request::HomeAndArm),
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
-                self.request(Request::Go).inspect(|()| self.begin_record(&who.to_string(), who.surface))
+                let before = self.count_before();
+                self.request(Request::Go).inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
             }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
             Ask::Park => self.request(Request::Park),
+            // Whoever pressed it meant what was latched then.
+            Ask::Clear if asked.is_before(self.known.since) => Err(overtaken("clear", self.known.state)),
             Ask::Clear => self.request(Request::Clear),
             Ask::Stop => {
                 // The flag is set already where it came by a handle; the machine takes a stop in every state.
@@ -49,7 +52,7 @@ impl Keeper {
     }
 
     fn request(&mut self, request: Request) -> Result<(), Problem> {
-        if matches!(request, Request::Arm | Request::Home) {
+        if matches!(request, Request::Arm | Request::HomeAndArm | Request::Home) {
             // Both need the line, or a show that nobody is about to replace.
             self.is_free()?;
         }
@@ -58,12 +61,13 @@ impl Keeper {
 
     /// Waits until the stop is seen in the state, a tick or two.
     fn await_stop(&mut self) {
-        for _ in 0..100 {
+        let until = Monotonic.now() + ANSWER;
+        while Monotonic.now() < until {
             self.take_news();
             if matches!(self.known.state, State::Stopping | State::Stopped | State::Fault) {
                 return;
             }
-            Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(1));
+            Monotonic.sleep_until(Monotonic.now() + LOOK_FOR_ANSWER);
         }
     }
 
@@ -107,9 +111,7 @@ impl Keeper {
     }
 
     fn levels(&mut self, change: &LevelsChange) -> Result<(), Problem> {
-        let before = self.board.clone();
-        self.board.change(change)?;
-        self.reset().inspect_err(|_| self.board = before)
+        self.set(|board| board.change(change))
     }
 
     /// Takes the group of a controller in or out.
@@ -120,8 +122,15 @@ impl Keeper {
             return Err(Problem::new(Code::Unknown, detail, "GET /api/v1/controllers lists them"));
         };
         let group = controller.group.clone();
-        let before = self.board.clone();
-        self.board.enable(&group, on);
-        self.reset().inspect_err(|_| self.board = before)
+        // Between shows arming sees to that.
+        if on && self.known.state.may_send_motion() && !self.is_preflighted(&group) {
+            let detail =
+                format!("cannot enable {name} while {}: its preflight has not passed", self.known.state);
+            return Err(Problem::new(Code::State, detail, "park, enable it, and run preflight"));
+        }
+        self.set(|board| {
+            board.enable(&group, on);
+            Ok(())
+        })
     }
 }

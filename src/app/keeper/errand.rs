@@ -1,15 +1,15 @@
 //! What takes long is done on a thread of its own, one thing at a time; whoever asked for it is answered when it is done.
 
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use super::Keeper;
-use super::list::{List, Onward};
+use super::list::List;
 use super::ready::Preflighted;
 use super::show::Cued;
 use super::sweep::Sweep;
 use crate::app::house::Finding;
 use crate::hall::{Asked, Code, Problem};
-use crate::rt::Line;
 
 /// What came of an errand.
 #[derive(Debug)]
@@ -18,14 +18,14 @@ pub(super) enum Done {
     Cued(Result<Box<Cued>, Problem>),
     /// A playlist is checked, and the cue of its first entry proved, or why not.
     Listed(Result<(Box<List>, Box<Cued>), Problem>),
-    /// The cue of an entry is proved, or why not; and what is to happen then.
-    Entry(usize, Onward, Result<Box<Cued>, Problem>),
+    /// The cue of an entry is proved, or why not.
+    Entry(usize, Result<Box<Cued>, Problem>),
     /// A test of the seats is made, or why not.
     Swept(Result<(Box<Sweep>, Box<Cued>), Problem>),
     /// The controllers were asked for all that preflight judges.
-    Preflighted(Line, Box<Preflighted>),
+    Preflighted(Box<Preflighted>),
     /// Controllers were homed.
-    Homed(Line, Finding),
+    Homed(Finding),
 }
 
 /// An errand under way.
@@ -37,8 +37,12 @@ pub(super) struct Errand {
 }
 
 impl Keeper {
-    /// Whether nothing long is under way; else why not.
+    /// Whether something long may begin; else why not. In a hall that closes nothing may: it would hold the port that the next
+    /// one opens.
     pub(super) fn is_free(&self) -> Result<(), Problem> {
+        if self.reins.leave.load(Ordering::Acquire) {
+            return Err(Problem::new(Code::Busy, "the hall is being closed", "ask again in a second"));
+        }
         match &self.errand {
             None => Ok(()),
             Some(errand) => Err(Problem::new(
@@ -65,7 +69,7 @@ impl Keeper {
         match (spawned, asked) {
             (Ok(_), asked) => self.errand = Some(Errand { word, done, asked }),
             (Err(cause), Some(asked)) => self.answer(asked, Err(no_thread(&cause))),
-            (Err(_), None) => {}
+            (Err(cause), None) => self.note(no_thread(&cause).to_string()),
         }
     }
 
@@ -81,17 +85,13 @@ impl Keeper {
         let result = match done {
             Some(Done::Cued(cued)) => cued.and_then(|cued| self.take_up(*cued)),
             Some(Done::Listed(listed)) => listed.and_then(|(list, cued)| self.take_up_list(*list, *cued)),
-            Some(Done::Entry(entry, onward, cued)) => {
-                cued.and_then(|cued| self.take_up_entry(entry, onward, *cued))
-            }
+            Some(Done::Entry(entry, cued)) => cued.and_then(|cued| self.take_up_entry(entry, *cued)),
             Some(Done::Swept(swept)) => swept.and_then(|(sweep, cued)| self.take_up_sweep(*sweep, *cued)),
-            Some(Done::Preflighted(line, preflighted)) => {
-                self.line = Some(line);
+            Some(Done::Preflighted(preflighted)) => {
                 self.preflighted = Some(*preflighted);
                 Ok(())
             }
-            Some(Done::Homed(line, finding)) => {
-                self.line = Some(line);
+            Some(Done::Homed(finding)) => {
                 self.on_homed(finding);
                 Ok(())
             }

@@ -1,13 +1,15 @@
 //! Homing: while the hall is in that state the controllers find their zero by themselves. Their seats stand elsewhere than
 //! before then, so the hall is home only once all of them were seen anew.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::Keeper;
 use super::errand::Done;
 use crate::app::house::{Finding, Inquiry, inquire};
 use crate::rt::{Command, Order};
-use crate::state::{Event, State, Trouble};
+use crate::state::{Event, Trouble};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -16,27 +18,38 @@ const SEEN_WITHIN: Duration = Duration::from_secs(5);
 /// What is told sooner than this after an order may be from before it.
 const STALE: Duration = Duration::from_millis(300);
 
-/// Controllers that are home and have to be seen.
+/// How far a homing is, which is over as soon as the hall leaves that state.
 #[derive(Debug)]
-pub(super) struct Settling {
-    since: MonoTime,
+pub(super) enum Homing {
+    /// The controllers are told to, and watched; called off, none of them is told any more.
+    UnderWay(Arc<AtomicBool>),
+    /// They are home since then, and have to be seen.
+    Settling(MonoTime),
 }
 
 impl Keeper {
-    /// Sends somebody to home all that take part. An errand that is under way has the line; the state machine ends the homing
-    /// then when its time is over.
+    /// Sends somebody to home all that take part. Where that cannot be, the state machine ends the homing when its time is
+    /// over.
     pub(super) fn begin_homing(&mut self) {
+        if self.is_free().is_err() {
+            return;
+        }
         let lanes: Vec<usize> =
             (0..self.reins.config.controllers.len()).filter(|lane| self.board.is_on(*lane)).collect();
-        let Some(mut line) = self.line.take() else {
-            let _ = self.command(Command::Event(Event::Trouble(Trouble::HomingTime)));
-            return;
-        };
-        let config = self.reins.config.clone();
+        let called_off = Arc::default();
+        self.homing = Some(Homing::UnderWay(Arc::clone(&called_off)));
+        let (config, line) = (self.reins.config.clone(), self.line.clone());
         self.send("homing", None, move || {
-            let finding = inquire(&mut line, &config.controllers, Inquiry::Home(lanes), &mut |_| {});
-            Done::Homed(line, finding)
+            let inquiry = Inquiry::Home { lanes, called_off };
+            Done::Homed(inquire(&mut line.hold(), &config.controllers, inquiry, &mut |_| {}))
         });
+    }
+
+    /// The hall homes no longer: no further seat begins to. What has begun is the controllers' own.
+    pub(super) fn call_off_homing(&mut self) {
+        if let Some(Homing::UnderWay(called_off)) = self.homing.take() {
+            called_off.store(true, Ordering::Release);
+        }
     }
 
     /// Takes what became of the seats: those that are home are looked at anew.
@@ -50,27 +63,28 @@ impl Keeper {
                     // Where it finds no room the controller is not looked at, and stays out.
                     let _ = self.reins.orders.push(Order::Homed(index));
                 }
+                // Of what was called off nobody waits for an end.
+                Err(_) if self.homing.is_none() => {}
                 Err(error) => {
                     self.note(format!("{}: {error}", self.reins.config.controllers[controller].name));
                     failed.get_or_insert(controller);
                 }
             }
         }
+        if self.homing.is_none() {
+            return;
+        }
         match failed {
             Some(controller) => {
                 let _ = self.command(Command::Event(Event::Trouble(Trouble::Homing(controller))));
             }
-            None => self.homing = Some(Settling { since: Monotonic.now() }),
+            None => self.homing = Some(Homing::Settling(Monotonic.now())),
         }
     }
 
     /// Says that the seats are home once all of them were seen.
     pub(super) fn settle_homing(&mut self) {
-        let Some(Settling { since }) = self.homing else { return };
-        if self.known.state != State::Homing {
-            self.homing = None;
-            return;
-        }
+        let Some(Homing::Settling(since)) = self.homing else { return };
         let now = Monotonic.now();
         let table = self.reins.live.table();
         let open = table.iter().enumerate().find(|(lane, row)| {

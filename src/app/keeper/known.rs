@@ -14,13 +14,16 @@ pub(super) struct Known {
     pub(super) cause: Cause,
     pub(super) next: Next,
     pub(super) since: MonoTime,
+    /// Commands that were given and not answered yet, be it that nobody waits any more.
+    open: u32,
     /// The answer to the command that was given last.
     answer: Option<Result<(), Problem>>,
 }
 
 impl Known {
     pub(super) const fn new(now: MonoTime) -> Self {
-        Self { state: State::Boot, cause: Cause::Started, next: Next::AwaitAnswers, since: now, answer: None }
+        let (state, cause, next) = (State::Boot, Cause::Started, Next::AwaitAnswers);
+        Self { state, cause, next, since: now, open: 0, answer: None }
     }
 
     /// Takes news; says from which state to which the hall went, where it did.
@@ -31,9 +34,9 @@ impl Known {
                 (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
                 return (from != state).then_some((from, state));
             }
-            News::Taken => self.answer = Some(Ok(())),
-            News::Refused(refusal) => self.answer = Some(Err(refusal.into())),
-            News::NotLoaded(state) => self.answer = Some(Err(not_loaded(state))),
+            News::Taken => self.on_answer(Ok(())),
+            News::Refused(refusal) => self.on_answer(Err(refusal.into())),
+            News::NotLoaded(state) => self.on_answer(Err(not_loaded(state))),
         }
         None
     }
@@ -44,8 +47,17 @@ impl Known {
         Some(end.since(now).as_secs_f64())
     }
 
-    /// An answer is waited for.
+    /// Answers come in the order of the commands: one that was given up on is not taken for that of the next.
+    fn on_answer(&mut self, answer: Result<(), Problem>) {
+        self.open = self.open.saturating_sub(1);
+        if self.open == 0 {
+            self.answer = Some(answer);
+        }
+    }
+
+    /// A command was given: its answer is waited for.
     pub(super) fn expect(&mut self) {
+        self.open += 1;
         self.answer = None;
     }
 

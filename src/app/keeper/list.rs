@@ -6,9 +6,10 @@ use jiff::Zoned;
 
 use super::Keeper;
 use super::errand::Done;
+use super::record::Before;
 use super::show::{Cued, read};
 use crate::config::Config;
-use crate::hall::{Asked, Code, EntryStatus, PlaylistStatus, Problem, Surface};
+use crate::hall::{Ask, Asked, Code, EntryStatus, PlaylistStatus, Problem, Surface};
 use crate::journal::{PlaylistPlace, stamp};
 use crate::library::Library;
 use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, Then, next_start};
@@ -26,13 +27,23 @@ pub(super) struct List {
     schedule: Schedule,
 }
 
-/// What is to happen once a cue of the playlist is loaded.
+/// What lets an entry start by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Onward {
-    /// Nothing.
-    Wait,
-    /// It starts: the entry before goes on to it, or its time has come.
-    Start,
+enum Start {
+    /// The entry before goes on to it: the hall is armed for it once more.
+    GoOn,
+    /// Its time has come, and a person has armed the hall.
+    Time,
+}
+
+/// What starts by itself, which is what every person can hold back.
+#[derive(Debug, Default)]
+pub(super) struct Onward {
+    /// The entry that is being loaded starts then. Taken back where the hall leaves the state that it was in, or somebody wants
+    /// it to stay there.
+    start: Option<Start>,
+    /// Somebody wanted the hall to stay at rest since the show began.
+    held: bool,
 }
 
 impl List {
@@ -88,7 +99,7 @@ impl List {
 impl Keeper {
     /// Loads a playlist, with the cue of its first entry, or drops the one that is loaded.
     pub(super) fn playlist(&mut self, id: Option<&str>, asked: Asked) {
-        let free = self.may_load().and_then(|()| self.is_free());
+        let free = self.may("load").and_then(|()| self.is_free());
         let id = match (free, id.map(str::parse::<PlaylistId>)) {
             (Err(problem), _) => return self.answer(asked, Err(problem)),
             (Ok(()), None) => {
@@ -115,7 +126,7 @@ impl Keeper {
 
     /// Takes up a playlist that was checked.
     pub(super) fn take_up_list(&mut self, list: List, cued: Cued) -> Result<(), Problem> {
-        self.may_load()?;
+        self.may("load")?;
         self.list = Some(list);
         self.set_entry()?;
         self.take_up(cued)
@@ -132,28 +143,33 @@ impl Keeper {
             );
             return self.answer(asked, Err(problem));
         }
-        if let Err(problem) = self.may_load().and_then(|()| self.is_free()) {
+        if let Err(problem) = self.may("load").and_then(|()| self.is_free()) {
             return self.answer(asked, Err(problem));
         }
-        self.fetch_entry(entry, Onward::Wait, Some(asked));
+        self.fetch_entry(entry, None, Some(asked));
     }
 
-    /// Has the cue of an entry read.
-    fn fetch_entry(&mut self, entry: usize, onward: Onward, asked: Option<Asked>) {
+    /// Has the cue of an entry read, which starts then where that is due.
+    fn fetch_entry(&mut self, entry: usize, start: Option<Start>, asked: Option<Asked>) {
         let Some(list) = &self.list else { return };
         let cue = list.playlist.entries[entry].cue.clone();
         let (library, config) = (self.library.clone(), self.reins.config.clone());
-        self.send("loading", asked, move || Done::Entry(entry, onward, read(&library, &config, &cue)));
+        self.onward.start = start;
+        self.send("loading", asked, move || Done::Entry(entry, read(&library, &config, &cue)));
     }
 
-    /// Takes up the cue of an entry, and starts it where that is due.
-    pub(super) fn take_up_entry(&mut self, entry: usize, onward: Onward, cued: Cued) -> Result<(), Problem> {
+    /// Takes up the cue of an entry, and starts it where that is still due.
+    pub(super) fn take_up_entry(&mut self, entry: usize, cued: Cued) -> Result<(), Problem> {
+        let start = self.onward.start.take();
+        if start.is_none() {
+            self.may("load")?;
+        }
         let Some(list) = &mut self.list else { return Ok(()) };
         list.current = entry;
         self.set_entry()?;
         self.cued = Some(cued);
         self.stage().inspect_err(|_| self.cued = None)?;
-        if onward == Onward::Start { self.start_entry() } else { Ok(()) }
+        start.map_or(Ok(()), |start| self.start_entry(start))
     }
 
     /// Sets what the current entry says of levels, effects and trim.
@@ -166,33 +182,72 @@ impl Keeper {
         Ok(())
     }
 
-    /// Lets the current entry go, arming the hall first where the entry before went on to it.
-    fn start_entry(&mut self) -> Result<(), Problem> {
+    /// Lets the current entry go, arming the hall first where the entry before went on to it. That homes no seat: people sit
+    /// there.
+    fn start_entry(&mut self, start: Start) -> Result<(), Problem> {
         self.tell_readiness();
-        if self.known.state == State::Parked {
+        if start == Start::GoOn {
             self.command(Command::Request(Request::Arm))?;
         }
-        if self.known.state == State::Homing {
-            return Err(Problem::new(Code::State, "the seats have to be homed first", "arm, and go"));
+        let before = self.count_before();
+        self.command(Command::Request(Request::Go))?;
+        self.begin_show("the playlist", Surface::Schedule, before);
+        Ok(())
+    }
+
+    /// A show has begun: who let it go, and that nobody has held the hall back since.
+    pub(super) fn begin_show(&mut self, who: &str, surface: Surface, before: Before) {
+        self.onward = Onward::default();
+        self.begin_record(who, surface, before);
+    }
+
+    /// Whether what is loaded is that entry of the playlist.
+    pub(super) fn is_entry(&self, entry: usize) -> bool {
+        let cue = self.cued.as_ref().map(|cued| cued.id.as_str());
+        self.list
+            .as_ref()
+            .is_some_and(|list| list.current == entry && cue == Some(&*list.entry().cue.to_string()))
+    }
+
+    /// Where the playlist is, where what is loaded is of it.
+    pub(super) fn place(&self) -> Option<PlaylistPlace> {
+        let list = self.list.as_ref().filter(|list| self.is_entry(list.current));
+        list.map(List::place)
+    }
+
+    /// Whoever wants the hall to be at rest wants nothing to start by itself either, also where it is at rest already.
+    pub(super) fn heed(&mut self, ask: &Ask) {
+        let rests = !matches!(self.known.state, State::Playing(_) | State::Paused);
+        if matches!(ask, Ask::Stop | Ask::Park | Ask::Disarm) || (rests && *ask == Ask::Pause) {
+            self.hold_back();
         }
-        self.command(Command::Request(Request::Go))
-            .inspect(|()| self.begin_record("the playlist", Surface::Schedule))
+    }
+
+    /// Nothing starts by itself before a person lets a show go.
+    pub(super) fn hold_back(&mut self) {
+        self.onward = Onward { start: None, held: true };
+    }
+
+    /// The hall is in another state: what was to start by itself was for the one before.
+    pub(super) fn forget_start(&mut self) {
+        self.onward.start = None;
     }
 
     /// A show is over: the next entry is loaded, and starts where the one before says so and came to its end.
     pub(super) fn on_show_over(&mut self, ended: Cause) {
         let Some(list) = &self.list else { return self.rewind() };
         let completed = ended == Cause::CueEnded;
-        let next = list.current + 1;
-        if !completed || next >= list.playlist.entries.len() {
+        let (played, next) = (list.current, list.current + 1);
+        // A cue that a person loaded beside the playlist leads nowhere.
+        if !completed || !self.is_entry(played) || next >= list.playlist.entries.len() {
             return self.rewind();
         }
-        let goes = list.entry().then == Then::Go && self.known.state == State::Parked;
-        let onward = if goes { Onward::Start } else { Onward::Wait };
+        let goes = list.entry().then == Then::Go && self.known.state == State::Parked && !self.onward.held;
+        let start = goes.then_some(Start::GoOn);
         // The engine that is done makes way for one that waits, whatever becomes of the next cue.
         self.rewind();
         if self.is_free().is_ok() {
-            self.fetch_entry(next, onward, None);
+            self.fetch_entry(next, start, None);
         }
     }
 
@@ -201,15 +256,17 @@ impl Keeper {
         let Some(list) = &mut self.list else { return };
         let Some(entry) = list.schedule.due(&list.playlist, &Zoned::now()) else { return };
         let cue = list.playlist.entries[entry].cue.to_string();
-        if self.known.state != State::Armed || self.is_free().is_err() {
+        if self.known.state != State::Armed {
             let state = self.known.state;
             self.note(format!("{cue} was to start now, but nobody had armed the hall: it was {state}"));
             return;
         }
-        let result = if self.list.as_ref().is_some_and(|list| list.current == entry) {
-            self.start_entry()
+        let result = if let Err(problem) = self.is_free() {
+            Err(problem)
+        } else if self.is_entry(entry) {
+            self.start_entry(Start::Time)
         } else {
-            self.fetch_entry(entry, Onward::Start, None);
+            self.fetch_entry(entry, Some(Start::Time), None);
             Ok(())
         };
         if let Err(problem) = result {
@@ -217,3 +274,6 @@ impl Keeper {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,39 +8,49 @@ mod errand;
 mod homing;
 mod known;
 mod list;
+mod party;
 mod ready;
 mod record;
+mod reload;
 mod show;
 mod status;
+mod strangers;
 mod sweep;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 mod voice;
 mod warnings;
 
+pub use reload::{Memory, Signals};
 pub use voice::Voice;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use super::house::{Closed, Reins};
-use crate::config::{self, Config};
-use crate::hall::{Asked, Code, Inbox, Problem, Status, StatusSource};
+use crate::config::Config;
+use crate::hall::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
-use crate::rt::{Command, Line};
+use crate::rt::Command;
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 use board::Board;
 use errand::Errand;
 use known::Known;
+use party::PartyLine;
 use ready::Preflighted;
 use record::Records;
 use show::Cued;
 use status::Rates;
+use strangers::Strangers;
 
 /// How long an ask is waited for before the keeper looks after everything else.
 const LOOK: Duration = Duration::from_millis(10);
@@ -50,6 +60,8 @@ const TELL: Duration = Duration::from_millis(100);
 const NOTES: usize = 5;
 /// How long the tick thread has to answer a command; a tick takes a second at most.
 const ANSWER: Duration = Duration::from_secs(2);
+/// How often its answer is looked for.
+const LOOK_FOR_ANSWER: Duration = Duration::from_micros(200);
 
 /// What a keeper has whatever the configuration is.
 #[derive(Debug)]
@@ -60,36 +72,14 @@ pub struct Ends {
     pub source: StatusSource,
     /// The file of the configuration.
     pub config: PathBuf,
+    /// When the program started.
+    pub began: MonoTime,
     /// What the system asks of the program.
     pub signals: Signals,
     /// Whom to tell what happens.
     pub voice: Voice,
     /// What was set in the hall before; for a first one, nothing.
     pub memory: Memory,
-}
-
-/// What goes over from a hall to the one that is opened with another configuration.
-#[derive(Debug, Default)]
-pub struct Memory {
-    board: Option<Board>,
-    cue: Option<String>,
-}
-
-/// What the system asks of the program; set by signals.
-#[derive(Debug, Clone, Default)]
-pub struct Signals {
-    /// Park, and end.
-    pub leave: Arc<AtomicBool>,
-    /// Read the configuration anew.
-    pub reload: Arc<AtomicBool>,
-}
-
-impl Signals {
-    /// Whether the program is to end.
-    #[must_use]
-    pub fn is_leaving(&self) -> bool {
-        self.leave.load(Ordering::Acquire)
-    }
 }
 
 /// What is left once the hall has closed.
@@ -118,17 +108,18 @@ pub struct Keeper {
     cued: Option<Cued>,
     preflighted: Option<Preflighted>,
     errand: Option<Errand>,
-    homing: Option<homing::Settling>,
+    homing: Option<homing::Homing>,
     /// What the tick thread was told of readiness.
     readiness: Option<crate::state::Readiness>,
     rates: Rates,
+    strangers: Strangers,
     told: MonoTime,
-    /// The way to the controllers' registers; none while an errand has it.
-    line: Option<Line>,
+    line: PartyLine,
     library: Library,
     /// What went wrong lately and no state says, newest last.
     notes: VecDeque<String>,
     list: Option<list::List>,
+    onward: list::Onward,
     sweep: Option<sweep::Sweep>,
     record: Records,
     reload: Option<Arc<Config>>,
@@ -140,7 +131,13 @@ pub struct Keeper {
 impl Keeper {
     /// The keeper of a hall that has just opened.
     #[must_use]
-    pub fn new(mut ends: Ends, reins: Reins, line: Line, library: Library, journal: Journal) -> Self {
+    pub fn new(
+        mut ends: Ends,
+        reins: Reins,
+        line: crate::rt::Line,
+        library: Library,
+        journal: Journal,
+    ) -> Self {
         let now = Monotonic.now();
         let memory = std::mem::take(&mut ends.memory);
         let mut board = Board::new(&reins.config);
@@ -160,11 +157,13 @@ impl Keeper {
             homing: None,
             readiness: None,
             rates: Rates::default(),
+            strangers: Strangers::default(),
             told: now,
-            line: Some(line),
+            line: PartyLine::of(line),
             library,
-            notes: VecDeque::new(),
+            notes: memory.notes,
             list: None,
+            onward: list::Onward::default(),
             sweep: None,
             record: Records::new(journal),
             reload: None,
@@ -172,9 +171,7 @@ impl Keeper {
             ended: Cause::Started,
         };
         keeper.examine_library();
-        if let Some(Ok(cue)) = memory.cue.map(|cue| cue.parse()) {
-            keeper.fetch(cue, None);
-        }
+        keeper.begin(memory.cue, memory.latched);
         keeper
     }
 
@@ -188,8 +185,8 @@ impl Keeper {
             self.look_after();
             if let Ok(closed) = closed.try_recv() {
                 self.end_record(self.ended);
-                let cue = self.cued.map(|cued| cued.id);
-                self.ends.memory = Memory { board: Some(self.board), cue };
+                self.close_record();
+                self.ends.memory = self.remember();
                 let journal = self.record.into_journal();
                 let ended = record::ending(self.ended);
                 return Left { ends: self.ends, closed, reload: self.reload, ended, journal };
@@ -200,18 +197,20 @@ impl Keeper {
     /// Everything that nobody has to ask for.
     fn look_after(&mut self) {
         self.take_news();
+        self.heed_signals();
         self.end_show();
+        self.settle_record();
         self.follow_sweep();
         self.end_errand();
         self.heed_schedule();
         self.settle_homing();
         self.tell_readiness();
-        self.heed_signals();
         let now = Monotonic.now();
         if now.since(self.told) >= TELL {
             self.told = now;
             let table = self.reins.live.table();
             self.rates.note(&table, now);
+            self.strangers.note(&table, now);
             self.say_journal();
             self.publish();
         }
@@ -227,6 +226,8 @@ impl Keeper {
     }
 
     fn on_state(&mut self, from: State, to: State) {
+        self.forget_start();
+        self.call_off_homing();
         if to == State::Homing {
             self.begin_homing();
         }
@@ -259,8 +260,9 @@ impl Keeper {
         }
     }
 
-    /// Notes what no state says, for the warnings.
+    /// Notes what no state says, for the log and the warnings.
     fn note(&mut self, note: String) {
+        self.say_note(&note);
         self.notes.push_back(note);
         if self.notes.len() > NOTES {
             self.notes.pop_front();
@@ -269,6 +271,7 @@ impl Keeper {
 
     /// Gives the tick thread a command and waits for its answer, a tick or two.
     fn command(&mut self, command: Command) -> Result<(), Problem> {
+        self.take_news(); // so that there is room for the answer
         if self.reins.commands.push(command).is_err() {
             return Err(known::busy());
         }
@@ -282,7 +285,7 @@ impl Keeper {
             if Monotonic.now() >= until {
                 return Err(known::no_answer(ANSWER));
             }
-            Monotonic.sleep_until(Monotonic.now() + Duration::from_micros(200));
+            Monotonic.sleep_until(Monotonic.now() + LOOK_FOR_ANSWER);
         }
     }
 
@@ -299,38 +302,5 @@ impl Keeper {
         self.write_down(&asked.desired, &result);
         let status = self.publish();
         asked.answer(result.map(|()| status));
-    }
-
-    fn heed_signals(&mut self) {
-        if self.ends.signals.is_leaving() {
-            // Whatever moves parks first; the tick thread sees to that.
-            self.reins.leave.store(true, Ordering::Release);
-        }
-        if self.ends.signals.reload.swap(false, Ordering::AcqRel)
-            && let Err(problem) = self.reload()
-        {
-            self.note(problem.to_string());
-        }
-    }
-
-    /// Reads the configuration anew, and has the hall opened with it. The old one is kept where the new one is bad, and while
-    /// anything is armed.
-    fn reload(&mut self) -> Result<(), Problem> {
-        let idle = matches!(
-            self.known.state,
-            State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
-        );
-        if !idle {
-            let detail = format!("cannot read the configuration anew while {}", self.known.state);
-            return Err(Problem::new(Code::State, detail, "park, and disarm first"));
-        }
-        let config = config::load(&self.ends.config).map_err(|faults| {
-            let detail = format!("{} is bad; the old configuration is kept", self.ends.config.display());
-            let faults = faults.to_string().lines().map(str::to_owned).collect();
-            Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
-        })?;
-        self.reload = Some(Arc::new(config));
-        self.reins.leave.store(true, Ordering::Release);
-        Ok(())
     }
 }

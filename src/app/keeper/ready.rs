@@ -2,11 +2,10 @@
 
 use super::Keeper;
 use super::errand::Done;
-use super::show::Cued;
 use crate::app::house::{Finding, Inquiry, inquire};
 use crate::config::Config;
 use crate::device::survey::Survey;
-use crate::hall::{Asked, Code, PreflightStatus, Problem, Severity, Warning};
+use crate::hall::{Asked, PreflightStatus, Severity, Warning};
 use crate::net::{Route, route};
 use crate::preflight::{self, Check, Subject, Terms, judge};
 use crate::rt::Command;
@@ -25,8 +24,8 @@ pub(super) struct Preflighted {
 }
 
 impl Preflighted {
-    /// Judges what controllers told; `cue` says how many axes it has and whether it vibrates.
-    fn of(config: &Config, surveys: &[Survey], cue: Option<(usize, bool)>) -> Self {
+    /// Judges what controllers told, for whatever cue is played.
+    fn of(config: &Config, surveys: &[Survey]) -> Self {
         let bind = *config.show.bind.ip();
         let way =
             |address| -> Result<Route, String> { route(bind, address).map_err(|error| error.to_string()) };
@@ -41,7 +40,7 @@ impl Preflighted {
                 survey: Some(survey),
             })
             .collect();
-        let terms = Terms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue };
+        let terms = Terms { frame_port: config.show.bind.port(), rate_hz: config.show.rate_hz, cue: None };
         let found = judge(&subjects, &terms, &config.show.accept_findings);
         let passed = found.iter().map(|found| !found.iter().any(preflight::Finding::fails)).collect();
         let mut findings = Vec::new();
@@ -70,6 +69,21 @@ impl Preflighted {
     }
 }
 
+#[cfg(test)]
+impl Preflighted {
+    /// One that so many controllers have passed.
+    pub(super) fn passing(controllers: usize) -> Self {
+        Self { at: Monotonic.now(), answered: controllers, passed: vec![true; controllers], findings: vec![] }
+    }
+
+    /// The same, but for one of them.
+    pub(super) fn failing_at(controller: usize, controllers: usize) -> Self {
+        let mut it = Self::passing(controllers);
+        it.passed[controller] = false;
+        it
+    }
+}
+
 /// A finding as surfaces show it; none where all is well.
 fn told(controller: &str, finding: preflight::Finding) -> Option<Warning> {
     let severity = match (finding.severity(), &finding.accepted) {
@@ -90,28 +104,26 @@ fn id(check: Check) -> String {
 impl Keeper {
     /// Has all controllers asked; whoever asked for it is answered once they were judged.
     pub(super) fn preflight(&mut self, asked: Asked) {
-        if self.known.state.may_send_motion() {
-            let detail = format!("cannot preflight while {}: frames go out", self.known.state);
-            return self.answer(asked, Err(Problem::new(Code::State, detail, "park first")));
-        }
-        if let Err(problem) = self.is_free() {
+        // An armed hall may go at any moment, and then frames come between.
+        if let Err(problem) = self.may("preflight").and_then(|()| self.is_free()) {
             return self.answer(asked, Err(problem));
         }
-        let Some(mut line) = self.line.take() else {
-            let problem =
-                Problem::new(Code::Busy, "the controllers are being asked", "ask again in a minute");
-            return self.answer(asked, Err(problem));
-        };
-        let config = self.reins.config.clone();
-        let cue = self.cued.as_ref().map(Cued::shape);
+        let (config, line) = (self.reins.config.clone(), self.line.clone());
         self.send("preflight", Some(asked), move || {
-            let surveys = match inquire(&mut line, &config.controllers, Inquiry::Survey, &mut |_| {}) {
+            let finding = inquire(&mut line.hold(), &config.controllers, Inquiry::Survey, &mut |_| {});
+            let surveys = match finding {
                 Finding::Surveyed(surveys) => surveys,
                 Finding::Homed(_) => Vec::new(),
             };
-            let preflighted = Preflighted::of(&config, &surveys, cue);
-            Done::Preflighted(line, Box::new(preflighted))
+            Done::Preflighted(Box::new(Preflighted::of(&config, &surveys)))
         });
+    }
+
+    /// Whether nothing fails at the controllers of a group.
+    pub(super) fn is_preflighted(&self, group: &str) -> bool {
+        let controllers = &self.reins.config.controllers;
+        let of_group = |lane: usize| controllers[lane].group == group;
+        self.preflighted.as_ref().is_some_and(|it| it.has_passed(of_group))
     }
 
     /// Tells the tick thread whether a show can be armed, where that has changed.

@@ -1,6 +1,7 @@
 //! What is written down: what was asked by whom, and what was played.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use jiff::Zoned;
 
@@ -9,8 +10,12 @@ use crate::hall::{Desired, JournalLine, Problem, Surface};
 use crate::journal::{Action, Ending, Journal, Outcome, Percentiles, ShowRecord, stamp};
 use crate::rt::{Row, Times};
 use crate::state::Cause;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
 use crate::tracker::{Counts, Histogram};
 
+/// How long the last frames of a show have to meet their fate, and the ack thread to tell it.
+const SETTLED_WITHIN: Duration = Duration::from_millis(1_500);
 /// Lines that every status carries.
 const NEWEST: usize = 20;
 
@@ -23,15 +28,33 @@ pub(super) struct Records {
     open: Option<Box<Open>>,
 }
 
-/// A show that has begun, with what was counted before.
+/// What was counted before a show.
 #[derive(Debug)]
-struct Open {
-    record: ShowRecord,
-    events: Vec<String>,
+pub(super) struct Before {
     ticks: u64,
     missed: u64,
     table: Vec<Row>,
     times: Times,
+}
+
+/// A show that has begun.
+#[derive(Debug)]
+struct Open {
+    record: ShowRecord,
+    before: Before,
+    events: Vec<String>,
+    /// How it ended; none while it goes on.
+    over: Option<Over>,
+}
+
+/// The end of a show whose last frames may be on their way.
+#[derive(Debug)]
+struct Over {
+    cause: Cause,
+    end: String,
+    at: MonoTime,
+    ticks: u64,
+    missed: u64,
 }
 
 impl Records {
@@ -62,7 +85,7 @@ impl Records {
 
     /// Notes something that happens while a show is under way.
     pub(super) fn event(&mut self, event: String) {
-        if let Some(open) = &mut self.open {
+        if let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) {
             open.events.push(event);
         }
     }
@@ -86,13 +109,22 @@ impl Keeper {
         self.record.journal.note(&Action { at, who, what, result, state });
     }
 
-    /// A show has just begun, and who let it go. What was counted is as the ack thread told it last, before it began.
-    pub(super) fn begin_record(&mut self, who: &str, surface: Surface) {
+    /// What is counted so far; to be taken before a show is let go.
+    pub(super) fn count_before(&self) -> Before {
+        let live = &self.reins.live;
+        Before { ticks: live.ticks(), missed: live.missed(), table: live.table(), times: live.times() }
+    }
+
+    /// A show has just begun, and who let it go.
+    pub(super) fn begin_record(&mut self, who: &str, surface: Surface, before: Before) {
+        self.close_record();
         let Some(cued) = &self.cued else { return };
         let (now, config) = (Zoned::now(), &self.reins.config);
-        let table = self.reins.live.table();
-        let available =
-            table.iter().enumerate().filter(|(lane, row)| self.board.is_on(*lane) && row.standing.may_move());
+        let available = before
+            .table
+            .iter()
+            .enumerate()
+            .filter(|(lane, row)| self.board.is_on(*lane) && row.standing.may_move());
         let levels = &self.board.levels;
         let off = levels.effects.iter().filter(|(_, on)| !**on);
         let record = ShowRecord {
@@ -101,7 +133,7 @@ impl Keeper {
             cue: cued.id.clone(),
             sha256: cued.sha256.clone(),
             title: cued.title.clone(),
-            playlist: self.list.as_ref().map(super::list::List::place),
+            playlist: self.place(),
             level: levels.motion,
             vibration: levels.vibration,
             trim_ms: self.board.trim_ms,
@@ -114,44 +146,59 @@ impl Keeper {
             outcome: None,
         };
         self.record.journal.begin(&record);
-        let live = &self.reins.live;
-        self.record.open = Some(Box::new(Open {
-            record,
-            events: Vec::new(),
-            ticks: live.ticks(),
-            missed: live.missed(),
-            times: live.times(),
-            table,
-        }));
+        self.record.open = Some(Box::new(Open { record, before, events: Vec::new(), over: None }));
     }
 
-    /// A show is over; the counts of its last second are still on their way, so a frame under way counts as
-    /// what it was when the show began.
+    /// A show is over. It is written down once its last frames have met their fate.
     pub(super) fn end_record(&mut self, ended: Cause) {
+        let Some(open) = self.record.open.as_mut().filter(|open| open.over.is_none()) else { return };
+        let live = &self.reins.live;
+        open.over = Some(Over {
+            cause: ended,
+            end: stamp(&Zoned::now()),
+            at: Monotonic.now(),
+            ticks: live.ticks().saturating_sub(open.before.ticks),
+            missed: live.missed().saturating_sub(open.before.missed),
+        });
+    }
+
+    /// Writes down a show that is over, once the ack thread has told the fate of every frame of it.
+    pub(super) fn settle_record(&mut self) {
+        let Some(over) = self.record.open.as_ref().and_then(|open| open.over.as_ref()) else { return };
+        let told = |row: &Row| row.at > over.at && row.counts.in_flight() == 0;
+        let late = Monotonic.now().since(over.at) > SETTLED_WITHIN;
+        if late || self.reins.live.table().iter().all(told) {
+            self.close_record();
+        }
+    }
+
+    /// Writes down a show that is over, with what was counted so far.
+    pub(super) fn close_record(&mut self) {
         let Some(open) = self.record.open.take() else { return };
-        let Open { mut record, events, ticks, missed, table, times } = *open;
+        let Open { mut record, before, events, over } = *open;
+        let Some(Over { cause, end, ticks, missed, .. }) = over else { return };
         let live = &self.reins.live;
         let now = live.table();
         let sum = |of: fn(&Counts) -> u64| -> u64 {
             let after: u64 = now.iter().map(|row| of(&row.counts)).sum();
-            let before: u64 = table.iter().map(|row| of(&row.counts)).sum();
-            after.saturating_sub(before)
+            let earlier: u64 = before.table.iter().map(|row| of(&row.counts)).sum();
+            after.saturating_sub(earlier)
         };
         let after = live.times();
         record.outcome = Some(Outcome {
-            end: stamp(&Zoned::now()),
-            result: ending(ended),
+            end,
+            result: ending(cause),
             events,
-            ticks: live.ticks().saturating_sub(ticks),
-            missed_ticks: live.missed().saturating_sub(missed),
+            ticks,
+            missed_ticks: missed,
             sent: sum(|counts| counts.sent),
             asked: sum(|counts| counts.asked),
             acked: sum(|counts| counts.acked),
             refused: sum(Counts::refused),
             lost: sum(|counts| counts.lost),
             send_failed: sum(|counts| counts.send_failed),
-            lateness: percentiles(after.lateness, &times.lateness),
-            ack: percentiles(after.acks, &times.acks),
+            lateness: percentiles(after.lateness, &before.times.lateness),
+            ack: percentiles(after.acks, &before.times.acks),
         });
         self.record.journal.show(&record);
     }

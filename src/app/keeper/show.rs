@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Keeper;
+use super::board::Board;
 use super::errand::Done;
 use crate::app::Staged;
 use crate::app::staged::headroom;
@@ -78,11 +79,6 @@ impl Cued {
         })
     }
 
-    /// How many axes it has, and whether it vibrates.
-    pub(super) fn shape(&self) -> (usize, bool) {
-        (self.timeline.axes(), self.timeline.has_vibration())
-    }
-
     /// As surfaces show it, the film being at `position`.
     pub(super) fn status(&self, position: ShowTime) -> ShowStatus {
         ShowStatus {
@@ -101,7 +97,7 @@ impl Cued {
 impl Keeper {
     /// Reads a cue of the library and proves it; whoever asked for it is answered then.
     pub(super) fn load(&mut self, id: &str, asked: Asked) {
-        if let Err(problem) = self.may_load().and_then(|()| self.is_free()) {
+        if let Err(problem) = self.may("load").and_then(|()| self.is_free()) {
             return self.answer(asked, Err(problem));
         }
         let id: CueId = match id.parse() {
@@ -133,19 +129,19 @@ impl Keeper {
         self.send("loading", asked, move || Done::Cued(read(&library, &config, &id)));
     }
 
-    /// Whether another cue may be loaded.
-    pub(super) fn may_load(&self) -> Result<(), Problem> {
+    /// Whether the hall is at rest, and nobody has made it ready to go, so that another cue may be loaded, or controllers asked.
+    pub(super) fn may(&self, what: &str) -> Result<(), Problem> {
         let remedy = match self.known.state {
             State::Armed => "disarm first",
             state if state.may_send_motion() => "park first",
             _ => return Ok(()),
         };
-        Err(Problem::new(Code::State, format!("cannot load while {}", self.known.state), remedy))
+        Err(Problem::new(Code::State, format!("cannot {what} while {}", self.known.state), remedy))
     }
 
     /// Takes up a cue that was proved.
     pub(super) fn take_up(&mut self, cued: Cued) -> Result<(), Problem> {
-        self.may_load()?;
+        self.may("load")?;
         self.cued = Some(cued);
         self.stage().inspect_err(|_| self.cued = None)
     }
@@ -167,15 +163,30 @@ impl Keeper {
         })?;
         let course = &staged.course;
         cued.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
-        self.board.set(&self.reins.desk, cued.timeline.effect_names());
+        self.set_desk();
         self.command(Command::Load(staged.loaded()))
     }
 
-    /// Makes the show anew after something was set that its first frames hang on; while the seats move the desk is enough.
-    pub(super) fn reset(&mut self) -> Result<(), Problem> {
+    /// Sets something, and makes the show anew where its first frames hang on that; while the seats move the desk is enough.
+    /// What no show can be made of is taken back.
+    pub(super) fn set(
+        &mut self,
+        change: impl FnOnce(&mut Board) -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        let before = self.board.clone();
+        change(&mut self.board)?;
+        self.set_desk();
+        let staged = if self.known.state.may_send_motion() { Ok(()) } else { self.stage() };
+        staged.inspect_err(|_| {
+            self.board = before;
+            self.set_desk();
+        })
+    }
+
+    /// Sets the tick thread's desk as the board says.
+    pub(super) fn set_desk(&self) {
         let effects = self.cued.as_ref().map_or(&[][..], |cued| cued.timeline.effect_names());
         self.board.set(&self.reins.desk, effects);
-        if self.known.state.may_send_motion() { Ok(()) } else { self.stage() }
     }
 
     /// The show is over: the same begins at its beginning the next time.
@@ -183,6 +194,11 @@ impl Keeper {
         if let Some(cued) = &mut self.cued {
             cued.start = ShowTime::ZERO;
         }
+        self.stage_again();
+    }
+
+    /// Makes the show that is loaded anew; one that cannot be made any more is dropped.
+    pub(super) fn stage_again(&mut self) {
         if let Err(problem) = self.stage() {
             self.note(problem.to_string());
             self.cued = None;

@@ -7,7 +7,7 @@ use super::Keeper;
 use crate::config::Controller;
 use crate::hall::{ControllerStatus, Histogram, Percentiles, RealTimeStatus, Status};
 use crate::rt::Row;
-use crate::state::Whose;
+use crate::state::{Next, Whose};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 use crate::tracker;
@@ -74,10 +74,11 @@ impl Keeper {
         Status {
             hall: self.reins.config.show.name.clone(),
             version: env!("CARGO_PKG_VERSION"),
-            uptime_s: now.since(self.began).as_secs_f64(),
+            uptime_s: now.since(self.ends.began).as_secs_f64(),
             state: self.known.state.word(),
             cause: self.cause(),
             next: self.known.next.to_string(),
+            arm_homes: self.known.next == Next::ArmAndHome,
             since_s: now.since(self.known.since).as_secs_f64(),
             lapses_s: self.known.lapses(now),
             moving,

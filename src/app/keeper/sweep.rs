@@ -107,19 +107,10 @@ impl Keeper {
     pub(super) fn test(&mut self, rows: &[String], asked: Asked) {
         let known = |row: &String| self.board.levels.rows.contains_key(row);
         let unknown: Vec<&String> = rows.iter().filter(|row| !known(row)).collect();
-        let problem = if self.known.state != State::Armed {
-            let detail = format!("cannot test while {}", self.known.state);
-            Some(Problem::new(
-                Code::State,
-                detail,
-                "load any cue and arm, with nobody on the seats, then test",
-            ))
-        } else if let Some(row) = unknown.first() {
-            Some(Problem::new(Code::Unknown, format!("there is no row {row}"), "the status names the rows"))
-        } else {
-            self.is_free().err()
-        };
-        if let Some(problem) = problem {
+        let named = unknown.first().map_or(Ok(()), |row| {
+            Err(Problem::new(Code::Unknown, format!("there is no row {row}"), "the status names the rows"))
+        });
+        if let Err(problem) = self.may_test().and(named).and_then(|()| self.is_free()) {
             return self.answer(asked, Err(problem));
         }
         let only = (!rows.is_empty()).then(|| rows.iter().cloned().collect());
@@ -145,18 +136,30 @@ impl Keeper {
         });
     }
 
-    /// Takes up a test that was made, and lets it go.
+    fn may_test(&self) -> Result<(), Problem> {
+        if self.known.state == State::Armed {
+            return Ok(());
+        }
+        let detail = format!("cannot test while {}", self.known.state);
+        Err(Problem::new(Code::State, detail, "load any cue and arm, with nobody on the seats, then test"))
+    }
+
+    /// Takes up a test that was made, and lets it go, where the hall is still armed.
     pub(super) fn take_up_sweep(&mut self, mut sweep: Sweep, cued: Cued) -> Result<(), Problem> {
+        self.may_test()?;
         self.board.only = sweep.only.take();
         sweep.before = self.cued.replace(cued).map(Box::new);
         self.sweep = Some(sweep);
+        let before = self.count_before();
         let begun = self.stage().and_then(|()| self.command(Command::Request(Request::Go)));
-        if begun.is_ok() {
-            self.begin_record("a test of the seats", Surface::Socket);
+        match &begun {
+            Ok(()) => self.begin_show("a test of the seats", Surface::Socket, before),
+            Err(_) => {
+                self.end_sweep("did not begin");
+                self.stage_again();
+            }
         }
-        begun.inspect_err(|_| {
-            self.end_sweep("did not begin");
-        })
+        begun
     }
 
     /// Follows a test that is under way.

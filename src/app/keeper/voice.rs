@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::Keeper;
+use super::warnings::NOTE;
 use crate::hall::{Severity, Status, Warning};
 use crate::log::{Line, Log, Priority};
 use crate::sd::Notifier;
@@ -35,7 +36,8 @@ impl Voice {
     fn warn(&mut self, warnings: &[Warning]) {
         let key = |warning: &Warning| (warning.id.clone(), warning.controller.clone());
         let now: BTreeMap<_, _> = warnings.iter().map(|warning| (key(warning), warning.severity)).collect();
-        for warning in warnings.iter().filter(|warning| warning.severity > Severity::Info) {
+        let news = |warning: &&Warning| warning.severity > Severity::Info && warning.id != NOTE;
+        for warning in warnings.iter().filter(news) {
             if self.warned.get(&key(warning)) == Some(&warning.severity) {
                 continue;
             }
@@ -77,6 +79,11 @@ impl Keeper {
             let text = format!("the service manager cannot be told: {error}");
             voice.log.say(Line::new(Priority::Warning, "notify", text));
         }
+    }
+
+    /// Says something that no state says: one such thing hides none that comes after it.
+    pub(super) fn say_note(&self, note: &str) {
+        self.ends.voice.log.say(Line::new(Priority::Warning, NOTE, note));
     }
 
     /// Says how the journal goes.

@@ -2,8 +2,11 @@
 
 use super::Keeper;
 use crate::hall::{Severity, Warning};
-use crate::health::Standing;
+use crate::health::{Standing, Why};
 use crate::rt::Row;
+
+/// What the warnings are called that say what no state says.
+pub(super) const NOTE: &str = "note";
 
 /// How a group stands, in one word.
 pub(super) const fn word(standing: Standing) -> &'static str {
@@ -23,6 +26,7 @@ impl Keeper {
     /// All of them, gravest first.
     pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
+        warnings.extend(self.of_strangers());
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
         warnings.extend(self.record.trouble().map(|trouble| Warning {
@@ -33,7 +37,7 @@ impl Keeper {
             remedy: String::new(),
         }));
         warnings.extend(self.notes.iter().rev().map(|note| Warning {
-            id: "note".to_owned(),
+            id: NOTE.to_owned(),
             severity: Severity::Warning,
             controller: None,
             text: note.clone(),
@@ -47,6 +51,7 @@ impl Keeper {
         let controllers = self.reins.config.controllers.iter().zip(table).enumerate();
         let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
             let severity = match row.standing {
+                Standing::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
                 Standing::Ok | Standing::Rejoining => return None,
                 Standing::Degraded | Standing::Unwatched => Severity::Warning,
                 _ if !self.board.is_on(lane) => Severity::Info,
@@ -57,10 +62,25 @@ impl Keeper {
                 severity,
                 controller: Some(controller.name.clone()),
                 text: format!("{}: {}", row.standing, row.why),
-                remedy: row.standing.next().to_owned(),
+                remedy: row.why.next().unwrap_or_else(|| row.standing.next()).to_owned(),
             })
         };
         controllers.filter_map(of).collect::<Vec<_>>().into_iter()
+    }
+
+    fn of_strangers(&self) -> impl Iterator<Item = Warning> {
+        let controllers = self.reins.config.controllers.iter().enumerate();
+        controllers.filter_map(|(lane, controller)| {
+            let answers = self.strangers.of(lane)?;
+            Some(Warning {
+                id: "another-master".to_owned(),
+                severity: Severity::Error,
+                controller: Some(controller.name.clone()),
+                text: format!("{answers} answers within a minute to frames that were not sent from here"),
+                remedy: "another machine may drive this seat: find it and stop it, before anybody sits down"
+                    .to_owned(),
+            })
+        })
     }
 
     fn of_the_machine(&self) -> impl Iterator<Item = Warning> {

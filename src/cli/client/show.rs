@@ -4,9 +4,14 @@ use serde_json::json;
 
 use super::server::ServerArgs;
 use super::table::table;
-use super::view::{Preflight, Warning};
+use super::view::{Controller, Preflight, Status, Warning};
 use crate::cli::{Exit, Failure, ask, print};
 use crate::time::{ShowTime, parse_time};
+
+/// Of so many controllers with the same finding only the number is told.
+const FEW: usize = 9;
+/// The severity of a finding that fails.
+const FAILS: &str = "error";
 
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
@@ -17,10 +22,14 @@ pub(in crate::cli) enum Command {
     #[command(after_help = "\
 Examples:
   kinocue load coaster && kinocue arm
+  kinocue arm --seats-empty              where a controller does not know its position
   kinocue arm --json
 
-Exit codes: 0 armed, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
-    Arm(ServerArgs),
+Where a position is unknown, after a reboot of a controller, the seats have to home first. They move over their whole stroke
+by themselves then, so that is not done without --seats-empty.
+
+Exit codes: 0 armed, or homing first, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
+    Arm(ArmArgs),
     /// Stands down: nothing can start until a person arms again.
     #[command(after_help = "Example:\n  kinocue disarm")]
     Disarm(ServerArgs),
@@ -66,6 +75,16 @@ All positions are read anew before anything moves.")]
     Reload(ServerArgs),
 }
 
+/// Whether the seats may home first, and where the daemon is.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct ArmArgs {
+    /// Nobody sits on the seats and nothing lies on or under them: they may home first.
+    #[arg(long)]
+    seats_empty: bool,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
 /// The position, and where the daemon is.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SeekArgs {
@@ -78,7 +97,10 @@ pub(in crate::cli) struct SeekArgs {
 
 pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
     let (word, server) = match command {
-        Command::Arm(server) => ("arm", server),
+        Command::Arm(ArmArgs { seats_empty, server }) => {
+            let body = if *seats_empty { json!({ "seats_empty": true }) } else { json!({}) };
+            return server.act("/api/v1/show/arm", &body);
+        }
         Command::Disarm(server) => ("disarm", server),
         Command::Go(server) => ("go", server),
         Command::Pause(server) => ("pause", server),
@@ -111,7 +133,7 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
         return Ok(server.tell(&status));
     };
     if !server.json && !found.findings.is_empty() {
-        print::out(&findings(&found.findings))?;
+        print::out(&findings(&status, &found.findings))?;
     }
     let Preflight { passed, answered, .. } = found;
     let verdict = if *passed { "passed" } else { "failed" };
@@ -123,10 +145,36 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
     Ok(if *passed { Exit::Done } else { Exit::CheckFailed })
 }
 
-fn findings(all: &[Warning]) -> String {
-    let row = |one: &Warning| {
-        let Warning { severity, controller, id, text, remedy } = one;
-        [severity.as_str(), controller.as_deref().unwrap_or("-"), id, text, remedy].map(str::to_owned)
+/// A row for each thing that was found, with those of whom it was. Of more than a few the number is enough, unless it fails.
+fn findings(status: &Status, all: &[Warning]) -> String {
+    let mut rows: Vec<(&Warning, Vec<String>)> = Vec::new();
+    for one in all {
+        let who = who(status, one);
+        let same = |(first, _): &&mut (&Warning, Vec<String>)| {
+            first.severity == one.severity && first.id == one.id && first.text == one.text
+        };
+        match rows.iter_mut().find(same) {
+            Some((_, of)) => of.push(who),
+            None => rows.push((one, vec![who])),
+        }
+    }
+    let row = |(one, of): &(&Warning, Vec<String>)| {
+        let Warning { severity, id, text, remedy, .. } = one;
+        let of = match of.len() {
+            FEW.. if severity != FAILS => format!("{} controllers", of.len()),
+            _ => of.join(", "),
+        };
+        [severity.as_str(), &of, id, text, remedy].map(str::to_owned)
     };
-    table(["severity", "controller", "check", "found", "what to do"], all.iter().map(row))
+    table(["severity", "controllers", "check", "found", "what to do"], rows.iter().map(row))
+}
+
+/// The controller that something was found of; where it fails with its row and address, for whoever goes there.
+fn who(status: &Status, found: &Warning) -> String {
+    let Some(name) = &found.controller else { return "-".to_owned() };
+    match status.controllers.iter().find(|one| one.name == *name && found.severity == FAILS) {
+        Some(Controller { row: Some(row), address, .. }) => format!("{name} (row {row}, {address})"),
+        Some(Controller { address, .. }) => format!("{name} ({address})"),
+        None => name.clone(),
+    }
 }

@@ -94,7 +94,8 @@ fn ticks(status: &Status) -> String {
 
 fn controllers(all: &[Controller]) -> String {
     let row = |one: &Controller| {
-        let Controller { name, row, enabled, standing, why, ack_rate, ack_p50_us, ack_p99_us, lost } = one;
+        let Controller { name, row, enabled, standing, why, ack_rate, ack_p50_us, ack_p99_us, lost, .. } =
+            one;
         let standing = if *enabled { standing.clone() } else { format!("{standing}, off") };
         [
             name.clone(),

@@ -106,6 +106,7 @@ pub(super) struct RealTime {
 pub(super) struct Controller {
     pub(super) name: String,
     pub(super) row: Option<String>,
+    pub(super) address: String,
     pub(super) enabled: bool,
     pub(super) standing: String,
     pub(super) why: String,

@@ -18,6 +18,9 @@ use crate::state::State;
 /// How long the virtual controllers have to tell that they are parked; they take a moment.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// Controllers of its own know their positions.
+const ARM: Ask = Ask::Arm { seats_empty: false };
+
 /// The thread.
 pub(super) struct Guide(JoinHandle<Result<(), Problem>>);
 
@@ -92,7 +95,7 @@ async fn ride(handle: &Handle) -> Result<(), Problem> {
         Ok(Err(Gone)) => return Ok(()),
         Err(_) => return Err(not_parked(&handle.status())),
     }
-    for ask in [Ask::Load { cue: CUE_ID.to_owned() }, Ask::Preflight, Ask::Arm, Ask::Go] {
+    for ask in [Ask::Load { cue: CUE_ID.to_owned() }, Ask::Preflight, ARM, Ask::Go] {
         handle.ask(who.clone(), ask).await?;
     }
     let resting = [State::Parked, State::Stopped, State::Fault, State::Recovering].map(State::word);

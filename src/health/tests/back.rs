@@ -167,3 +167,52 @@ fn a_seat_is_back_only_when_all_its_controllers_are() {
     hall.run(30);
     assert_eq!(hall.health.standing(0), Standing::Rejoining);
 }
+
+#[test]
+fn a_seat_that_was_moved_at_rest_is_out_until_it_was_seen_and_says_so_until_it_has_joined() {
+    let mut hall = Hall::new(LossPolicy::Park);
+    hall.health.on_moved(2);
+    hall.run(1);
+    assert_eq!(hall.changes(), [(Standing::Lost, Why::Moved(2))]);
+    hall.notices.clear();
+    hall.run(21);
+    assert_eq!(hall.changes(), [(Standing::Rejoining, Why::Moved(2))]);
+    hall.run(100);
+    hall.health.on_joined(1);
+    hall.run(100);
+    assert_eq!(
+        (hall.health.standing(1), hall.health.why(1)),
+        (Standing::Ok, Why::Acked),
+        "it was moved once"
+    );
+}
+
+#[test]
+fn another_master_is_a_fault_of_the_hall_and_its_seat_has_to_be_homed() {
+    let mut hall = Hall::with_lost();
+    hall.packets[2] += 5_000;
+    hall.back();
+    hall.run(21);
+    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Crowded(2))]);
+    assert_eq!(hall.told_hall(), [Event::Trouble(Trouble::OtherMaster(2)), Event::Rebooted(2)]);
+    hall.notices.clear();
+    hall.health.look_anew(1);
+    hall.run(100);
+    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Crowded(2))]);
+    assert_eq!(hall.told_hall(), [Event::Rebooted(2)], "once cleared it is no fault any more");
+}
+
+#[test]
+fn a_hall_moves_no_controller_that_does_not_know_its_zero_whenever_it_is_first_seen() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.health =
+        Health::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
+    hall.homed = false;
+    hall.health.look_anew(1);
+    hall.run(2);
+    assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, Why::NotHome(2)));
+    hall.homed = true;
+    hall.health.on_homed(2);
+    hall.run(30);
+    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+}

@@ -45,10 +45,10 @@ fn event() -> impl Strategy<Value = Event> {
 }
 
 fn turn() -> impl Strategy<Value = Turn> {
-    use Request::{Arm, Clear, Go, Park, Resume};
+    use Request::{Clear, Go, HomeAndArm, Park, Resume};
     prop_oneof![
         4 => select(Request::ALL.to_vec()).prop_map(|request| Turn::Step(Step::Ask(request))),
-        4 => select(vec![Arm, Go, Resume, Park, Clear]).prop_map(|request| Turn::Step(Step::Ask(request))),
+        4 => select(vec![HomeAndArm, Go, Resume, Park, Clear]).prop_map(|request| Turn::Step(Step::Ask(request))),
         8 => event().prop_map(|event| Turn::Step(Step::Tell(event))),
         4 => (0..1_000_i64).prop_map(Turn::Clock),
         1 => (-4_000_000..4_000_000_i64).prop_map(Turn::Clock),
@@ -110,10 +110,15 @@ impl Model {
                 assert_eq!(to, rest, "stopped while {from}");
             }
             Request::Clear if taken => assert_eq!((from.is_latched(), to), (true, State::Recovering)),
-            Request::Arm if taken => self.homes_to_arm = to == State::Homing,
+            Request::Arm | Request::HomeAndArm if taken => self.homes_to_arm = to == State::Homing,
             Request::Home | Request::Disarm if taken => self.homes_to_arm &= request == Request::Home,
             _ => {}
         }
+        let homes = (from, to) != (State::Homing, State::Homing) && to == State::Homing;
+        assert!(
+            !homes || matches!(request, Request::Home | Request::HomeAndArm),
+            "{request} homed the seats"
+        );
         let stays = from.is_latched() && request != Request::Clear;
         assert!(!stays || to.is_latched(), "{request} led from {from} to {to}");
         if !from.may_send_motion() && to.may_send_motion() {
@@ -164,7 +169,7 @@ fn to_the_show(hall: &mut Machine, mut now: MonoTime) {
                 hall.event(Event::PositionsRead, now);
                 hall.request(Request::Park, now).or_else(|_| hall.request(Request::Home, now)).unwrap();
             }
-            State::Parked => hall.request(Request::Arm, now).unwrap(),
+            State::Parked => hall.request(Request::HomeAndArm, now).unwrap(),
             State::Armed => hall.request(Request::Go, now).unwrap(),
             State::Paused => hall.request(Request::Resume, now).unwrap(),
             State::Stopped | State::Fault => hall.request(Request::Clear, now).unwrap(),

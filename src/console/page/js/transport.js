@@ -43,6 +43,11 @@ export function startTransport() {
     label: () => byId('home'),
     action: (button) => ask(button, 'home', () => post('home')),
   });
+  onTwoPresses(byId('home-arm'), {
+    asks: 'SEATS EMPTY?',
+    label: () => byId('home-arm'),
+    action: (button) => ask(button, 'arm', () => change('POST', 'show/arm', { seats_empty: true })),
+  });
   relaxGo = onTwoPresses(byId('go'), { asks: 'SURE?', label: () => byId('go-word'), action: go });
 }
 
@@ -60,7 +65,7 @@ function go(button) {
 export function showTransport(status, link) {
   const state = link === 'live' ? status.state : null;
   for (const what of ['pause', 'resume', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
-  showArm(state);
+  showArm(state, status?.arm_homes ?? false);
   showGo(state, status);
   for (const what of ['clear', 'home']) {
     const button = byId(what);
@@ -70,7 +75,7 @@ export function showTransport(status, link) {
   }
 }
 
-function showArm(state) {
+function showArm(state, homes) {
   const button = byId('arm');
   const now = may('disarm', state) ? 'disarm' : 'arm';
   if (now !== armIs) {
@@ -80,6 +85,10 @@ function showArm(state) {
     setAttribute(button, 'data-is', now);
   }
   setProperty(button, 'disabled', !may(now, state));
+  // Where the seats home first a button of its own asks whether they are empty.
+  setProperty(button, 'hidden', homes);
+  setProperty(byId('home-arm'), 'hidden', !homes);
+  setProperty(byId('home-arm'), 'disabled', !may('arm', state));
 }
 
 function showGo(state, status) {

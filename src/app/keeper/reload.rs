@@ -1,0 +1,115 @@
+//! What the system asks of the program: to end, and to read its configuration anew, for which another hall is opened.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::Keeper;
+use super::board::Board;
+use crate::config;
+use crate::hall::{Ask, Code, Desired, Problem, Role, Surface, Who};
+use crate::state::State;
+
+/// What goes over from a hall to the one that is opened with another configuration.
+#[derive(Debug, Default)]
+pub struct Memory {
+    pub(super) board: Option<Board>,
+    pub(super) cue: Option<String>,
+    /// What was latched: another configuration clears nothing.
+    pub(super) latched: bool,
+    /// What a person should know of the hall before.
+    pub(super) notes: VecDeque<String>,
+}
+
+impl Memory {
+    /// Adds something that a person should know.
+    pub fn note(&mut self, note: String) {
+        self.notes.push_back(note);
+    }
+}
+
+/// What the system asks of the program; set by signals.
+#[derive(Debug, Clone, Default)]
+pub struct Signals {
+    /// Park, and end.
+    pub leave: Arc<AtomicBool>,
+    /// Read the configuration anew.
+    pub reload: Arc<AtomicBool>,
+}
+
+impl Signals {
+    /// Whether the program is to end.
+    #[must_use]
+    pub fn is_leaving(&self) -> bool {
+        self.leave.load(Ordering::Acquire)
+    }
+}
+
+impl Keeper {
+    /// Takes up what goes over from the hall before. Ahead of the first tick: a seat that is out is not waited for, and what
+    /// was latched stays so.
+    pub(super) fn begin(&mut self, cue: Option<String>, latched: bool) {
+        self.set_desk();
+        if latched {
+            self.reins.desk.stop();
+        }
+        if let Some(Ok(cue)) = cue.map(|cue| cue.parse()) {
+            self.fetch(cue, None);
+        }
+    }
+
+    /// What goes over to the next hall.
+    pub(super) fn remember(&mut self) -> Memory {
+        let latched = self.known.state.is_latched();
+        if latched {
+            let (state, cause) = (self.known.state, self.cause());
+            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
+        }
+        if let Some(list) = self.list.take() {
+            self.note(format!("the playlist {} is no longer loaded; load it again", list.place().id));
+        }
+        let cue = self.cued.take().map(|cued| cued.id);
+        Memory { board: Some(self.board.clone()), cue, latched, notes: std::mem::take(&mut self.notes) }
+    }
+
+    /// Does what the system asks.
+    pub(super) fn heed_signals(&mut self) {
+        if self.ends.signals.is_leaving() {
+            // Whatever moves parks first; the tick thread sees to that.
+            self.reins.leave.store(true, Ordering::Release);
+            self.hold_back();
+            self.call_off_homing();
+        }
+        // An errand that is under way holds what the next hall needs: its end is waited for.
+        if self.is_free().is_ok() && self.ends.signals.reload.swap(false, Ordering::AcqRel) {
+            let result = self.reload();
+            let who = Who { role: Role::Engineer, surface: Surface::Signal, name: "SIGHUP".to_owned() };
+            self.write_down(&Desired { ask: Ask::Reload, who }, &result);
+            if let Err(problem) = result {
+                self.note(problem.to_string());
+            }
+        }
+    }
+
+    /// Reads the configuration anew, and has the hall opened with it. The old one is kept where the new one is bad, and while
+    /// anything is armed.
+    pub(super) fn reload(&mut self) -> Result<(), Problem> {
+        let idle = matches!(
+            self.known.state,
+            State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
+        );
+        if !idle {
+            let detail = format!("cannot read the configuration anew while {}", self.known.state);
+            return Err(Problem::new(Code::State, detail, "park, and disarm first"));
+        }
+        self.is_free()?;
+        let config = config::load(&self.ends.config).map_err(|faults| {
+            let detail = format!("{} is bad; the old configuration is kept", self.ends.config.display());
+            let faults = faults.to_string().lines().map(str::to_owned).collect();
+            Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
+        })?;
+        self.reload = Some(Arc::new(config));
+        self.reins.leave.store(true, Ordering::Release);
+        Ok(())
+    }
+}

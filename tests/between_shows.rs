@@ -1,0 +1,211 @@
+//! A hall that lives on between shows, in virtual time: what is loaded in one state is played from another, and the seats go
+//! on from where they are.
+
+mod common;
+
+use std::cell::{Cell, RefCell};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use common::{ORIGIN, swell};
+use kinocue::app::Staged;
+use kinocue::config::from_to_args;
+use kinocue::cue::{self, Source};
+use kinocue::engine::Show;
+use kinocue::fanout::Manner;
+use kinocue::motion::{MAX_AXES, Pose};
+use kinocue::net::Delivery;
+use kinocue::rt::{
+    Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, PlanLoop, Planning, TickLoop,
+    mailboxes,
+};
+use kinocue::state::{Event, Finding, Readiness, Request, Ride, State};
+use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
+use kinocue::timeline::Timeline;
+use kinocue::wire::{MotionRequest, Timing};
+use rtrb::Producer;
+
+/// Something that happens between shows.
+#[derive(Debug, Clone, Copy)]
+enum Deed {
+    Load,
+    Ask(Request),
+    Tell(Event),
+    See(Alarm),
+    Stop,
+}
+
+use Deed::{Ask, Load, See, Stop, Tell};
+
+const PARKED: Pose = [0.0; MAX_AXES];
+const READY: Deed = Tell(Event::Readiness(Readiness::Ready));
+
+const fn found(homed: bool, at_park: bool) -> Deed {
+    Tell(Event::Identified(Finding { homed, at_park, crashed: false }))
+}
+
+/// Four seconds for one seat of one axis.
+fn staged() -> Staged {
+    let text = swell(1, 4, 30.0, 0.2);
+    let timeline = Timeline::new(
+        cue::read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).expect("the cue is sound"),
+    );
+    let config = from_to_args(&["127.0.0.1:7408".to_owned()], &[], 1).expect("the address is sound");
+    let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
+    Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false }).expect("there is a join")
+}
+
+/// A clock that jumps, with what happens at each tick of that number.
+struct Hands<'a> {
+    now: Cell<MonoTime>,
+    tick: Cell<u64>,
+    script: &'a [(u64, Deed)],
+    end: u64,
+    leave: &'a AtomicBool,
+    desk: &'a Desk,
+    commands: RefCell<Producer<Command>>,
+    alarms: RefCell<Producer<Alarm>>,
+    plans: RefCell<PlanLoop>,
+}
+
+impl Clock for Hands<'_> {
+    fn now(&self) -> MonoTime {
+        self.now.get()
+    }
+
+    fn sleep_until(&self, deadline: MonoTime) {
+        self.now.set(deadline);
+        self.plans.borrow_mut().serve(&mut Vec::new());
+        let tick = self.tick.replace(self.tick.get() + 1);
+        let command = |command| self.commands.borrow_mut().push(command).expect("there is room");
+        for (_, deed) in self.script.iter().filter(|(at, _)| *at == tick) {
+            match deed {
+                Load => command(Command::Load(show())),
+                Ask(request) => command(Command::Request(*request)),
+                Tell(event) => command(Command::Event(*event)),
+                See(alarm) => self.alarms.borrow_mut().push(*alarm).expect("there is room"),
+                Stop => self.desk.stop(),
+            }
+        }
+        if tick >= self.end {
+            self.leave.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+    }
+}
+
+fn show() -> Box<Loaded> {
+    staged().loaded()
+}
+
+/// First axes of the frames, in pulses, each with its tick.
+struct Link<'a> {
+    tick: &'a Cell<u64>,
+    frames: Vec<(u64, i32)>,
+}
+
+impl FrameSink for Link<'_> {
+    fn send(&mut self, _lane: usize, datagram: &[u8]) -> Delivery {
+        let request = MotionRequest::parse(datagram).expect("only frames are sent");
+        self.frames.push((self.tick.get(), request.positions[0].0));
+        Delivery::Sent
+    }
+}
+
+/// A hall of one seat that lives through a script until tick `end`: its frames, and the states that it was in.
+fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State>) {
+    let (engine, lanes, planner, timeline) = staged().split();
+    let (desk, leave) = (staged().desk(), AtomicBool::new(false));
+    let (mail, ends) = mailboxes(1, Rate::from_hz(100.0), Arc::new(Live::default()));
+    let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, mut news } = ends;
+    let planning = Box::new(Planning { planner, timeline });
+    let hands = Hands {
+        now: Cell::new(ORIGIN),
+        tick: Cell::new(0),
+        script,
+        end,
+        leave: &leave,
+        desk: &desk,
+        commands: RefCell::new(commands),
+        alarms: RefCell::new(alarms),
+        plans: RefCell::new(PlanLoop { planning, tasks, answers }),
+    };
+    let mut ticks = TickLoop {
+        clock: &hands,
+        grid: TickGrid::new(ORIGIN, Rate::from_hz(100.0)),
+        engine: engine.unknown(),
+        conductor: Conductor::of_a_hall(ORIGIN),
+        lanes,
+        sink: Link { tick: &hands.tick, frames: Vec::new() },
+        mail,
+        desk: &desk,
+        leave: &leave,
+    };
+    ticks.run();
+    let frames = ticks.sink.frames;
+    let state = |news| if let News::Entered { state, .. } = news { Some(state) } else { None };
+    let states = std::iter::from_fn(|| news.pop().ok()).filter_map(state).collect();
+    (frames, states)
+}
+
+/// That the cue was played from `go` on: it was joined within three seconds, and the seat parked in the end.
+#[track_caller]
+fn assert_played(script: &[(u64, Deed)], go: u64) {
+    let (frames, states) = live_through(script, go + 1_500);
+    assert!(states.contains(&State::Playing(Ride::Following)), "{states:?}");
+    assert_eq!(states.last(), Some(&State::Parked), "{states:?}");
+    let (first, _) = frames.iter().find(|(tick, _)| *tick > go).expect("frames go out");
+    assert!(*first <= go + 2, "the first frame came at tick {first}");
+    let farthest = frames.iter().map(|(_, pulses)| *pulses).max();
+    assert!(farthest > Some(150_000), "{farthest:?} pulses");
+    assert!(frames.windows(2).all(|pair| (pair[1].1 - pair[0].1).abs() <= 4_800), "no step over 240 mm/s");
+}
+
+#[test]
+fn a_cue_that_was_loaded_before_the_seats_were_found_is_played() {
+    let script = [
+        (1, Load),
+        (2, READY),
+        (5, See(Alarm::Found(0, PARKED))),
+        (6, found(true, true)),
+        (9, Ask(Request::Arm)),
+    ];
+    assert_played(&[&script[..], &[(10, Ask(Request::Go))]].concat(), 10);
+}
+
+#[test]
+fn a_cue_that_was_loaded_before_the_seats_homed_is_played_from_where_they_are_then() {
+    let mut home = PARKED;
+    home[0] = 0.02;
+    let script = [
+        (1, See(Alarm::Found(0, PARKED))),
+        (2, found(false, true)),
+        (3, Load),
+        (4, READY),
+        (5, Ask(Request::HomeAndArm)),
+        (50, See(Alarm::Leave(0))),
+        (60, See(Alarm::Found(0, home))),
+        (70, Tell(Event::Homed)),
+        (80, Ask(Request::Go)),
+    ];
+    assert_played(&script, 80);
+}
+
+#[test]
+fn a_hall_that_was_stopped_cleared_and_homed_plays_what_was_loaded_meanwhile() {
+    let script = [
+        (1, See(Alarm::Found(0, PARKED))),
+        (2, found(true, true)),
+        (3, Load),
+        (4, READY),
+        (5, Stop),
+        (6, Load),
+        (7, Ask(Request::Clear)),
+        (8, Tell(Event::PositionsRead)),
+        (9, Ask(Request::Home)),
+        (50, Tell(Event::Homed)),
+        (60, Ask(Request::Arm)),
+        (61, Ask(Request::Go)),
+    ];
+    assert_played(&script, 61);
+}

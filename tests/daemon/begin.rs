@@ -1,0 +1,111 @@
+//! How it starts, and when it does not.
+
+use std::fs;
+
+use crate::hall::Hall;
+use crate::process::{Run, kinocue};
+
+/// A daemon that is to end by itself.
+fn serve(hall: &Hall, socket: &str) -> Run {
+    let path = |name: &str| hall.path(name).to_str().unwrap().to_owned();
+    let (config, socket, state) = (path("hall.toml"), path(socket), path("state"));
+    kinocue(&["serve", "--config", &config, "--socket", &socket, "--state", &state])
+}
+
+#[test]
+fn a_start_goes_from_boot_to_parked_and_moves_nothing() {
+    let mut hall = Hall::open();
+    let parked = hall.lives_on(100);
+    assert_eq!(parked["cause"], "all seats were found at their park poses");
+    let lines = hall.close();
+    let states = lines.iter().filter(|line| line.contains("(state-")).count();
+    assert_eq!(states, 1, "boot to parked at once: {lines:?}");
+    assert_eq!(hall.end().motion(), 0);
+}
+
+#[test]
+fn after_a_crash_in_mid_show_nothing_moves_until_a_person_parks_the_seats() {
+    let mut hall = Hall::open();
+    hall.play("night");
+    hall.rises(0);
+    hall.kill();
+    hall.relay(0).count();
+    hall.serve();
+    let status = hall.lives_on(100);
+    assert_eq!(status["state"], "recovering", "{status}");
+    assert!(status["cause"].as_str().unwrap().contains("without parking"), "{status}");
+    assert_eq!(status["next"], "park, or home");
+    let refused = hall.run(&["arm"]);
+    assert_eq!(refused.code, Some(75), "{refused:?}");
+    assert_eq!(hall.relay(0).count(), 0, "no motion frame");
+    let before = hall.status()["controllers"][0]["positions_mm"][0].as_f64().unwrap();
+    assert!(before > 1.0, "it stands where the crash left it: {before} mm");
+
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    let seen = hall.end();
+    assert!(seen.rest_in_park(), "{seen:?}");
+    let of_one = seen.rows.iter().rev().filter(|row| row.controller == seen.rows[0].controller);
+    let park: Vec<_> = of_one.take_while(|row| row.frame > 1).collect();
+    assert!(park.len() > 10, "{park:?}");
+    for pair in park.windows(2) {
+        let mm = f64::from((pair[0].commanded[0] - pair[1].commanded[0]).abs()) / 2_000.0;
+        let speed = mm / (f64::from(pair[0].time_ms) / 1_000.0);
+        assert!(speed <= 50.5, "{speed} mm/s");
+    }
+}
+
+#[test]
+fn a_second_daemon_is_refused_by_the_port_and_by_the_socket_and_the_first_goes_on() {
+    let port = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let hall = Hall::open_with(|config| config.replace("127.0.0.1:0", &port.to_string()));
+    let run = serve(&hall, "other.sock");
+    assert_eq!(run.code, Some(75), "{run:?}");
+    assert!(run.stderr.contains(&port.to_string()), "{run:?}");
+
+    hall.rewrite(|config| config.replace(&port.to_string(), "127.0.0.1:0"));
+    let run = serve(&hall, "control.sock");
+    assert_eq!(run.code, Some(71), "{run:?}");
+    assert!(run.stderr.contains("stop.sock"), "{run:?}");
+    hall.done(&["load", "ride"]);
+}
+
+#[test]
+fn a_start_that_is_refused_leaves_no_mark_of_a_crash() {
+    let mut hall = Hall::closed(&[], |config| config);
+    let held = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let port = held.local_addr().unwrap().to_string();
+    hall.rewrite(|config| config.replace("127.0.0.1:0", &port));
+    assert_eq!(serve(&hall, "control.sock").code, Some(75));
+    drop(held);
+    hall.serve();
+    hall.comes_to("parked");
+}
+
+#[test]
+fn a_bad_configuration_is_refused_with_every_fault_and_its_place() {
+    let hall = Hall::closed(&[], |config| {
+        let config = config.replace("rate_hz = 100", "rate_hz = 0\nrates = 1");
+        config.replacen("seat = \"bench3\"", "seat = \"bench4\"", 1)
+    });
+    let run = serve(&hall, "control.sock");
+    assert_eq!(run.code, Some(78), "{run:?}");
+    for fault in ["hall.toml:4:", "hall.toml:5:", "rates", "bench4"] {
+        assert!(run.stderr.contains(fault), "{fault}: {run:?}");
+    }
+    assert!(!hall.path("control.sock").exists());
+    assert_eq!(hall.end().motion(), 0);
+}
+
+#[test]
+fn a_configuration_that_is_missing_and_a_library_that_is_none_are_named() {
+    let hall = Hall::closed(&[], |config| config);
+    hall.rewrite(|config| config.replace("/cues\"", "/cues/ride.csv\""));
+    let run = serve(&hall, "control.sock");
+    assert_eq!(run.code, Some(71), "{run:?}");
+    assert!(run.stderr.contains("cues/ride.csv"), "{run:?}");
+    fs::remove_file(hall.path("hall.toml")).unwrap();
+    let run = serve(&hall, "control.sock");
+    assert_eq!(run.code, Some(78), "{run:?}");
+    assert!(run.stderr.contains("hall.toml"), "{run:?}");
+}

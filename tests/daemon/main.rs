@@ -1,0 +1,26 @@
+//! The daemon as a house runs it: `kinocue serve` against the virtual controllers of `kinocue sim`, real processes both, led
+//! by the client commands and over its sockets.
+
+#![allow(
+    unreachable_pub,
+    clippy::unwrap_used,
+    reason = "a program of its own; whatever fails here fails the test"
+)]
+
+#[path = "../common/http.rs"]
+#[expect(dead_code, reason = "each test uses its own part")]
+mod http;
+#[path = "../common/process.rs"]
+#[expect(dead_code, reason = "each test uses its own part")]
+mod process;
+#[path = "../common/serving.rs"]
+mod serving;
+
+mod begin;
+mod hall;
+mod library;
+mod playlist;
+mod show;
+mod signals;
+mod surfaces;
+mod trouble;

@@ -1,0 +1,81 @@
+//! What the service manager sends: SIGTERM ends it, SIGHUP has it read its configuration anew.
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::hall::Hall;
+
+fn notes(status: &Value) -> String {
+    let warnings = status["warnings"].as_array().expect("a list").iter();
+    warnings.filter(|one| one["id"] == "note").map(|one| one["text"].as_str().expect("text")).collect()
+}
+
+#[test]
+fn told_to_end_in_mid_show_it_parks_the_seats_however_often_it_is_told_and_the_next_start_is_parked() {
+    let mut hall = Hall::open();
+    hall.play("night");
+    hall.rises(0);
+    hall.serving().signal(Signal::TERM);
+    hall.serving().heard(|line| line.contains("parking: ").then_some(()));
+    let lines = hall.close();
+    assert!(lines.iter().any(|line| line.contains("parked: ")), "{lines:?}");
+    assert_eq!(hall.journal("show")[0]["outcome"]["result"], "stopped");
+    hall.serve();
+    hall.comes_to("parked");
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_configuration_is_read_anew_upon_a_signal_and_what_was_set_stays() {
+    let mut hall = Hall::open();
+    hall.done(&["level", "motion", "60%"]);
+    hall.done(&["load", "ride"]);
+    hall.rewrite(|config| config.replace("Hall 1", "Hall 2"));
+    hall.serving().signal(Signal::HUP);
+    let is_well =
+        |status: &Value| status["state"] == "parked" && status["controllers"][1]["standing"] == "ok";
+    let anew = hall.wait(|status| status["hall"] == "Hall 2" && is_well(status));
+    assert_eq!(anew["levels"]["motion"], 0.6);
+    hall.wait(|status| status["show"]["cue"] == "ride");
+    hall.arm("ride");
+    hall.close();
+    let acts = hall.journal("action");
+    let act = acts.iter().find(|act| act["what"] == "reload").expect("it is written down");
+    assert!(act["who"].as_str().unwrap().contains("signal"), "{act}");
+    assert_eq!(hall.end().motion(), 0);
+}
+
+#[test]
+fn a_bad_configuration_is_kept_out_with_file_line_and_reason_each_time() {
+    let hall = Hall::open();
+    for (bad, reason) in [("rate_hz = 2000", "2000"), ("rate_hz = 3000", "3000")] {
+        hall.rewrite(|config| {
+            config
+                .lines()
+                .map(|line| if line.starts_with("rate_hz") { bad } else { line })
+                .collect::<Vec<_>>()
+                .join("\n")
+        });
+        hall.serving().signal(Signal::HUP);
+        hall.serving().heard(|line| (line.contains("hall.toml:4:") && line.contains(reason)).then_some(()));
+        let status = hall.wait(|status| notes(status).contains(reason));
+        assert_eq!((status["state"].as_str(), status["rate_hz"].as_f64()), (Some("parked"), Some(100.0)));
+    }
+    let run = hall.run(&["reload"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.stderr.contains("hall.toml:4:"), "{run:?}");
+}
+
+#[test]
+fn no_configuration_is_read_while_the_hall_is_armed() {
+    let hall = Hall::open();
+    hall.arm("ride");
+    hall.rewrite(|config| config.replace("Hall 1", "Hall 2"));
+    hall.serving().signal(Signal::HUP);
+    let status = hall.wait(|status| notes(status).contains("while armed"));
+    assert_eq!((status["hall"].as_str(), status["state"].as_str()), (Some("Hall 1"), Some("armed")));
+    assert_eq!(hall.run(&["reload"]).code, Some(75));
+    hall.done(&["disarm"]);
+    hall.done(&["reload"]);
+    hall.wait(|status| status["hall"] == "Hall 2" && status["state"] == "parked");
+}

@@ -1,0 +1,159 @@
+//! What goes wrong while people sit on the seats, and the stop.
+
+use std::io::Write as _;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+
+use serde_json::Value;
+
+use crate::hall::Hall;
+
+fn standing(status: &Value, controller: usize) -> &str {
+    status["controllers"][controller]["standing"].as_str().expect("a word")
+}
+
+/// Connections that send half a request and stay, and are made anew when there are many, until this is dropped.
+struct Flood {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Flood {
+    fn of(socket: PathBuf) -> Self {
+        let over = Arc::<AtomicBool>::default();
+        let is_over = Arc::clone(&over);
+        let thread = thread::spawn(move || {
+            let mut held = Vec::new();
+            while !is_over.load(Ordering::Relaxed) {
+                if held.len() == 200 {
+                    held.clear();
+                }
+                if let Ok(mut stream) = UnixStream::connect(&socket) {
+                    let _ = stream.write_all(b"GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\n");
+                    held.push(stream);
+                }
+            }
+        });
+        Self { over, thread: Some(thread) }
+    }
+}
+
+impl Drop for Flood {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(JoinHandle::join); // what it did is no matter
+    }
+}
+
+/// The warning about a controller that is no more than news.
+fn warning<'s>(status: &'s Value, controller: &str) -> Option<&'s Value> {
+    let warnings = status["warnings"].as_array().expect("a list");
+    warnings.iter().find(|one| one["controller"] == controller && one["severity"] == "error")
+}
+
+#[test]
+fn the_stop_socket_brings_the_seats_to_rest_while_the_api_is_flooded() {
+    let hall = Hall::open();
+    hall.play("night");
+    let flood = [(); 2].map(|()| Flood::of(hall.path("control.sock")));
+    hall.serving().heard(|line| line.contains("no room for more connections").then_some(()));
+    assert_eq!(hall.stop_socket("stop\n"), "stopping\n");
+    hall.serving().heard(|line| line.contains("stopped: ").then_some(()));
+    drop(flood);
+    let stopped = hall.comes_to("stopped");
+    assert_eq!(stopped["next"], "clear, then park or home");
+    let rest = hall.lives_on(20);
+    assert_eq!(
+        rest["controllers"][0]["sent"],
+        hall.lives_on(20)["controllers"][0]["sent"],
+        "no frames any more"
+    );
+    assert_eq!(hall.run(&["go"]).code, Some(75));
+    hall.done(&["clear"]);
+    hall.wait(|status| status["next"] == "park, or home");
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_again() {
+    let hall = Hall::open();
+    hall.play("night");
+    hall.relay(1).pull();
+    let lost = hall.wait(|status| standing(status, 1) == "lost");
+    assert_eq!((lost["state"].as_str(), standing(&lost, 0)), (Some("playing"), "ok"));
+    let told = warning(&lost, "A2").expect("it is told");
+    assert!(told["text"].as_str().unwrap().contains("no ack"), "{told}");
+    assert!(told["remedy"].as_str().unwrap().contains("power and network"), "{told}");
+    hall.serving().heard(|line| (line.contains("controller-lost") && line.contains("A2")).then_some(()));
+    let acked = |status: &Value| status["controllers"][0]["acked"].as_u64();
+    let later = hall.lives_on(100);
+    assert!(acked(&later) > acked(&lost) && later["state"] == "playing", "{later}");
+
+    hall.relay(1).put_back();
+    let back = hall.wait(|status| standing(status, 1) == "ok");
+    assert!(warning(&back, "A2").is_none(), "{back}");
+    hall.relay(1).count();
+    hall.relay(1).wait_for(|_| true);
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_plug_pulled_between_shows_is_seen_and_put_back_it_is_well_again() {
+    let hall = Hall::open();
+    hall.relay(0).pull();
+    let lost = hall.wait(|status| standing(status, 0) == "lost");
+    assert_eq!((lost["state"].as_str(), standing(&lost, 1)), (Some("parked"), "ok"));
+    assert!(warning(&lost, "A1").is_some(), "{lost}");
+    hall.relay(0).put_back();
+    let back = hall.wait(|status| standing(status, 0) == "ok");
+    assert!(warning(&back, "A1").is_none(), "{back}");
+    hall.arm("ride");
+    assert_eq!(hall.end().motion(), 0);
+}
+
+#[test]
+fn a_controller_that_reboots_in_mid_show_is_out_until_a_person_homes_it() {
+    let hall = Hall::open();
+    hall.play("night");
+    hall.lives_on(200);
+    hall.happens("2@reboot");
+    let out = hall.wait(|status| standing(status, 1) == "excluded");
+    assert_eq!((out["state"].as_str(), standing(&out, 0)), (Some("playing"), "ok"));
+    let told = warning(&out, "A2").expect("it is told");
+    assert!(told["remedy"].as_str().unwrap().contains("home it"), "{told}");
+    hall.relay(1).count();
+    hall.lives_on(100);
+    assert_eq!(hall.relay(1).count(), 0, "no motion goes to it");
+
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    hall.done(&["home", "--seats-empty"]);
+    let home = hall.wait(|status| status["state"] == "parked" && standing(status, 1) == "ok");
+    assert!(warning(&home, "A2").is_none(), "{home}");
+    hall.arm("ride");
+    hall.done(&["go"]);
+    hall.relay(1).wait_for(|_| true);
+    hall.wait(|status| status["cause"] == "the seats have parked");
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_controller_that_reboots_between_shows_is_out_until_a_person_homes_it() {
+    let hall = Hall::open();
+    // A counter of a few datagrams looks the same after a reboot; so the controllers are asked for more.
+    (0..4).for_each(|_| drop(hall.done(&["preflight"])));
+    hall.lives_on(50);
+    hall.happens("1@reboot");
+    let out = hall.wait(|status| standing(status, 0) == "excluded");
+    assert_eq!((out["state"].as_str(), standing(&out, 1)), (Some("parked"), "ok"));
+    hall.done(&["home", "--seats-empty"]);
+    hall.wait(|status| status["state"] == "parked" && standing(status, 0) == "ok");
+    assert_eq!(hall.end().motion(), 0);
+}
