@@ -18,6 +18,8 @@ const BEAT_WEIGHT: u32 = UNHEARD.div_ceil(2);
 const SEEN_FOR: Duration = Duration::from_secs(1);
 /// Frames further apart belong to two streams, and what was unanswered of the first says nothing of the second.
 const APART: Duration = Duration::from_secs(2);
+/// While nothing moves, what a controller is and whether it knows its zero is read this often: nobody sees it being reset.
+const LOOK_AGAIN: Duration = Duration::from_secs(1);
 /// From one read to the next: 5 Hz.
 const READ_EVERY: Duration = Duration::from_millis(200);
 
@@ -41,6 +43,9 @@ pub(super) struct Member {
     seen: Option<MonoTime>,
     /// A read was sent that nothing came of yet.
     reading: bool,
+    /// When it was last read, and whether it is to be again.
+    read: MonoTime,
+    look_again: bool,
     next_read: Option<MonoTime>,
     /// It has to be homed, and why.
     pub(super) outcast: Option<Why>,
@@ -77,6 +82,8 @@ impl Member {
             must_be_home: false,
             seen: None,
             reading: false,
+            read: MonoTime::default(),
+            look_again: false,
             next_read: None,
             outcast: None,
             pressed: false,
@@ -141,6 +148,7 @@ impl Member {
         self.traffic.sent += 1;
         self.unheard = self.unheard.saturating_add(BEAT_WEIGHT);
         self.waiting.get_or_insert(at);
+        self.look_again = self.must_be_home && at.since(self.read) >= LOOK_AGAIN;
     }
 
     /// A sighting that nobody asked for since the controller was lost is none.
@@ -282,7 +290,7 @@ impl Member {
 
     /// Whether its packet counter has to be read, though all is well.
     pub(super) fn wants_baseline(&self) -> bool {
-        self.baseline.map_or(self.trusted, |baseline| baseline.is_stale(self.traffic))
+        self.look_again || self.baseline.map_or(self.trusted, |baseline| baseline.is_stale(self.traffic))
     }
 
     /// Whether it is time for a read; if so, the next one is due a while later.
@@ -290,6 +298,8 @@ impl Member {
         let due = self.next_read.is_none_or(|next| now >= next);
         if due {
             self.next_read = Some(now + READ_EVERY);
+            // Not again before the next beat: none goes out while somebody counts datagrams.
+            (self.read, self.look_again) = (now, false);
         }
         due
     }

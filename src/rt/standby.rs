@@ -22,8 +22,6 @@ use crate::wire::PerAxis;
 pub enum Order {
     /// This controller is home: its group is looked at anew.
     Homed(u16),
-    /// All groups are looked at anew, and what was latched and is over is forgotten.
-    LookAnew,
 }
 
 /// What a hall has beside a play.
@@ -113,14 +111,9 @@ impl Standby {
 
     /// Takes orders, counts what the line sent, and beats while nothing moves.
     pub(super) fn serve(&mut self, health: &mut Health, sender: &Sender, moving: bool, now: MonoTime) {
-        while let Ok(order) = self.orders.pop() {
-            match order {
-                Order::Homed(controller) => {
-                    health.on_homed(usize::from(controller));
-                    health.look_anew(health.groups().group_of(usize::from(controller)));
-                }
-                Order::LookAnew => (0..health.groups().len()).for_each(|group| health.look_anew(group)),
-            }
+        while let Ok(Order::Homed(controller)) = self.orders.pop() {
+            health.on_homed(usize::from(controller));
+            health.look_anew(health.groups().group_of(usize::from(controller)));
         }
         for controller in 0..self.seen.len() {
             health.on_other_sent(controller, self.line.take_sent(controller));

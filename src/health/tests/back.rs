@@ -217,3 +217,27 @@ fn a_hall_moves_no_controller_that_does_not_know_its_zero_whenever_it_is_first_s
     hall.run(30);
     assert_eq!(hall.health.standing(1), Standing::Rejoining);
 }
+
+#[test]
+fn a_controller_that_is_reset_while_nothing_moves_is_out_within_two_seconds() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.health =
+        Health::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
+    let beat = |hall: &mut Hall| {
+        hall.now = hall.now + Duration::from_millis(250);
+        for controller in 0..4 {
+            hall.health.on_beat_sent(controller, hall.now);
+            hall.packets[controller] += 1;
+            hall.health.on_status(controller, hall.now);
+        }
+        hall.look();
+    };
+    (0..8).for_each(|_| beat(&mut hall));
+    let reads = hall.reads().len();
+    assert!((8..=16).contains(&reads), "{reads} reads of four controllers in two seconds");
+    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    hall.homed = false;
+    (0..8).for_each(|_| beat(&mut hall));
+    assert_eq!(hall.standings(), [Standing::Excluded; 3]);
+    assert_eq!(hall.health.why(1), Why::NotHome(2));
+}
