@@ -44,7 +44,7 @@ fn after_a_crash_in_mid_show_nothing_moves_until_a_person_parks_the_seats() {
     hall.done(&["park"]);
     hall.comes_to("parked");
     let seen = hall.end();
-    assert!(seen.rest_in_park(), "{seen:?}");
+    assert!(seen.rest_in_park(), "{:?}", seen.controllers);
     let of_one = seen.rows.iter().rev().filter(|row| row.controller == seen.rows[0].controller);
     let park: Vec<_> = of_one.take_while(|row| row.frame > 1).collect();
     assert!(park.len() > 10, "{park:?}");

@@ -27,7 +27,7 @@ fn a_whole_show_ends_parked_and_its_record_says_what_the_controllers_counted() {
     let report = kinocue(&["report", "--day", "today", "--json", "--config", &config]).report_of(0);
     assert_eq!(report["totals"]["shows"], 1, "{report}");
     let seen = hall.end();
-    assert!(seen.rest_in_park(), "{seen:?}");
+    assert!(seen.rest_in_park(), "{:?}", seen.controllers);
     let (figures, motion) = (&show["outcome"], sum(&seen.controllers, "motion"));
     assert_eq!(figures["result"], "completed");
     assert_eq!(figures["ticks"], motion / 2, "{show}");
@@ -123,5 +123,5 @@ fn a_sweep_tries_each_axis_and_effect_of_two_seats_and_gives_a_table() {
     assert_eq!(status["show"]["cue"], "ride", "what was loaded before is back");
     let seen = hall.end();
     assert!(seen.farthest(0) > 50_000, "30 mm are 60,000 pulses");
-    assert!(seen.rest_in_park(), "{seen:?}");
+    assert!(seen.rest_in_park(), "{:?}", seen.controllers);
 }

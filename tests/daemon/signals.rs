@@ -1,5 +1,7 @@
 //! What the service manager sends: SIGTERM ends it, SIGHUP has it read its configuration anew.
 
+use std::net::UdpSocket;
+
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -22,7 +24,8 @@ fn told_to_end_in_mid_show_it_parks_the_seats_however_often_it_is_told_and_the_n
     assert_eq!(hall.journal("show")[0]["outcome"]["result"], "stopped");
     hall.serve();
     hall.comes_to("parked");
-    assert!(hall.end().rest_in_park());
+    let seen = hall.end();
+    assert!(seen.rest_in_park(), "{:?}", seen.controllers);
 }
 
 #[test]
@@ -78,4 +81,18 @@ fn no_configuration_is_read_while_the_hall_is_armed() {
     hall.done(&["disarm"]);
     hall.done(&["reload"]);
     hall.wait(|status| status["hall"] == "Hall 2" && status["state"] == "parked");
+}
+
+#[test]
+fn a_configuration_whose_port_is_taken_is_given_up_and_the_hall_goes_on_with_the_old_one() {
+    let hall = Hall::open();
+    let held = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let port = held.local_addr().unwrap().to_string();
+    hall.rewrite(|config| config.replace("Hall 1", "Hall 2").replace("127.0.0.1:0", &port));
+    hall.serving().signal(Signal::HUP);
+    hall.serving().heard(|line| (line.contains("has the old one") && line.contains(&port)).then_some(()));
+    let status = hall.lives_on(50);
+    assert_eq!((status["hall"].as_str(), status["state"].as_str()), (Some("Hall 1"), Some("parked")));
+    hall.arm("ride");
+    assert_eq!(hall.end().motion(), 0);
 }
