@@ -208,6 +208,26 @@ fn a_cue_that_was_loaded_before_the_seats_homed_is_played_from_where_they_are_th
 }
 
 #[test]
+fn a_seat_that_was_moved_while_the_hall_was_armed_joins_from_where_it_was_found() {
+    let mut elsewhere = PARKED;
+    elsewhere[0] = 0.3;
+    let script = [
+        (1, See(Alarm::Found(0, PARKED))),
+        (2, found(true, true)),
+        (3, Load),
+        (4, READY),
+        (5, Ask(Request::Arm)),
+        (20, See(Alarm::Leave(0))),
+        (40, See(Alarm::Found(0, elsewhere))),
+        (60, Ask(Request::Go)),
+    ];
+    assert_played(&script, 60);
+    let (frames, _) = live_through(&script, 200);
+    let (_, first) = frames[0];
+    assert!((first - 90_000).abs() <= 4_800, "{first} pulses at first, from 90,000");
+}
+
+#[test]
 fn a_hall_that_was_stopped_cleared_and_homed_plays_what_was_loaded_meanwhile() {
     let script = [
         (1, See(Alarm::Found(0, PARKED))),

@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use rustix::process::Signal;
 use serde_json::Value;
@@ -123,6 +123,17 @@ impl Hall {
     pub(crate) fn rewrite(&self, change: impl FnOnce(String) -> String) {
         let config = fs::read_to_string(self.path("hall.toml")).expect("it was written");
         self.write("hall.toml", &change(config));
+    }
+
+    /// Another machine that drives the seats, past the relays, with the cue `ride`.
+    pub(crate) fn rival(&self) -> Child {
+        let mut config = serving::hall(self.folder());
+        serving::write_row(&mut config, "A", &self.sim.addresses);
+        self.write("rival.toml", &config);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        command.arg("play").arg(self.path("cues/ride.csv")).arg("--config").arg(self.path("rival.toml"));
+        command.args(["--bind", "127.0.0.1:0"]).stdin(Stdio::null()).stdout(Stdio::null());
+        command.spawn().expect("kinocue runs")
     }
 
     /// Its control socket.

@@ -159,3 +159,28 @@ fn a_controller_that_reboots_between_shows_is_out_until_a_person_homes_it() {
     hall.wait(|status| status["state"] == "parked" && standing(status, 0) == "ok");
     assert_eq!(hall.end().motion(), 0);
 }
+
+#[test]
+fn another_machine_that_drives_a_seat_at_rest_is_a_fault_and_the_seat_is_homed_before_it_plays_again() {
+    let hall = Hall::open();
+    hall.arm("ride");
+    let mut rival = hall.rival();
+    let fault = hall.comes_to("fault");
+    assert!(fault["cause"].as_str().expect("text").contains("another master sends frames"), "{fault}");
+    assert_eq!(fault["next"], "stop the other master, then clear");
+    assert_eq!(hall.run(&["go"]).code, Some(75));
+    let excluded = hall.wait(|status| [0, 1].map(|one| standing(status, one)) == ["excluded"; 2]);
+    let remedy = warning(&excluded, "A1").expect("it is told")["remedy"].as_str().expect("text");
+    assert!(remedy.starts_with("stop the other machine"), "{remedy}");
+    assert!(rival.wait().expect("it is ours").success());
+    assert_eq!(excluded["controllers"][0]["sent"], 0, "nothing was sent from here");
+
+    hall.done(&["clear"]);
+    hall.done(&["home", "--seats-empty"]);
+    hall.comes_to("parked");
+    hall.arm("ride");
+    hall.done(&["go"]);
+    hall.comes_to("playing");
+    hall.comes_to("parked");
+    assert!(hall.end().rest_in_park());
+}
