@@ -106,6 +106,7 @@ fn the_cues_are_of_the_sizes_that_the_readme_says() {
     assert_eq!(
         sizes,
         [
+            ("seat-demo.csv".to_owned(), 3, seconds(11), true),
             ("bench-ride.csv".to_owned(), 3, seconds(18), true),
             ("coaster.csv".to_owned(), 6, seconds(50), true),
             ("voyage.csv".to_owned(), 12, seconds(56), false),

@@ -68,7 +68,7 @@ const SEAT_DEMO: Ride = Ride {
     rumbles: &[rumble(2.6, 3.0, 16.0, 0.0012)],
     effects: &["air", "water", "wind", "leg", "light"],
     bursts: &[
-        burst("light", 0.2, 0.5),
+        burst("light", 0.6, 0.9),
         burst("air", 3.4, 3.7),
         burst("water", 4.2, 4.4),
         burst("wind", 5.2, 7.8),
