@@ -1,13 +1,16 @@
 //! Looking at a controller while a show runs: the registers that tell what it is, whether it has rebooted, and where its
 //! seat stands. Ack thread; allocates nothing.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
+use std::time::Duration;
 
 use crate::config::{Controller, FanOut};
 use crate::fanout::Lane;
 use crate::health::{Identity, Sighting};
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::net::{Delivery, Sender};
+use crate::time::MonoTime;
 use crate::wire::{
     Access, Code, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, position_reads,
     positions,
@@ -25,6 +28,10 @@ const RESET: u16 = 0xf0;
 const RESET_DONE: u16 = 2;
 /// How far from where it rests a seat has to be found to have been moved, in strokes: 0.3 mm of 150.
 const NEAR: f64 = 0.002;
+/// How far apart two answers may see a seat at rest, in strokes.
+const STILL: f64 = 0.001;
+/// How long after each other they come: looks are 200 ms apart.
+const REST: RangeInclusive<Duration> = Duration::from_millis(100)..=Duration::from_secs(1);
 /// DPFE and DPFF: versions.
 const VERSIONS: (u16, u16) = (0xfe, 2);
 
@@ -36,6 +43,8 @@ pub(super) struct Looker {
     seat: Arc<SeatType>,
     /// The place of its first own axis in a frame.
     first_slot: usize,
+    /// What it was seen in last, and when.
+    before: Option<(Pose, MonoTime)>,
     /// Where the slots of a frame rest that are not its own.
     park: Pose,
     seen: Seen,
@@ -65,6 +74,7 @@ impl Looker {
                 FanOut::Shared => controller.axis_offset,
             },
             park: lane.window.park(),
+            before: None,
             seen: Seen::default(),
         }
     }
@@ -140,6 +150,14 @@ impl Looker {
         self.seen.asked = false;
         let identity = Identity { version, minor_version, work_mode, axes };
         Some((Sighting { identity, error, packets, homed }, pose))
+    }
+
+    /// Notes the pose that a seat is seen in, by an answer that came at `at`; says whether it rests there. One that was lost may
+    /// still be on its way, through frames that its controller has kept; what comes in one burst proves nothing.
+    pub(super) fn is_at_rest(&mut self, pose: &Pose, at: MonoTime) -> bool {
+        let Some((before, then)) = self.before.replace((*pose, at)) else { return false };
+        let still = pose.iter().zip(before).all(|(now, before)| (now - before).abs() <= STILL);
+        still && REST.contains(&at.since(then))
     }
 
     /// Whether a seat in that pose stands at park, to a pulse.
@@ -235,6 +253,30 @@ mod tests {
         let mut looker = looker();
         assert_eq!(answer(&mut looker, ReplyCode::Fault, 21), [true; 5]);
         assert_eq!(looker.take().unwrap().0.error, 21);
+    }
+
+    #[test]
+    fn a_seat_rests_where_two_looks_one_after_the_other_see_it() {
+        let pose = |first| {
+            let mut pose = [0.0; MAX_AXES];
+            pose[0] = first;
+            pose
+        };
+        let after = |ms| MonoTime::default() + Duration::from_millis(ms);
+        let mut looker = looker();
+        let looks = [
+            (0, 0.30, false),   // the first
+            (200, 0.32, false), // it moves
+            (201, 0.32, false), // of the same burst
+            (401, 0.32, true),
+            (601, 0.3205, true),
+            (801, 0.35, false),
+            (5_000, 0.35, false), // from before it was lost anew
+            (5_200, 0.35, true),
+        ];
+        for (ms, first, rests) in looks {
+            assert_eq!(looker.is_at_rest(&pose(first), after(ms)), rests, "at {ms} ms");
+        }
     }
 
     #[test]

@@ -144,7 +144,11 @@ impl Watch {
         let awaited = self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at));
         let looker = &mut self.lookers[controller];
         let is_answer = looker.hear(octets);
-        if let Some((sighting, pose)) = looker.take() {
+        let standing = self.health.standing(self.health.groups().group_of(controller));
+        if let Some((sighting, pose)) = looker.take()
+            // Whoever joins from where it is found has to be at rest there.
+            && (looker.is_at_rest(&pose, at) || !standing.is_looked_at())
+        {
             self.poses[controller] = pose;
             self.health.on_sighting(controller, &sighting, at);
             if let Some(standby) = &mut self.standby {

@@ -125,7 +125,7 @@ pub fn clock_sync() -> io::Result<ClockSync> {
 /// The finest step of a sleep on the monotonic clock, ns: 1 with high-resolution timers, a kernel tick without.
 #[must_use]
 pub fn timer_resolution_ns() -> u64 {
-    let step = clock_getres(ClockId::Monotonic);
+    let step = clock_getres(ClockId::Boottime);
     let part = |part: i64| u64::try_from(part).unwrap_or(0);
     part(step.tv_sec).saturating_mul(1_000_000_000).saturating_add(part(step.tv_nsec))
 }
