@@ -170,6 +170,7 @@ impl Keeper {
             show_over: false,
             ended: Cause::Started,
         };
+        memory.untold.into_iter().for_each(|note| keeper.note(note));
         keeper.examine_library();
         keeper.begin(memory.cue, memory.latched);
         keeper

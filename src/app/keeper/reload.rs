@@ -19,12 +19,14 @@ pub struct Memory {
     pub(super) latched: bool,
     /// What a person should know of the hall before.
     pub(super) notes: VecDeque<String>,
+    /// What happened between the halls, and was not said yet.
+    pub(super) untold: Vec<String>,
 }
 
 impl Memory {
     /// Adds something that a person should know.
     pub fn note(&mut self, note: String) {
-        self.notes.push_back(note);
+        self.untold.push(note);
     }
 }
 
@@ -69,7 +71,13 @@ impl Keeper {
             self.note(format!("the playlist {} is no longer loaded; load it again", list.place().id));
         }
         let cue = self.cued.take().map(|cued| cued.id);
-        Memory { board: Some(self.board.clone()), cue, latched, notes: std::mem::take(&mut self.notes) }
+        Memory {
+            board: Some(self.board.clone()),
+            cue,
+            latched,
+            notes: std::mem::take(&mut self.notes),
+            untold: Vec::new(),
+        }
     }
 
     /// Does what the system asks.

@@ -1,10 +1,16 @@
 //! What a person should know, with what to do.
 
+use std::time::Duration;
+
 use super::Keeper;
 use crate::hall::{Severity, Warning};
 use crate::health::{Standing, Why};
 use crate::rt::Row;
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
 
+/// In a new state all controllers have this long to be looked at before one that was not is worth a word.
+const FIRST_LOOK: Duration = Duration::from_secs(1);
 /// What the warnings are called that say what no state says.
 pub(super) const NOTE: &str = "note";
 
@@ -49,10 +55,12 @@ impl Keeper {
 
     fn of_controllers(&self, table: &[Row]) -> impl Iterator<Item = Warning> {
         let controllers = self.reins.config.controllers.iter().zip(table).enumerate();
+        let has_begun = Monotonic.now().since(self.known.since) < FIRST_LOOK;
         let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
             let severity = match row.standing {
                 Standing::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
                 Standing::Ok | Standing::Rejoining => return None,
+                Standing::Lost if has_begun && row.why == Why::NotSeenYet => return None,
                 Standing::Degraded | Standing::Unwatched => Severity::Warning,
                 _ if !self.board.is_on(lane) => Severity::Info,
                 _ => Severity::Error,
