@@ -293,7 +293,7 @@ fn a_second_master_is_noticed() {
         done.store(true, Ordering::Relaxed);
         said
     });
-    assert_eq!((said.exit, failed(&said.json(), 0)), (1, vec!["other-master"]));
+    assert_eq!((said.exit, failed(&said.json(), 0)), (79, vec!["other-master"]));
 }
 
 #[test]

@@ -49,8 +49,8 @@ Exit codes:
   0   done                        70  a fault of kinocue       76   a controller refused
   1   a check failed              71  the system refused       77   not allowed
   64  usage                       74  input or output failed   78   bad configuration
-  65  bad cue                     75  not ready, try again     130  a second Ctrl-C
-  66  no such file or name
+  65  bad cue                     75  not ready, try again     79   another master
+  66  no such file or name                                     130  a second Ctrl-C
   69  no daemon, or no controller, answered";
 
 /// Plays motion cues to the seats of a theatre, in time with a film.

@@ -49,7 +49,8 @@ Exit codes:
   1   something fails
   69  no controller answers, or no daemon
   75  another program holds the frame port
-  78  the configuration is bad")]
+  78  the configuration is bad
+  79  another machine sends to a controller")]
 pub(super) struct Args {
     /// The controllers [default: all].
     #[arg(value_name = "NAME")]
@@ -178,6 +179,7 @@ fn tell(report: &Report, json: bool) -> Result<Exit, Failure> {
     print::tell(&format!("kinocue: {}", report.summary()));
     Ok(match (report.answered(), report.passed()) {
         (0, _) => Exit::Unavailable,
+        (_, false) if report.fails(Check::OtherMaster) => Exit::OtherMaster,
         (_, false) => Exit::CheckFailed,
         (_, true) => Exit::Done,
     })

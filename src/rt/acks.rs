@@ -125,6 +125,8 @@ impl AckLoop {
             if clock.now() >= tell_at {
                 self.tell_times();
                 tell_at = clock.now() + TELL;
+            } else if self.watch.as_mut().is_some_and(Watch::take_untold) {
+                self.tell_table();
             }
             if over && clock.now().since(self.last_sent) > ACK_TIMEOUT {
                 break;
@@ -146,6 +148,10 @@ impl AckLoop {
             let Accounts { books, lateness, .. } = &self.accounts;
             live.on_times(lateness, books.tracker().latency_of_all());
         }
+        self.tell_table();
+    }
+
+    fn tell_table(&mut self) {
         if let (Some(watch), true) = (&mut self.watch, self.live.is_some()) {
             watch.tell_table(self.accounts.books.tracker(), &self.accounts.observer);
         }

@@ -44,6 +44,8 @@ pub struct Watch {
     /// When it last judged.
     looked: MonoTime,
     silent: bool,
+    /// A group stands otherwise than was told last.
+    untold: bool,
     /// What a hall has beside a play.
     standby: Option<Standby>,
     turns: Turns,
@@ -76,6 +78,7 @@ impl Watch {
             alarms,
             live,
             silent,
+            untold: false,
             standby: None,
             turns: Turns::default(),
         }
@@ -121,7 +124,13 @@ impl Watch {
         }
     }
 
+    /// Whether a group stands otherwise than when this was last asked.
+    pub(super) const fn take_untold(&mut self) -> bool {
+        std::mem::replace(&mut self.untold, false)
+    }
+
     fn keep(&mut self, change: Change) {
+        self.untold = true;
         if self.changes.len() < CHANGES_KEPT {
             self.changes.push(change);
         }
@@ -313,7 +322,7 @@ impl Watch {
     }
 
     fn stand_by(&mut self, now: MonoTime) {
-        let Self { standby, health, sender, live, .. } = self;
+        let Self { standby, health, sender, live, untold, .. } = self;
         let Some(standby) = standby else { return };
         standby.serve(health, sender, live.is_moving(), now);
         if live.is_moving() {
@@ -325,6 +334,7 @@ impl Watch {
                 && standby.is_at_park(health.groups().members(group))
             {
                 health.on_joined(group);
+                *untold = true;
             }
         }
         if let Some(finding) = standby.take_finding(health) {

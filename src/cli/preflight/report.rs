@@ -83,6 +83,12 @@ impl Report {
         self.passed
     }
 
+    /// Whether that fails.
+    pub(super) fn fails(&self, check: Check) -> bool {
+        let mut findings = self.controllers.iter().flat_map(|one| &one.findings);
+        findings.any(|one| one.finding.check == check && one.finding.fails())
+    }
+
     /// How many controllers answered.
     pub(super) const fn answered(&self) -> usize {
         self.answered
