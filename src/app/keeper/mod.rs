@@ -249,10 +249,15 @@ impl Keeper {
             return;
         }
         let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
+        let played = self.record.is_under_way();
         self.end_record(self.ended);
         if self.reins.leave.load(Ordering::Acquire) {
             // There is no next show in this hall, and soon no tick thread to take it.
             return;
+        }
+        if !played {
+            // Seats were brought to park between shows: what is next stays as it is.
+            return self.stage_again();
         }
         if self.end_sweep(how) {
             self.rewind();

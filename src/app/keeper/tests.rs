@@ -9,6 +9,7 @@ use super::*;
 use crate::hall::{Ask, Code};
 use crate::rt::News;
 use crate::state::{Event, Next, Trouble};
+use crate::time::ShowTime;
 
 const ARM: Ask = Ask::Arm { seats_empty: false };
 
@@ -129,6 +130,18 @@ fn an_armed_hall_is_not_asked_for_registers() {
     let mut rig = Rig::armed();
     assert_eq!(rig.ask(Ask::Preflight).unwrap_err().code, Code::State);
     assert_eq!((rig.state(), rig.keeper.known.next), (State::Armed, Next::Go));
+}
+
+#[test]
+fn a_park_between_shows_leaves_the_next_show_where_it_is_to_begin() {
+    let mut rig = Rig::parked();
+    let start = ShowTime::from_millis(2_000);
+    rig.ask(Ask::Seek(start)).unwrap();
+    rig.tell(Event::Astray(true));
+    rig.ask(Ask::Park).unwrap();
+    assert_eq!(rig.state(), State::Parking);
+    rig.tell(Event::Parked);
+    assert_eq!((rig.state(), rig.keeper.cued.as_ref().map(|cued| cued.start)), (State::Parked, Some(start)));
 }
 
 #[test]
