@@ -38,7 +38,7 @@ use crate::config::Config;
 use crate::hall::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
-use crate::rt::Command;
+use crate::rt::{Command, News};
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -220,9 +220,16 @@ impl Keeper {
     /// Hears what the tick thread has to say, and does what a new state needs.
     fn take_news(&mut self) {
         while let Ok(news) = self.reins.news.pop() {
-            if let Some((from, to)) = self.known.hear(news) {
-                self.on_state(from, to);
-            }
+            self.hear(news);
+        }
+    }
+
+    fn hear(&mut self, news: News) {
+        if let News::Unplanned(what) = news {
+            self.note(self.name_unplanned(what));
+        }
+        if let Some((from, to)) = self.known.hear(news) {
+            self.on_state(from, to);
         }
     }
 
