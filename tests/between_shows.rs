@@ -76,7 +76,9 @@ struct Hands<'a> {
 impl Hands<'_> {
     fn hear(&self) {
         while let Ok(news) = self.news.borrow_mut().pop() {
-            if let News::Entered { state, .. } = news {
+            if let News::Entered { state, .. } = news
+                && self.states.borrow().last() != Some(&state)
+            {
                 self.states.borrow_mut().push(state);
             }
         }
@@ -244,6 +246,75 @@ fn a_hall_that_was_stopped_cleared_and_homed_plays_what_was_loaded_meanwhile() {
         (61, Ask(Request::Go)),
     ];
     assert_played(&script, 61);
+}
+
+/// That height of the only axis, fraction of its stroke.
+fn up(height: f64) -> Pose {
+    let mut pose = PARKED;
+    pose[0] = height;
+    pose
+}
+
+/// Parked by a show, or before any, with a seat that comes back up at tick 20 and is asked to park at tick 100.
+fn astray(before: &[(u64, Deed)]) -> Vec<(u64, Deed)> {
+    let found = [(1, See(Alarm::Found(0, PARKED))), (2, found(true, true))];
+    let back = [(19, See(Alarm::Leave(0))), (20, See(Alarm::Found(0, up(0.3)))), (100, Ask(Request::Park))];
+    [&found[..], before, &back[..]].concat()
+}
+
+#[test]
+fn a_seat_that_came_back_up_between_shows_is_parked_slowly_once_a_person_asks() {
+    let loaded = [(3, Load), (4, READY)];
+    for before in [&loaded[..], &[]] {
+        let (frames, states) = live_through(&astray(before), 600);
+        assert_eq!(states, [State::Boot, State::Parked, State::Parking, State::Parked]);
+        let (first, from) = frames[0];
+        assert!(first >= 100 && (from - 90_000).abs() <= 1_000, "{from} pulses at tick {first}");
+        // 50 mm/s are 1,000 pulses in 10 ms.
+        let steps = frames.windows(2).map(|pair| pair[0].1 - pair[1].1);
+        assert!(steps.clone().all(|step| (0..=1_001).contains(&step)), "{:?}", steps.max());
+        assert_eq!(frames.last().map(|(_, pulses)| *pulses), Some(0));
+    }
+}
+
+#[test]
+fn a_seat_that_was_parked_between_shows_plays_the_next_one() {
+    let script = [&astray(&[(3, Load), (4, READY)])[..], &[(600, Load), (601, Ask(Request::Arm))]].concat();
+    assert_played(&[&script[..], &[(610, Ask(Request::Go))]].concat(), 610);
+}
+
+#[test]
+fn a_seat_that_comes_up_again_is_parked_again_though_nothing_was_loaded_since() {
+    let again = [(700, See(Alarm::Found(0, up(0.1)))), (710, Ask(Request::Park))];
+    let (frames, states) = live_through(&[&astray(&[])[..], &again].concat(), 1_000);
+    assert_eq!(states.iter().filter(|state| **state == State::Parking).count(), 2, "{states:?}");
+    let (_, from) = frames.iter().find(|(tick, _)| *tick > 700).expect("frames go out");
+    assert!((from - 30_000).abs() <= 1_000, "{from} pulses");
+    assert_eq!(frames.last().map(|(_, pulses)| *pulses), Some(0));
+}
+
+#[test]
+fn a_park_of_seats_that_are_all_at_park_sends_nothing() {
+    for before in [&[(3, Load), (4, READY)][..], &[]] {
+        let found = [(1, See(Alarm::Found(0, PARKED))), (2, found(true, true)), (100, Ask(Request::Park))];
+        let (frames, states) = live_through(&[&found[..], before].concat(), 200);
+        assert_eq!((frames, states), (vec![], vec![State::Boot, State::Parked]));
+    }
+}
+
+#[test]
+fn a_seat_that_is_stopped_before_it_sets_out_to_park_stays_where_it_is() {
+    let script = [
+        (101, Stop),
+        (110, Ask(Request::Clear)),
+        (111, Tell(Event::PositionsRead)),
+        // Had it set out, it would be half-way by now, as far as the engine knows.
+        (190, Ask(Request::Park)),
+    ];
+    let (frames, states) = live_through(&[&astray(&[])[..], &script].concat(), 700);
+    assert_eq!(states.last(), Some(&State::Parked), "{states:?}");
+    let (first, from) = frames[0];
+    assert!(first >= 190 && (from - 90_000).abs() <= 1_000, "{from} pulses at tick {first}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod common;
 use std::time::Duration;
 
 use common::{Event, Frame, Played, Virtual, Worst, swell};
-use kinocue::engine::{Ending, Mix};
+use kinocue::engine::{Ending, Mix, Unplanned};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
 use kinocue::state::{self, Refusal, Request, Why};
@@ -36,7 +36,14 @@ fn ride_with_effects() -> Virtual {
 fn refusal(news: &News) -> Option<Refusal> {
     match news {
         News::Refused(refusal) => Some(*refusal),
-        News::Entered { .. } | News::Taken | News::NotLoaded(_) => None,
+        News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
+    }
+}
+
+const fn unplanned(news: &News) -> Option<Unplanned> {
+    match news {
+        News::Unplanned(what) => Some(*what),
+        News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Refused(_) => None,
     }
 }
 
@@ -339,6 +346,30 @@ fn a_controller_that_is_lost_once_more_before_it_rests_is_away() {
         .with(505, Event::Alarm(Alarm::Leave(1)))
         .play();
     assert!((503..=530).contains(&played.lane(1).count()));
+}
+
+#[test]
+fn a_seat_for_which_no_join_is_found_is_named_once_and_stays_up_until_all_park() {
+    let played = two_seats()
+        .with(500, Event::Alarm(Alarm::Leave(1)))
+        .with(1_000, Event::Refuse)
+        .with(1_000, Event::Alarm(Alarm::Found(1, [0.2; MAX_AXES])))
+        .play();
+    let told = played.news.iter().filter_map(unplanned).collect::<Vec<_>>();
+    assert_eq!(told, [Unplanned::Lane(1)]);
+    assert_eq!(played.ended.ending, Ending::Completed, "the other plays on");
+    let up = played.lane(1).map(pulses).skip_while(|pulses| *pulses != 60_000);
+    assert!(up.take_while(|pulses| *pulses == 60_000).count() > 900, "it waits for the end of the cue");
+    assert_eq!(played.lane(1).rev_pulses(1), [0]);
+}
+
+#[test]
+fn a_seek_to_which_no_move_leads_is_told_and_the_show_goes_on_where_it_is() {
+    let smooth = ride().play();
+    let seek = Event::Seek(ShowTime::from_millis(15_000));
+    let played = ride().with(500, Event::Refuse).with(500, seek).play();
+    assert_eq!(played.news.iter().filter_map(unplanned).collect::<Vec<_>>(), [Unplanned::Seek]);
+    assert_eq!(octets(&played, 0), octets(&smooth, 0));
 }
 
 #[test]

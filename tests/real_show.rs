@@ -136,7 +136,7 @@ impl Leader {
         self.ask(Request::Resume);
         self.wait_until("the refusal", |leader| match leader.reins.news.pop().ok()? {
             News::Refused(refusal) => Some(refusal.why),
-            News::Entered { .. } | News::Taken | News::NotLoaded(_) => None,
+            News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
         })
     }
 }

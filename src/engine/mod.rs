@@ -17,6 +17,7 @@ mod wait;
 
 pub use headroom::Headroom;
 pub use mix::Mix;
+pub use signs::Unplanned;
 pub use slew::MAX_SPEED_UP;
 
 use std::sync::Arc;
@@ -152,6 +153,8 @@ pub struct Engine {
     resuming: bool,
     /// Where in the cue the show is to go on.
     seeking: Option<ShowTime>,
+    /// Whether a seek could not be planned, and nobody was told yet.
+    seek_refused: bool,
     /// Whether a move that the show needs could not be planned.
     planless: bool,
     /// How much later than the film the motion is to be, milliseconds.
@@ -195,6 +198,7 @@ impl Engine {
             homeward: false,
             resuming: false,
             seeking: None,
+            seek_refused: false,
             planless: false,
             trim_ms: 0,
             late_answers: 0,

@@ -8,16 +8,22 @@ use crate::time::{ShowTime, TRIM_MS};
 impl Engine {
     /// Parks, three hold frames, and the end. Asking again changes nothing.
     ///
-    /// Before the first frame it is the end at once: nothing has been set in motion, and the lanes may still be on a
-    /// slow way to park, or where nobody knows.
+    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end
+    /// at once: nothing has been set in motion, and the lanes may still be on a slow way to park, or where nobody knows.
     pub fn park(&mut self) {
-        if self.frames == 0 && self.rest().is_none() {
+        let is_over = self.phase == Phase::Done;
+        let is_fresh = self.frames == 0 && self.rest().is_none();
+        if (is_over || is_fresh) && self.is_astray() {
+            self.rest_untold();
+        } else if is_over || self.is_homeward() {
+            return;
+        } else if is_fresh {
             self.phase = Phase::Done;
-            self.ending = Ending::Stopped;
-        } else if !self.is_homeward() {
-            self.homeward = true;
-            self.ending = Ending::Stopped;
         }
+        // The course that it was to begin on will not be there any more.
+        self.begun = true;
+        self.homeward = true;
+        self.ending = Ending::Stopped;
     }
 
     /// Ends the play where the lanes are.
@@ -27,15 +33,16 @@ impl Engine {
 
     /// Brings the lanes to rest at once, without the planner; then three hold frames, and no more.
     pub fn stop(&mut self) {
-        if self.phase == Phase::Done || self.rest() == Some(Rest::Stopped) {
+        if self.phase == Phase::Done {
             return;
         }
         (self.homeward, self.resuming, self.seeking) = (false, false, None);
         self.ending = Ending::Stopped;
-        if self.phase == Phase::Waiting {
-            self.rest_untold();
-        } else {
-            self.come_down(Rest::Stopped);
+        match self.phase {
+            Phase::Waiting => self.rest_untold(),
+            // Of a course that was asked for to park from there nothing may begin any more.
+            _ if self.rest() == Some(Rest::Stopped) => self.drop_switch(),
+            _ => self.come_down(Rest::Stopped),
         }
     }
 

@@ -47,6 +47,8 @@ pub(super) struct Rider {
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
     pub(super) refused: bool,
+    /// The same, as long as nobody was told.
+    refusal_untold: bool,
     is_at_fault: bool,
     pub(super) fader: Fader,
     /// Whether its pose is the cue's.
@@ -71,6 +73,7 @@ impl Rider {
             heard_again: false,
             returning: false,
             refused: false,
+            refusal_untold: false,
             is_at_fault: false,
             fader: Fader::at(level),
             on_cue: true,
@@ -241,6 +244,17 @@ impl Rider {
             Part::Braking(_) | Part::Away => false,
         };
         apart && !self.refused
+    }
+
+    /// Hears that no such course could be planned.
+    pub(super) fn refuse(&mut self) {
+        self.refused = self.needs_a_course();
+        self.refusal_untold |= self.refused;
+    }
+
+    /// Whether no way in or out could be planned for it; said once.
+    pub(super) const fn take_refusal(&mut self) -> bool {
+        std::mem::replace(&mut self.refusal_untold, false)
     }
 
     /// Takes up the course that was asked for with `scene`.

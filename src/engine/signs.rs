@@ -1,11 +1,43 @@
 //! What the engine tells of its lanes, and of how it goes.
 
+use std::fmt;
 use std::time::Duration;
 
-use super::{Ending, Engine, Phase};
+use super::{Ending, Engine, Phase, Rider};
 use crate::gate::Counts;
 
+/// What the planner found no move for, while the show goes on without it. In words by its `Display`, without the name of the seat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unplanned {
+    /// The seek that was asked for.
+    Seek,
+    /// The way of this lane into the show, or out of it.
+    Lane(usize),
+}
+
+impl fmt::Display for Unplanned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Seek => {
+                "the seek was not done: no move within the limits leads there; seek a little earlier or later"
+            }
+            Self::Lane(_) => {
+                "it stays where it is: no move within the limits leads it to where it should be; seek elsewhere in the cue, \
+                 or park"
+            }
+        })
+    }
+}
+
 impl Engine {
+    /// What could not be planned since this was asked last, without ending the show; each is said once.
+    pub fn take_unplanned(&mut self) -> Option<Unplanned> {
+        if std::mem::take(&mut self.seek_refused) {
+            return Some(Unplanned::Seek);
+        }
+        self.riders.iter_mut().position(Rider::take_refusal).map(Unplanned::Lane)
+    }
+
     /// What the gate had to do for a lane.
     #[must_use]
     pub fn clamps(&self, lane: usize) -> &Counts {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::switch::{Goal, Switch};
-use super::{Ending, Engine, HOLD_FRAMES, Phase, Rest};
+use super::{Ending, Engine, HOLD_FRAMES, Phase, Rest, Rider};
 use crate::plan::{Course, From, Request, Scene, To};
 use crate::time::ShowTime;
 
@@ -40,7 +40,7 @@ impl Engine {
     fn halt(&mut self, rest: Rest) {
         self.stamps.break_off();
         self.drop_switch();
-        self.riders.iter_mut().for_each(super::Rider::halt);
+        self.riders.iter_mut().for_each(Rider::halt);
         self.holds.begin();
         self.phase = Phase::Resting(rest);
     }
@@ -206,8 +206,8 @@ impl Engine {
         self.scenes.put(scene);
         let Some(switch) = self.switch.take_if(|switch| switch.serial == serial) else { return };
         match switch.goal {
-            Goal::Lanes => self.riders.iter_mut().for_each(|rider| rider.refused = rider.needs_a_course()),
-            Goal::Cue if self.seeking.take().is_some() => {}
+            Goal::Lanes => self.riders.iter_mut().for_each(Rider::refuse),
+            Goal::Cue if self.seeking.take().is_some() => self.seek_refused = true,
             Goal::Cue | Goal::Again | Goal::Park | Goal::Home => {
                 (self.ending, self.planless, self.resuming) = (Ending::Fault, true, false);
             }

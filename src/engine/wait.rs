@@ -1,7 +1,7 @@
 //! Between shows: an engine that is loaded waits until somebody lets it go, and the next takes over what the last one knows
 //! of the lanes. Nothing is sent meanwhile.
 
-use super::{Engine, Part, Phase, Rest, first_phase};
+use super::{Engine, Part, Phase, Rest, Rider, first_phase};
 use crate::engine::Mix;
 use crate::motion::{Pose, Slot, Window};
 
@@ -20,7 +20,7 @@ impl Engine {
     /// The same with nothing known of any lane, and at rest: nothing goes to a lane before it is found.
     #[must_use]
     pub fn unknown(mut self) -> Self {
-        self.riders.iter_mut().for_each(super::Rider::cut);
+        self.riders.iter_mut().for_each(Rider::cut);
         self.rest_untold();
         self
     }
@@ -71,9 +71,16 @@ impl Engine {
         }
     }
 
+    /// Whether a lane that frames may go to is elsewhere than at park.
+    #[must_use]
+    pub fn is_astray(&self) -> bool {
+        let is_up = |rider: &Rider| !is_at(&rider.window, rider.pose(), &rider.window.park());
+        self.riders.iter().any(|rider| rider.part != Part::Away && is_up(rider))
+    }
+
     /// At rest, and no frame says so: the seats have not moved.
     pub(super) fn rest_untold(&mut self) {
-        self.riders.iter_mut().for_each(super::Rider::halt);
+        self.riders.iter_mut().for_each(Rider::halt);
         self.holds.skip();
         self.phase = Phase::Resting(Rest::Stopped);
     }

@@ -28,7 +28,8 @@ impl Standing {
     #[must_use]
     pub const fn next(self) -> &'static str {
         match self {
-            Self::Ok | Self::Rejoining => "nothing",
+            Self::Ok => "nothing",
+            Self::Rejoining => "park, or start a show: it joins slowly",
             Self::Degraded => "look at the network",
             Self::Lost => "look at its power and network; it joins again by itself if it did not reboot",
             Self::Stopped => "release the emergency stop at its place, then clear",
@@ -45,7 +46,7 @@ impl Why {
     pub const fn next(self) -> Option<&'static str> {
         match self {
             Self::Moved(_) => {
-                Some("find out what moved it; with the next start it joins slowly from where it is")
+                Some("find out what moved it; then park, or start a show: it joins slowly from where it is")
             }
             Self::Crowded(_) => {
                 Some("stop the other machine; then park, and home it with nobody on the seat")

@@ -64,6 +64,7 @@ impl Conductor {
     /// # Errors
     /// [`Refusal`] where the state does not allow it; nothing has changed then.
     pub fn request(&mut self, request: Request, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
+        self.look_for_stray(engine, now);
         self.machine.request(request, now)?;
         self.steer(engine);
         Ok(())
@@ -146,8 +147,16 @@ impl Conductor {
             self.machine.event(event, now);
             self.steer(engine);
         }
+        self.look_for_stray(engine, now);
         if !self.attended && self.machine.state().is_latched() {
             engine.end();
+        }
+    }
+
+    /// Between shows a person may want a seat down that rests up.
+    fn look_for_stray(&mut self, engine: &Engine, now: MonoTime) {
+        if self.machine.state() == State::Parked {
+            self.machine.event(Event::Astray(engine.is_astray()), now);
         }
     }
 

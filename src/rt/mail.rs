@@ -6,7 +6,7 @@ use std::thread::Thread;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::live::Live;
-use crate::engine::Engine;
+use crate::engine::{Engine, Unplanned};
 use crate::fanout::Lane;
 use crate::motion::Pose;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
@@ -151,6 +151,8 @@ pub enum News {
     Refused(Refusal),
     /// A show was not loaded, because the seats move.
     NotLoaded(State),
+    /// No move was found for something that the show goes on without.
+    Unplanned(Unplanned),
 }
 
 /// The tick thread's ends.

@@ -189,6 +189,11 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     fn hand_on(&mut self) {
         self.mail.look(self.conductor.machine().state());
         tell_state(&mut self.conductor, &mut self.mail);
+        while self.mail.has_room_for_news()
+            && let Some(what) = self.engine.take_unplanned()
+        {
+            self.mail.tell(News::Unplanned(what));
+        }
         if let Some(request) = self.engine.take_request() {
             self.mail.task(Task::Plan(request));
         }

@@ -138,6 +138,7 @@ impl Machine {
         match self.state {
             State::Playing(_) | State::Paused => self.enter(State::Parking, cause, now),
             State::Armed => self.enter(State::Parked, cause, now),
+            State::Parked if self.facts.astray => self.enter(State::Parking, cause, now),
             State::Parked | State::Parking => {}
             State::Recovering => {
                 self.known_position()?;

@@ -161,6 +161,8 @@ pub enum Event {
     Identified(Finding),
     /// The positions of all seats were read (again).
     PositionsRead,
+    /// Whether a seat that frames may go to rests elsewhere than at park.
+    Astray(bool),
     /// A controller has rebooted or was reset: its position is unknown until it is homed. Counted from 0.
     Rebooted(usize),
     /// What is loaded and proved has changed.

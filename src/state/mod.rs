@@ -65,6 +65,8 @@ struct Facts {
     homed: bool,
     /// The positions were read since the hall was cleared.
     measured: bool,
+    /// A seat that frames may go to rests elsewhere than at park.
+    astray: bool,
     /// An emergency stop is in effect.
     pressed: bool,
     /// A controller or a drive has an error.
@@ -90,6 +92,7 @@ impl Machine {
                 identified: false,
                 homed: false,
                 measured: false,
+                astray: false,
                 pressed: false,
                 errors: false,
                 readiness: Readiness::NoCue,

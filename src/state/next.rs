@@ -15,6 +15,8 @@ pub enum Next {
     AwaitRest,
     /// Park, or home.
     ParkOrHome,
+    /// Park, or start a show: a seat is not at park.
+    ParkOrStart,
     /// Home: a position is unknown.
     Home,
     /// Load a cue.
@@ -83,11 +85,12 @@ impl Machine {
 
     const fn next_parked(&self) -> Next {
         match self.facts.readiness {
+            Readiness::Ready if !self.facts.homed => Next::ArmAndHome,
+            _ if self.facts.astray => Next::ParkOrStart,
             Readiness::NoCue => Next::Load,
             Readiness::NotProved => Next::Prove,
             Readiness::NotPreflighted => Next::Preflight,
-            Readiness::Ready if self.facts.homed => Next::Arm,
-            Readiness::Ready => Next::ArmAndHome,
+            Readiness::Ready => Next::Arm,
         }
     }
 

@@ -9,6 +9,7 @@ impl Machine {
         match event {
             Event::Identified(finding) => self.identified(finding, now),
             Event::PositionsRead => self.facts.measured = true,
+            Event::Astray(astray) => self.facts.astray = astray,
             Event::Rebooted(controller) => self.rebooted(controller, now),
             Event::Readiness(readiness) => self.ready(readiness, now),
             Event::Homed => self.homed(now),

@@ -368,6 +368,19 @@ fn parking_an_armed_hall_only_disarms_it() {
 }
 
 #[test]
+fn parking_a_parked_hall_brings_down_a_seat_that_is_up_and_moves_nothing_else() {
+    let mut hall = told(State::Parked, Event::Astray(true));
+    assert_eq!((hall.state(), hall.next()), (State::Parked, Next::ParkOrStart), "nothing moves by itself");
+    hall.request(Request::Park, s(2)).unwrap();
+    assert_eq!((hall.state(), hall.cause()), (State::Parking, Cause::Asked(Request::Park)));
+    hall.event(Event::Parked, s(5));
+    hall.event(Event::Astray(false), s(5));
+    assert_eq!((hall.state(), hall.next()), (State::Parked, Next::Arm));
+    hall.request(Request::Park, s(6)).unwrap();
+    assert_eq!((hall.state(), hall.since()), (State::Parked, s(5)));
+}
+
+#[test]
 fn a_refusal_says_what_was_asked_in_which_state_why_not_and_what_to_do() {
     let mut hall = hall(State::Stopped);
     assert_eq!(

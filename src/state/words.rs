@@ -60,6 +60,7 @@ impl fmt::Display for Next {
             Self::AwaitHome => "wait until the seats are home, and keep clear of them",
             Self::AwaitRest => "wait until the seats are at rest",
             Self::ParkOrHome => "park, or home",
+            Self::ParkOrStart => "park, or start a show: it joins slowly",
             Self::Home => "home, with nobody on the seats",
             Self::Load => "load a cue, then arm",
             Self::Prove => "check the cue against the seats, then arm",

@@ -19,8 +19,8 @@ use kinocue::gate::Counts;
 use kinocue::motion::{Measure, SeatType, Spacing};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, Planning, TickLoop,
-    mailboxes,
+    Alarm, Answer, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, Planning,
+    Task, TickLoop, mailboxes,
 };
 use kinocue::state::Request;
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -52,6 +52,8 @@ pub enum Event {
     Trim(i32),
     /// From here on the planner takes this many ticks to answer.
     SlowPlanner(u32),
+    /// The planner finds no move for what it is asked next.
+    Refuse,
 }
 
 /// A show to be played in virtual time.
@@ -170,6 +172,7 @@ struct Stage<'a> {
     plans: RefCell<PlanLoop>,
     planner_delay: Cell<u32>,
     planner_waits: Cell<u32>,
+    planner_refuses: Cell<bool>,
     hands: Hands<'a>,
     happened: RefCell<Vec<(MonoTime, Event)>>,
     script: &'a [(u64, Event)],
@@ -184,6 +187,7 @@ impl<'a> Stage<'a> {
             plans: RefCell::new(plans),
             planner_delay: Cell::new(0),
             planner_waits: Cell::new(0),
+            planner_refuses: Cell::new(false),
             hands,
             happened: RefCell::default(),
             script,
@@ -192,6 +196,17 @@ impl<'a> Stage<'a> {
     }
 
     fn serve_planner(&self) {
+        let mut plans = self.plans.borrow_mut();
+        while self.planner_refuses.get()
+            && let Ok(task) = plans.tasks.pop()
+        {
+            if let Task::Plan(request) = task {
+                let answer = Answer::Refused(request.serial, request.scene);
+                plans.answers.push(answer).expect("there is room");
+                self.planner_refuses.set(false);
+            }
+        }
+        drop(plans);
         if self.plans.borrow().tasks.is_empty() {
             self.planner_waits.set(self.planner_delay.get());
         } else if self.planner_waits.get() > 0 {
@@ -226,6 +241,7 @@ impl Clock for Stage<'_> {
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+                Event::Refuse => self.planner_refuses.set(true),
                 Event::SlowPlanner(ticks) => {
                     self.planner_delay.set(*ticks);
                     self.planner_waits.set(*ticks);

@@ -108,8 +108,34 @@ fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_a
 }
 
 #[test]
+fn a_seat_whose_plug_was_pulled_in_mid_show_and_is_put_back_after_it_comes_down_once_a_person_parks_it() {
+    let hall = Hall::open();
+    hall.play("ride");
+    hall.rises(1);
+    hall.relay(1).pull();
+    hall.comes_to("parked");
+    hall.relay(1).put_back();
+    let down = "park, or start a show: it joins slowly";
+    let up = hall.wait(|status| status["next"] == down && standing(status, 1) == "rejoining");
+    let warnings = up["warnings"].as_array().expect("a list");
+    let told = warnings.iter().find(|one| one["id"] == "controller-rejoining").expect("it is told");
+    assert_eq!((told["controller"].as_str(), told["remedy"].as_str()), (Some("A2"), Some(down)));
+    hall.relay(1).count();
+    hall.lives_on(50);
+    assert_eq!(hall.relay(1).count(), 0, "nothing moves by itself");
+
+    assert_eq!(hall.done(&["park"]).code, Some(0));
+    hall.relay(1).wait_for(|frame| frame.positions[0].0 == 0);
+    hall.wait(|status| status["state"] == "parked" && standing(status, 1) == "ok");
+    assert_ne!(hall.status()["next"], down);
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
 fn a_plug_pulled_between_shows_is_seen_and_put_back_it_is_well_again() {
     let hall = Hall::open();
+    // How the controllers stand may be told a moment later than the state.
+    hall.wait(|status| [0, 1].iter().all(|one| standing(status, *one) == "ok"));
     hall.relay(0).pull();
     let lost = hall.wait(|status| standing(status, 0) == "lost");
     assert_eq!((lost["state"].as_str(), standing(&lost, 1)), (Some("parked"), "ok"));

@@ -103,13 +103,13 @@ fn commands_alarms_levels_and_a_stop_neither_allocate_nor_free_on_the_tick_threa
 fn entered(news: &News) -> Option<State> {
     match news {
         News::Entered { state, .. } => Some(*state),
-        News::Taken | News::NotLoaded(_) | News::Refused(_) => None,
+        News::Taken | News::NotLoaded(_) | News::Refused(_) | News::Unplanned(_) => None,
     }
 }
 
 fn refusal(news: &News) -> Option<Why> {
     match news {
-        News::Entered { .. } | News::Taken | News::NotLoaded(_) => None,
+        News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
         News::Refused(refusal) => Some(refusal.why),
     }
 }

@@ -37,6 +37,7 @@ impl Known {
             News::Taken => self.on_answer(Ok(())),
             News::Refused(refusal) => self.on_answer(Err(refusal.into())),
             News::NotLoaded(state) => self.on_answer(Err(not_loaded(state))),
+            News::Unplanned(_) => {} // of no state, and no answer
         }
         None
     }

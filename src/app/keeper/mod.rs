@@ -38,7 +38,7 @@ use crate::config::Config;
 use crate::hall::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
-use crate::rt::Command;
+use crate::rt::{Command, News};
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -220,9 +220,16 @@ impl Keeper {
     /// Hears what the tick thread has to say, and does what a new state needs.
     fn take_news(&mut self) {
         while let Ok(news) = self.reins.news.pop() {
-            if let Some((from, to)) = self.known.hear(news) {
-                self.on_state(from, to);
-            }
+            self.hear(news);
+        }
+    }
+
+    fn hear(&mut self, news: News) {
+        if let News::Unplanned(what) = news {
+            self.note(self.name_unplanned(what));
+        }
+        if let Some((from, to)) = self.known.hear(news) {
+            self.on_state(from, to);
         }
     }
 
@@ -249,10 +256,15 @@ impl Keeper {
             return;
         }
         let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
+        let played = self.record.is_under_way();
         self.end_record(self.ended);
         if self.reins.leave.load(Ordering::Acquire) {
             // There is no next show in this hall, and soon no tick thread to take it.
             return;
+        }
+        if !played {
+            // Seats were brought to park between shows: what is next stays as it is.
+            return self.stage_again();
         }
         if self.end_sweep(how) {
             self.rewind();

@@ -83,6 +83,11 @@ impl Records {
         self.journal
     }
 
+    /// Whether a show has begun, and is not over.
+    pub(super) fn is_under_way(&self) -> bool {
+        self.open.as_ref().is_some_and(|open| open.over.is_none())
+    }
+
     /// Notes something that happens while a show is under way.
     pub(super) fn event(&mut self, event: String) {
         if let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::Keeper;
 use crate::config::Controller;
+use crate::engine::Unplanned;
 use crate::hall::{ControllerStatus, Histogram, Percentiles, RealTimeStatus, Status};
 use crate::rt::Row;
 use crate::state::{Next, Whose};
@@ -119,6 +120,14 @@ impl Keeper {
                 format!("{}: {cause}", crate::health::Groups::of(&config.controllers).name(index))
             }
             None => cause.to_string(),
+        }
+    }
+
+    /// What could not be planned, with the name of whose move that is.
+    pub(super) fn name_unplanned(&self, what: Unplanned) -> String {
+        match what {
+            Unplanned::Seek => what.to_string(),
+            Unplanned::Lane(lane) => format!("{}: {what}", self.reins.config.controllers[lane].name),
         }
     }
 

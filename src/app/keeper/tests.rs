@@ -6,9 +6,11 @@ use std::sync::mpsc::channel;
 use super::errand::Done;
 use super::testing::Rig;
 use super::*;
+use crate::engine::Unplanned;
 use crate::hall::{Ask, Code};
 use crate::rt::News;
 use crate::state::{Event, Next, Trouble};
+use crate::time::ShowTime;
 
 const ARM: Ask = Ask::Arm { seats_empty: false };
 
@@ -129,6 +131,28 @@ fn an_armed_hall_is_not_asked_for_registers() {
     let mut rig = Rig::armed();
     assert_eq!(rig.ask(Ask::Preflight).unwrap_err().code, Code::State);
     assert_eq!((rig.state(), rig.keeper.known.next), (State::Armed, Next::Go));
+}
+
+#[test]
+fn a_park_between_shows_leaves_the_next_show_where_it_is_to_begin() {
+    let mut rig = Rig::parked();
+    let start = ShowTime::from_millis(2_000);
+    rig.ask(Ask::Seek(start)).unwrap();
+    rig.tell(Event::Astray(true));
+    rig.ask(Ask::Park).unwrap();
+    assert_eq!(rig.state(), State::Parking);
+    rig.tell(Event::Parked);
+    assert_eq!((rig.state(), rig.keeper.cued.as_ref().map(|cued| cued.start)), (State::Parked, Some(start)));
+}
+
+#[test]
+fn a_move_that_was_not_found_is_a_warning_with_the_name_of_the_seat_and_what_to_do() {
+    let mut rig = Rig::playing();
+    rig.keeper.hear(News::Unplanned(Unplanned::Lane(1)));
+    let warnings = rig.keeper.status().warnings;
+    let told =
+        warnings.iter().find(|one| one.text.starts_with("B1: it stays where it is")).expect("it is told");
+    assert!(told.text.ends_with("seek elsewhere in the cue, or park"), "{}", told.text);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::Keeper;
 use crate::hall::{Severity, Warning};
 use crate::health::{Standing, Why};
 use crate::rt::Row;
+use crate::state::Next;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -59,6 +60,8 @@ impl Keeper {
         let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
             let severity = match row.standing {
                 Standing::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
+                Standing::Rejoining if self.known.next == Next::ParkOrStart => Severity::Warning,
+                // While a show runs it joins by itself.
                 Standing::Ok | Standing::Rejoining => return None,
                 Standing::Lost if has_begun && row.why == Why::NotSeenYet => return None,
                 Standing::Degraded | Standing::Unwatched => Severity::Warning,

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::{CtrlC, leader};
 use crate::app::Control;
+use crate::engine::Unplanned;
 use crate::rt::{News, Phase};
 use crate::state::{Cause, Request, State, Whose};
 use crate::time::ShowTime;
@@ -38,6 +39,7 @@ impl Said {
         let (state, cause, next) = match *news {
             News::Entered { state, cause, next, .. } => (state, cause, next),
             News::Refused(refusal) => return Some(refusal.to_string()),
+            News::Unplanned(what) => return Some(self.unplanned(what)),
             News::Taken | News::NotLoaded(_) => return None,
         };
         let mut text = match (state, cause) {
@@ -54,6 +56,13 @@ impl Said {
             let _ = write!(text, "; {}", self.next(next));
         }
         Some(text)
+    }
+
+    fn unplanned(&self, what: Unplanned) -> String {
+        match what {
+            Unplanned::Seek => what.to_string(),
+            Unplanned::Lane(lane) => format!("{}: {what}", self.names[lane]),
+        }
     }
 
     fn name(&self, cause: Cause) -> Option<&str> {
@@ -153,6 +162,12 @@ mod tests {
             "cannot park while recovering: where the seats stand has not been read since they stopped; wait until the \
              controllers have answered"
         );
+    }
+
+    #[test]
+    fn a_move_that_was_not_found_names_the_seat_and_what_to_do() {
+        let told = said().news(&News::Unplanned(Unplanned::Lane(1))).unwrap();
+        assert!(told.starts_with("A2: it stays where it is: ") && told.ends_with(", or park"), "{told}");
     }
 
     #[test]

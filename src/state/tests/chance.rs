@@ -36,6 +36,7 @@ fn event() -> impl Strategy<Value = Event> {
         4 => select(vec![AllReleased, ErrorsGone, Event::Readiness(Readiness::Ready)]),
         2 => any::<[bool; 3]>().prop_map(|[homed, at_park, crashed]| Identified(Finding { homed, at_park, crashed })),
         1 => Just(Identified(PARKED)),
+        1 => any::<bool>().prop_map(Event::Astray),
         1 => (0..3_usize).prop_map(Rebooted),
         1 => select(readiness.to_vec()).prop_map(Event::Readiness),
         1 => (select(vec![Demand::Pause, Demand::Park]), 0..3_usize).prop_map(|(demand, group)| Policy(demand, group)),
@@ -78,6 +79,7 @@ struct Model {
     errors: bool,
     /// The last taken request to home was one to arm, and it was not taken back.
     homes_to_arm: bool,
+    astray: bool,
 }
 
 impl Model {
@@ -123,10 +125,8 @@ impl Model {
         assert!(!stays || to.is_latched(), "{request} led from {from} to {to}");
         if !from.may_send_motion() && to.may_send_motion() {
             let way = (from, request);
-            assert!(
-                matches!(way, (State::Armed, Request::Go) | (State::Recovering, Request::Park)),
-                "{way:?}"
-            );
+            let parks = from == State::Recovering || (from == State::Parked && self.astray);
+            assert!(way == (State::Armed, Request::Go) || (parks && request == Request::Park), "{way:?}");
         }
     }
 
@@ -136,6 +136,7 @@ impl Model {
             Event::AllReleased => self.pressed = false,
             Event::Trouble(trouble) => self.errors |= trouble.lasts(),
             Event::ErrorsGone => self.errors = false,
+            Event::Astray(astray) => self.astray = astray,
             Event::Readiness(readiness) => self.homes_to_arm &= readiness == Readiness::Ready,
             _ => {}
         }

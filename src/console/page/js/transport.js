@@ -15,7 +15,7 @@ const MAY = {
   go: ['armed'],
   pause: ['joining', 'playing', 'freewheeling'],
   resume: ['paused'],
-  park: ['recovering', 'armed', 'joining', 'playing', 'freewheeling', 'paused'],
+  park: ['recovering', 'parked', 'armed', 'joining', 'playing', 'freewheeling', 'paused'],
   clear: ['stopped', 'fault'],
   home: ['recovering', 'parked'],
 };
