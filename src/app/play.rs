@@ -187,10 +187,7 @@ impl Play {
     /// # Panics
     /// Where one of its threads panicked.
     pub fn run(mut self, lead: impl FnOnce(Reins) -> bool) -> Result<Played, PlayError> {
-        // Refused, the ports may still open; if not, their error says what to do.
-        let _ = realtime::raise_open_files();
-        let peers: Vec<_> = self.config.controllers.iter().map(|one| one.address).collect();
-        let (sender, receiver) = Ports::open(self.config.show.bind, &peers).map_err(PlayError::Net)?.split();
+        let (sender, receiver) = open(&self.config)?.split();
         let show = self.staged.show.clone();
         let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = self.ends;
         let watched = self.config.controllers.iter().map(Watched::of).collect();
@@ -232,6 +229,14 @@ impl Play {
         let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
         Ok(sum_up(about, &self.config.controllers, &prepared, &run))
     }
+}
+
+/// Binds the frame port.
+fn open(config: &Config) -> Result<Ports, PlayError> {
+    // Refused, the ports may still open; if not, their error says what to do.
+    let _ = realtime::raise_open_files();
+    let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
+    Ports::open(config.show.bind, &peers).map_err(PlayError::Net)
 }
 
 /// Who judges how the controllers of a play stand.

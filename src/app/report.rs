@@ -244,49 +244,59 @@ impl Report {
     fn table(&self) -> Table {
         let mut table = Table::new();
         table.load_style(presets::NOTHING);
-        table.set_header([
-            "controller",
-            "address",
-            "sent",
-            "asked",
-            "acked",
-            "refused",
-            "lost",
-            "homing",
-            "dup",
-            "stale",
-            "stray",
-            "failed",
-            "closed",
-            "ack p50 µs",
-            "p99",
-            "p99.9",
-            "max",
-        ]);
+        table.set_header(COLUMNS);
         for one in &self.controllers {
-            let counts = [
-                one.sent,
-                one.asked,
-                one.acked,
-                one.refused,
-                one.lost,
-                one.homing,
-                one.duplicate,
-                one.stale,
-                one.stray,
-                one.send_failed,
-                one.port_closed,
-            ];
-            let latencies = [one.ack_us.p50, one.ack_us.p99, one.ack_us.p999, one.ack_us.max];
-            let mut row = vec![one.name.clone(), one.address.clone()];
-            row.extend(counts.iter().map(u64::to_string));
-            row.extend(latencies.iter().map(|us| shown(*us)));
-            table.add_row(row);
+            table.add_row(one.row());
         }
         for column in table.column_iter_mut().skip(2) {
             column.set_cell_alignment(CellAlignment::Right);
         }
         table
+    }
+}
+
+/// What the table says of each controller.
+const COLUMNS: [&str; 17] = [
+    "controller",
+    "address",
+    "sent",
+    "asked",
+    "acked",
+    "refused",
+    "lost",
+    "homing",
+    "dup",
+    "stale",
+    "stray",
+    "failed",
+    "closed",
+    "ack p50 µs",
+    "p99",
+    "p99.9",
+    "max",
+];
+
+impl ControllerReport {
+    /// Its row, cell by cell in the order of [`COLUMNS`].
+    fn row(&self) -> Vec<String> {
+        let counts = [
+            self.sent,
+            self.asked,
+            self.acked,
+            self.refused,
+            self.lost,
+            self.homing,
+            self.duplicate,
+            self.stale,
+            self.stray,
+            self.send_failed,
+            self.port_closed,
+        ];
+        let latencies = [self.ack_us.p50, self.ack_us.p99, self.ack_us.p999, self.ack_us.max];
+        let mut row = vec![self.name.clone(), self.address.clone()];
+        row.extend(counts.iter().map(u64::to_string));
+        row.extend(latencies.iter().map(|us| shown(*us)));
+        row
     }
 }
 

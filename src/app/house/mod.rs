@@ -6,25 +6,28 @@ mod boot;
 
 pub use ask::{Finding, Inquiry, inquire};
 
+use std::collections::BTreeMap;
+use std::io;
 use std::net::SocketAddrV4;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, Builder};
+use std::sync::atomic::AtomicBool;
+use std::thread;
 use std::time::Duration;
-use std::{collections::BTreeMap, io};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::helpers::{Helpers, Over};
 use super::run::Run;
 use crate::config::Config;
+use crate::engine::Engine;
 use crate::fanout::Lane;
 use crate::health::{Groups, Health};
-use crate::net::{DrainGrid, NetError};
+use crate::net::{DrainGrid, NetError, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Command, Conductor, Desk, Line, Live, MailEnds, News, Order, PlanLoop, Planning, Spinning,
-    Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, News, Order, PlanLoop, Planning,
+    Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, RealTime};
@@ -61,11 +64,15 @@ pub struct House {
     desk: Arc<Desk>,
     live: Arc<Live>,
     leave: Arc<AtomicBool>,
-    opened: boot::Opened,
-    ends: MailEnds,
-    mail: crate::rt::Mail,
+    engine: Engine,
+    lanes: Vec<Lane>,
+    sender: Sender,
+    mail: Mail,
+    acks: AckLoop,
+    plans: PlanLoop,
     line: Line,
-    standby: Standby,
+    commands: Producer<Command>,
+    news: Consumer<News>,
     orders: Producer<Order>,
 }
 
@@ -110,20 +117,38 @@ impl House {
         let rate = Rate::from_hz(config.show.rate_hz);
         let opened = boot::open(&config, numbers)?;
         let desk = Arc::new(opened.desk());
-        let live = Arc::new(Live::with_clamps(config.controllers.len()));
-        let (mail, ends) = mailboxes(config.controllers.len(), rate, Arc::clone(&live));
-        let (line, line_end) = line(opened.sender.clone(), config.controllers.len());
+        let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
+        let controllers = &config.controllers;
+        let live = Arc::new(Live::with_clamps(controllers.len()));
+        let (mail, ends) = mailboxes(controllers.len(), rate, Arc::clone(&live));
+        let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;
+        let (line, line_end) = line(sender.clone(), controllers.len());
         let (orders, orders_end) = RingBuffer::new(ORDERS);
-        let standby = Standby::new(
-            &config.controllers,
-            &opened.lanes,
-            line_end,
-            Arc::clone(&desk),
-            orders_end,
-            crashed,
-        );
+        let standby = Standby::new(controllers, &lanes, line_end, Arc::clone(&desk), orders_end, crashed);
+        let watch = watch(&config, &lanes, &sender, alarms, &live).of_a_hall(standby);
+        let watched = controllers.iter().map(Watched::of).collect();
+        let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
+        let mut acks = AckLoop::going_on(receiver, watched, &firsts, config.show.ack_every, sent, ticks);
+        acks.tell(Arc::clone(&live));
+        acks.watched_by(watch);
+        let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let leave = Arc::default();
-        Ok(Self { config, desk, live, leave, opened, ends, mail, line, standby, orders })
+        Ok(Self {
+            config,
+            desk,
+            live,
+            leave,
+            engine,
+            lanes,
+            sender,
+            mail,
+            acks,
+            plans,
+            line,
+            commands,
+            news,
+            orders,
+        })
     }
 
     /// Where levels and the stop are set.
@@ -141,84 +166,57 @@ impl House {
     /// # Panics
     /// Where one of its threads panicked.
     pub fn run(self, lead: impl FnOnce(Reins, Line)) -> Result<Closed, HouseError> {
-        let Self { config, desk, live, leave, opened, ends, mut mail, line, standby, orders } = self;
-        let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;
-        let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
+        let Self { config, desk, live, leave, engine, lanes, sender, mut mail, acks, plans, .. } = self;
         let rate = Rate::from_hz(config.show.rate_hz);
-        let ack_every = config.show.ack_every;
-        let watched = config.controllers.iter().map(Watched::of).collect();
-        let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
-        let mut acks = AckLoop::going_on(receiver, watched, &firsts, ack_every, sent, ticks);
-        acks.tell(Arc::clone(&live));
-        let groups = Groups::of(&config.controllers);
-        let health = Health::new(groups, config.show.loss_policy, ack_every, rate.period()).of_a_hall();
-        let watch =
-            Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, Arc::clone(&live));
-        acks.watched_by(watch.of_a_hall(standby));
-        let mut plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
+        let spin = Duration::from_micros(u64::from(config.show.spin_us));
         let granted = realtime::request();
-        let (over, done) = (AtomicBool::new(false), AtomicBool::new(false));
+        let reins = Reins {
+            config: Arc::clone(&config),
+            desk: Arc::clone(&desk),
+            live: Arc::clone(&live),
+            leave: Arc::clone(&leave),
+            commands: self.commands,
+            news: self.news,
+            orders: self.orders,
+            granted: granted.clone(),
+        };
+        let over = Over::default();
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, rate.period());
-            let over = &over;
-            let ack_thread = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
-                let _ = realtime::normal_priority();
-                acks.run(&Monotonic, drains, || over.load(Ordering::Acquire))
-            });
-            let ack_thread = ack_thread.map_err(HouseError::Thread)?;
-            let planner = Builder::new().name("planner".to_owned()).spawn_scoped(scope, || {
-                let _ = realtime::normal_priority();
-                plans.run(&done)
-            });
-            let planner = planner.inspect_err(|_| over.store(true, Ordering::Release));
-            let planner = planner.map_err(HouseError::Thread)?;
-            mail.wakes(planner.thread().clone());
-            let clock = Spinning::new(
-                &Monotonic,
-                Duration::from_micros(u64::from(config.show.spin_us)),
-                rate.period(),
-            );
-            let mut ticks = TickLoop {
-                clock: &clock,
-                grid: TickGrid::new(origin, rate),
-                engine,
-                conductor: Conductor::of_a_hall(origin),
-                lanes,
-                sink: sender,
-                mail,
-                desk: &desk,
-                leave: &leave,
-            };
-            let reins = Reins {
-                config: Arc::clone(&config),
-                desk: Arc::clone(&desk),
-                live: Arc::clone(&live),
-                leave: Arc::clone(&leave),
-                commands,
-                news,
-                orders,
-                granted: granted.clone(),
-            };
-            lead(reins, line);
+            let helpers = Helpers::start(scope, &over, acks, drains, plans).map_err(HouseError::Thread)?;
+            mail.wakes(helpers.planner());
+            let grid = TickGrid::new(origin, rate);
+            let clock = Spinning::new(&Monotonic, spin, rate.period());
+            let conductor = Conductor::of_a_hall(origin);
+            let (desk, leave) = (&*desk, &*leave);
+            let mut ticks =
+                TickLoop { clock: &clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave };
+            lead(reins, self.line);
             let ended = ticks.run();
             live.close();
-            over.store(true, Ordering::Release);
-            done.store(true, Ordering::Release);
-            planner.thread().unpark();
-            let refusals = planner.join().expect("the planner does not panic");
-            let mut accounts = ack_thread.join().expect("the ack thread does not panic");
-            let closed_at = Monotonic.now();
-            accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-            let next = |lane: &Lane| lane.last_frame().next();
-            let addresses = config.controllers.iter().map(|one| one.address);
-            let numbers = addresses.zip(ticks.lanes.iter().map(next)).collect();
-            let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
-            let spun = clock.spun();
-            Ok(Closed {
-                run: Run { ended, accounts, granted, spun, refusals, clamps, origin, closed_at },
-                numbers,
-            })
+            let run = helpers.end(&ticks, ended, granted, origin);
+            Ok(Closed { run, numbers: next_numbers(&config, &ticks.lanes) })
         })
     }
+}
+
+/// Who judges how the controllers of a hall stand.
+fn watch(
+    config: &Config,
+    lanes: &[Lane],
+    sender: &Sender,
+    alarms: Producer<Alarm>,
+    live: &Arc<Live>,
+) -> Watch {
+    let groups = Groups::of(&config.controllers);
+    let period = Rate::from_hz(config.show.rate_hz).period();
+    let health = Health::new(groups, config.show.loss_policy, config.show.ack_every, period).of_a_hall();
+    Watch::new(health, &config.controllers, lanes, sender.clone(), alarms, Arc::clone(live))
+}
+
+/// From where the frame numbers of each controller go on.
+fn next_numbers(config: &Config, lanes: &[Lane]) -> Numbers {
+    let next = lanes.iter().map(|lane| lane.last_frame().next());
+    config.controllers.iter().map(|one| one.address).zip(next).collect()
 }

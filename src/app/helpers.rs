@@ -1,0 +1,78 @@
+//! The threads beside the tick thread, of a play as of a hall: started before the first tick, ended after the last.
+
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, Scope, ScopedJoinHandle, Thread};
+
+use super::run::Run;
+use crate::fanout::Lane;
+use crate::net::{DrainGrid, Sender};
+use crate::plan::PlanError;
+use crate::rt::{Accounts, AckLoop, Ended, PlanLoop, Spinning, TickLoop};
+use crate::sys::clock::Monotonic;
+use crate::sys::realtime::{self, RealTime};
+use crate::time::{Clock as _, MonoTime};
+
+/// The tick loop on real time and real sockets.
+pub(super) type Ticks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Sender>;
+
+/// What ends the threads.
+#[derive(Debug, Default)]
+pub(super) struct Over {
+    acks: AtomicBool,
+    plans: AtomicBool,
+}
+
+/// The ack thread and the planner's.
+#[derive(Debug)]
+pub(super) struct Helpers<'scope> {
+    over: &'scope Over,
+    acks: ScopedJoinHandle<'scope, Accounts>,
+    planner: ScopedJoinHandle<'scope, Vec<PlanError>>,
+}
+
+impl<'scope> Helpers<'scope> {
+    /// Starts them, as ordinary threads whatever the calling one has been granted.
+    ///
+    /// # Errors
+    /// That of the system where it starts no further thread; none is left then.
+    pub(super) fn start(
+        scope: &'scope Scope<'scope, '_>,
+        over: &'scope Over,
+        acks: AckLoop,
+        drains: DrainGrid,
+        mut plans: PlanLoop,
+    ) -> io::Result<Self> {
+        let acks = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
+            let _ = realtime::normal_priority();
+            acks.run(&Monotonic, drains, || over.acks.load(Ordering::Acquire))
+        })?;
+        let planner = Builder::new().name("planner".to_owned()).spawn_scoped(scope, move || {
+            let _ = realtime::normal_priority();
+            plans.run(&over.plans)
+        });
+        let planner = planner.inspect_err(|_| over.acks.store(true, Ordering::Release))?;
+        Ok(Self { over, acks, planner })
+    }
+
+    /// The planner's thread, to be woken when there is something for it.
+    pub(super) fn planner(&self) -> Thread {
+        self.planner.thread().clone()
+    }
+
+    /// Ends them, the tick loop having ended, and closes the accounts.
+    ///
+    /// # Panics
+    /// Where one of them panicked.
+    pub(super) fn end(self, ticks: &Ticks<'_>, ended: Ended, granted: RealTime, origin: MonoTime) -> Run {
+        self.over.acks.store(true, Ordering::Release);
+        self.over.plans.store(true, Ordering::Release);
+        self.planner.thread().unpark();
+        let refusals = self.planner.join().expect("the planner does not panic");
+        let mut accounts = self.acks.join().expect("the ack thread does not panic");
+        let closed_at = Monotonic.now();
+        accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
+        let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
+        Run { ended, accounts, granted, spun: ticks.clock.spun(), refusals, clamps, origin, closed_at }
+    }
+}
