@@ -6,6 +6,7 @@
 //! from its own controller only.
 
 mod error;
+mod network;
 mod open;
 mod recv;
 mod route;
@@ -23,6 +24,7 @@ use socket2::Socket;
 use crate::time::MonoTime;
 
 pub use error::NetError;
+pub use network::{Network, over};
 pub use recv::{Origin, Receiver};
 pub use route::{Route, route};
 pub use schedule::DrainGrid;

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use socket2::Socket;
 
-use super::Lane;
+use super::{Lane, Network};
 use crate::sys::batch::{Batch, SLOTS};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock, MonoTime};
@@ -27,8 +27,19 @@ pub enum Origin {
     Stranger(SocketAddrV4),
 }
 
-/// The receiving half of [`Ports`](super::Ports).
-pub struct Receiver {
+/// The receiving half of [`Ports`](super::Ports), or of a [`Network`].
+#[derive(Debug)]
+pub struct Receiver(Way);
+
+/// Where datagrams come from.
+#[derive(Debug)]
+enum Way {
+    Kernel(Box<Sockets>),
+    Network(Arc<dyn Network>),
+}
+
+/// The sockets of all lanes, read in batches.
+struct Sockets {
     lanes: Arc<[Lane]>,
     stray: Socket,
     batch: Batch,
@@ -36,9 +47,9 @@ pub struct Receiver {
     emptied: Box<[MonoTime]>,
 }
 
-impl fmt::Debug for Receiver {
+impl fmt::Debug for Sockets {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Receiver").field("lanes", &self.lanes).finish_non_exhaustive()
+        f.debug_struct("Sockets").field("lanes", &self.lanes).finish_non_exhaustive()
     }
 }
 
@@ -46,13 +57,20 @@ impl Receiver {
     /// Sockets from which nothing that came before `quiet` can be read any more.
     pub(super) fn new(lanes: Arc<[Lane]>, stray: Socket, quiet: MonoTime) -> Self {
         let emptied = vec![quiet; lanes.len() + 1].into_boxed_slice();
-        Self { lanes, stray, batch: Batch::new(), emptied }
+        Self(Way::Kernel(Box::new(Sockets { lanes, stray, batch: Batch::new(), emptied })))
+    }
+
+    pub(super) const fn over(network: Arc<dyn Network>) -> Self {
+        Self(Way::Network(network))
     }
 
     /// How many controllers there are.
     #[must_use]
     pub fn lanes(&self) -> usize {
-        self.lanes.len()
+        match &self.0 {
+            Way::Kernel(sockets) => sockets.lanes.len(),
+            Way::Network(network) => network.lanes(),
+        }
     }
 
     /// Gives every waiting datagram to `on`, with its sender and the instant at which the kernel received it; socket by
@@ -61,10 +79,31 @@ impl Receiver {
     /// Returns the instant at which the drain began: unless a flood left datagrams behind, all that arrived before it
     /// has been given.
     pub fn drain(&mut self, mut on: impl FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
+        match &mut self.0 {
+            Way::Kernel(sockets) => sockets.drain(&mut on),
+            Way::Network(network) => network.drain(&mut on),
+        }
+    }
+
+    /// How often the kernel has reported so far that the port of controller `lane` is closed, to either half.
+    ///
+    /// # Panics
+    /// If there is no such lane.
+    #[must_use]
+    pub fn port_closed(&self, lane: usize) -> u64 {
+        match &self.0 {
+            Way::Kernel(sockets) => sockets.lanes[lane].refusals.load(Ordering::Relaxed),
+            Way::Network(network) => network.port_closed(lane),
+        }
+    }
+}
+
+impl Sockets {
+    fn drain(&mut self, on: &mut impl FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
         let began = Monotonic.now();
         let mut now = began;
         for index in 0..=self.lanes.len() {
-            now = self.drain_one(index, now, &mut on);
+            now = self.drain_one(index, now, on);
         }
         began
     }
@@ -104,15 +143,6 @@ impl Receiver {
             }
         }
         now
-    }
-
-    /// How often the kernel has reported so far that the port of controller `lane` is closed, to either half.
-    ///
-    /// # Panics
-    /// If there is no such lane.
-    #[must_use]
-    pub fn port_closed(&self, lane: usize) -> u64 {
-        self.lanes[lane].refusals.load(Ordering::Relaxed)
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use rustix::io::Errno;
 use rustix::net::SendFlags;
 
-use super::Lane;
+use super::{Lane, Network};
 
 /// What became of a datagram on its way into the kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +30,12 @@ pub struct SendFault {
 impl SendFault {
     /// Kept back, because what it belongs to was called off.
     pub const CALLED_OFF: Self = Self { errno: libc::ECANCELED };
+
+    /// That of a system's error number.
+    #[must_use]
+    pub const fn of(errno: i32) -> Self {
+        Self { errno }
+    }
 
     /// The system's error number.
     #[must_use]
@@ -67,21 +73,33 @@ impl fmt::Display for SendFault {
     }
 }
 
-/// The sending half of [`Ports`](super::Ports). Clones send by the same sockets.
+/// The sending half of [`Ports`](super::Ports), or of a [`Network`]. Clones send by the same sockets.
 #[derive(Debug, Clone)]
-pub struct Sender {
-    lanes: Arc<[Lane]>,
+pub struct Sender(Way);
+
+/// Where datagrams go.
+#[derive(Debug, Clone)]
+enum Way {
+    Kernel(Arc<[Lane]>),
+    Network(Arc<dyn Network>),
 }
 
 impl Sender {
     pub(super) const fn new(lanes: Arc<[Lane]>) -> Self {
-        Self { lanes }
+        Self(Way::Kernel(lanes))
+    }
+
+    pub(super) const fn over(network: Arc<dyn Network>) -> Self {
+        Self(Way::Network(network))
     }
 
     /// How many controllers there are.
     #[must_use]
     pub fn lanes(&self) -> usize {
-        self.lanes.len()
+        match &self.0 {
+            Way::Kernel(lanes) => lanes.len(),
+            Way::Network(network) => network.lanes(),
+        }
     }
 
     /// Sends one datagram to controller `lane`, counted from 0 in the order in which they were opened.
@@ -92,7 +110,10 @@ impl Sender {
     /// # Panics
     /// If there is no such lane.
     pub fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
-        let lane = &self.lanes[lane];
+        let lane = match &self.0 {
+            Way::Kernel(lanes) => &lanes[lane],
+            Way::Network(network) => return network.send(lane, datagram),
+        };
         match lane.send(datagram) {
             Ok(()) => Delivery::Sent,
             Err(Errno::CONNREFUSED) => match lane.send(datagram) {
@@ -105,7 +126,7 @@ impl Sender {
 }
 
 fn failed(errno: Errno) -> Delivery {
-    Delivery::Failed(SendFault { errno: errno.raw_os_error() })
+    Delivery::Failed(SendFault::of(errno.raw_os_error()))
 }
 
 impl Lane {

@@ -121,21 +121,27 @@ impl AckLoop {
         let mut tell_at = clock.now() + TELL;
         loop {
             let over = done();
-            self.drain(&mut |_, _| false);
-            if clock.now() >= tell_at {
-                self.tell_times();
-                tell_at = clock.now() + TELL;
-            } else if self.watch.as_mut().is_some_and(Watch::take_untold) {
-                self.tell_table();
-            }
+            let next = self.step(clock, drains, &mut tell_at);
             if over && clock.now().since(self.last_sent) > ACK_TIMEOUT {
                 break;
             }
-            let next = drains.next_after(clock.now());
-            clock.sleep_until(if self.is_idle() { next.max(clock.now() + IDLE) } else { next });
+            clock.sleep_until(next);
         }
         self.tell_times();
         self.into_accounts()
+    }
+
+    /// Drains once, and tells what is new, or all where it is time to; gives when to drain next.
+    pub fn step(&mut self, clock: &impl Clock, drains: DrainGrid, tell_at: &mut MonoTime) -> MonoTime {
+        self.drain(&mut |_, _| false);
+        if clock.now() >= *tell_at {
+            self.tell_times();
+            *tell_at = clock.now() + TELL;
+        } else if self.watch.as_mut().is_some_and(Watch::take_untold) {
+            self.tell_table();
+        }
+        let next = drains.next_after(clock.now());
+        if self.is_idle() { next.max(clock.now() + IDLE) } else { next }
     }
 
     /// Whether a hall has nothing on its way: then there is no hurry.

@@ -57,6 +57,15 @@ const COMMANDS_PER_TICK: usize = 8;
 /// Alarms taken in one tick; more wait for the next.
 const ALARMS_PER_TICK: usize = 64;
 
+/// What the loop has done so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ticked {
+    /// Ticks that sent.
+    pub ticks: u64,
+    /// Ticks slept through.
+    pub missed: u64,
+}
+
 /// What the loop did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ended {
@@ -95,32 +104,34 @@ pub struct TickLoop<'a, C, S> {
 impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     /// Runs until the play has ended.
     pub fn run(&mut self) -> Ended {
-        let (mut ticks, mut missed) = (0, 0);
-        loop {
-            self.clock.sleep_until(self.grid.next_deadline());
-            let now = self.clock.now();
-            let tick = self.grid.take(now);
-            self.take_mail(now);
-            let step = self.engine.tick(tick.missed);
-            match step {
-                // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
-                Step::Send(beat) if self.conductor.machine().may_send_motion() => {
-                    missed += tick.missed;
-                    ticks += 1;
-                    self.send(tick, &beat);
-                }
-                Step::Send(_) | Step::Quiet | Step::Over => {}
-            }
-            self.conductor.watch(&mut self.engine, now);
-            self.hand_on();
-            self.mail.beat();
-            // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
-            if step == Step::Over && (!self.conductor.stays() || self.leave.load(Ordering::Relaxed)) {
-                break;
-            }
-        }
+        let mut ticked = Ticked::default();
+        while self.step(&mut ticked) {}
+        let Ticked { ticks, missed } = ticked;
         let ending = self.conductor.ending(&self.engine);
         Ended { ticks, missed, unposted: self.mail.unposted(), ending }
+    }
+
+    /// Waits for the next tick and does it; says whether there is another.
+    pub fn step(&mut self, ticked: &mut Ticked) -> bool {
+        self.clock.sleep_until(self.grid.next_deadline());
+        let now = self.clock.now();
+        let tick = self.grid.take(now);
+        self.take_mail(now);
+        let step = self.engine.tick(tick.missed);
+        match step {
+            // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
+            Step::Send(beat) if self.conductor.machine().may_send_motion() => {
+                ticked.missed += tick.missed;
+                ticked.ticks += 1;
+                self.send(tick, &beat);
+            }
+            Step::Send(_) | Step::Quiet | Step::Over => {}
+        }
+        self.conductor.watch(&mut self.engine, now);
+        self.hand_on();
+        self.mail.beat();
+        // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
+        step != Step::Over || (self.conductor.stays() && !self.leave.load(Ordering::Relaxed))
     }
 
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of

@@ -35,10 +35,18 @@ impl Opened {
     }
 }
 
-/// Binds the frame port and makes the engine.
-pub(super) fn open(config: &Config, numbers: &Numbers) -> Result<Opened, HouseError> {
+/// Binds the frame port.
+pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), HouseError> {
     let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
-    let (sender, receiver) = Ports::open(config.show.bind, &peers).map_err(HouseError::Net)?.split();
+    Ok(Ports::open(config.show.bind, &peers).map_err(HouseError::Net)?.split())
+}
+
+/// Makes the engine, which sends and hears by these halves.
+pub(super) fn open(
+    config: &Config,
+    numbers: &Numbers,
+    (sender, receiver): (Sender, Receiver),
+) -> Result<Opened, HouseError> {
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
         timing: config.show.timing,

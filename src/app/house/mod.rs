@@ -22,7 +22,7 @@ use crate::config::Config;
 use crate::engine::Engine;
 use crate::fanout::Lane;
 use crate::health::{Groups, Health};
-use crate::net::{DrainGrid, NetError, Sender};
+use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
@@ -30,8 +30,8 @@ use crate::rt::{
     Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime::{self, RealTime};
-use crate::time::{Clock as _, Rate, TickGrid};
+use crate::sys::realtime::{self, Policy, RealTime};
+use crate::time::{Clock, MonoTime, Rate, TickGrid};
 use crate::wire::FrameNo;
 
 /// From the start of the threads to tick 0.
@@ -114,8 +114,22 @@ impl House {
     pub fn open(config: Arc<Config>, crashed: bool, numbers: &Numbers) -> Result<Self, HouseError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
+        let halves = boot::bind(&config)?;
+        Self::over(config, crashed, numbers, halves)
+    }
+
+    /// The same by sockets, or another network, that are open.
+    ///
+    /// # Errors
+    /// As [`House::open`].
+    pub fn over(
+        config: Arc<Config>,
+        crashed: bool,
+        numbers: &Numbers,
+        halves: (Sender, Receiver),
+    ) -> Result<Self, HouseError> {
         let rate = Rate::from_hz(config.show.rate_hz);
-        let opened = boot::open(&config, numbers)?;
+        let opened = boot::open(&config, numbers, halves)?;
         let desk = Arc::new(opened.desk());
         let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
         let controllers = &config.controllers;
@@ -166,38 +180,93 @@ impl House {
     /// # Panics
     /// Where one of its threads panicked.
     pub fn run(self, lead: impl FnOnce(Reins, Line)) -> Result<Closed, HouseError> {
-        let Self { config, desk, live, leave, engine, lanes, sender, mut mail, acks, plans, .. } = self;
+        let granted = realtime::request();
+        let (reins, line, Parts { acks, plans, mut ticks }) = self.part(granted.clone());
+        let (config, desk) = (Arc::clone(&reins.config), Arc::clone(&reins.desk));
+        let (live, leave) = (Arc::clone(&reins.live), Arc::clone(&reins.leave));
         let rate = Rate::from_hz(config.show.rate_hz);
         let spin = Duration::from_micros(u64::from(config.show.spin_us));
-        let granted = realtime::request();
-        let reins = Reins {
-            config: Arc::clone(&config),
-            desk: Arc::clone(&desk),
-            live: Arc::clone(&live),
-            leave: Arc::clone(&leave),
-            commands: self.commands,
-            news: self.news,
-            orders: self.orders,
-            granted: granted.clone(),
-        };
         let over = Over::default();
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, rate.period());
             let helpers = Helpers::start(scope, &over, acks, drains, plans).map_err(HouseError::Thread)?;
-            mail.wakes(helpers.planner());
-            let grid = TickGrid::new(origin, rate);
+            ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
-            let conductor = Conductor::of_a_hall(origin);
-            let (desk, leave) = (&*desk, &*leave);
-            let mut ticks =
-                TickLoop { clock: &clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave };
-            lead(reins, self.line);
+            let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &desk, &leave);
+            lead(reins, line);
             let ended = ticks.run();
             live.close();
             let run = helpers.end(&ticks, ended, granted, origin);
             Ok(Closed { run, numbers: next_numbers(&config, &ticks.lanes) })
         })
+    }
+
+    /// Hands its loops to `drive`, which takes every step of each by itself, instead of running them on threads; the first
+    /// tick is due at `origin`. Gives what `drive` gives, and from where frame numbers go on.
+    pub fn stepped<C: Clock, T>(
+        self,
+        clock: &C,
+        origin: MonoTime,
+        drive: impl FnOnce(Reins, Line, &mut Loops<'_, C>) -> T,
+    ) -> (T, Numbers) {
+        let (policy, refusals) = (Policy::Other, Vec::new());
+        let nothing = RealTime { policy, priority: 0, memory_locked: false, refusals };
+        let (reins, line, Parts { acks, plans, ticks }) = self.part(nothing);
+        let (config, desk, leave) =
+            (Arc::clone(&reins.config), Arc::clone(&reins.desk), Arc::clone(&reins.leave));
+        let grid = TickGrid::new(origin, Rate::from_hz(config.show.rate_hz));
+        let mut loops = Loops { ticks: ticks.on(clock, grid, &desk, &leave), acks, plans };
+        let outcome = drive(reins, line, &mut loops);
+        (outcome, next_numbers(&config, &loops.ticks.lanes))
+    }
+
+    fn part(self, granted: RealTime) -> (Reins, Line, Parts) {
+        let Self { config, desk, live, leave, engine, lanes, sender, mail, acks, plans, .. } = self;
+        let (commands, news, orders) = (self.commands, self.news, self.orders);
+        let reins = Reins { config, desk, live, leave, commands, news, orders, granted };
+        let ticks = Ticks { engine, lanes, sender, mail };
+        (reins, self.line, Parts { acks, plans, ticks })
+    }
+}
+
+/// The loops of a hall that somebody steps.
+pub struct Loops<'a, C> {
+    /// The tick thread's.
+    pub ticks: TickLoop<'a, C, Sender>,
+    /// The ack thread's.
+    pub acks: AckLoop,
+    /// The planner's.
+    pub plans: PlanLoop,
+}
+
+/// What becomes the loops of a hall.
+struct Parts {
+    acks: AckLoop,
+    plans: PlanLoop,
+    ticks: Ticks,
+}
+
+/// What becomes the tick thread's.
+struct Ticks {
+    engine: Engine,
+    lanes: Vec<Lane>,
+    sender: Sender,
+    mail: Mail,
+}
+
+impl Ticks {
+    /// The loop on that clock, from the grid's first tick on.
+    fn on<'a, C: Clock>(
+        self,
+        clock: &'a C,
+        grid: TickGrid,
+        desk: &'a Desk,
+        leave: &'a AtomicBool,
+    ) -> TickLoop<'a, C, Sender> {
+        let Self { engine, lanes, sender, mail } = self;
+        let conductor = Conductor::of_a_hall(grid.next_deadline());
+        TickLoop { clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave }
     }
 }
 
