@@ -90,7 +90,7 @@ fn different_slots(windows: &[Window]) -> Vec<(usize, Slot)> {
     let mut slots: Vec<(usize, Slot)> = Vec::new();
     for (_, slot) in windows.iter().flat_map(Window::moving) {
         let slot = slot.at_level(1.0);
-        let axis = slot.axis.expect("a moving slot has an axis");
+        let Some(axis) = slot.axis else { continue };
         if !slots.contains(&(axis, slot)) {
             slots.push((axis, slot));
         }

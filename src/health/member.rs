@@ -20,6 +20,8 @@ const SEEN_FOR: Duration = Duration::from_secs(1);
 const APART: Duration = Duration::from_secs(2);
 /// While nothing moves, what a controller is and whether it knows its zero is read this often: nobody sees it being reset.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
+/// A seat that falls out three times within so long is not led back and forth any more.
+const UNSTEADY: Duration = Duration::from_mins(1);
 /// From one read to the next: 5 Hz.
 const READ_EVERY: Duration = Duration::from_millis(200);
 
@@ -64,6 +66,8 @@ pub(super) struct Member {
     pub(super) moved: bool,
     /// Nobody knows where its frames have led it.
     pub(super) unsure: bool,
+    /// When it was sent to last before each of the last two times that nobody knew that any more.
+    falls: [Option<MonoTime>; 2],
     /// The axis, from 0, that told a position outside of its stroke, and which.
     pub(super) outside: Option<(usize, Pulses)>,
     /// Another master was found, and nobody was told yet.
@@ -99,6 +103,7 @@ impl Member {
             ailed: None,
             moved: false,
             unsure: false,
+            falls: [None; 2],
             outside: None,
             crowd_untold: false,
         }
@@ -234,8 +239,13 @@ impl Member {
     }
 
     /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
-    pub(super) const fn on_fell_out(&mut self) {
+    pub(super) fn on_fell_out(&mut self) {
         (self.unsure, self.seen, self.reading) = (true, None, false);
+        let [last, before] = self.falls;
+        self.falls = [Some(self.asked), last];
+        if before.is_some_and(|first| self.asked.since(first) < UNSTEADY) {
+            self.ailed.get_or_insert(Why::Unsteady(self.controller));
+        }
     }
 
     /// Not all of its axes tell where they are.
@@ -262,7 +272,7 @@ impl Member {
         self.refusing = false;
         self.tripped = self.pressed;
         if !self.ails() {
-            self.ailed = None;
+            (self.ailed, self.falls) = (None, [None; 2]);
         }
     }
 

@@ -58,6 +58,8 @@ pub enum Why {
     Moved(usize),
     /// It is not known where the frames to this controller have led its seat.
     Unsure(usize),
+    /// That was so three times within a minute.
+    Unsteady(usize),
     /// Not all axes of this controller tell where they are.
     Unread(usize),
     /// An axis of this controller, from 0, says that it is outside of its stroke.
@@ -110,6 +112,7 @@ impl Why {
             | Self::Silent(controller)
             | Self::Moved(controller)
             | Self::Unsure(controller)
+            | Self::Unsteady(controller)
             | Self::Unread(controller)
             | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)

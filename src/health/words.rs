@@ -68,6 +68,9 @@ impl fmt::Display for Why {
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
+            Self::Unsteady(_) => {
+                "frames to it, or its acks, were missing for over 50 ms three times within a minute: look at the network"
+            }
             Self::Unread(_) => {
                 "not all of its axes tell where they are: those past the sixth have no register"
             }

@@ -191,6 +191,9 @@ impl AckLoop {
             }
         });
         books.settle(began, &mut Records { sent, last_sent, watch, live });
+        if let Some(live) = live {
+            live.on_told(began);
+        }
         for controller in 0..receiver.lanes() {
             let closed = receiver.port_closed(controller);
             books.tracker_mut().on_port_closed(controller, closed);
