@@ -11,9 +11,8 @@ use tokio::sync::{Semaphore, watch};
 use super::Pages;
 use super::access::Access;
 use super::once::Once;
-use super::peer::Peer;
 use super::problem::panicked;
-use super::slots::{Slot, Slots};
+use super::streams::Streams;
 use super::tries::Tries;
 use crate::hall::{Code, Handle, Problem, Status};
 use crate::library::Library;
@@ -24,10 +23,6 @@ use crate::time::{Clock as _, MonoTime};
 
 /// How long the tick counter may stand still in a process that is well.
 const STILL: Duration = Duration::from_secs(2);
-/// How many are pushed to at a time over the control socket.
-const LOCAL_STREAMS: usize = 16;
-/// The same over TCP, and of one address.
-const TCP_STREAMS: (usize, usize) = (32, 16);
 /// What waits for a disk at the most.
 const ERRANDS: usize = 32;
 
@@ -41,8 +36,8 @@ pub(super) struct Shared {
     pub(super) tries: Tries,
     /// Requests that may come twice.
     pub(super) once: Once,
-    /// Room for those who are pushed to: over the control socket, over TCP.
-    pub(super) streams: [Slots; 2],
+    /// Room for those who are pushed to.
+    pub(super) streams: Streams,
     /// Room for what waits for a disk.
     pub(super) errands: Arc<Semaphore>,
     /// Whether the server ends.
@@ -65,30 +60,12 @@ pub(super) struct Shared {
     pub(super) written: Mutex<Option<(Arc<Status>, Bytes)>>,
 }
 
-/// Room for those who are pushed to.
-pub(super) fn streams() -> [Slots; 2] {
-    [Slots::new(LOCAL_STREAMS, LOCAL_STREAMS), Slots::new(TCP_STREAMS.0, TCP_STREAMS.1)]
-}
-
 /// Room for what waits for a disk.
 pub(super) fn errands() -> Arc<Semaphore> {
     Arc::new(Semaphore::new(ERRANDS))
 }
 
 impl Shared {
-    /// A place among those who are pushed to.
-    pub(super) fn stream(&self, peer: &Peer) -> Result<Slot, Problem> {
-        let [local, tcp] = &self.streams;
-        let slot = match peer {
-            Peer::Socket(_) => local.take(None),
-            Peer::Tcp(address) => tcp.take(Some(*address)),
-        };
-        slot.ok_or_else(|| {
-            let remedy = "close a page elsewhere, or ask for the status now and then";
-            Problem::new(Code::Busy, "too many are watching already", remedy)
-        })
-    }
-
     /// Does what waits for a disk, on a thread for that.
     pub(super) async fn blocking<T: Send + 'static>(
         &self,

@@ -16,10 +16,9 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::asker::StatusReply;
-use super::peer::Peer;
 use super::shared::Shared;
-use super::slots::Slot;
-use crate::hall::{Code, Problem, Status};
+use super::streams::Stream;
+use crate::hall::{Code, Problem, Status, Who};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -46,9 +45,9 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusRe
 )]
 pub(super) async fn events(
     State(shared): State<Arc<Shared>>,
-    Extension(peer): Extension<Peer>,
+    Extension(who): Extension<Who>,
 ) -> Result<Response, Problem> {
-    let place = shared.stream(&peer)?;
+    let place = shared.streams.take(&who)?;
     // One event waits at the most, beside what the connection holds.
     let (to, events) = mpsc::channel(1);
     tokio::spawn(push(shared, to, place));
@@ -57,7 +56,7 @@ pub(super) async fn events(
 }
 
 /// Pushes statuses until the other end has gone, or the server ends.
-async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: Slot) {
+async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, place: Stream) {
     let mut statuses = shared.handle.watch();
     let mut closing = shared.closing.clone();
     let mut pace = interval(PACE);
@@ -81,6 +80,7 @@ async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: Slot) {
                 Err(_) => false,
             },
             () = to.closed() => return,
+            () = place.leave() => return,
             _ = closing.changed() => return,
         };
     }
