@@ -216,6 +216,7 @@ impl Keeper {
             let table = self.reins.live.table();
             self.rates.note(&table, now);
             self.strangers.note(&table, now);
+            self.settle_folds();
             self.say_journal();
             self.publish();
         }
