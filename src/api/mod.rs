@@ -33,6 +33,7 @@ mod guarded;
 mod input;
 mod once;
 mod peer;
+mod pieces;
 mod playlist;
 mod problem;
 mod reports;
@@ -174,6 +175,8 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         once: Default::default(),
         streams: Default::default(),
         errands: shared::errands(),
+        reports: shared::one_at_a_time(),
+        curves: shared::one_at_a_time(),
         closing: closed.clone(),
         document: document.to_json().expect("a description is text").into(),
         library,

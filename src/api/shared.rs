@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use hyper::body::Bytes;
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::Pages;
 use super::access::Access;
@@ -23,6 +23,8 @@ use crate::time::{Clock as _, MonoTime};
 
 /// How long the tick counter may stand still in a process that is well.
 const STILL: Duration = Duration::from_secs(2);
+/// How long somebody waits for their turn at what is done for one at a time.
+const TURN: Duration = Duration::from_secs(5);
 /// What waits for a disk at the most.
 const ERRANDS: usize = 32;
 
@@ -40,6 +42,10 @@ pub(super) struct Shared {
     pub(super) streams: Streams,
     /// Room for what waits for a disk.
     pub(super) errands: Arc<Semaphore>,
+    /// Held by the report that is being read and sent.
+    pub(super) reports: Arc<Semaphore>,
+    /// Held by whoever has a curve drawn.
+    pub(super) curves: Arc<Semaphore>,
     /// Whether the server ends.
     pub(super) closing: watch::Receiver<bool>,
     /// The description of all this, JSON.
@@ -63,6 +69,20 @@ pub(super) struct Shared {
 /// Room for what waits for a disk.
 pub(super) fn errands() -> Arc<Semaphore> {
     Arc::new(Semaphore::new(ERRANDS))
+}
+
+/// Room for one, so that many who ask for much take no more than one does.
+pub(super) fn one_at_a_time() -> Arc<Semaphore> {
+    Arc::new(Semaphore::new(1))
+}
+
+/// A turn at what is done for one at a time.
+pub(super) async fn turn(of: &Arc<Semaphore>, what: &str) -> Result<OwnedSemaphorePermit, Problem> {
+    let turn = tokio::time::timeout(TURN, Arc::clone(of).acquire_owned()).await;
+    turn.ok().and_then(Result::ok).ok_or_else(|| {
+        let detail = format!("{what} is being made for somebody else already");
+        Problem::new(Code::Busy, detail, "ask again in a few seconds")
+    })
 }
 
 impl Shared {

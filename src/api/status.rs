@@ -1,8 +1,6 @@
 //! `/api/v1/status` and `/api/v1/events`: the status of the hall, once or as it changes.
 
-use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 use std::time::Duration;
 
 use axum::Extension;
@@ -11,11 +9,12 @@ use axum::extract::State;
 use axum::http::HeaderValue;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse as _, Response};
-use hyper::body::{Bytes, Frame};
+use hyper::body::Bytes;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::asker::StatusReply;
+use super::pieces::Pieces;
 use super::shared::Shared;
 use super::streams::Stream;
 use crate::hall::{Code, Problem, Status, Who};
@@ -51,7 +50,7 @@ pub(super) async fn events(
     // One event waits at the most, beside what the connection holds.
     let (to, events) = mpsc::channel(1);
     tokio::spawn(push(shared, to, place));
-    let body = Body::new(Events(events));
+    let body = Body::new(Pieces(events));
     Ok(([(CONTENT_TYPE, HeaderValue::from_static("text/event-stream"))], body).into_response())
 }
 
@@ -93,19 +92,4 @@ fn event(json: &Bytes) -> Bytes {
     text.extend_from_slice(json);
     text.extend_from_slice(b"\n\n");
     text.into()
-}
-
-/// Events as the body of a reply.
-struct Events(mpsc::Receiver<Bytes>);
-
-impl hyper::body::Body for Events {
-    type Data = Bytes;
-    type Error = std::convert::Infallible;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
-        self.0.poll_recv(cx).map(|event| event.map(|event| Ok(Frame::data(event))))
-    }
 }

@@ -25,7 +25,7 @@ mod writer;
 
 pub use fold::Folds;
 pub use record::{Action, Ending, Outcome, Percentiles, PlaylistPlace, ShowRecord, stamp};
-pub use report::{JournalError, Report, ShowResult, Shown, Totals, report};
+pub use report::{JournalError, Most, Report, ShowResult, Shown, Totals, report};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
