@@ -260,3 +260,31 @@ fn a_playlist_of_proved_cues_has_no_faults_and_unknown_ones_are_proved_when_it_i
     assert!(faults[0].starts_with("day.toml:3:7: cue: wild does not pass: "), "{faults:?}");
     assert!(faults[1].starts_with("day.toml:5:7: cue: there is no cue gone"), "{faults:?}");
 }
+
+#[test]
+fn curves_are_drawn_once_until_the_file_changes() {
+    let fixture = Fixture::new();
+    let id = "ride".parse().unwrap();
+    let put = |text: &str| {
+        fs::write(fixture.cues().join("new"), text).unwrap();
+        fs::rename(fixture.cues().join("new"), fixture.cues().join("ride.csv")).unwrap();
+    };
+    put("time_ms,a1\n0,0.5\n100,0.5\n");
+    let first = fixture.library.curve(&id, 10).unwrap();
+    assert!(std::sync::Arc::ptr_eq(&first, &fixture.library.curve(&id, 10).unwrap()));
+    assert_eq!(fixture.library.curve(&id, 20).unwrap().t_s.len(), 20);
+    put("# units: mm\ntime_ms,a1\n0,15\n100,15\n");
+    assert_eq!(fixture.library.curve(&id, 10).unwrap().axes[0].max[0], 0.1);
+    put("time_ms,a1\n0,0.5\n100,7\n");
+    let problem = fixture.library.curve(&id, 10).unwrap_err();
+    assert_eq!((problem.code, problem.faults.len()), (Code::Check, 2), "{problem}");
+}
+
+#[test]
+fn a_curve_that_takes_too_much_memory_is_given_up_by_the_child_alone() {
+    let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
+    let rows: String = (0..300_000).map(|row| format!("{row},0.5\n")).collect();
+    fs::write(fixture.cues().join("long.csv"), format!("time_ms,a1\n{rows}")).unwrap();
+    let problem = fixture.library.curve(&"long".parse().unwrap(), 100).unwrap_err();
+    assert!(problem.remedy.contains("max_memory_mib in [library]"), "{problem}");
+}

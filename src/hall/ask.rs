@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Role;
-use crate::config::Preset;
+use crate::config::{GearWord, Preset};
 use crate::time::ShowTime;
 
 /// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
@@ -148,6 +148,22 @@ impl Ask {
                 | Self::Enable(_)
                 | Self::Test { .. }
         )
+    }
+
+    /// What gear has to be allowed for it; none for what needs no leave, a stop, and for what gear has no way to ask.
+    #[must_use]
+    pub const fn gear_word(&self) -> Option<GearWord> {
+        Some(match self {
+            Self::Go => GearWord::Go,
+            Self::Pause => GearWord::Pause,
+            Self::Resume => GearWord::Resume,
+            Self::Park => GearWord::Park,
+            Self::Seek(_) => GearWord::Seek,
+            Self::Trim(_) => GearWord::Trim,
+            Self::Levels(_) => GearWord::Levels,
+            Self::Enable(_) | Self::Disable(_) => GearWord::Seats,
+            _ => return None,
+        })
     }
 
     /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.

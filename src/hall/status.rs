@@ -340,4 +340,6 @@ pub struct JournalLine {
     pub what: String,
     /// What came of it: `done`, or why not.
     pub result: String,
+    /// How often the same was asked in a row.
+    pub times: u32,
 }

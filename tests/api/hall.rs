@@ -196,6 +196,7 @@ pub fn long_status() -> Status {
         who: "x".repeat(5000),
         what: String::new(),
         result: String::new(),
+        times: 1,
     };
     Status { journal: (0..20).map(line).collect(), ..with_controller() }
 }

@@ -32,6 +32,17 @@ fn of_two_requests_with_one_key_the_second_does_nothing() {
 }
 
 #[test]
+fn a_stop_is_done_each_time_whatever_key_comes_with_it() {
+    let hall = Hall::open();
+    go().header("Idempotency-Key", "b").send(&hall.socket());
+    for key in ["a", "a", "b", "a b"] {
+        let stop = Request::new("POST", "/api/v1/show/stop").header("Idempotency-Key", key);
+        assert_eq!(stop.send(&hall.socket()).state(), "stopping", "{key}");
+        assert!(hall.desk.take_stop(), "{key}: not the reply of before alone");
+    }
+}
+
+#[test]
 fn a_key_is_its_owners_and_a_refusal_is_repeated_too() {
     let hall = Hall::open();
     let resume = |token: &str| {

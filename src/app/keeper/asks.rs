@@ -12,6 +12,10 @@ impl Keeper {
     pub(super) fn on_asked(&mut self, asked: Asked) {
         self.take_news();
         let Desired { ask, who } = asked.desired.clone();
+        if let Err(problem) = self.may_ask(&asked.desired) {
+            return self.answer(asked, Err(problem));
+        }
+        let before = self.before(&ask);
         self.heed(&ask);
         let result = match ask {
             Ask::Load { cue } => return self.load(&cue, asked),
@@ -24,8 +28,9 @@ impl Keeper {
             Ask::Arm { seats_empty: true } => self.request(Request::HomeAndArm),
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
-                let before = self.count_before();
-                self.request(Request::Go).inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
+                let counted = self.count_before();
+                self.request(Request::Go)
+                    .inspect(|()| self.begin_show(&who.to_string(), who.surface, counted))
             }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
@@ -41,12 +46,16 @@ impl Keeper {
             }
             Ask::Seek(film) => self.seek(film),
             Ask::Trim(ms) => self.trim(ms),
+            Ask::Levels(change) if who.surface.is_gear() => self.levels_of_gear(&change),
             Ask::Levels(change) => self.levels(&change),
             Ask::Enable(name) => self.enable(&name, true),
             Ask::Disable(name) => self.enable(&name, false),
             Ask::Reload => self.reload(),
             Ask::Preset(name) => self.preset(&name),
         };
+        if result.is_ok() {
+            self.note_doer(&asked.desired, before);
+        }
         self.tell_readiness();
         self.answer(asked, result);
     }

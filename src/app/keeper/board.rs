@@ -11,7 +11,11 @@ use crate::rt::Desk;
 #[derive(Debug, Clone)]
 pub(super) struct Board {
     pub(super) levels: Levels,
+    /// The same as people have set it: what gear may set at the most.
+    pub(super) ceiling: Levels,
     pub(super) trim_ms: i32,
+    /// Groups that gear took out, and no person since.
+    pub(super) gear_out: BTreeSet<String>,
     /// Groups that are taken out.
     pub(super) out: BTreeSet<String>,
     /// Rows that alone take part, while seats are tested; none where all do.
@@ -36,19 +40,14 @@ impl Board {
             lanes.iter().filter_map(|lane| Some((lane.row.clone()?, 1.0))).collect();
         let effects = config.effects.iter().map(|effect| (effect.name.clone(), true)).collect();
         let levels = Levels { motion: 1.0, vibration: 1.0, effects, rows };
-        Self { levels, trim_ms: 0, out: BTreeSet::new(), only: None, lanes }
+        let (ceiling, none) = (levels.clone(), BTreeSet::new());
+        Self { levels, ceiling, trim_ms: 0, gear_out: none.clone(), out: none, only: None, lanes }
     }
 
     /// What is set goes over to the board of another configuration, as far as that knows it.
     pub(super) fn carry_over(&mut self, before: &Self) {
-        self.levels.motion = before.levels.motion;
-        self.levels.vibration = before.levels.vibration;
-        for (name, on) in &mut self.levels.effects {
-            *on = before.levels.effects.get(name).copied().unwrap_or(*on);
-        }
-        for (row, level) in &mut self.levels.rows {
-            *level = before.levels.rows.get(row).copied().unwrap_or(*level);
-        }
+        carry(&mut self.levels, &before.levels);
+        carry(&mut self.ceiling, &before.ceiling);
         self.trim_ms = before.trim_ms;
         self.out = before
             .out
@@ -56,13 +55,24 @@ impl Board {
             .filter(|group| self.lanes.iter().any(|lane| lane.group == **group))
             .cloned()
             .collect();
+        self.gear_out = before.gear_out.intersection(&self.out).cloned().collect();
     }
 
-    /// Changes levels and effects; nothing is changed where one of them is not known or not within 0 to 1.
+    /// Changes levels and effects, as a person does; nothing is changed where one of them is not known or not within 0 to 1.
     ///
     /// # Errors
     /// Every fault.
     pub(super) fn change(&mut self, change: &LevelsChange) -> Result<(), Problem> {
+        self.change_below(change)?;
+        apply(&mut self.ceiling, change);
+        Ok(())
+    }
+
+    /// The same for gear, of what a person has allowed for.
+    ///
+    /// # Errors
+    /// Every fault.
+    pub(super) fn change_below(&mut self, change: &LevelsChange) -> Result<(), Problem> {
         let mut faults = Vec::new();
         let levels = [("motion", change.motion), ("vibration", change.vibration)];
         let levels = levels.into_iter().filter_map(|(name, level)| Some((name.to_owned(), level?)));
@@ -80,10 +90,7 @@ impl Board {
             let remedy = "give levels from 0 to 1, and names of the configuration";
             return Err(Problem::new(Code::Value, "levels not changed", remedy).with(faults));
         }
-        self.levels.motion = change.motion.unwrap_or(self.levels.motion);
-        self.levels.vibration = change.vibration.unwrap_or(self.levels.vibration);
-        self.levels.rows.extend(change.rows.clone());
-        self.levels.effects.extend(change.effects.clone());
+        apply(&mut self.levels, change);
         Ok(())
     }
 
@@ -133,5 +140,24 @@ impl Board {
             desk.set(lane, mix);
         }
         desk.set_trim_ms(self.trim_ms);
+    }
+}
+
+fn apply(levels: &mut Levels, change: &LevelsChange) {
+    levels.motion = change.motion.unwrap_or(levels.motion);
+    levels.vibration = change.vibration.unwrap_or(levels.vibration);
+    levels.rows.extend(change.rows.clone());
+    levels.effects.extend(change.effects.clone());
+}
+
+/// Takes over what was set before, as far as it is known here.
+fn carry(levels: &mut Levels, before: &Levels) {
+    levels.motion = before.motion;
+    levels.vibration = before.vibration;
+    for (name, on) in &mut levels.effects {
+        *on = before.effects.get(name).copied().unwrap_or(*on);
+    }
+    for (row, level) in &mut levels.rows {
+        *level = before.rows.get(row).copied().unwrap_or(*level);
     }
 }

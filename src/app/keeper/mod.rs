@@ -5,6 +5,7 @@
 mod asks;
 mod board;
 mod errand;
+mod gear;
 mod homing;
 mod known;
 mod list;
@@ -123,6 +124,8 @@ pub struct Keeper {
     sweep: Option<sweep::Sweep>,
     record: Records,
     reload: Option<Arc<Config>>,
+    /// Since when the hall is paused by gear, and by no person; where that is not the pause of now, it is an old one.
+    gear_paused: Option<MonoTime>,
     /// A show has ended, and why.
     show_over: bool,
     ended: Cause,
@@ -167,6 +170,7 @@ impl Keeper {
             sweep: None,
             record: Records::new(journal),
             reload: None,
+            gear_paused: None,
             show_over: false,
             ended: Cause::Started,
         };
@@ -212,6 +216,7 @@ impl Keeper {
             let table = self.reins.live.table();
             self.rates.note(&table, now);
             self.strangers.note(&table, now);
+            self.settle_folds();
             self.say_journal();
             self.publish();
         }

@@ -200,7 +200,12 @@ impl Rig {
 
     /// Asks the keeper something as a surface does, and waits for the answer.
     pub(super) fn ask(&mut self, ask: Ask) -> Result<Arc<Status>, Problem> {
-        let waits = self.post(ask);
+        self.ask_as(Surface::Socket, ask)
+    }
+
+    /// The same by another surface.
+    pub(super) fn ask_as(&mut self, surface: Surface, ask: Ask) -> Result<Arc<Status>, Problem> {
+        let waits = self.post_as(surface, ask);
         self.hear();
         self.wait_until(|_| waits.is_finished());
         waits.join().unwrap()
@@ -208,7 +213,11 @@ impl Rig {
 
     /// Has something asked that waits for its turn.
     pub(super) fn post(&self, ask: Ask) -> JoinHandle<Result<Arc<Status>, Problem>> {
-        let who = Who { role: Role::Engineer, surface: Surface::Socket, name: "anna".to_owned() };
+        self.post_as(Surface::Socket, ask)
+    }
+
+    fn post_as(&self, surface: Surface, ask: Ask) -> JoinHandle<Result<Arc<Status>, Problem>> {
+        let who = Who { role: Role::Engineer, surface, name: "anna".to_owned() };
         let posted = self.handle.post(who, ask).unwrap();
         let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
         thread::spawn(move || runtime.block_on(posted.answer()))

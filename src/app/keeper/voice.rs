@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::Keeper;
 use super::warnings::NOTE;
 use crate::hall::{Severity, Status, Warning};
+use crate::journal::Action;
 use crate::log::{Line, Log, Priority};
 use crate::sd::Notifier;
 use crate::state::State;
@@ -105,11 +106,12 @@ impl Keeper {
     }
 
     /// Says what somebody asked, and what came of it.
-    pub(super) fn say_ask(&self, who: &str, what: &str, result: &str, word: &str) {
-        let text = format!("{who}: {what}: {result}");
-        self.ends
-            .voice
-            .log
-            .say(Line::new(Priority::Notice, format!("ask-{word}"), text).with("operator", who));
+    pub(super) fn say_ask(&self, action: &Action) {
+        let Action { who, what, result, times, .. } = action;
+        let often = if *times > 1 { format!(" ({times} times)") } else { String::new() };
+        let word = what.split(' ').next().unwrap_or_default();
+        let line =
+            Line::new(Priority::Notice, format!("ask-{word}"), format!("{who}: {what}: {result}{often}"));
+        self.ends.voice.log.say(line.with("operator", who.clone()));
     }
 }

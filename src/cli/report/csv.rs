@@ -14,10 +14,12 @@ pub(super) fn shows(report: &Report) -> String {
 
 /// One record for each thing that was asked.
 pub(super) fn actions(report: &Report) -> String {
-    let head = ["at", "who", "what", "result", "state"].map(str::to_owned);
+    let head = ["at", "who", "what", "result", "state", "times"].map(str::to_owned);
     let rows = report.actions.iter();
-    let rows =
-        rows.map(|one| [&one.at, &one.who, &one.what, &one.result, &one.state].map(|text| plain(text)));
+    let rows = rows.map(|one| {
+        let times = one.times.to_string();
+        [&one.at, &one.who, &one.what, &one.result, &one.state, &times].map(|text| plain(text))
+    });
     [head].into_iter().chain(rows).map(|cells| record(&cells)).collect()
 }
 

@@ -49,8 +49,8 @@ function whose(controllers, all) {
 }
 
 const showJournal = onChange((journal) => {
-  const lines = journal.map(({ at, who, what, result }) => {
-    const line = row([timeOfDay(at), who, what, result]);
+  const lines = journal.map(({ at, who, what, result, times }) => {
+    const line = row([timeOfDay(at), who, what, times > 1 ? `${result} (${times} times)` : result]);
     line.classList.toggle('refused', result !== 'done');
     return line;
   });
