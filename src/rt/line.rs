@@ -27,7 +27,7 @@ struct Shared {
 struct Answer {
     controller: u16,
     at: MonoTime,
-    length: u8,
+    length: u16,
     octets: [u8; MAX_LEN],
 }
 
@@ -103,7 +103,7 @@ impl LineEnd {
         let mut answer = Answer {
             controller: u16::try_from(controller).expect("fewer controllers than ports"),
             at,
-            length: u8::try_from(octets.len()).unwrap_or(u8::MAX),
+            length: u16::try_from(octets.len()).expect("a message is shorter than 65,536 octets"),
             octets: [0; MAX_LEN],
         };
         answer.octets[..octets.len()].copy_from_slice(octets);
@@ -125,5 +125,24 @@ impl LineEnd {
     pub(super) fn take_sent(&mut self, controller: usize) -> u64 {
         let sent = self.shared.sent[controller].load(Ordering::Acquire);
         sent - std::mem::replace(&mut self.counted[controller], sent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::net::Ports;
+
+    #[test]
+    fn the_longest_answer_is_handed_over_whole() {
+        let to = "127.0.0.1:9".parse().unwrap();
+        let (sender, _) = Ports::open("127.0.0.1:0".parse().unwrap(), &[to]).unwrap().split();
+        let (mut line, mut end) = line(sender, 1);
+        line.open(true);
+        let octets: Vec<u8> = (0..=u8::MAX).cycle().take(MAX_LEN).collect();
+        assert!(end.hear(0, &octets, MonoTime::default()));
+        let mut heard = Vec::new();
+        line.drain(&mut |_, octets, _| heard.push(octets.to_vec()));
+        assert_eq!(heard, [octets]);
     }
 }
