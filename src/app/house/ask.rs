@@ -76,7 +76,7 @@ pub fn inquire(
     let mut talk = Talk::over(OverLine { line, called_off }, Monotonic, &peers(controllers));
     let finding = match inquiry {
         Inquiry::Survey => {
-            let wanted: Vec<_> = controllers.iter().map(|one| wanted(one.dialect)).collect();
+            let wanted: Vec<_> = controllers.iter().map(wanted).collect();
             Finding::Surveyed(survey(&mut talk, controllers, &wanted, tell))
         }
         Inquiry::Home { lanes, .. } => {
