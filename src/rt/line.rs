@@ -17,6 +17,8 @@ const ANSWERS: usize = 1024;
 #[derive(Debug)]
 struct Shared {
     open: AtomicBool,
+    /// Nobody else is to ask the controllers anything.
+    hushed: AtomicBool,
     /// Datagrams sent by the line, and how often its port was found closed; by controller.
     sent: Box<[AtomicU64]>,
     closed: Box<[AtomicU64]>,
@@ -52,7 +54,12 @@ pub struct LineEnd {
 #[must_use]
 pub fn line(sender: Sender, controllers: usize) -> (Line, LineEnd) {
     let zeros = || (0..controllers).map(|_| AtomicU64::new(0)).collect();
-    let shared = Arc::new(Shared { open: AtomicBool::new(false), sent: zeros(), closed: zeros() });
+    let shared = Arc::new(Shared {
+        open: AtomicBool::new(false),
+        hushed: AtomicBool::new(false),
+        sent: zeros(),
+        closed: zeros(),
+    });
     let (producer, answers) = RingBuffer::new(ANSWERS);
     let end =
         LineEnd { answers: producer, shared: Arc::clone(&shared), counted: vec![0; controllers].into() };
@@ -64,6 +71,11 @@ impl Line {
     pub fn open(&mut self, open: bool) {
         while self.answers.pop().is_ok() {}
         self.shared.open.store(open, Ordering::Release);
+    }
+
+    /// Has the ack thread ask nothing by itself while nothing moves, or lets it.
+    pub fn hush(&self, hushed: bool) {
+        self.shared.hushed.store(hushed, Ordering::Release);
     }
 
     /// Sends a datagram to a controller, counted from 0.
@@ -114,6 +126,11 @@ impl LineEnd {
     /// Whether a conversation is under way.
     pub(super) fn is_open(&self) -> bool {
         self.shared.open.load(Ordering::Acquire)
+    }
+
+    /// Whether nobody else is to ask.
+    pub(super) fn is_hushed(&self) -> bool {
+        self.shared.hushed.load(Ordering::Acquire)
     }
 
     /// Notes how often a controller's port was found closed so far.

@@ -109,6 +109,11 @@ impl Standby {
         self.line.is_open()
     }
 
+    /// Whether that conversation wants nobody else to ask.
+    pub(super) fn is_hushed(&self) -> bool {
+        self.line.is_hushed()
+    }
+
     /// Takes orders, counts what the line sent, and beats while nothing moves.
     pub(super) fn serve(&mut self, health: &mut Health, sender: &Sender, moving: bool, now: MonoTime) {
         while let Ok(Order::Homed(controller)) = self.orders.pop() {
@@ -119,7 +124,7 @@ impl Standby {
             health.on_other_sent(controller, self.line.take_sent(controller));
         }
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if moving || self.line.is_open() {
+        if moving || self.line.is_open() || self.line.is_hushed() {
             self.beats.forget();
             return;
         }
