@@ -169,6 +169,8 @@ pub struct Controller {
     pub effects: Option<Vec<String>>,
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where only its replies tell.
     pub estop_inputs: u16,
+    /// The inputs of its belts, each active while its belt is open, bit 0 = X01; 0 for none.
+    pub belt_inputs: u16,
     /// Findings of preflight that are accepted for good of this controller.
     pub accept_findings: Vec<Acceptance>,
 }

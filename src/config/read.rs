@@ -282,6 +282,10 @@ fn controller<'t>(
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
     let estop_inputs = inputs_of(&mut section, "estop_inputs");
+    let belt_inputs = inputs_of(&mut section, "belt_inputs");
+    if let Some(entry) = section.get("belt_inputs").filter(|_| estop_inputs & belt_inputs != 0) {
+        entry.fault(section.faults, "an input of estop_inputs is none of a belt");
+    }
     let accept_findings = acceptances(&mut section);
     section.finish();
     let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
@@ -300,6 +304,7 @@ fn controller<'t>(
         accept,
         effects,
         estop_inputs,
+        belt_inputs,
         accept_findings,
     })
 }

@@ -188,6 +188,7 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
         accept: Accept::All,
         effects: None,
         estop_inputs: 0,
+        belt_inputs: 0,
         accept_findings: Vec::new(),
     })
 }

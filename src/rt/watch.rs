@@ -297,7 +297,9 @@ impl Watch {
             // One that is out may be at work on: it stays away until it was homed, and holds up nobody.
             Notice::Hall(Event::Rebooted(controller)) if !self.takes_part(controller) => {}
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
-            // Preflight counts every datagram that a controller received: what can wait does not come between.
+            // Preflight counts every datagram that a controller received, and would take the answers for its own.
+            Notice::Read(_) if self.is_hushed() => {}
+            // A homing is watched by who ordered it; only those that are looked for are looked at beside.
             Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
             Notice::Read(controller) => {
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
@@ -317,6 +319,11 @@ impl Watch {
     /// Whether the control plane holds a conversation with the controllers.
     fn is_asked_otherwise(&self) -> bool {
         self.standby.as_ref().is_some_and(Standby::is_asked_otherwise)
+    }
+
+    /// Whether that conversation wants to be the only one.
+    fn is_hushed(&self) -> bool {
+        self.standby.as_ref().is_some_and(Standby::is_hushed) && !self.live.is_moving()
     }
 
     fn stands(&self, controller: usize) -> Standing {
@@ -361,7 +368,7 @@ impl Watch {
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
     fn beat(&mut self, now: MonoTime) {
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if self.silent || self.live.is_moving() || self.is_asked_otherwise() || !self.beats.take(now) {
+        if self.silent || self.live.is_moving() || self.is_hushed() || self.is_asked_otherwise() || !self.beats.take(now) {
             return;
         }
         for controller in 0..self.lookers.len() {

@@ -17,6 +17,7 @@ mod report;
 mod servo;
 mod status;
 mod vibration;
+mod word_order;
 mod words;
 
 pub use error::{DeviceError, WireError};
@@ -31,6 +32,7 @@ pub use report::Report;
 pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
 pub use vibration::Vibration;
+pub use word_order::{WordOrder, word_order};
 pub use words::{MAX_WORDS, Words};
 
 /// Octets that hold any message we write; the longest carries a whole table of registers.

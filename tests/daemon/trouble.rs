@@ -210,3 +210,17 @@ fn another_machine_that_drives_a_seat_at_rest_is_a_fault_and_the_seat_is_homed_b
     hall.comes_to("parked");
     assert!(hall.end().rest_in_park());
 }
+
+#[test]
+fn the_halls_homing_refuses_a_controller_that_would_not_search_its_zero() {
+    let mut hall = Hall::closed(&["--pa", "0e=1"], |config| config);
+    hall.serve();
+    hall.run(&["home", "--seats-empty"]);
+    let told = |status: &Value| {
+        let warnings = status["warnings"].as_array().expect("a list");
+        let texts = warnings.iter().filter_map(|warning| warning["text"].as_str());
+        texts.filter(|text| text.contains("without searching it (PA0e = 1)")).count() == 2
+    };
+    let status = hall.wait(|status| status["state"] == "fault" && told(status));
+    assert_eq!(status["cause"], "A1: a seat did not get home");
+}

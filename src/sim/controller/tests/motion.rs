@@ -108,6 +108,30 @@ fn vibration_is_for_smc_alone() {
 }
 
 #[test]
+fn an_imax_told_so_makes_of_lateness_speed() {
+    let parameters = vec![(pa::INTERVAL_SOURCE, 1)];
+    let mut late = Bench::new(&Setup { dialect: Dialect::Mbox, parameters, ..Setup::default() });
+    late.x(&FRAME);
+    late.wait(100).word(0, 0x5e);
+    late.wait(20).x(&Motion { positions: &[Pulses(2_000), Pulses(2_000), Pulses(-3_000)], ..FRAME });
+    assert_eq!(
+        late.wait(20).positions()[0],
+        2_000,
+        "in the 20 ms since the datagram before, not in its 100 ms"
+    );
+    let mut smc = Bench::with(&[(pa::INTERVAL_SOURCE, 1)]);
+    smc.x(&FRAME);
+    assert_eq!(smc.wait(50).positions(), [500, 1_000, -1_500], "there it is for commands without a Time");
+}
+
+#[test]
+fn inverted_outputs_are_on_where_a_frame_says_off() {
+    let mut bench = Bench::with(&[(pa::OUTPUT_POLARITY, 1)]);
+    bench.x(&Motion { outputs: 5, ..FRAME });
+    assert_eq!(bench.word(0, 0x66), 0x0ffa);
+}
+
+#[test]
 fn a_queue_that_runs_over_stops_the_play_with_err21_until_a_reset() {
     let mut bench = Bench::with(&[]);
     for _ in 0..201 {
