@@ -20,6 +20,7 @@ use crate::fanout::{Lane, Manner};
 use crate::health::{Groups, Health};
 use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
+use crate::plain;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
 use crate::rt::{
@@ -70,12 +71,12 @@ pub enum PlayError {
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
-    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", cue.display());
+    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", plain::path(cue));
     misfits.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
-    let cue = cue.display();
+    let cue = plain::path(cue);
     let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
     if more > 0 {
         text += &format!("{cue}: and {more} more\n");
@@ -193,9 +194,7 @@ impl Play {
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
-        if self.holds {
-            acks.tell(Arc::clone(live));
-        }
+        acks.tell(Arc::clone(live));
         let mut preparation = Preparation {
             clock: &Monotonic,
             sender: &sender,

@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use crate::plain;
+
 /// One fault of a configuration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigFault {
@@ -19,7 +21,7 @@ pub struct ConfigFault {
 
 impl fmt::Display for ConfigFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: {}", self.path.display(), self.line, self.column, self.message)
+        write!(f, "{}:{}:{}: {}", plain::path(&self.path), self.line, self.column, self.message)
     }
 }
 
@@ -28,7 +30,7 @@ impl fmt::Display for ConfigFault {
 #[non_exhaustive]
 pub enum ConfigFaults {
     /// The file is missing, a folder, or cannot be read.
-    #[error("cannot read the configuration {}", path.display())]
+    #[error("cannot read the configuration {}", plain::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
