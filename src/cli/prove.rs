@@ -15,7 +15,6 @@ use crate::engine::Show;
 use crate::fanout::Manner;
 use crate::library::Verdict;
 use crate::proof::{Digest, Terms, prove};
-use crate::sys;
 use crate::sys::humble::{self, Bounds};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -53,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 
 /// Reads a cue and proves it for all seats of a hall, at full level, as `play` does before it starts.
 fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
-    let mut input = Hashed { file: sys::file::open(path)?, hash: Sha256::new(), front: Vec::new() };
+    let mut input = Hashed { file: File::open(path)?, hash: Sha256::new(), front: Vec::new() };
     let cue = cue::read(path, &mut input, &Source::Native);
     io::copy(&mut input, &mut io::sink())?; // reading ends at the first fault of some kinds
     let mut verdict = Verdict {

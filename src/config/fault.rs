@@ -6,6 +6,9 @@ use std::path::PathBuf;
 
 use crate::plain;
 
+/// How much of a fault is told, octets.
+const TOLD: usize = 1_000;
+
 /// One fault of a configuration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigFault {
@@ -98,8 +101,10 @@ impl<'t> Faults<'t> {
     pub(crate) fn into_list(mut self, path: &std::path::Path) -> Vec<ConfigFault> {
         self.found.sort_by_key(|&(at, _)| at);
         let text = self.text.as_bytes();
-        let at_place = |(at, message)| {
+        let at_place = |(at, message): (usize, String)| {
             let (line, column) = place(text, at);
+            // It may name a key as it stands in the file.
+            let message = plain::escaped(&message, TOLD).into_owned();
             ConfigFault { path: path.to_owned(), line, column, message }
         };
         self.found.into_iter().map(at_place).collect()

@@ -15,7 +15,12 @@ pub(crate) fn is_installed(program: &str) -> bool {
     let paths = std::env::var_os("PATH").unwrap_or_default();
     let mut places = std::env::split_paths(&paths).map(|folder: PathBuf| folder.join(program));
     let without = std::env::var(WITHOUT).unwrap_or_default();
-    is_wanted(program, places.any(|place| place.is_file()), &without)
+    let installed = is_wanted(program, places.any(|place| place.is_file()), &without);
+    if !installed {
+        // Straight to the standard error: the test harness keeps what a passed test prints.
+        let _ = writeln!(std::io::stderr(), "skipped: {program} is not installed");
+    }
+    installed
 }
 
 fn is_wanted(program: &str, installed: bool, without: &str) -> bool {
@@ -23,10 +28,6 @@ fn is_wanted(program: &str, installed: bool, without: &str) -> bool {
         installed || without.split_whitespace().any(|name| name == program),
         "{program} is not installed, and this test needs it; install it, or skip its tests with {WITHOUT}={program}"
     );
-    if !installed {
-        // Straight to the standard error: the test harness keeps what a passed test prints.
-        let _ = writeln!(std::io::stderr(), "skipped: {program} is not installed");
-    }
     installed
 }
 
