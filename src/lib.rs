@@ -22,6 +22,7 @@
 )]
 
 pub mod motion;
+pub mod plain;
 pub mod time;
 pub mod wire;
 

@@ -5,9 +5,10 @@
 mod common;
 #[path = "common/pcap.rs"]
 mod pcap;
+#[path = "common/programs.rs"]
+mod programs;
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
 use std::net::SocketAddrV4;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -21,6 +22,7 @@ use kinocue::wire::{
     Words, WriteRequest,
 };
 use pcap::Pcap;
+use programs::is_installed;
 use serde::Deserialize;
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/wireshark/kinocue.lua");
@@ -59,16 +61,15 @@ const FIELDS: [&str; 27] = [
 /// The fields that a message has, several values joined by commas.
 type Fields = BTreeMap<&'static str, String>;
 
-/// Whether there is a tshark that runs Lua; says so where there is none.
+/// Whether there is a tshark; false where somebody asked for tests without it.
 fn tshark_runs() -> bool {
-    let output = Command::new("tshark").arg("--version").output();
-    let runs =
-        output.is_ok_and(|Output { stdout, .. }| String::from_utf8_lossy(&stdout).contains("with Lua"));
-    if !runs {
-        // Straight to the standard error: the test harness keeps what a passed test prints.
-        let _ = writeln!(std::io::stderr(), "skipped: no tshark with Lua is installed");
+    if !is_installed("tshark") {
+        return false;
     }
-    runs
+    let Output { stdout, .. } = Command::new("tshark").arg("--version").output().unwrap();
+    let version = String::from_utf8_lossy(&stdout);
+    assert!(version.contains("with Lua"), "this tshark runs no dissectors: {version}");
+    true
 }
 
 /// The lines that tshark prints of a capture, one for each packet.

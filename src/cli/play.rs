@@ -24,6 +24,7 @@ mod keys;
 mod leader;
 mod progress;
 mod said;
+mod standings;
 
 use progress::Progress;
 use said::Said;
@@ -37,8 +38,9 @@ const EXAMPLES: [&str; 4] = [
 
 /// Plays one cue to the controllers, and reports what became of every frame.
 ///
-/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. On a terminal keys lead the play; ?
-/// says which. None of it is an emergency stop: that one is hard-wired.
+/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C, half a second after the first or later, ends at once and
+/// leaves the seats where they are. On a terminal keys lead the play; ? says which. None of it is an emergency stop: that one is
+/// hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help(&EXAMPLES))]
 pub(super) struct Args {

@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if args.json {
         print::json(&report)?;
     } else if args.csv {
-        print::out(&if args.actions { csv::actions(&report) } else { csv::shows(&report) })?;
+        print::data(&if args.actions { csv::actions(&report) } else { csv::shows(&report) })?;
         tell_notes(&report);
     } else {
         print::out(&if args.actions { table::actions(&report) } else { table::shows(&report) })?;

@@ -1,9 +1,11 @@
 //! The console as a technician uses it: in a real browser, against a real `kinocue serve` and virtual controllers. Pictures of
-//! what was seen are kept in `target/console-shots`. Where there is no chromium the tests say so and are skipped.
+//! what was seen are kept in `target/console-shots`.
 
 #[path = "../common/process.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod process;
+#[path = "../common/programs.rs"]
+mod programs;
 #[path = "../common/serving.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod serving;

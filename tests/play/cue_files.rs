@@ -47,6 +47,20 @@ fn what_is_bad_is_refused_before_anything_moves_with_its_place_and_exit_code() {
 }
 
 #[test]
+fn a_pipe_or_a_device_in_place_of_a_cue_is_refused_at_once() {
+    let folder = Folder::new();
+    let pipe = folder.path("pipe.csv");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("coreutils").success());
+    for path in [pipe.to_str().expect("text"), "/dev/zero"] {
+        for command in [vec!["check", path], vec!["info", path], vec!["play", path, "--to", "127.0.0.1:9"]] {
+            let run = kinocue(&command);
+            assert_eq!(run.code, Some(66), "{run:?}");
+            assert!(run.stderr.contains("it is a pipe or a device, not a file; write what comes"), "{run:?}");
+        }
+    }
+}
+
+#[test]
 fn the_first_twenty_faults_are_named_and_the_others_counted() {
     let folder = Folder::new();
     let rows: String = (1..=50).map(|row| format!("{},2\n", row * 10)).collect();

@@ -3,6 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::view::{Controller, Show, Status, Warning, percent, time, us};
+use crate::plain;
 
 /// Controllers and warnings that are shown one by one at the most.
 const FEW: usize = 6;
@@ -26,7 +27,7 @@ impl Panel {
 
     /// Shows the hall as it is.
     pub(super) fn show(&mut self, status: &Status) {
-        self.last = text(status);
+        self.last = plain::lines(&text(status)).into_owned();
         self.bar.set_message(self.last.clone());
         self.bar.tick();
     }
