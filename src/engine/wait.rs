@@ -4,6 +4,7 @@
 use super::{Engine, Part, Phase, Rest, Rider, first_phase};
 use crate::engine::Mix;
 use crate::motion::{Pose, Slot, Window};
+use crate::time::TRIM_MS;
 
 /// A seat this near its park pose is there, pulses: positions are read in whole ones.
 const AT_PARK: f64 = 1.5;
@@ -35,6 +36,12 @@ impl Engine {
         self
     }
 
+    /// It was made for that trim: its show starts where the motion then is in the cue, so that nothing has to be slewed in. What
+    /// it is told of any other trim counts from there.
+    pub fn begin_trimmed(&mut self, ms: i32) {
+        self.trim_ms = ms.clamp(-TRIM_MS, TRIM_MS);
+    }
+
     /// Begins, where it waits.
     pub fn go(&mut self) {
         if self.phase == Phase::Waiting {
@@ -54,7 +61,6 @@ impl Engine {
     /// Takes over where the seats are from the engine that is done: lanes to which nothing goes stay so, and those that rest
     /// elsewhere than at park go on from there. Where the hall is not ready to play (`ready` false), it rests.
     pub fn take_over(&mut self, before: &Self, ready: bool) {
-        self.trim_ms = before.trim_ms;
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
             rider.count_on(old);
             match old.part {

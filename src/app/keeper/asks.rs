@@ -96,9 +96,10 @@ impl Keeper {
             let detail = format!("a trim of {ms} ms is outside -{TRIM_MS}..={TRIM_MS}");
             return Err(Problem::new(Code::Value, detail, "give a smaller one"));
         }
-        self.board.trim_ms = ms;
-        self.reins.desk.set_trim_ms(ms);
-        Ok(())
+        self.set(|board| {
+            board.trim_ms = ms;
+            Ok(())
+        })
     }
 
     fn preset(&mut self, name: &str) -> Result<(), Problem> {

@@ -154,7 +154,7 @@ impl Keeper {
         let show = Show {
             rate: Rate::from_hz(config.show.rate_hz),
             timing: config.show.timing,
-            start: cued.start,
+            start: motion_at(cued.start, self.board.trim_ms),
             plays: 1,
         };
         let staged = Staged::mixed(config, &cued.timeline, cued.headroom.clone(), show, &mixes, false);
@@ -163,8 +163,10 @@ impl Keeper {
         })?;
         let course = &staged.course;
         cued.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
+        let mut loaded = staged.loaded();
+        loaded.engine.begin_trimmed(self.board.trim_ms);
         self.set_desk();
-        self.command(Command::Load(staged.loaded()))
+        self.command(Command::Load(loaded))
     }
 
     /// Sets something, and makes the show anew where its first frames hang on that; while the seats move the desk is enough.
@@ -204,6 +206,11 @@ impl Keeper {
             self.cued = None;
         }
     }
+}
+
+/// Where in the cue the motion is at a time of the film, with that trim.
+const fn motion_at(film: ShowTime, trim_ms: i32) -> ShowTime {
+    ShowTime::from_nanos(film.as_nanos() - trim_ms as i64 * 1_000_000)
 }
 
 pub(super) fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<Cued>, Problem> {
