@@ -45,7 +45,7 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
             Ask::Levels(levels),
         ),
         (plain("/api/v1/presets/kids"), Ask::Preset("kids".to_owned())),
-        (plain("/api/v1/controllers/A%201/disable"), Ask::Disable("A 1".to_owned())),
+        (plain("/api/v1/controllers/A%201/disable"), Ask::Disable { name: "A 1".to_owned(), why: None }),
         (plain("/api/v1/controllers/A1/enable"), Ask::Enable("A1".to_owned())),
         (plain("/api/v1/preflight"), Ask::Preflight),
         (post("/api/v1/test", r#"{"rows":["A","B"]}"#), Ask::Test { rows: vec!["A".into(), "B".into()] }),

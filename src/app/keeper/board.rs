@@ -6,14 +6,15 @@ use crate::config::Config;
 use crate::engine::Mix;
 use crate::hall::{Code, Levels, LevelsChange, Problem};
 use crate::rt::Desk;
+use crate::settings::{Out, Settings};
 
 /// What is set.
 #[derive(Debug, Clone)]
 pub(super) struct Board {
     pub(super) levels: Levels,
     pub(super) trim_ms: i32,
-    /// Groups that are taken out.
-    pub(super) out: BTreeSet<String>,
+    /// Groups that are taken out, also such as this configuration does not know: one that comes back with the next is out still.
+    pub(super) out: BTreeMap<String, Out>,
     /// Rows that alone take part, while seats are tested; none where all do.
     pub(super) only: Option<BTreeSet<String>>,
     lanes: Vec<Strip>,
@@ -33,29 +34,26 @@ impl Board {
             |one: &crate::config::Controller| Strip { row: one.row.clone(), group: one.group.clone() };
         let lanes: Vec<Strip> = config.controllers.iter().map(strip).collect();
         let rows: BTreeMap<String, f64> =
-            lanes.iter().filter_map(|lane| Some((lane.row.clone()?, 1.0))).collect();
+            config.named().filter_map(|one| Some((one.row.clone()?, 1.0))).collect();
         let effects = config.effects.iter().map(|effect| (effect.name.clone(), true)).collect();
         let levels = Levels { motion: 1.0, vibration: 1.0, effects, rows };
-        Self { levels, trim_ms: 0, out: BTreeSet::new(), only: None, lanes }
+        Self { levels, trim_ms: 0, out: BTreeMap::new(), only: None, lanes }
     }
 
-    /// What is set goes over to the board of another configuration, as far as that knows it.
-    pub(super) fn carry_over(&mut self, before: &Self) {
-        self.levels.motion = before.levels.motion;
-        self.levels.vibration = before.levels.vibration;
-        for (name, on) in &mut self.levels.effects {
-            *on = before.levels.effects.get(name).copied().unwrap_or(*on);
+    /// The same with what was set before, as far as this configuration knows it.
+    pub(super) fn with(config: &Config, before: &Settings) -> Self {
+        let mut board = Self::new(config);
+        let Settings { levels, trim_ms, out, .. } = before;
+        (board.levels.motion, board.levels.vibration) = (levels.motion, levels.vibration);
+        for (name, on) in &mut board.levels.effects {
+            *on = levels.effects.get(name).copied().unwrap_or(*on);
         }
-        for (row, level) in &mut self.levels.rows {
-            *level = before.levels.rows.get(row).copied().unwrap_or(*level);
+        for (row, level) in &mut board.levels.rows {
+            *level = levels.rows.get(row).copied().unwrap_or(*level);
         }
-        self.trim_ms = before.trim_ms;
-        self.out = before
-            .out
-            .iter()
-            .filter(|group| self.lanes.iter().any(|lane| lane.group == **group))
-            .cloned()
-            .collect();
+        board.trim_ms = *trim_ms;
+        board.out.clone_from(out);
+        board
     }
 
     /// Changes levels and effects; nothing is changed where one of them is not known or not within 0 to 1.
@@ -87,13 +85,16 @@ impl Board {
         Ok(())
     }
 
-    /// Takes the group of a controller in, or out.
-    pub(super) fn enable(&mut self, group: &str, on: bool) {
-        if on {
+    /// Takes a group in, or out. One that is out already stays so since then, and by whom it was; a reason that is given now
+    /// counts.
+    pub(super) fn enable(&mut self, group: &str, out: Option<Out>) {
+        let Some(out) = out else {
             self.out.remove(group);
-        } else {
-            self.out.insert(group.to_owned());
-        }
+            return;
+        };
+        let why = out.why.clone();
+        let entry = self.out.entry(group.to_owned()).or_insert(out);
+        entry.why = why.or_else(|| entry.why.take());
     }
 
     /// Whether a lane is to take part.
@@ -104,7 +105,12 @@ impl Board {
             (Some(only), Some(row)) => only.contains(row),
             (Some(_), None) => false,
         };
-        !self.out.contains(group) && tested
+        !self.out.contains_key(group) && tested
+    }
+
+    /// The group of a lane.
+    pub(super) fn group(&self, lane: usize) -> &str {
+        &self.lanes[lane].group
     }
 
     /// What each lane makes of a cue that has these effects.

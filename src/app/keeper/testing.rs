@@ -23,6 +23,7 @@ use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
 use crate::rt::{Command, Desk, Live, News, line};
+use crate::settings::Store;
 use crate::state::{Event, Finding, Machine, Readiness, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{Policy, RealTime};
@@ -182,6 +183,7 @@ impl Rig {
         let library = Library::open(&config.show.library, library).unwrap();
         let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
         let journal = Journal::open(&folder.path().join("log"), limits, &Zoned::now());
+        memory.set_desk(&config, &desk);
         let (handle, ends) = ends(&desk, folder.path(), memory);
         let keeper = Keeper::new(ends, reins, line, library, journal);
         let double = Double::start(desk, commands_end, news);
@@ -283,5 +285,6 @@ fn ends(desk: &Arc<Desk>, folder: &Path, memory: Memory) -> (Handle, Ends) {
     let voice = Voice::new(Log::start(|_| {}).unwrap());
     let config = folder.join("hall.toml");
     let (began, signals) = (Monotonic.now(), Signals::default());
-    (handle, Ends { inbox, source, config, began, signals, voice, memory })
+    let (store, _) = Store::open(folder);
+    (handle, Ends { inbox, source, config, began, signals, voice, memory, store })
 }

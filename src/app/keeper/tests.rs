@@ -7,12 +7,21 @@ use super::errand::Done;
 use super::testing::Rig;
 use super::*;
 use crate::engine::Unplanned;
-use crate::hall::{Ask, Code};
+use crate::hall::{Ask, Code, Role, Surface, Who};
 use crate::rt::News;
+use crate::settings::Out;
 use crate::state::{Event, Next, Trouble};
 use crate::time::ShowTime;
 
 const ARM: Ask = Ask::Arm { seats_empty: false };
+
+fn anna() -> Who {
+    Who { role: Role::Engineer, surface: Surface::Socket, name: "anna".to_owned() }
+}
+
+fn out(name: &str) -> Ask {
+    Ask::Disable { name: name.to_owned(), why: None }
+}
 
 #[test]
 fn an_answer_that_came_too_late_is_not_taken_for_that_of_the_next_command() {
@@ -44,7 +53,7 @@ fn a_hall_that_was_latched_is_so_with_another_configuration_too() {
 #[test]
 fn a_seat_that_is_out_is_out_from_the_first_tick_of_the_next_hall_on() {
     let mut before = Rig::parked();
-    before.ask(Ask::Disable("B1".to_owned())).unwrap();
+    before.ask(out("B1")).unwrap();
     let rig = Rig::starting(before.keeper.remember());
     assert_eq!([0, 1].map(|lane| rig.keeper.reins.desk.mix(lane).on), [true, false]);
 }
@@ -105,7 +114,7 @@ fn what_cannot_be_set_is_not_set_on_the_desk_either() {
     // As where the keeper has not heard yet that the seats move.
     rig.keeper.known.state = State::Parked;
     let problem = rig.keeper.set(|board| {
-        board.enable("B1", false);
+        board.enable("B1", Some(Out::now(&anna(), None)));
         Ok(())
     });
     assert_eq!(problem.unwrap_err().code, Code::State);
@@ -115,13 +124,13 @@ fn what_cannot_be_set_is_not_set_on_the_desk_either() {
 #[test]
 fn a_seat_whose_preflight_has_not_passed_does_not_join_a_show() {
     let mut rig = Rig::parked();
-    rig.ask(Ask::Disable("B1".to_owned())).unwrap();
+    rig.ask(out("B1")).unwrap();
     rig.keeper.preflighted = Some(ready::Preflighted::failing_at(1, 2));
     rig.ask(ARM).unwrap();
     rig.ask(Ask::Go).unwrap();
     assert_eq!(rig.ask(Ask::Enable("B1".to_owned())).unwrap_err().code, Code::State);
     assert!(!rig.keeper.reins.desk.mix(1).on);
-    rig.ask(Ask::Disable("A1".to_owned())).unwrap();
+    rig.ask(out("A1")).unwrap();
     rig.ask(Ask::Enable("A1".to_owned())).unwrap();
     assert!(rig.keeper.reins.desk.mix(0).on);
 }

@@ -36,6 +36,14 @@ impl Keeper {
         warnings.extend(self.of_strangers());
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
+        warnings.extend(self.of_what_lasts());
+        warnings.extend(self.ends.store.trouble().map(|trouble| Warning {
+            id: "settings".to_owned(),
+            severity: Severity::Warning,
+            controller: None,
+            text: trouble,
+            remedy: String::new(),
+        }));
         warnings.extend(self.record.trouble().map(|trouble| Warning {
             id: "journal".to_owned(),
             severity: Severity::Warning,
