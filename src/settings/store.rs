@@ -54,7 +54,7 @@ struct Tray {
     due: Option<String>,
     over: bool,
     trouble: Option<String>,
-    news: Vec<String>,
+    mended: bool,
 }
 
 /// That something is being loaded because it was before the start. Where the program ends meanwhile other than in order, it is
@@ -119,9 +119,9 @@ impl Store {
         self.desk.lock().trouble.clone()
     }
 
-    /// What has become worse or better since this was last asked, a line each, for the log.
-    pub fn news(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.desk.lock().news)
+    /// Whether trouble has ended since this was last asked.
+    pub fn take_mended(&mut self) -> bool {
+        std::mem::take(&mut self.desk.lock().mended)
     }
 }
 
@@ -177,18 +177,14 @@ impl Tray {
     fn fail(&mut self, why: &io::Error, folder: &Path) {
         if self.trouble.is_none() {
             let folder = folder.display();
-            let words = format!(
+            self.trouble = Some(format!(
                 "what people set cannot be kept over a restart: {why}; make room in {folder}, or name another folder with --state"
-            );
-            self.news.push(words.clone());
-            self.trouble = Some(words);
+            ));
         }
     }
 
     fn mend(&mut self) {
-        if self.trouble.take().is_some() {
-            self.news.push("what people set is kept again".to_owned());
-        }
+        self.mended |= self.trouble.take().is_some();
     }
 }
 

@@ -14,7 +14,7 @@ use crate::journal::stamp;
 use crate::playlist::Shelf;
 use crate::rt::Desk;
 use crate::settings::{Kept, Loaded, Out, Settings, Store, seats_out};
-use crate::state::State;
+use crate::state::{Cause, State};
 use crate::time::ShowTime;
 
 /// A show that was left sooner after its beginning is begun anew, not gone on with.
@@ -128,7 +128,7 @@ impl Keeper {
 
     /// A show is over: where it was left is kept with its cue.
     pub(super) fn keep_place(&mut self) {
-        let left_at = self.lasting.left_at.take();
+        let left_at = self.lasting.left_at.take().filter(|_| self.ended != Cause::CueEnded);
         if let Some(cued) = &mut self.cued {
             let end = cued.timeline.duration();
             cued.left_at = left_at.filter(|film| (WORTH_IT..end).contains(film));

@@ -77,13 +77,16 @@ impl List {
             Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them")
         })?;
         let mut list = Self::read(shelf, library, config, &id)?;
-        let entries = &list.playlist.entries;
-        let is_of = |entry: &Entry| entry.cue.to_string() == cue;
-        // Where somebody has changed it meanwhile, the entry may be another, or nowhere.
-        let there = entries.get(place.entry).is_some_and(is_of).then_some(place.entry);
-        let entry = there.or_else(|| entries.iter().position(is_of));
-        list.current = entry.unwrap_or_else(|| place.entry.min(entries.len() - 1));
+        list.current = list.nearest(place.entry, cue);
         Ok(list)
+    }
+
+    /// That entry where it is of the cue, else one that is: somebody may have changed the playlist meanwhile.
+    fn nearest(&self, entry: usize, cue: &str) -> usize {
+        let entries = &self.playlist.entries;
+        let is_of = |entry: &Entry| entry.cue.to_string() == cue;
+        let there = entries.get(entry).is_some_and(is_of).then_some(entry);
+        there.or_else(|| entries.iter().position(is_of)).unwrap_or_else(|| entry.min(entries.len() - 1))
     }
 
     /// Where it is, for the record of a show.

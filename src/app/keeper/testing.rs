@@ -161,7 +161,13 @@ impl Rig {
 
     /// One that has just started, after a hall of which it knows that.
     pub(super) fn starting(memory: Memory) -> Self {
+        Self::starting_in(|_| memory)
+    }
+
+    /// The same in a folder that is made ready for it.
+    pub(super) fn starting_in(ready: impl FnOnce(&Path) -> Memory) -> Self {
         let folder = tempfile::tempdir().unwrap();
+        let memory = ready(folder.path());
         let config = Arc::new(config(folder.path()));
         let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
         let (commands, commands_end) = RingBuffer::new(64);

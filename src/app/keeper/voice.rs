@@ -91,8 +91,8 @@ impl Keeper {
         for news in self.record.news() {
             self.ends.voice.log.say(Line::new(Priority::Warning, "journal", news));
         }
-        for news in self.ends.store.news() {
-            self.ends.voice.log.say(Line::new(Priority::Warning, "settings", news));
+        if self.ends.store.take_mended() {
+            self.ends.voice.log.say(Line::new(Priority::Notice, "settings", "what people set is kept again"));
         }
     }
 

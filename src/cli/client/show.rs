@@ -157,7 +157,7 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
     let verdict = if *passed { "passed" } else { "failed" };
     print::tell(&format!(
         "kinocue: preflight {verdict}: {answered} of {} controllers answered; next: {}",
-        status.controllers.len(),
+        status.controllers.iter().filter(|one| !one.is_out_for_good()).count(),
         status.hall.next
     ));
     Ok(if *passed { Exit::Done } else { Exit::CheckFailed })

@@ -96,14 +96,11 @@ fn ticks(status: &Status) -> String {
 
 fn controllers(all: &[Controller]) -> String {
     let row = |one: &Controller| {
-        let Controller { name, row, enabled, standing, why, ack_rate, ack_p50_us, ack_p99_us, lost, .. } =
-            one;
-        let standing =
-            if *enabled || standing == "out" { standing.clone() } else { format!("{standing}, off") };
+        let Controller { name, row, why, ack_rate, ack_p50_us, ack_p99_us, lost, .. } = one;
         [
             name.clone(),
             row.clone().unwrap_or_else(|| "-".to_owned()),
-            standing,
+            one.stands(),
             ack_rate.map_or_else(|| "-".to_owned(), percent),
             us(*ack_p50_us),
             us(*ack_p99_us),

@@ -200,6 +200,19 @@ impl Status {
     }
 }
 
+impl Controller {
+    /// How it stands, and whether it is out.
+    pub(super) fn stands(&self) -> String {
+        let off = if self.enabled || self.is_out_for_good() { "" } else { ", off" };
+        format!("{}{off}", self.standing)
+    }
+
+    /// Whether the configuration has it out, so that nobody counts it.
+    pub(super) fn is_out_for_good(&self) -> bool {
+        self.standing == "out"
+    }
+}
+
 impl Warning {
     /// What is the matter and what to do, in a line.
     pub(super) fn line(&self) -> String {
