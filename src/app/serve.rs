@@ -29,7 +29,7 @@ use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
-use crate::settings::Store;
+use crate::settings::SettingsFile;
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
@@ -185,9 +185,10 @@ fn serve_halls(
     let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
-    let (store, kept) = Store::open(&places.state);
+    let (settings_file, kept) = SettingsFile::open(&places.state);
     let memory = Memory::of(kept);
-    let mut ends = Ends { inbox, source, config: places.config, began, signals, voice, memory, store };
+    let mut ends =
+        Ends { inbox, source, config: places.config, began, signals, voice, memory, settings_file };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.

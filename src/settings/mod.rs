@@ -1,10 +1,10 @@
 //! What people set and what is to last: seats that are out, levels, effects, trim, and what is loaded. The model and its text
-//! ([`Settings::parse`], [`Settings::text`]) are pure; a thread of its own keeps the text in a file ([`Store`]).
+//! ([`Settings::parse`], [`Settings::text`]) are pure; a thread of its own keeps the text in a file ([`SettingsFile`]).
 //!
 //! Nothing in the file starts or moves anything. What cannot be read is put aside with a word, and the hall begins as one in
 //! which nobody has set anything.
 
-mod store;
+mod file;
 #[cfg(test)]
 mod tests;
 mod words;
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-pub use store::{Kept, Loading, Store};
+pub use file::{Kept, Loading, SettingsFile};
 pub use words::seats_out;
 
 use crate::hall::{Levels, Surface};
@@ -35,7 +35,7 @@ pub struct Settings {
     /// The groups of seats that are out.
     pub out: BTreeMap<String, Out>,
     /// What is loaded.
-    pub show: Option<Loaded>,
+    pub show: Option<LoadedShow>,
 }
 
 impl Default for Settings {
@@ -61,7 +61,7 @@ pub struct Out {
 
 /// What is loaded, and where in it people were left.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Loaded {
+pub struct LoadedShow {
     /// The id of the cue.
     pub cue: String,
     /// SHA-256 of its file, hexadecimal: a place in another cue is none in this one.

@@ -23,7 +23,7 @@ fn set() -> Settings {
     set.out = [("B2".to_owned(), broken())].into();
     let playlist = Some(PlaylistPlace { id: "saturday".to_owned(), entry: 1 });
     let (cue, sha256) = ("night".to_owned(), "00ff".to_owned());
-    set.show = Some(Loaded { cue, sha256, playlist, film_ms: Some(12_340) });
+    set.show = Some(LoadedShow { cue, sha256, playlist, film_ms: Some(12_340) });
     set
 }
 
@@ -33,7 +33,7 @@ fn at(day: i8, hour: i8) -> Zoned {
 
 /// Waits until a file is as it should be; the thread that writes it says nothing.
 #[track_caller]
-fn becomes(store: &Store, is_so: impl Fn(&Store) -> bool) {
+fn becomes(store: &SettingsFile, is_so: impl Fn(&SettingsFile) -> bool) {
     let until = Instant::now() + Duration::from_secs(20);
     while !is_so(store) {
         assert!(Instant::now() < until, "{store:?}");
@@ -104,12 +104,12 @@ proptest! {
 #[test]
 fn what_was_put_is_there_at_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut store, kept) = Store::open(folder.path());
+    let (mut store, kept) = SettingsFile::open(folder.path());
     assert_eq!(kept, Kept::default());
     store.put(Settings::default());
     store.put(set());
     drop(store);
-    let (_store, kept) = Store::open(folder.path());
+    let (_store, kept) = SettingsFile::open(folder.path());
     assert_eq!(kept, Kept { settings: Some(set()), said: Vec::new() });
     let names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|one| one.unwrap().file_name()).collect();
     assert_eq!(names, ["settings.json"], "nothing unfinished stays");
@@ -122,13 +122,13 @@ fn a_file_that_cannot_be_read_is_put_aside_with_a_word_and_what_is_set_then_is_k
     for bad in [half, &old, "", "\u{0}"] {
         let folder = tempfile::tempdir().unwrap();
         fs::write(file(folder.path()), bad).unwrap();
-        let (mut store, kept) = Store::open(folder.path());
+        let (mut store, kept) = SettingsFile::open(folder.path());
         assert_eq!(kept.settings, None);
         assert!(kept.said[0].contains("it is now settings.json.bad. Look which seats"), "{:?}", kept.said);
         assert_eq!(fs::read_to_string(folder.path().join("settings.json.bad")).unwrap(), bad);
         store.put(set());
         drop(store);
-        assert_eq!(Store::open(folder.path()).1.settings, Some(set()));
+        assert_eq!(SettingsFile::open(folder.path()).1.settings, Some(set()));
     }
 }
 
@@ -136,10 +136,10 @@ fn a_file_that_cannot_be_read_is_put_aside_with_a_word_and_what_is_set_then_is_k
 fn what_stands_in_the_place_of_the_file_is_put_aside_too() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(file(folder.path())).unwrap();
-    let (_, kept) = Store::open(folder.path());
+    let (_, kept) = SettingsFile::open(folder.path());
     assert!(kept.said[0].contains("it is no regular file"), "{:?}", kept.said);
     assert!(!file(folder.path()).exists());
-    let (_, kept) = Store::open(&folder.path().join("nowhere"));
+    let (_, kept) = SettingsFile::open(&folder.path().join("nowhere"));
     assert!(kept.settings.is_none() && kept.said.len() == 1, "{kept:?}");
 }
 
@@ -150,7 +150,7 @@ fn a_disk_that_takes_nothing_is_told_once_and_what_was_kept_stays() {
     // What has to be made anew cannot be.
     let in_the_way = folder.path().join("settings.json.new");
     fs::create_dir(&in_the_way).unwrap();
-    let (mut store, _) = Store::open(folder.path());
+    let (mut store, _) = SettingsFile::open(folder.path());
     store.put(Settings::default());
     becomes(&store, |store| store.trouble().is_some());
     for trim_ms in 1..5 {
@@ -165,24 +165,24 @@ fn a_disk_that_takes_nothing_is_told_once_and_what_was_kept_stays() {
     becomes(&store, |store| store.trouble().is_none());
     assert_eq!([store.take_mended(), store.take_mended()], [true, false]);
     drop(store);
-    assert_eq!(Store::open(folder.path()).1.settings.unwrap().trim_ms, 7);
+    assert_eq!(SettingsFile::open(folder.path()).1.settings.unwrap().trim_ms, 7);
 }
 
 #[test]
 fn what_ended_the_program_while_it_was_loaded_is_not_loaded_at_each_start() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(file(folder.path()), set().text()).unwrap();
-    let (store, kept) = Store::open(folder.path());
+    let (store, kept) = SettingsFile::open(folder.path());
     assert!(kept.settings.unwrap().show.is_some());
     // A crash: neither of them is dropped.
-    std::mem::forget(Store::loading(folder.path()));
+    std::mem::forget(SettingsFile::loading(folder.path()));
     std::mem::forget(store);
-    let (store, kept) = Store::open(folder.path());
+    let (store, kept) = SettingsFile::open(folder.path());
     let settings = kept.settings.unwrap();
     assert_eq!((settings.show, settings.trim_ms), (None, -40));
     assert!(kept.said[0].contains("night is not loaded"), "{:?}", kept.said);
     // An end in order is none.
-    std::mem::forget(Store::loading(folder.path()));
+    std::mem::forget(SettingsFile::loading(folder.path()));
     drop(store);
-    assert_eq!(Store::open(folder.path()).1.said, Vec::<String>::new());
+    assert_eq!(SettingsFile::open(folder.path()).1.said, Vec::<String>::new());
 }

@@ -4,7 +4,7 @@ use jiff::Zoned;
 use jiff::civil::Date;
 use jiff::tz::TimeZone;
 
-use super::{LONGEST_WHY, Loaded, Out, Settings};
+use super::{LONGEST_WHY, LoadedShow, Out, Settings};
 use crate::hall::Levels;
 use crate::time::ShowTime;
 
@@ -73,12 +73,12 @@ impl Settings {
         if self.trim_ms != 0 {
             words.push(format!("trim {:+} ms", self.trim_ms));
         }
-        words.extend(self.show.as_ref().map(Loaded::words));
+        words.extend(self.show.as_ref().map(LoadedShow::words));
         (!words.is_empty()).then(|| words.join(", "))
     }
 }
 
-impl Loaded {
+impl LoadedShow {
     fn words(&self) -> String {
         let Self { cue, playlist, film_ms, .. } = self;
         let of = playlist.as_ref().map(|at| format!(" (playlist {}, entry {})", at.id, at.entry + 1));

@@ -50,6 +50,11 @@ fn after_a_crash_a_broken_seat_is_out_levels_and_effects_are_as_they_were_and_th
     assert!(arm.stderr.contains("A2: out since ") && arm.stderr.contains(": broken leg"), "{arm:?}");
     assert!(arm.stderr.contains("motion 60 %, vibration 60 %, water off, trim -40 ms, cue night"), "{arm:?}");
     hall.done(&["disarm"]);
+    // Another configuration changes nothing of it either.
+    hall.rewrite(|config| config.replace("Hall 1", "Hall 2"));
+    hall.done(&["reload"]);
+    let anew = hall.wait(|status| status["hall"] == "Hall 2" && status["show"]["cue"] == "night");
+    assert_eq!((&anew["playlist"]["current"], &seat(&anew, 1)["enabled"]), (&1.into(), &false.into()));
     let lines = hall.close();
     assert!(lines.iter().any(|line| line.contains("A2 is out since ")), "{lines:?}");
     let acts = hall.journal("action");

@@ -13,7 +13,7 @@ use crate::hall::{Problem, Severity, Warning, Who};
 use crate::journal::stamp;
 use crate::playlist::Shelf;
 use crate::rt::Desk;
-use crate::settings::{Kept, Loaded, Out, Settings, Store, seats_out};
+use crate::settings::{Kept, LoadedShow, Out, Settings, SettingsFile, seats_out};
 use crate::state::{Cause, State};
 use crate::time::ShowTime;
 
@@ -26,7 +26,7 @@ const KEPT_EVERY_MS: i64 = 5_000;
 #[derive(Debug, Default)]
 pub(super) struct Lasting {
     /// What was loaded before, while it is loaded again.
-    loading: Option<Loaded>,
+    loading: Option<LoadedShow>,
     /// What came back with the start of the program, in words; none once a show has begun.
     came_back: Option<String>,
     /// Nobody has armed the hall since the start of the program.
@@ -68,11 +68,11 @@ impl Keeper {
     /// Has it kept.
     pub(super) fn keep_settings(&mut self) {
         let settings = self.settings();
-        self.ends.store.put(settings);
+        self.ends.settings_file.put(settings);
     }
 
     /// What is loaded; while seats are tested, what was before.
-    fn loaded(&self) -> Option<Loaded> {
+    fn loaded(&self) -> Option<LoadedShow> {
         let tested = self.sweep.as_ref().filter(|sweep| sweep.status.running);
         let cued = tested.map_or(self.cued.as_ref(), super::sweep::Sweep::before)?;
         let rides = matches!(self.known.state, State::Playing(_) | State::Paused);
@@ -81,17 +81,17 @@ impl Keeper {
             None => cued.left_at.map(millis),
         };
         let playlist = self.list.as_ref().map(List::place);
-        Some(Loaded { cue: cued.id.clone(), sha256: cued.sha256.clone(), playlist, film_ms })
+        Some(LoadedShow { cue: cued.id.clone(), sha256: cued.sha256.clone(), playlist, film_ms })
     }
 
     /// Loads what was loaded before.
-    pub(super) fn load_again(&mut self, loaded: Loaded) {
+    pub(super) fn load_again(&mut self, loaded: LoadedShow) {
         let (library, config) = (self.library.clone(), self.reins.config.clone());
-        let folder = self.ends.store.folder().to_owned();
+        let folder = self.ends.settings_file.folder().to_owned();
         let shelf = Shelf::new(&config.playlists());
         self.lasting.loading = Some(loaded.clone());
         self.send("loading", None, move || {
-            let _loading = Store::loading(&folder);
+            let _loading = SettingsFile::loading(&folder);
             let cued = loaded.cue.parse().map_err(|error| super::show::no_cue(&loaded.cue, &error));
             let cued = cued.and_then(|id| read(&library, &config, &id));
             let list =

@@ -40,7 +40,7 @@ use crate::hall::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::{Command, News};
-use crate::settings::Store;
+use crate::settings::SettingsFile;
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -83,7 +83,7 @@ pub struct Ends {
     /// What was set in the hall before, or before the program started.
     pub memory: Memory,
     /// Where what is set is kept.
-    pub store: Store,
+    pub settings_file: SettingsFile,
 }
 
 /// What is left once the hall has closed.

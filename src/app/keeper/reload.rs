@@ -8,7 +8,7 @@ use super::Keeper;
 use super::lasting::Lasting;
 use crate::config;
 use crate::hall::{Ask, Code, Desired, Problem, Role, Surface, Who};
-use crate::settings::{Loaded, Settings};
+use crate::settings::{LoadedShow, Settings};
 use crate::state::State;
 
 /// What goes over from a hall to the one that is opened with another configuration, or comes from before the start.
@@ -51,7 +51,7 @@ impl Signals {
 
 impl Keeper {
     /// Takes up what goes over from the hall before. Ahead of the first tick: what was latched stays so.
-    pub(super) fn begin(&mut self, show: Option<Loaded>, latched: bool) {
+    pub(super) fn begin(&mut self, show: Option<LoadedShow>, latched: bool) {
         self.set_desk();
         if latched {
             self.reins.desk.stop();

@@ -23,7 +23,7 @@ use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
 use crate::rt::{Command, Desk, Live, News, line};
-use crate::settings::Store;
+use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, Readiness, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{Policy, RealTime};
@@ -291,6 +291,6 @@ fn ends(desk: &Arc<Desk>, folder: &Path, memory: Memory) -> (Handle, Ends) {
     let voice = Voice::new(Log::start(|_| {}).unwrap());
     let config = folder.join("hall.toml");
     let (began, signals) = (Monotonic.now(), Signals::default());
-    let (store, _) = Store::open(folder);
-    (handle, Ends { inbox, source, config, began, signals, voice, memory, store })
+    let (settings_file, _) = SettingsFile::open(folder);
+    (handle, Ends { inbox, source, config, began, signals, voice, memory, settings_file })
 }

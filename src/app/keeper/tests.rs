@@ -64,7 +64,7 @@ fn after_a_restart(mut rig: Rig) -> Memory {
     rig.keeper.keep_settings();
     let Rig { keeper, folder: kept, .. } = rig;
     drop(keeper);
-    let (_store, found) = Store::open(&folder);
+    let (_store, found) = SettingsFile::open(&folder);
     drop(kept);
     Memory::of(found)
 }

@@ -91,7 +91,7 @@ impl Keeper {
         for news in self.record.news() {
             self.ends.voice.log.say(Line::new(Priority::Warning, "journal", news));
         }
-        if self.ends.store.take_mended() {
+        if self.ends.settings_file.take_mended() {
             self.ends.voice.log.say(Line::new(Priority::Notice, "settings", "what people set is kept again"));
         }
     }

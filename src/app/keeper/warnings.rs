@@ -37,7 +37,7 @@ impl Keeper {
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
         warnings.extend(self.of_what_lasts());
-        warnings.extend(self.of_the_store());
+        warnings.extend(self.of_the_settings_file());
         warnings.extend(self.record.trouble().map(|trouble| Warning {
             id: "journal".to_owned(),
             severity: Severity::Warning,
@@ -109,8 +109,8 @@ impl Keeper {
         })
     }
 
-    fn of_the_store(&self) -> Option<Warning> {
-        let trouble = self.ends.store.trouble()?;
+    fn of_the_settings_file(&self) -> Option<Warning> {
+        let trouble = self.ends.settings_file.trouble()?;
         let (text, remedy) = trouble.split_once("; ").unwrap_or((&trouble, ""));
         Some(Warning {
             id: "settings".to_owned(),

@@ -34,16 +34,16 @@ pub struct Kept {
 
 /// Where settings go. Dropped, it writes what still waits.
 #[derive(Debug)]
-pub struct Store {
+pub struct SettingsFile {
     folder: PathBuf,
     given: Option<Settings>,
-    desk: Arc<Desk>,
+    exchange: Arc<Exchange>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// Between whoever sets and whoever writes.
 #[derive(Debug, Default)]
-struct Desk {
+struct Exchange {
     tray: Mutex<Tray>,
     come: Condvar,
 }
@@ -68,7 +68,7 @@ impl Drop for Loading {
     }
 }
 
-impl Store {
+impl SettingsFile {
     /// Opens that of a folder, and reads what is there. Cannot fail: what is wrong is said.
     #[must_use]
     pub fn open(folder: &Path) -> (Self, Kept) {
@@ -80,14 +80,14 @@ impl Store {
             kept.said.push(format!("{} is not loaded: {why}; load it again", show.cue));
         }
         drop(Loading(loading));
-        let desk = Arc::<Desk>::default();
-        let (of_thread, to) = (Arc::clone(&desk), folder.to_owned());
+        let exchange = Arc::<Exchange>::default();
+        let (of_thread, to) = (Arc::clone(&exchange), folder.to_owned());
         let thread = thread::Builder::new().name("settings".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
             of_thread.serve(&to);
         });
-        let thread = thread.map_err(|error| desk.lock().fail(&error, folder)).ok();
-        (Self { folder: folder.to_owned(), given: None, desk, thread }, kept)
+        let thread = thread.map_err(|error| exchange.lock().fail(&error, folder)).ok();
+        (Self { folder: folder.to_owned(), given: None, exchange, thread }, kept)
     }
 
     /// Has it kept, where it is another than before. Waits for nothing.
@@ -95,8 +95,8 @@ impl Store {
         if self.given.as_ref() == Some(&settings) {
             return;
         }
-        self.desk.lock().due = Some(settings.text());
-        self.desk.come.notify_one();
+        self.exchange.lock().due = Some(settings.text());
+        self.exchange.come.notify_one();
         self.given = Some(settings);
     }
 
@@ -116,19 +116,19 @@ impl Store {
     /// Why it cannot be kept at present, and what to do; none where it can.
     #[must_use]
     pub fn trouble(&self) -> Option<String> {
-        self.desk.lock().trouble.clone()
+        self.exchange.lock().trouble.clone()
     }
 
     /// Whether trouble has ended since this was last asked.
     pub fn take_mended(&mut self) -> bool {
-        std::mem::take(&mut self.desk.lock().mended)
+        std::mem::take(&mut self.exchange.lock().mended)
     }
 }
 
-impl Drop for Store {
+impl Drop for SettingsFile {
     fn drop(&mut self) {
-        self.desk.lock().over = true;
-        self.desk.come.notify_one();
+        self.exchange.lock().over = true;
+        self.exchange.come.notify_one();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join(); // what it could not write was said
         }
@@ -137,7 +137,7 @@ impl Drop for Store {
     }
 }
 
-impl Desk {
+impl Exchange {
     /// What is behind the lock is whole at any time, also where a thread that held it panicked.
     fn lock(&self) -> MutexGuard<'_, Tray> {
         self.tray.lock().unwrap_or_else(PoisonError::into_inner)
