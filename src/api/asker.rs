@@ -90,7 +90,7 @@ impl Asker {
             return Ok(now);
         }
         let Some(age_ms) = self.age_ms.clone()? else {
-            if *ask == Ask::Go && self.who.surface != Surface::Socket {
+            if matches!(ask, Ask::Go | Ask::GoFrom(_)) && self.who.surface != Surface::Socket {
                 let remedy = format!("send the header {SENT}, unix milliseconds, with a go");
                 return Err(bad_value("nobody can tell how old this go is", remedy));
             }

@@ -264,10 +264,11 @@ impl Report {
 
 fn hall_in_words(hall: &Config) -> String {
     let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
-    [
+    let mut words = vec![
         counted(hall.controllers.len(), "controller"),
         counted(hall.seats.len(), "seat type"),
         counted(hall.effects.len(), "effect"),
-    ]
-    .join(", ")
+    ];
+    words.extend(hall.absent.iter().map(|one| format!("{} out for good", one.controller.name)));
+    words.join(", ")
 }

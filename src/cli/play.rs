@@ -9,6 +9,7 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::load::{self, SourceArgs, after_help, parse_rate};
+use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
@@ -118,6 +119,7 @@ fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bo
         let name = &controller.name;
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
+    config.absent.iter().for_each(|one| tell_absent(&one.controller));
     if manner.silent {
         print::tell(&format!("kinocue: {ACKS_OFF}"));
     }

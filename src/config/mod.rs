@@ -67,8 +67,10 @@ pub struct Config {
     pub store: Store,
     /// Where the journal is kept, and how much of it.
     pub log: Log,
-    /// The controllers, at least one, in the order of the file.
+    /// The controllers that take part, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
+    /// Those that are out for good, in the order of the file.
+    pub absent: Vec<Absent>,
     /// The port that takes OSC, where there is one.
     pub osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
@@ -175,6 +177,15 @@ pub struct Controller {
     pub accept_findings: Vec<Acceptance>,
 }
 
+/// A controller that is out for good (`enabled = false`): no frame goes to it, nobody waits for it, and nothing is asked of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Absent {
+    /// What the configuration says of it.
+    pub controller: Controller,
+    /// How many of those that take part stand before it in the file.
+    pub after: usize,
+}
+
 /// A finding of preflight that the site lives with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Acceptance {
@@ -238,10 +249,15 @@ impl Config {
         }
     }
 
-    /// The axes of a cue of `cue_axes` axes that no controller takes, counted from 1.
+    /// Every controller that the file names: those that take part, and those that are out for good.
+    pub fn named(&self) -> impl Iterator<Item = &Controller> {
+        self.controllers.iter().chain(self.absent.iter().map(|one| &one.controller))
+    }
+
+    /// The axes of a cue of `cue_axes` axes that are no controller's, also of none that is out for good, counted from 1.
     #[must_use]
     pub fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
-        (1..=cue_axes).filter(|&axis| !self.controllers.iter().any(|c| c.takes(axis - 1))).collect()
+        (1..=cue_axes).filter(|&axis| !self.named().any(|c| c.takes(axis - 1))).collect()
     }
 
     /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.

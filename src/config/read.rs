@@ -21,8 +21,8 @@ use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
 use super::text::text;
 use super::{
-    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store,
-    Timing, check_effect_name, check_peer, check_window,
+    Absent, Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show,
+    Store, Timing, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] octets.
@@ -85,7 +85,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
-    let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
+    let (controllers, absent) =
+        controller_at.map_or_else(Default::default, |entry| controllers(entry, &site, faults));
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -98,6 +99,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         store: store?,
         log: log?,
         controllers,
+        absent,
         osc,
         text,
         api: api?,
@@ -224,24 +226,50 @@ struct Site<'a> {
     effects: &'a [Effect],
 }
 
-fn controllers(entry: Entry<'_>, site: &Site<'_>, faults: &mut Faults<'_>) -> Vec<Controller> {
+/// Those that take part, and those that are out for good.
+fn controllers(entry: Entry<'_>, site: &Site<'_>, faults: &mut Faults<'_>) -> (Vec<Controller>, Vec<Absent>) {
     if entry.value.is_table() {
         entry.fault(faults, "write [[controller]], with two brackets, once for each controller");
-        return Vec::new();
+        return Default::default();
     }
-    let Some(entries) = entry.array(faults) else { return Vec::new() };
+    let Some(entries) = entry.array(faults) else { return Default::default() };
     let mut taken = Vec::new();
-    let mut sound = Vec::new();
+    let (mut present, mut absent, mut at) = (Vec::new(), Vec::new(), Vec::new());
     for entry in entries {
         let Some(table) = entry.table(faults) else { continue };
-        sound.extend(controller(entry.at, table, site, faults));
+        match controller(entry.at, table, site, faults) {
+            Some((controller, true)) => present.push(controller),
+            Some((controller, false)) => {
+                absent.push(Absent { controller, after: present.len() });
+                at.push(table.get("enabled").map_or(entry.at, |value| value.span().start));
+            }
+            None => {}
+        }
         for key in ["name", "address"] {
             if let Some(value) = table.get(key) {
                 refuse_repeat(Entry::new(key, value), &mut taken, faults);
             }
         }
     }
-    sound
+    absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &present, faults));
+    if let ([], [_, ..]) = (&present[..], &absent[..]) {
+        faults.note_missing(entry.at, "enabled: every [[controller]] is out for good; leave at least one in");
+    }
+    (present, absent)
+}
+
+/// Notes where a rigid seat is to move by only a part of its controllers.
+fn refuse_parted(absent: &Absent, at: usize, present: &[Controller], faults: &mut Faults<'_>) {
+    let Controller { name, group, .. } = &absent.controller;
+    if let Some(other) = present.iter().find(|one| one.group == *group) {
+        let (other, text) = (&other.name, "one rigid seat does not move by a part of its controllers");
+        faults.note(
+            at,
+            format!(
+                "enabled: {name} shares the group {group} with {other}, and {text}; give {other} the same"
+            ),
+        );
+    }
 }
 
 /// Notes a name or address that a controller before has too; `taken` holds key, value and place of each.
@@ -258,12 +286,13 @@ fn refuse_repeat<'t>(entry: Entry<'t>, taken: &mut Vec<(&'t str, String, usize)>
     }
 }
 
+/// One controller, and whether it takes part.
 fn controller<'t>(
     at: usize,
     table: &'t DeTable<'t>,
     site: &Site<'_>,
     faults: &mut Faults<'_>,
-) -> Option<Controller> {
+) -> Option<(Controller, bool)> {
     let mut section = Section::new("[[controller]]", at, table, faults);
     section.require(&["name", "seat", "address"]);
     let name = section.text("name");
@@ -287,12 +316,13 @@ fn controller<'t>(
         entry.fault(section.faults, "an input of estop_inputs is none of a belt");
     }
     let accept_findings = acceptances(&mut section);
+    let enabled = section.get("enabled").and_then(|entry| entry.switch(section.faults)).unwrap_or(true);
     section.finish();
     let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
     if let Err(reason) = check_window(axis_offset, seat.axes, fan_out) {
         faults.note(table.get("axis_offset").map_or(at, |value| value.span().start), reason);
     }
-    Some(Controller {
+    let controller = Controller {
         group: group.unwrap_or_else(|| name.clone()),
         name,
         row,
@@ -306,7 +336,8 @@ fn controller<'t>(
         estop_inputs,
         belt_inputs,
         accept_findings,
-    })
+    };
+    Some((controller, enabled))
 }
 
 /// A list of inputs, X01 to X12, as a word.

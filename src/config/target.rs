@@ -89,6 +89,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         store: Store::default(),
         log: Log::default(),
         controllers,
+        absent: Vec::new(),
         osc: None,
         text: None,
         api: Api::default(),

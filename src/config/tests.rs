@@ -53,6 +53,29 @@ fn a_hall_reads_as_it_is_written() {
 }
 
 #[test]
+fn a_controller_that_is_out_for_good_takes_no_part_and_its_axes_still_belong_to_somebody() {
+    let more = "[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.2:7408\"\naxis_offset = 6\n\
+        enabled = false\n[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"10.0.0.3:7408\"\nenabled = true\n";
+    let hall = hall_with(more);
+    let names: Vec<_> = hall.controllers.iter().map(|one| one.name.as_str()).collect();
+    let [absent] = &hall.absent[..] else { panic!("one: {:?}", hall.absent) };
+    assert_eq!((names, absent.controller.name.as_str(), absent.after), (vec!["A1", "A3"], "A2", 1));
+    assert_eq!(hall.untaken_axes(12), [0; 0]);
+}
+
+#[test]
+fn not_all_are_out_for_good_and_no_seat_loses_a_part_of_its_controllers() {
+    let [fault] = &faults_of("enabled = false\n")[..] else { panic!("one fault") };
+    assert!(fault.contains("leave at least one in"), "{fault}");
+    let more = "group = \"g\"\n[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.2:7408\"\ngroup = \"g\"\n\
+        enabled = false\n";
+    let [fault] = &faults_of(more)[..] else { panic!("one fault") };
+    assert!(fault.starts_with("hall.toml:19:") && fault.contains("give A1 the same"), "{fault}");
+    let [fault] = &faults_of("enabled = 0\n")[..] else { panic!("one fault") };
+    assert!(fault.contains("true or false is wanted here"), "{fault}");
+}
+
+#[test]
 fn what_is_left_out_has_its_default() {
     let config = with("").unwrap();
     assert_eq!(config.show, Show::default());

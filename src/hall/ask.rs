@@ -40,6 +40,8 @@ pub enum Ask {
     Disarm,
     /// Start what is loaded.
     Go,
+    /// Start what is loaded at that time of the film.
+    GoFrom(ShowTime),
     /// Hold; the film waits.
     Pause,
     /// Go on.
@@ -61,7 +63,12 @@ pub enum Ask {
     /// Take a controller's group in.
     Enable(String),
     /// Take a controller's group out: its seat parks.
-    Disable(String),
+    Disable {
+        /// Which.
+        name: String,
+        /// Why, for whoever comes next.
+        why: Option<String>,
+    },
     /// Ask all controllers for their registers and judge them.
     Preflight,
     /// Move each axis and effect of empty, armed seats slowly in turn, and store a table of acks and latency.
@@ -115,7 +122,7 @@ impl Ask {
             Self::Select { .. } => "select",
             Self::Arm { .. } => "arm",
             Self::Disarm => "disarm",
-            Self::Go => "go",
+            Self::Go | Self::GoFrom(_) => "go",
             Self::Pause => "pause",
             Self::Resume => "resume",
             Self::Seek(_) => "seek",
@@ -126,7 +133,7 @@ impl Ask {
             Self::Levels(_) => "levels",
             Self::Preset(_) => "preset",
             Self::Enable(_) => "enable",
-            Self::Disable(_) => "disable",
+            Self::Disable { .. } => "disable",
             Self::Preflight => "preflight",
             Self::Test { .. } => "test",
             Self::Reload => "reload",
@@ -142,6 +149,7 @@ impl Ask {
             Self::Home
                 | Self::Arm { .. }
                 | Self::Go
+                | Self::GoFrom(_)
                 | Self::Resume
                 | Self::Seek(_)
                 | Self::Clear
@@ -161,7 +169,7 @@ impl Ask {
             Self::Seek(_) => GearWord::Seek,
             Self::Trim(_) => GearWord::Trim,
             Self::Levels(_) => GearWord::Levels,
-            Self::Enable(_) | Self::Disable(_) => GearWord::Seats,
+            Self::Enable(_) | Self::Disable { .. } => GearWord::Seats,
             _ => return None,
         })
     }
@@ -198,7 +206,11 @@ impl fmt::Display for Ask {
             Self::Seek(film) => write!(f, " {film}"),
             Self::Trim(ms) => write!(f, " {ms} ms"),
             Self::Levels(change) => change.fmt(f),
-            Self::Preset(name) | Self::Enable(name) | Self::Disable(name) => write!(f, " {name}"),
+            Self::GoFrom(film) => write!(f, " from {film}"),
+            Self::Preset(name) | Self::Enable(name) | Self::Disable { name, why: None } => {
+                write!(f, " {name}")
+            }
+            Self::Disable { name, why: Some(why) } => write!(f, " {name}: {}", why.escape_debug()),
             Self::Arm { seats_empty: true } => f.write_str(" with empty seats"),
             Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
             Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),

@@ -49,7 +49,7 @@ pub struct AxisCurve {
 pub fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
     let bench = SeatType::bench3(timeline.axes());
     let to_stroke = |axis: usize| {
-        let taker = hall.and_then(|hall| hall.controllers.iter().find(|one| one.takes(axis)));
+        let taker = hall.and_then(|hall| hall.named().find(|one| one.takes(axis)));
         timeline.unit().to_stroke(taker.map_or(&bench, |one| &one.seat))
     };
     let length_s = timeline.duration().as_secs_f64();

@@ -75,6 +75,7 @@ fn playing() -> Status {
             length_s: 120.0,
             position_s: 12.5,
             join_s: 1.5,
+            resume_s: None,
             axes: 6,
             effects: vec![],
         }),

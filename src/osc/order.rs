@@ -71,7 +71,7 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
         ["seat", name, "enable"] if !name.is_empty() => {
             let on = taken.allowed(GearWord::Seats)?.switch()?;
             let name = name.to_owned();
-            Ok(Order::Ask(if on { Ask::Enable(name) } else { Ask::Disable(name) }))
+            Ok(Order::Ask(if on { Ask::Enable(name) } else { Ask::Disable { name, why: None } }))
         }
         ["arm", ..] => Err(Fault::Forbidden("arm")),
         ["disarm", ..] => Err(Fault::Forbidden("disarm")),
@@ -237,7 +237,11 @@ mod tests {
                 levels(LevelsChange { rows: [("A".to_owned(), 0.0)].into(), ..LevelsChange::default() }),
             ),
             ("/kinocue/seat/F4/enable", vec![OscType::Int(1)], Ask::Enable("F4".to_owned())),
-            ("/kinocue/seat/F4/enable", vec![OscType::Bool(false)], Ask::Disable("F4".to_owned())),
+            (
+                "/kinocue/seat/F4/enable",
+                vec![OscType::Bool(false)],
+                Ask::Disable { name: "F4".to_owned(), why: None },
+            ),
         ] {
             assert_eq!(ordered(addr, args), Ok(Order::Ask(ask)), "{addr}");
         }

@@ -110,6 +110,7 @@ fn playing_at(position_s: f64) -> Status {
         length_s: 60.0,
         position_s,
         join_s: 2.0,
+        resume_s: None,
         axes: 3,
         effects: Vec::new(),
     };

@@ -368,7 +368,12 @@ impl Watch {
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
     fn beat(&mut self, now: MonoTime) {
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if self.silent || self.live.is_moving() || self.is_hushed() || self.is_asked_otherwise() || !self.beats.take(now) {
+        if self.silent
+            || self.live.is_moving()
+            || self.is_hushed()
+            || self.is_asked_otherwise()
+            || !self.beats.take(now)
+        {
             return;
         }
         for controller in 0..self.lookers.len() {

@@ -52,7 +52,7 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
         ["effect", name, "on"] => effect(name, true),
         ["effect", name, "off"] => effect(name, false),
         ["enable", name] => Ask::Enable(name.to_owned()),
-        ["disable", name] => Ask::Disable(name.to_owned()),
+        ["disable", name] => Ask::Disable { name: name.to_owned(), why: None },
         [word @ ("arm" | "disarm" | "home" | "clear" | "load"), ..] => {
             let detail = format!("lines of text may never {word}");
             return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
@@ -131,7 +131,7 @@ mod tests {
             ("effect water off", effect("water", false)),
             ("effect water on", effect("water", true)),
             ("enable F4", Ask::Enable("F4".to_owned())),
-            ("disable F4", Ask::Disable("F4".to_owned())),
+            ("disable F4", Ask::Disable { name: "F4".to_owned(), why: None }),
         ] {
             assert_eq!(asked(line), ask, "{line}");
         }

@@ -81,6 +81,7 @@ fn playing() -> Status {
         length_s: 60.0,
         position_s: 12.34,
         join_s: 2.0,
+        resume_s: None,
         axes: 3,
         effects: Vec::new(),
     };

@@ -84,7 +84,9 @@ fn a_go_that_is_old_or_from_the_future_does_nothing() {
 fn over_tcp_a_go_has_to_say_when_it_was_sent() {
     let hall = Hall::open();
     let go = go().token("tablet-token");
-    assert_eq!(go.clone().send(&hall.port()).problem(), problem(400, "value"));
+    for go in [go.clone(), go.clone().json(r#"{"from_s":1}"#)] {
+        assert_eq!(go.send(&hall.port()).problem(), problem(400, "value"));
+    }
     assert!(hall.asks().is_empty());
     assert_eq!(go.sent_ago(0).send(&hall.port()).state(), "joining");
 }

@@ -115,6 +115,40 @@ fn a_show_is_armed_played_paused_turned_down_and_stopped_from_the_page() {
 }
 
 #[test]
+fn a_seat_is_taken_out_with_a_reason_and_a_stopped_show_goes_on_where_it_was_left() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    arm(&browser);
+    go(&browser);
+    browser.press("[data-controller=A2]");
+    browser.press("#controller-why");
+    browser.type_text("broken leg");
+    browser.press("#controller-disable");
+    browser.reads("controller", "by booth: broken leg");
+    browser.wait("/^00:0[3-9]/.test(document.getElementById('position').textContent)");
+    browser.touch("#stop");
+    browser.reads("state", "stopped");
+    browser.press("#clear");
+    browser.reads("next", "park, or home");
+    browser.press("#park");
+    browser.reads("state", "parked");
+    browser.press("#arm");
+    browser.reads("show-reply", "a2: out since");
+    browser.wait("document.getElementById('resume').hidden");
+    browser.reads("go-from", "from 00:");
+    browser.shot("09-go-from");
+    browser.press("#go-from");
+    browser.reads("go-from", "sure?");
+    browser.wait("(window.fromPressed ??= performance.now()) + 400 < performance.now()");
+    browser.press("#go-from");
+    browser.reads("state", "playing");
+    browser.wait("document.getElementById('go-from').hidden && !document.getElementById('resume').hidden");
+    browser.wait("/^00:(0[3-9]|[1-5])/.test(document.getElementById('position').textContent)");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
 fn the_escape_key_stops_wherever_the_focus_is_and_a_pulled_plug_is_named_first() {
     let Some(browser) = Browser::start() else { return };
     let mut hall = Hall::open();

@@ -18,6 +18,7 @@ mod serving;
 
 mod begin;
 mod hall;
+mod lasting;
 mod library;
 mod playlist;
 mod show;

@@ -6,6 +6,7 @@ use crate::config::Config;
 use crate::engine::Mix;
 use crate::hall::{Code, Levels, LevelsChange, Problem};
 use crate::rt::Desk;
+use crate::settings::{Out, Settings};
 
 /// What is set.
 #[derive(Debug, Clone)]
@@ -14,10 +15,8 @@ pub(super) struct Board {
     /// The same as people have set it: what gear may set at the most.
     pub(super) ceiling: Levels,
     pub(super) trim_ms: i32,
-    /// Groups that gear took out, and no person since.
-    pub(super) gear_out: BTreeSet<String>,
-    /// Groups that are taken out.
-    pub(super) out: BTreeSet<String>,
+    /// Groups that are taken out, also such as this configuration does not know: one that comes back with the next is out still.
+    pub(super) out: BTreeMap<String, Out>,
     /// Rows that alone take part, while seats are tested; none where all do.
     pub(super) only: Option<BTreeSet<String>>,
     lanes: Vec<Strip>,
@@ -37,25 +36,22 @@ impl Board {
             |one: &crate::config::Controller| Strip { row: one.row.clone(), group: one.group.clone() };
         let lanes: Vec<Strip> = config.controllers.iter().map(strip).collect();
         let rows: BTreeMap<String, f64> =
-            lanes.iter().filter_map(|lane| Some((lane.row.clone()?, 1.0))).collect();
+            config.named().filter_map(|one| Some((one.row.clone()?, 1.0))).collect();
         let effects = config.effects.iter().map(|effect| (effect.name.clone(), true)).collect();
         let levels = Levels { motion: 1.0, vibration: 1.0, effects, rows };
-        let (ceiling, none) = (levels.clone(), BTreeSet::new());
-        Self { levels, ceiling, trim_ms: 0, gear_out: none.clone(), out: none, only: None, lanes }
+        Self { ceiling: levels.clone(), levels, trim_ms: 0, out: BTreeMap::new(), only: None, lanes }
     }
 
-    /// What is set goes over to the board of another configuration, as far as that knows it.
-    pub(super) fn carry_over(&mut self, before: &Self) {
-        carry(&mut self.levels, &before.levels);
-        carry(&mut self.ceiling, &before.ceiling);
-        self.trim_ms = before.trim_ms;
-        self.out = before
-            .out
-            .iter()
-            .filter(|group| self.lanes.iter().any(|lane| lane.group == **group))
-            .cloned()
-            .collect();
-        self.gear_out = before.gear_out.intersection(&self.out).cloned().collect();
+    /// The same with what was set before, as far as this configuration knows it.
+    pub(super) fn with(config: &Config, before: &Settings) -> Self {
+        let mut board = Self::new(config);
+        let Settings { levels, trim_ms, out, .. } = before;
+        carry(&mut board.levels, levels);
+        // Gear may have set less than a person did; a person raises it again.
+        board.ceiling.clone_from(&board.levels);
+        board.trim_ms = *trim_ms;
+        board.out.clone_from(out);
+        board
     }
 
     /// Changes levels and effects, as a person does; nothing is changed where one of them is not known or not within 0 to 1.
@@ -94,13 +90,19 @@ impl Board {
         Ok(())
     }
 
-    /// Takes the group of a controller in, or out.
-    pub(super) fn enable(&mut self, group: &str, on: bool) {
-        if on {
+    /// Takes a group in, or out. One that is out already stays so since then, and by whom it was, but for one that gear took out and
+    /// now a person; a reason that is given now counts.
+    pub(super) fn enable(&mut self, group: &str, out: Option<Out>) {
+        let Some(out) = out else {
             self.out.remove(group);
-        } else {
-            self.out.insert(group.to_owned());
+            return;
+        };
+        if self.out.get(group).is_some_and(|before| before.surface.is_gear() && !out.surface.is_gear()) {
+            self.out.remove(group);
         }
+        let why = out.why.clone();
+        let entry = self.out.entry(group.to_owned()).or_insert(out);
+        entry.why = why.or_else(|| entry.why.take());
     }
 
     /// Whether a lane is to take part.
@@ -111,7 +113,12 @@ impl Board {
             (Some(only), Some(row)) => only.contains(row),
             (Some(_), None) => false,
         };
-        !self.out.contains(group) && tested
+        !self.out.contains_key(group) && tested
+    }
+
+    /// The group of a lane.
+    pub(super) fn group(&self, lane: usize) -> &str {
+        &self.lanes[lane].group
     }
 
     /// What each lane makes of a cue that has these effects.

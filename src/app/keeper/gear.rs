@@ -10,7 +10,6 @@ use crate::state::State;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Before {
     state: State,
-    was_out: bool,
 }
 
 impl Keeper {
@@ -34,7 +33,9 @@ impl Keeper {
             Ask::Resume if !matches!(self.known.state, State::Paused | State::Playing(_)) => {
                 refused("nothing is paused", "a person looks at the hall first")
             }
-            Ask::Enable(name) if self.is_out(name) && !self.board.gear_out.contains(self.group(name)) => {
+            Ask::Enable(name)
+                if self.board.out.get(self.group(name)).is_some_and(|out| !out.surface.is_gear()) =>
+            {
                 refused(&format!("it did not take {name} out"), "a person takes in whom a person took out")
             }
             _ => Ok(()),
@@ -42,9 +43,8 @@ impl Keeper {
     }
 
     /// How things stand before an ask is done.
-    pub(super) fn before(&self, ask: &Ask) -> Before {
-        let was_out = matches!(ask, Ask::Enable(name) | Ask::Disable(name) if self.is_out(name));
-        Before { state: self.known.state, was_out }
+    pub(super) const fn before(&self) -> Before {
+        Before { state: self.known.state }
     }
 
     /// Notes whose doing it is what was done.
@@ -53,12 +53,6 @@ impl Keeper {
         match &desired.ask {
             Ask::Pause if !by_gear => self.gear_paused = None,
             Ask::Pause if before.state != State::Paused => self.gear_paused = Some(self.known.since),
-            Ask::Disable(name) if by_gear && !before.was_out => {
-                self.board.gear_out.insert(self.group(name).to_owned());
-            }
-            Ask::Disable(name) if !by_gear => {
-                self.board.gear_out.remove(&self.group(name).to_owned());
-            }
             _ => {}
         }
     }
@@ -77,10 +71,6 @@ impl Keeper {
     fn group<'n>(&'n self, name: &'n str) -> &'n str {
         let controllers = &self.reins.config.controllers;
         controllers.iter().find(|one| one.name == name).map_or(name, |one| &one.group)
-    }
-
-    fn is_out(&self, name: &str) -> bool {
-        self.board.out.contains(self.group(name))
     }
 }
 
@@ -137,7 +127,11 @@ mod tests {
             assert!(role(rig.ask_as(surface, Ask::Resume)).ends_with("it did not pause the hall"));
             rig.ask_as(surface, Ask::Pause).unwrap();
             role(rig.ask_as(surface, Ask::Resume));
-            for ask in [Ask::Park, Ask::Seek(crate::time::ShowTime::ZERO), Ask::Disable("A1".to_owned())] {
+            for ask in [
+                Ask::Park,
+                Ask::Seek(crate::time::ShowTime::ZERO),
+                Ask::Disable { name: "A1".to_owned(), why: None },
+            ] {
                 role(rig.ask_as(surface, ask));
             }
             assert_eq!(rig.state(), State::Paused);
@@ -153,7 +147,8 @@ mod tests {
     #[test]
     fn gear_takes_in_only_what_it_took_out() {
         let mut rig = Rig::parked();
-        let (enable, disable) = (|| Ask::Enable("A1".to_owned()), || Ask::Disable("A1".to_owned()));
+        let (enable, disable) =
+            (|| Ask::Enable("A1".to_owned()), || Ask::Disable { name: "A1".to_owned(), why: None });
         rig.ask_as(Surface::Osc, disable()).unwrap();
         rig.ask_as(Surface::Osc, enable()).unwrap();
         rig.ask(disable()).unwrap();
@@ -164,7 +159,7 @@ mod tests {
         rig.ask_as(Surface::Osc, disable()).unwrap();
         rig.ask(disable()).unwrap();
         role(rig.ask_as(Surface::Osc, enable()));
-        assert!(rig.keeper.board.out.contains("A1"));
+        assert!(rig.keeper.board.out.contains_key("A1"));
     }
 
     #[test]

@@ -168,7 +168,7 @@ impl Keeper {
             vibration: levels.vibration,
             trim_ms: self.board.trim_ms,
             effects_off: off.map(|(name, _)| name.clone()).collect(),
-            seats_total: config.controllers.len(),
+            seats_total: config.named().count(),
             seats_available: available.count(),
             operator: who.to_owned(),
             scheduled: surface == Surface::Schedule,

@@ -87,11 +87,19 @@ impl Keeper {
         self.ends.voice.log.say(Line::new(Priority::Warning, NOTE, note));
     }
 
-    /// Says how the journal goes.
+    /// Says how the journal goes, and the keeping of what is set.
     pub(super) fn say_journal(&mut self) {
         for news in self.record.news() {
             self.ends.voice.log.say(Line::new(Priority::Warning, "journal", news));
         }
+        if self.ends.settings_file.take_mended() {
+            self.ends.voice.log.say(Line::new(Priority::Notice, "settings", "what people set is kept again"));
+        }
+    }
+
+    /// Says something that was set before the program started.
+    pub(super) fn say_kept(&self, text: &str) {
+        self.ends.voice.log.say(Line::new(Priority::Notice, "kept", text));
     }
 
     /// Says that the hall is in another state.

@@ -75,11 +75,11 @@ fn film(show: &Show) -> String {
 /// How many are well, and those that are not.
 fn controllers(all: &[Controller]) -> Vec<String> {
     let is_well = |one: &&Controller| one.standing == "ok" && one.enabled;
-    let mut lines = vec![format!("{} of {} controllers ok", all.iter().filter(is_well).count(), all.len())];
+    let part = all.iter().filter(|one| !one.is_out_for_good()).count();
+    let mut lines = vec![format!("{} of {part} controllers ok", all.iter().filter(is_well).count())];
     let ill = all.iter().filter(|one| !is_well(one)).map(|one| {
-        let off = if one.enabled { "" } else { ", off" };
         let acks = one.ack_rate.map_or_else(String::new, |rate| format!(", acks {}", percent(rate)));
-        format!("  {} {}{off}{acks}  {}", one.name, one.standing, one.why)
+        format!("  {} {}{acks}  {}", one.name, one.stands(), one.why)
     });
     lines.extend(few(ill.collect()));
     lines

@@ -165,9 +165,8 @@ fn changes(before: Option<&Status>, now: &Status) -> Vec<String> {
         let known = was.controllers.iter().find(|one| one.name == controller.name);
         let Controller { name, enabled, standing, why, .. } = controller;
         if known.map(|one| (one.enabled, &one.standing)) != Some((*enabled, standing)) {
-            let off = if *enabled { "" } else { ", off" };
             let why = if why.is_empty() { String::new() } else { format!(": {why}") };
-            lines.push(format!("{name} {standing}{off}{why}"));
+            lines.push(format!("{name} {}{why}", controller.stands()));
         }
     }
     let same =
