@@ -252,6 +252,10 @@ fn the_literal_imax_layout_is_read() {
         if vector.kind == "reg_read_reply" {
             let reply = ImaxRegisters::parse(&octets).unwrap();
             assert_eq!(reply.values().collect::<Vec<_>>(), [3, 0], "{name}");
+            assert!(reply.is_wide(), "{name}");
+            let need = octets.len() - 4;
+            let surplus = WireError::Surplus { len: octets.len(), need };
+            assert_eq!(Message::parse(&octets), Err(surplus), "{name}: nobody reads it as words of 16 bits");
             continue;
         }
         let motion = ImaxMotion::parse(&octets).unwrap();

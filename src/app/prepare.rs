@@ -131,7 +131,7 @@ impl<C: Clock> Preparation<'_, C> {
             let Ok(reply) = RegisterReply::parse(octets) else { return false };
             let Some(first) = first_axis(&reply) else { return false };
             let dialect = controllers[lane].dialect;
-            for (axis, pulses) in positions(reply.data, dialect).iter().enumerate() {
+            for (axis, pulses) in positions(reply.values(dialect), dialect).iter().enumerate() {
                 if let Some(place) = told.borrow_mut()[lane].get_mut(first + axis) {
                     *place = Some(*pulses);
                 }

@@ -92,7 +92,7 @@ impl Beats {
             && reads.any(|read| (read.start, read.num) == (reply.start, reply.num));
         let first = DP_POSITIONS.iter().position(|register| is_ours && *register == reply.start)?;
         for (place, pulses) in
-            heart.places[first..].iter_mut().zip(positions(reply.data, heart.dialect).iter())
+            heart.places[first..].iter_mut().zip(positions(reply.values(heart.dialect), heart.dialect).iter())
         {
             *place = Some(*pulses);
         }

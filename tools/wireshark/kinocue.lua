@@ -187,6 +187,10 @@ local function ends(len, need)
   return fault(len, "ends after %d octets; this message takes %d", len, need)
 end
 
+local function goes_on(len, need)
+  return fault(need, "goes on to %d octets; this message takes %d", len, need)
+end
+
 local function motion_len(axes, vibrating)
   return BODY + 4 * axes + 2 + (vibrating and 4 * axes or 4)
 end
@@ -252,6 +256,11 @@ local function read_registers(tvb, message)
   if len < message.len then
     return ends(len, message.len)
   end
+  -- Nothing follows the words of a reply, or registers of 32 bits would be read as others. A refusal may bring an error.
+  local most = WORDS + 2 * (message.low > RUNNING and math.max(count, 1) or count)
+  if message.low ~= 1 and not message.is.servo and len > most then
+    return goes_on(len, most)
+  end
   return message
 end
 
@@ -265,7 +274,7 @@ local function read_status(tvb, message)
   if len < message.len then
     return ends(len, message.len)
   elseif len > message.len then
-    return fault(message.len, "goes on to %d octets; this message takes %d", len, message.len)
+    return goes_on(len, message.len)
   end
   return message
 end
