@@ -16,7 +16,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use crate::config::Controller;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
-use crate::wire::{Code, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status};
+use crate::wire::{Code, DPFE, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status};
 
 /// Events that are kept; of more the oldest go.
 const EVENTS_KEPT: usize = 1_000;
@@ -141,8 +141,13 @@ impl Observer {
         let state = &mut self.states[controller];
         state.reports += 1;
         state.heard_at = Some(at);
-        let first = report.data.get(0).unwrap_or(0);
-        self.happened(controller, at, What::Report { start: report.start, first });
+        let first = (report.start, report.data.get(0).unwrap_or(0));
+        if self.watched[controller].dialect != Dialect::Mbox {
+            return self.happened(controller, at, What::Report { start: first.0, first: first.1 });
+        }
+        let of_drives = DPFE.checked_sub(report.start).and_then(|index| report.data.get(usize::from(index)));
+        let (register, value) = of_drives.map_or(first, |alarm| (DPFE, alarm));
+        self.happened(controller, at, What::Alarm { register, value });
     }
 
     /// Hears positions that were measured: position registers, or a status report.

@@ -127,18 +127,19 @@ fn errors_come_and_go_as_events_in_words() {
 }
 
 #[test]
-fn a_report_of_registers_is_an_event() {
-    let mut observer = observer(Dialect::Mbox);
-    let data = [0x0011];
-    let report = Report {
-        channel: 0,
-        accept: Code::NONE,
-        reply: Code::NONE,
-        start: 0xfe,
-        data: Words::from(&data[..]),
+fn a_report_of_registers_is_an_alarm_of_an_mbox_controller_and_else_an_event() {
+    let say = |dialect, start, data: &[u16]| {
+        let mut observer = observer(dialect);
+        let data = Words::from(data);
+        let report = Report { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
+        observer.on_report(0, &report, at(5));
+        happened(&observer).remove(0).1
     };
-    observer.on_report(0, &report, at(5));
-    assert_eq!(happened(&observer), [(5, "report of register fe: 0x0011".to_owned())]);
+    assert_eq!(say(Dialect::Smc, 0xfe, &[17]), "report of register fe: 0x0011");
+    assert_eq!(say(Dialect::Mbox, 0xfe, &[17]), "alarm: DPfe is 17 (0x1001)");
+    assert_eq!(say(Dialect::Mbox, 0xfe, &[0]), "alarm over (DPfe is 0)");
+    assert_eq!(say(Dialect::Mbox, 0xf5, &[3, 0, 0, 0, 0, 0, 0, 0, 0, 12]), "alarm: DPfe is 12 (0x1001)");
+    assert_eq!(say(Dialect::Mbox, 0x5e, &[1]), "alarm: DP5e is 1 (0x1001)");
 }
 
 #[test]

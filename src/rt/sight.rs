@@ -112,17 +112,23 @@ impl Looker {
         let Some(reply) = reply.filter(|reply| self.seen.asked && reply.access == Access::Read) else {
             return false;
         };
-        if reply.code != ReplyCode::Running {
-            self.seen.error = reply.error;
+        match self.dialect {
+            _ if reply.code == ReplyCode::Running => {}
+            Dialect::Smc => self.seen.error = reply.error,
+            // It tells of the request alone. What it has no versions for is known by the rest.
+            Dialect::Mbox if reply.start == VERSIONS.0 => self.seen.versions = Some((0, 0)),
+            Dialect::Mbox => return true,
         }
-        let word = |index| reply.data.get(index);
+        let word = |index| reply.values(self.dialect).get(index);
         // An answer with x over 2 does not say its channel; of what is asked here, start and count tell all the same.
         let of_parameters = reply.channel == PARAMETERS
             || (reply.code != ReplyCode::Running && (reply.start, reply.num) == MODE);
         let channel = if of_parameters { PARAMETERS } else { reply.channel };
         match (channel, reply.start) {
             (PARAMETERS, start) if start == MODE.0 => self.seen.mode = word(0).zip(word(2)),
-            (MONITORS, start) if start == VERSIONS.0 => self.seen.versions = word(0).zip(word(1)),
+            (MONITORS, start) if start == VERSIONS.0 => {
+                self.seen.versions = word(0).zip(word(1)).or(self.seen.versions);
+            }
             (MONITORS, PACKETS) => self.seen.packets = word(0),
             (MONITORS, RESET) => self.seen.homed = word(0).map(|state| state == RESET_DONE),
             (MONITORS, start) => return self.hear_positions(start, &reply),
@@ -148,8 +154,12 @@ impl Looker {
         let told = packets.is_some() || self.dialect != Dialect::Smc;
         let pose = self.pose().filter(|_| asked && told)?;
         self.seen.asked = false;
+        let (minor_version, alarm) = match self.dialect {
+            Dialect::Smc => (minor_version, 0),
+            Dialect::Mbox => (0, minor_version),
+        };
         let identity = Identity { version, minor_version, work_mode, axes };
-        Some((Sighting { identity, error, packets, homed }, pose))
+        Some((Sighting { identity, error, alarm, packets, homed }, pose))
     }
 
     /// Notes the pose that a seat is seen in, by an answer that came at `at`; says whether it rests there. One that was lost may
@@ -243,8 +253,20 @@ mod tests {
         assert_eq!(answer(&mut looker, ReplyCode::Running, 0), [true; 5]);
         let (sighting, pose) = looker.take().unwrap();
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
-        assert_eq!(sighting, Sighting { identity, error: 0, packets: Some(77), homed: true });
+        assert_eq!(sighting, Sighting { identity, error: 0, alarm: 0, packets: Some(77), homed: true });
         assert!((pose[0] - 0.25).abs() < 1e-3, "{pose:?}");
+        assert!(looker.take().is_none());
+    }
+
+    #[test]
+    fn an_mbox_tells_the_alarm_of_its_drives_where_others_tell_a_version_and_a_refusal_tells_nothing() {
+        let mut looker = looker();
+        looker.dialect = Dialect::Mbox;
+        answer(&mut looker, ReplyCode::Running, 0);
+        let (sighting, _) = looker.take().unwrap();
+        assert_eq!((sighting.identity.minor_version, sighting.alarm), (0, 1));
+        looker.seen = Seen { asked: true, ..Seen::default() };
+        assert_eq!(answer(&mut looker, ReplyCode::Fault, 0), [true; 5]);
         assert!(looker.take().is_none());
     }
 

@@ -27,7 +27,7 @@ pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_
 pub use per_axis::PerAxis;
 pub use position::{DP_POSITIONS, position, position_reads, position_words, positions};
 pub use register::{Access, ReadRequest, RegisterReply, Space, WriteRequest};
-pub use report::Report;
+pub use report::{DPFE, Report};
 pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
 pub use vibration::Vibration;

@@ -19,6 +19,7 @@ mod serving;
 mod begin;
 mod hall;
 mod library;
+mod mbox;
 mod playlist;
 mod show;
 mod signals;
