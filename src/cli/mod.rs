@@ -6,6 +6,7 @@ use std::{panic, thread};
 use clap::{Parser, Subcommand};
 
 use crate::api;
+use crate::wire::VibrationPort;
 
 mod ask;
 mod check;
@@ -147,4 +148,10 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Prove(args) => prove::run(&args),
         Command::Man(args) => man::run(&args),
     }
+}
+
+/// Octets of Port Out in vibration frames.
+fn vibration_port(text: &str) -> Result<VibrationPort, String> {
+    let port = text.parse().ok().and_then(VibrationPort::of_octets);
+    port.ok_or_else(|| "it is 2 or 4".to_owned())
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::wire::{FrameNo, Timing, Words};
+use crate::wire::{FrameNo, Timing, VibrationPort, Words};
 
 const X01: u16 = 0b0001;
 const STATION: Code = Code(0x0fc9);
@@ -12,6 +12,7 @@ fn observer(dialect: Dialect) -> Observer {
     Observer::new(vec![Watched {
         address: "192.168.15.201:7408".parse().unwrap(),
         dialect,
+        vibration_port: VibrationPort::Two,
         estop_inputs: X01,
     }])
 }
@@ -157,6 +158,7 @@ fn a_report_from_another_port_is_its_senders_unless_two_could_have_sent_it() {
     let watched = |host: u8, port: u16| Watched {
         address: SocketAddrV4::new(Ipv4Addr::new(192, 168, 15, host), port),
         dialect: Dialect::Smc,
+        vibration_port: VibrationPort::Two,
         estop_inputs: 0,
     };
     let observer =
