@@ -18,8 +18,8 @@ use common::Virtual;
 use kinocue::motion::Pulses;
 use kinocue::sim::{Controller, Setup};
 use kinocue::wire::{
-    Access, Code, MAX_LEN, Message, ReadRequest, RegisterReply, ReplyCode, Status, Vibration, WireError,
-    Words, WriteRequest,
+    Access, Code, MAX_LEN, Message, ReadRequest, RegisterReply, ReplyCode, Status, Vibration, VibrationPort,
+    WireError, Words, WriteRequest,
 };
 use pcap::Pcap;
 use programs::is_installed;
@@ -135,14 +135,14 @@ fn put(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> usize {
             fields.insert("kinocue.output", format!("0x{:04x}", motion.outputs));
             body(fields, motion.frame.0, motion.time_ms, &motion.positions);
             tail(fields, motion.extend, motion.vibration.as_deref());
-            motion.layout_len()
+            motion.layout_len(VibrationPort::Two)
         }
         Message::MotionReply(reply) => {
             answer(fields, octets, reply.code, ("kinocue.channel", reply.channel), reply.error);
             fields.insert("kinocue.input", format!("0x{:04x}", reply.inputs));
             body(fields, reply.frame.0, reply.time_ms, &reply.positions);
             tail(fields, reply.extend, reply.vibration.as_deref());
-            reply.layout_len()
+            reply.layout_len(VibrationPort::Two)
         }
         Message::Status(status) => {
             put_status(fields, status);
@@ -467,22 +467,27 @@ fn decoded(path: &Path, args: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn the_info_column_says_what_decode_says_in_both_dialects() {
+fn the_info_column_says_what_decode_says_in_both_dialects_and_with_both_ports_of_vibration() {
     if !tshark_runs() {
         return;
     }
-    let mut datagrams = [golden(), monitored()].concat();
-    datagrams.retain(|octets| Message::parse(octets).is_ok());
-    let capture = captured(&datagrams);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("golden.pcap");
-    std::fs::write(&path, capture.octets()).unwrap();
-    for (dialect, preference) in [("smc", "kinocue.dialect:SMC"), ("mbox", "kinocue.dialect:MBOX")] {
+    let readings = [
+        (["--dialect", "smc"], "kinocue.dialect:SMC", VibrationPort::Two),
+        (["--dialect", "mbox"], "kinocue.dialect:MBOX", VibrationPort::Two),
+        (["--vibration-port-octets", "4"], "kinocue.vibration_port_octets:4", VibrationPort::Four),
+    ];
+    for (args, preference, port) in readings {
+        let mut datagrams = [golden(), monitored()].concat();
+        datagrams.retain(|octets| Message::parse_as(port, octets).is_ok());
+        let capture = captured(&datagrams);
+        std::fs::write(&path, capture.octets()).unwrap();
         let infos = tshark(&capture, &["-o", preference, "-e", "_ws.col.Info"]);
-        let words = decoded(&path, &["--dialect", dialect]);
+        let words = decoded(&path, &args);
         assert_eq!(infos.len(), words.len());
         for (info, words) in infos.iter().zip(words) {
-            assert_eq!(*info, words, "{dialect}");
+            assert_eq!(*info, words, "{preference}");
         }
     }
 }

@@ -6,6 +6,7 @@ use std::{panic, thread};
 
 use clap::{Parser, Subcommand};
 
+use crate::wire::VibrationPort;
 use crate::{api, plain};
 
 mod ask;
@@ -160,4 +161,10 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Prove(args) => prove::run(&args),
         Command::Man(args) => man::run(&args),
     }
+}
+
+/// Octets of Port Out in vibration frames.
+fn vibration_port(text: &str) -> Result<VibrationPort, String> {
+    let port = text.parse().ok().and_then(VibrationPort::of_octets);
+    port.ok_or_else(|| "it is 2 or 4".to_owned())
 }

@@ -17,7 +17,7 @@ use crate::wire::ReplyCode;
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
     /// A controller: HOST:PORT, and behind commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
-    /// mbox; repeatable.
+    /// mbox, vibration_port_octets=2 or 4; repeatable.
     #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,
     /// The controllers of a configuration: all of them, unless --row or names choose.

@@ -27,7 +27,7 @@ mod target;
 mod tests;
 mod text;
 
-pub use crate::wire::{Dialect, Timing};
+pub use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
 pub use effect_limits::EffectLimit;
 pub(crate) use fault::Faults;
@@ -163,6 +163,8 @@ pub struct Controller {
     pub fan_out: FanOut,
     /// The message set it speaks.
     pub dialect: Dialect,
+    /// How it has Port Out in vibration frames.
+    pub vibration_port: VibrationPort,
     /// Controllers under one rigid seat share a group; its own name by default.
     pub group: String,
     /// The accept and reply code of its frames.

@@ -22,7 +22,7 @@ use super::section::{Entry, Section, did_you_mean};
 use super::text::text;
 use super::{
     Absent, Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show,
-    Store, Timing, check_effect_name, check_peer, check_window,
+    Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] octets.
@@ -308,6 +308,7 @@ fn controller<'t>(
     let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
     let fan_out = section.choice("fan_out", &[("slice", FanOut::Slice), ("shared", FanOut::Shared)]);
     let dialect = section.choice("dialect", &[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)]);
+    let vibration_port = vibration_port(&mut section, dialect);
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
     let estop_inputs = inputs_of(&mut section, "estop_inputs");
@@ -331,6 +332,7 @@ fn controller<'t>(
         axis_offset,
         fan_out,
         dialect: dialect.unwrap_or(Dialect::Smc),
+        vibration_port: vibration_port.unwrap_or_default(),
         accept,
         effects,
         estop_inputs,
@@ -355,6 +357,20 @@ fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<Sea
         entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
     }
     site.seats.iter().find(|seat| seat.name == name).cloned()
+}
+
+/// Octets of Port Out in vibration frames, which MBOX controllers do not have.
+fn vibration_port(section: &mut Section<'_, '_, '_>, dialect: Option<Dialect>) -> Option<VibrationPort> {
+    let entry = section.get("vibration_port_octets")?;
+    if dialect == Some(Dialect::Mbox) {
+        entry.fault(section.faults, "mbox controllers have no vibration frames; leave it out");
+    }
+    let octets: u8 = entry.whole_in(2..=4, section.faults)?;
+    let port = VibrationPort::of_octets(octets);
+    if port.is_none() {
+        entry.fault(section.faults, &format!("{octets} is neither 2 nor 4"));
+    }
+    port
 }
 
 fn accept(section: &mut Section<'_, '_, '_>) -> Option<Accept> {

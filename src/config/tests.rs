@@ -201,6 +201,17 @@ fn a_shared_frame_reaches_no_axis_past_the_twelfth() {
 }
 
 #[test]
+fn port_out_of_vibration_frames_has_two_octets_or_four_and_mbox_controllers_have_none() {
+    let port = |more: &str| with(more).map(|hall| hall.controllers[0].vibration_port);
+    assert_eq!(port(""), Ok(VibrationPort::Two));
+    assert_eq!(port("vibration_port_octets = 4\n"), Ok(VibrationPort::Four));
+    let place = "hall.toml:13:25: vibration_port_octets: ";
+    assert_eq!(port("vibration_port_octets = 3\n"), Err(vec![format!("{place}3 is neither 2 nor 4")]));
+    let faults = port("vibration_port_octets = 2\ndialect = \"mbox\"\n").unwrap_err();
+    assert_eq!(faults, [format!("{place}mbox controllers have no vibration frames; leave it out")]);
+}
+
+#[test]
 fn a_stroke_of_more_pulses_than_a_register_holds_is_refused() {
     let faults = parse(&format!("{}{CONTROLLER}", SEAT.replace("= 150", "= 1e9"))).unwrap_err();
     assert_eq!(

@@ -41,6 +41,7 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         channel,
         code: Code(controller.accept.code(controller.address)),
         vibrates,
+        vibration_port: controller.vibration_port,
         wiring: wiring(config, controller, timeline),
         ack_every: manner.ack_every(config),
         longest_ms: controller.seat.max_interval_ms,

@@ -121,7 +121,7 @@ impl Terms {
         let vibrates = self.cue.is_none_or(|(_, vibrates)| vibrates)
             && controller.dialect == Dialect::Smc
             && slots <= MAX_VIBRATING_AXES;
-        let frame = motion_len(slots, vibrates);
+        let frame = motion_len(slots, vibrates.then_some(controller.vibration_port));
         frame.max(REGISTER_LEN) + HEADERS_LEN
     }
 }

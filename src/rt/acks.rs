@@ -13,7 +13,7 @@ use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply, PerAxis, ReplyCode};
+use crate::wire::{FrameNo, PerAxis, ReplyCode};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
@@ -176,7 +176,7 @@ impl AckLoop {
                     return;
                 }
             };
-            match MotionReply::parse(octets) {
+            match observer.read_reply(controller, octets) {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
                     let reply = Reply { controller, frame: reply.frame, code: reply.code, at };

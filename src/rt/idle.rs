@@ -75,7 +75,7 @@ impl Beats {
             && reply.channel == 0
             && reads.any(|read| (read.start, read.num) == (reply.start, reply.num));
         let first = DP_POSITIONS.iter().position(|register| is_ours && *register == reply.start)?;
-        Some((first, positions(reply.data, dialect)))
+        Some((first, positions(reply.values(dialect), dialect)))
     }
 }
 

@@ -22,7 +22,7 @@ use crate::observe::Observer;
 use crate::state::Event;
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
-use crate::wire::{Dialect, PerAxis, ReplyCode};
+use crate::wire::{Dialect, ImaxRegisters, PerAxis, ReplyCode};
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
@@ -153,7 +153,8 @@ impl Watch {
         let smc = self.lookers.get(reply.controller).is_some_and(|one| one.dialect() == Dialect::Smc);
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
-            Fate::Answered(ReplyCode::Fault | ReplyCode::Command) if smc => {
+            // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
+            Fate::Answered(code) if !(smc && code == ReplyCode::EmergencyStop) => {
                 self.health.on_refused(reply.controller);
             }
             _ => {}
@@ -167,6 +168,12 @@ impl Watch {
         let is_answer = looker.hear(octets);
         if let Some((first, positions)) = looker.take_positions() {
             self.on_positions(controller, first, &positions, at, Source::Registers);
+        }
+        if is_answer || awaited {
+            self.health.on_answer(controller, at);
+        }
+        if ImaxRegisters::parse(octets).is_ok_and(|reply| reply.is_wide()) {
+            self.health.on_wide_registers(controller);
         }
         self.take_sighting(controller, at);
         is_answer || awaited

@@ -20,6 +20,7 @@ mod begin;
 mod hall;
 mod lasting;
 mod library;
+mod mbox;
 mod playlist;
 mod show;
 mod signals;
