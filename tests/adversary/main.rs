@@ -19,6 +19,7 @@ mod dice;
 mod ether;
 mod hall;
 mod judge;
+mod named;
 mod person;
 mod seat;
 mod words;
