@@ -72,7 +72,7 @@ fn setting(name: &str) -> Option<u64> {
 
 /// Lives through so many histories on two threads: those in which a seat did what no seat may.
 fn histories(first: u64, count: u64) -> Vec<Past> {
-    let next = AtomicU64::new(0);
+    let [next, frames] = [0; 2].map(AtomicU64::new);
     let work = || {
         let mut bad = Vec::new();
         loop {
@@ -81,18 +81,22 @@ fn histories(first: u64, count: u64) -> Vec<Past> {
                 return bad;
             }
             let past = live_through(first + index, u64::MAX, false);
+            frames.fetch_add(past.frames, Ordering::Relaxed);
             if !past.breaches.is_empty() {
                 bad.push(past);
             }
         }
     };
-    thread::scope(|scope| {
+    let bad = thread::scope(|scope| {
         let threads = [scope.spawn(work), scope.spawn(work)];
         let mut bad: Vec<Past> =
             threads.into_iter().flat_map(|thread| thread.join().expect("no history panics")).collect();
         bad.sort_by_key(|past| past.seed);
         bad
-    })
+    });
+    let each = frames.into_inner() / count.max(1);
+    assert!(each >= 50, "{each} frames in a history: nothing was played");
+    bad
 }
 
 /// One history in full.

@@ -88,7 +88,7 @@ impl Kind {
 }
 
 /// Six seconds in which all axes swing, each a little after the one before.
-fn swing(axes: usize, hz: f64, mm: f64, about_mm: f64) -> String {
+pub(crate) fn swing(axes: usize, hz: f64, mm: f64, about_mm: f64) -> String {
     let names: String = (1..=axes).map(|axis| format!(",a{axis}")).collect();
     let mut text = format!("time_ms{names}\n");
     for row in 0..=300 {

@@ -9,6 +9,7 @@ use kinocue::time::{Clock, MonoTime};
 
 use super::dice::Dice;
 use super::seat::{Arrival, MS, Seat, Settings};
+use super::words;
 
 /// What befalls the datagrams of a seat for a while.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +36,8 @@ pub(crate) enum Weather {
     Echo(u64),
     /// The kernel takes none.
     Refused,
+    /// Frames of motion do not arrive whose Time is longer than so many milliseconds.
+    Slow(u32),
 }
 
 #[derive(Debug, Clone)]
@@ -110,6 +113,14 @@ impl Ether {
         self.world().deliver(ns);
     }
 
+    /// What has come back from a seat.
+    pub(crate) fn take_back(&self, seat: usize) -> Option<Vec<u8>> {
+        let now = self.ns();
+        let back = &mut self.world().lines[seat].back;
+        let came = back.front().is_some_and(|packet| packet.at <= now);
+        if came { back.pop_front().map(|packet| packet.octets) } else { None }
+    }
+
     /// It becomes so for a while.
     pub(crate) fn turns(&self, seat: usize, weather: Weather, ms: u64) {
         let now = self.ns();
@@ -172,6 +183,8 @@ impl Line {
         self.frames += u64::from(matches!(octets.get(4), Some(0x13 | 0x14 | 0x18 | 0x19)));
         let thin = self.until(now, |what| matches!(what, Weather::Thin(_)));
         let lost = matches!(thin, Some((_, Weather::Thin(times))) if dice.one_in(times));
+        let slow = self.until(now, |what| matches!(what, Weather::Slow(_)));
+        let lost = lost || matches!(slow, Some((_, Weather::Slow(ms))) if words::takes_longer(octets, ms));
         if lost || self.is(now, Weather::Lost).is_some() || self.is(now, Weather::Cut).is_some() {
             return Delivery::Sent;
         }

@@ -118,7 +118,7 @@ pub(crate) fn open<T>(
 
 /// Seats as a kind of hall has them, set as they leave the factory, but for the cap on speed.
 pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
-    let seat = |axes: &usize| Settings {
+    let seat = |(index, axes): (usize, &usize)| Settings {
         axes: *axes,
         mm_s: 240.0,
         high_first: false,
@@ -127,8 +127,10 @@ pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
         stop_mode: 0,
         report_ms: 0,
         period_ms: kind.period_ms(),
+        jitter_ms: 0.0,
+        address: ([127, 0, 1, index as u8 + 1], 7_408),
     };
-    kind.axes.iter().map(seat).collect()
+    kind.axes.iter().enumerate().map(seat).collect()
 }
 
 impl Hall<'_, '_> {

@@ -66,6 +66,8 @@ pub(crate) struct Executed {
     pub(crate) period_ms: f64,
     /// Whether the network brought frames closer together than they were sent.
     pub(crate) bunched: bool,
+    /// How much later than they were sent datagrams may be noticed.
+    pub(crate) jitter_ms: f64,
     /// Whether somebody had asked for motion when it was sent.
     pub(crate) asked: bool,
 }
@@ -73,7 +75,7 @@ pub(crate) struct Executed {
 impl Executed {
     /// The first axis that goes too far, how far, mm, and in which way.
     pub(crate) fn verdict(&self, mm_s: f64) -> Option<(usize, f64, How)> {
-        let admitted = self.apart_ms <= ADMITTED_MS + 2.0 * self.period_ms;
+        let admitted = self.apart_ms <= ADMITTED_MS + 2.0 * self.period_ms + self.jitter_ms;
         // What was lost for a moment is made up for in one frame; what came in a heap is executed in haste, where the seat is
         // set to.
         let time = if self.bunched { self.time_ms } else { self.ms };

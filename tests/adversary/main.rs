@@ -13,6 +13,10 @@
     reason = "pulses of a stroke and nanoseconds of a minute fit all of these"
 )]
 
+#[expect(dead_code, reason = "shared with tests that need more of it")]
+#[path = "../common/process.rs"]
+mod process;
+
 mod chance;
 mod cues;
 mod dice;
@@ -21,5 +25,7 @@ mod hall;
 mod judge;
 mod named;
 mod person;
+mod plays;
 mod seat;
+mod town;
 mod words;

@@ -44,6 +44,10 @@ pub(crate) struct Settings {
     pub(crate) report_ms: u32,
     /// How often the hall sends.
     pub(crate) period_ms: f64,
+    /// How much later than they were sent datagrams may be noticed, ms: none in virtual time, some on a busy machine.
+    pub(crate) jitter_ms: f64,
+    /// Where its controller listens, as it knows.
+    pub(crate) address: ([u8; 4], u16),
 }
 
 /// A command on its way through the queue.
@@ -248,7 +252,8 @@ impl Seat {
                 .executed
                 .map_or(f64::INFINITY, |sent| sent.abs_diff(command.sent_ns) as f64 / MS as f64),
             period_ms: self.settings.period_ms,
-            bunched,
+            bunched: bunched || self.settings.jitter_ms > 0.0,
+            jitter_ms: self.settings.jitter_ms,
             asked: command.asked,
         };
         self.judge(&executed, command.number, now);
@@ -350,14 +355,7 @@ impl Seat {
 
     fn register(&self, channel: u16, at: u16, now: u64) -> u16 {
         if channel == 1 {
-            return match at {
-                0x00 => 10,
-                0x02 => self.settings.axes as u16,
-                0x06 => u16::from(self.settings.hurry),
-                0x0b => self.settings.cut_ms as u16,
-                0x91 => u16::from(self.settings.stop_mode),
-                _ => 0,
-            };
+            return self.parameter(at);
         }
         if let Some(axis) = POSITIONS.iter().position(|first| at == *first || at == *first + 1) {
             if axis >= self.settings.axes {
@@ -373,6 +371,36 @@ impl Seat {
             0xf0 => u16::from(self.moving.is_some_and(|current| current.homes)),
             0xfe => 1,
             0xff => 3,
+            _ => 0,
+        }
+    }
+
+    /// Its parameters: those of the factory but where a show needs others. It tells of caps on speed that it does not keep.
+    fn parameter(&self, at: u16) -> u16 {
+        let Settings { axes, hurry, cut_ms, stop_mode, report_ms, address: (ip, port), .. } = self.settings;
+        match at {
+            0x00 => 10,
+            0x02 => axes as u16,
+            0x06 => u16::from(hurry),
+            0x07 | 0x80..=0x85 => 2_880,
+            0x09 | 0x40 => 100,
+            0x0b => cut_ms as u16,
+            0x0c | 0x15 | 0x90 | 0x92 => 1,
+            0x10..=0x13 => u16::from(ip[usize::from(at - 0x10)]),
+            0x14 => port,
+            0x1e => report_ms as u16,
+            0x1f => u16::from(report_ms > 0),
+            0x20 => 127,
+            0x23 => 1,
+            0x24 => 8_410,
+            0x3d => 1_000,
+            0x41 => 50,
+            0x42 => 1_500,
+            0x91 => u16::from(stop_mode),
+            0x93 => (FILTER / MS) as u16,
+            0x94 => 300,
+            0xa0..=0xa5 => 2,
+            0xb0..=0xb5 => 1_500,
             _ => 0,
         }
     }

@@ -45,6 +45,11 @@ pub(crate) fn hear(octets: &[u8]) -> Heard {
     }
 }
 
+/// Whether it is a frame of motion whose Time is longer than that.
+pub(crate) fn takes_longer(octets: &[u8], ms: u32) -> bool {
+    matches!(hear(octets), Heard::Motion(frame) if frame.time_ms > ms)
+}
+
 fn motion(octets: &[u8], function: u16, channel: u16) -> Heard {
     let vibrating = function >= 0x1801;
     let axes = match channel {
