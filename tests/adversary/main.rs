@@ -14,8 +14,15 @@
 )]
 
 #[expect(dead_code, reason = "shared with tests that need more of it")]
+#[allow(unreachable_pub, clippy::unwrap_used, reason = "whatever fails there fails the test")]
+#[path = "../common/http.rs"]
+mod http;
+#[expect(dead_code, reason = "shared with tests that need more of it")]
 #[path = "../common/process.rs"]
 mod process;
+#[expect(dead_code, reason = "shared with tests that need more of it")]
+#[path = "../common/serving.rs"]
+mod serving;
 
 mod chance;
 mod cues;
@@ -26,6 +33,7 @@ mod judge;
 mod named;
 mod person;
 mod plays;
+mod processes;
 mod seat;
 mod town;
 mod words;
