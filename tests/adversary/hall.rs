@@ -26,6 +26,9 @@ const REPEAT: u64 = 200 * MS;
 /// How long seats that were told to rest may go on.
 const COMES_TO_REST: u64 = 1_500 * MS;
 
+/// A show that was asleep for longer is resumed by a person.
+const ASLEEP_MS: u64 = 2_000;
+
 /// Which loop stands still.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Thread {
@@ -361,7 +364,7 @@ impl Hall<'_, '_> {
         self.reins.desk.set_trim_ms(ms);
     }
 
-    /// A thread stands still for so many milliseconds.
+    /// A thread stands still for so many milliseconds. Whoever was asleep for seconds waits for somebody to go on.
     pub(crate) fn still(&mut self, thread: Thread, ms: u64) {
         self.note(|| format!("{thread:?} stands still for {ms} ms"));
         let until = self.ether.ns() + ms * MS;
@@ -372,6 +375,9 @@ impl Hall<'_, '_> {
             Thread::All => &[0, 1, 2],
         };
         which.iter().for_each(|index| self.still[*index] = until);
+        if thread == Thread::All && ms > ASLEEP_MS && matches!(self.state, State::Playing(_)) {
+            self.ether.world().asked = false;
+        }
     }
 
     /// Somebody wants the hall to close.

@@ -34,6 +34,7 @@ mod named;
 mod person;
 mod plays;
 mod processes;
+mod rules;
 mod seat;
 mod town;
 mod words;

@@ -6,7 +6,7 @@ use kinocue::state::{Request, Ride, State};
 
 use super::cues::{KINDS, Kind};
 use super::ether::{Ether, Weather};
-use super::hall::{Hall, breaches, open, seats};
+use super::hall::{Hall, Thread, breaches, open, seats};
 use super::seat::{MS, Settings};
 
 const THREE: Kind = KINDS[0];
@@ -325,6 +325,22 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
         hall.pass(4_000);
     });
     assert_no_breach(&ether);
+}
+
+// A machine that was asleep.
+
+#[test]
+fn a_show_whose_machine_was_asleep_for_seconds_does_not_go_on_by_itself() {
+    for (kind, asleep_ms) in [(THREE, 3_000), (SIX, 9_000)] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(500);
+            hall.still(Thread::All, asleep_ms);
+            hall.pass(asleep_ms + 3_000);
+        });
+        assert_no_breach(&ether);
+    }
 }
 
 // D18: frames that pile up behind a long one.

@@ -148,6 +148,7 @@ impl Person {
             0..=2 => {
                 let thread = self.dice.pick(&[Thread::Tick, Thread::Acks, Thread::Planner, Thread::All]);
                 let ms = self.dice.pick(&[15, 40, 60, 120, 400]);
+                let ms = if thread == Thread::All && self.dice.one_in(3) { 2_300 } else { ms };
                 hall.still(thread, ms);
             }
             3 => hall.trim(self.dice.range(0, 1_000) as i32 - 500),
@@ -170,10 +171,12 @@ impl Person {
             settings.cut_ms = self.dice.pick(&[3_000, 3_000, 500, 0]);
             settings.stop_mode = self.dice.pick(&[0, 0, 1, 2]);
             settings.report_ms = self.dice.pick(&[0, 0, 100]);
+            settings.high_first = self.dice.one_in(25);
             let axes = settings.axes;
             for axis in 0..axes {
                 if self.dice.one_in(6) {
-                    line.seat.put(axis, self.dice.range(0, 150) as f64);
+                    // Some stand a little outside of their stroke.
+                    line.seat.put(axis, self.dice.range(0, 165) as f64 - 10.0);
                 }
             }
         }
