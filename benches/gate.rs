@@ -18,7 +18,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use asked::sound::{self, Sound};
-use asked::trial::Trial;
+use asked::trial::{Trial, standing};
 use asked::wild::{self, Wild};
 use common::spread::{Spread, verdict};
 use kinocue::gate::{Asked, Gate, Verdict};
@@ -68,7 +68,7 @@ fn round() -> [f64; 2] {
         (0..AXES).map(|axis| Slot::new(&SeatType::bench3(AXES), axis, Some(axis), 1.0)).collect(),
     );
     let mut gates: Vec<Gate> =
-        (0..LANES).map(|_| Gate::new(&window, Rate::from_hz(1000.0), wave(0))).collect();
+        (0..LANES).map(|_| standing(&window, Rate::from_hz(1000.0), wave(0))).collect();
     let mut kept = vec![[0.0; MAX_AXES]; LANES];
     let (mut ours, mut bare) = (Vec::new(), Vec::new());
     for tick in 0..TICKS {

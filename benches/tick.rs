@@ -10,19 +10,24 @@ mod common {
 
 use std::hint::black_box;
 use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
+use std::sync::Arc;
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
 use common::stage::{ride, stage};
+use kinocue::belief::{Evidence, Reading, Taken};
 use kinocue::engine::Step;
+use kinocue::motion::MAX_AXES;
+use kinocue::net::Delivery;
+use kinocue::rt::{Live, Places, mailboxes};
 use kinocue::sys::clock::Monotonic;
-use kinocue::time::Clock as _;
+use kinocue::time::{Clock as _, MonoTime};
 use kinocue::wire::MAX_LEN;
 
 const CONTROLLERS: usize = 64;
 const GOAL: f64 = 0.25;
 /// Ticks of one round: the join lasts 1.5 s, the ride fills the rest.
-const TICKS: u32 = 4_500;
+const TICKS: u64 = 4_500;
 const SECONDS: u32 = 6;
 
 /// What the ticks of one round took, µs for all controllers: those on the join and those on the cue, each with the sends
@@ -104,17 +109,31 @@ fn round(links: &[Link]) -> Round {
     let addresses: Vec<SocketAddrV4> = links.iter().map(Link::address).collect();
     let (staged, _) = stage(ride(SECONDS, 0.1, &[]), 1000.0, &addresses, false);
     let settled = staged.course.settled();
+    let rate = staged.show.rate;
     let (mut engine, mut lanes, _planner, _timeline) = staged.split();
+    let live = Arc::new(Live::new(lanes.len()));
+    let (mail, _ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
+    let parked = Reading::at_rest([0.0; MAX_AXES], MonoTime::default());
+    evidence(&live).for_each(|evidence| evidence.on_reading(&parked));
+    let mut places = Places::new(&lanes, rate);
     let (mut round, mut buf) = (Round::default(), [0; MAX_LEN]);
-    for _ in 0..TICKS {
+    for tick in 0..TICKS {
         let joining = engine.playhead() < settled;
+        let at = MonoTime::default() + rate.offset(tick);
         let tick_us = timed(|| {
+            places.look(&mut engine, &mail, at, true);
             let Step::Send(beat) = engine.tick(0) else { unreachable!("the ride is longer") };
             for (index, lane) in lanes.iter_mut().enumerate() {
-                let (pose, mix) = engine.frame(index).expect("every lane takes part");
-                black_box(lane.encode(&beat, pose, mix, &mut buf));
+                let beat = places.admit(index, &mut engine, &beat, at).expect("every lane takes part");
+                let pose = engine.pose(index);
+                let (stamped, octets) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
+                black_box(octets);
+                let taken = Taken { frame: stamped.frame, asked: true, pose, lasts_ms: beat.lasts_ms, at };
+                places.sent(index, &taken, Delivery::Sent);
             }
         });
+        // Every frame is acked before the next tick.
+        lanes.iter().zip(evidence(&live)).for_each(|(lane, evidence)| evidence.on_ack(lane.last_frame()));
         let sends_us = timed(|| send_all(links));
         links.iter().for_each(|link| empty(&link.to));
         let phase = if joining { &mut round.joining } else { &mut round.following };
@@ -122,6 +141,10 @@ fn round(links: &[Link]) -> Round {
         phase.sends_us.push(sends_us);
     }
     round
+}
+
+fn evidence(live: &Live) -> impl Iterator<Item = &Evidence> {
+    (0..).map_while(|lane| live.evidence(lane))
 }
 
 fn timed(work: impl FnOnce()) -> f64 {

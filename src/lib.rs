@@ -32,6 +32,7 @@ pub mod checks;
 pub mod config;
 pub mod proof;
 
+pub mod belief;
 pub mod engine;
 pub mod fanout;
 pub mod gate;

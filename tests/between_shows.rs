@@ -10,6 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 use common::{ORIGIN, swell};
 use kinocue::app::Staged;
+use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
 use kinocue::engine::Show;
@@ -17,8 +18,8 @@ use kinocue::fanout::Manner;
 use kinocue::motion::{MAX_AXES, Pose};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, PlanLoop, Planning, TickLoop,
-    mailboxes,
+    Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, Places, PlanLoop, Planning,
+    TickLoop, mailboxes,
 };
 use kinocue::state::{Event, Finding, Readiness, Request, Ride, State};
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -33,12 +34,14 @@ enum Deed {
     Ask(Request),
     Tell(Event),
     See(Alarm),
+    /// A controller takes part again: its seat was read at rest in that pose.
+    Found(Pose),
     Stop,
     /// Somebody hears what there is to hear.
     Hear,
 }
 
-use Deed::{Ask, Hear, Load, See, Stop, Tell};
+use Deed::{Ask, Found, Hear, Load, See, Stop, Tell};
 
 const PARKED: Pose = [0.0; MAX_AXES];
 const READY: Deed = Tell(Event::Readiness(Readiness::Ready));
@@ -71,9 +74,18 @@ struct Hands<'a> {
     plans: RefCell<PlanLoop>,
     news: RefCell<Consumer<News>>,
     states: RefCell<Vec<State>>,
+    live: &'a Live,
+    /// Where the seat is.
+    stands: Cell<Pose>,
 }
 
 impl Hands<'_> {
+    /// The ack thread reads the seat.
+    fn read(&self) {
+        let reading = Reading::at_rest(self.stands.get(), self.now.get());
+        self.live.evidence(0).expect("there is one lane").on_reading(&reading);
+    }
+
     fn hear(&self) {
         while let Ok(news) = self.news.borrow_mut().pop() {
             if let News::Entered { state, .. } = news
@@ -92,6 +104,9 @@ impl Clock for Hands<'_> {
 
     fn sleep_until(&self, deadline: MonoTime) {
         self.now.set(deadline);
+        if self.tick.get().is_multiple_of(25) && !self.live.is_moving() {
+            self.read(); // a beat
+        }
         self.plans.borrow_mut().serve(&mut Vec::new());
         let tick = self.tick.replace(self.tick.get() + 1);
         let command = |command| self.commands.borrow_mut().push(command).expect("there is room");
@@ -100,6 +115,11 @@ impl Clock for Hands<'_> {
                 Load => command(Command::Load(show())),
                 Ask(request) => command(Command::Request(*request)),
                 Tell(event) => command(Command::Event(*event)),
+                Found(pose) => {
+                    self.stands.set(*pose);
+                    self.read();
+                    self.alarms.borrow_mut().push(Alarm::Found(0)).expect("there is room");
+                }
                 See(alarm) => self.alarms.borrow_mut().push(*alarm).expect("there is room"),
                 Stop => self.desk.stop(),
                 Hear => self.hear(),
@@ -117,14 +137,18 @@ fn show() -> Box<Loaded> {
 
 /// First axes of the frames, in pulses, each with its tick.
 struct Link<'a> {
-    tick: &'a Cell<u64>,
+    hands: &'a Hands<'a>,
     frames: Vec<(u64, i32)>,
 }
 
 impl FrameSink for Link<'_> {
     fn send(&mut self, _lane: usize, datagram: &[u8]) -> Delivery {
         let request = MotionRequest::parse(datagram).expect("only frames are sent");
-        self.frames.push((self.tick.get(), request.positions[0].0));
+        // Each frame is acked at once, and leads the seat.
+        self.hands.live.evidence(0).expect("there is one lane").on_ack(request.frame);
+        let first = request.positions[0].0;
+        self.hands.stands.set(up(f64::from(first) / 300_000.0));
+        self.frames.push((self.hands.tick.get(), first));
         Delivery::Sent
     }
 }
@@ -133,7 +157,8 @@ impl FrameSink for Link<'_> {
 fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State>) {
     let (engine, lanes, planner, timeline) = staged().split();
     let (desk, leave) = (staged().desk(), AtomicBool::new(false));
-    let (mail, ends) = mailboxes(1, Rate::from_hz(100.0), Arc::new(Live::default()));
+    let live = Arc::new(Live::new(1));
+    let (mail, ends) = mailboxes(1, Rate::from_hz(100.0), Arc::clone(&live));
     let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
     let planning = Box::new(Planning { planner, timeline });
     let hands = Hands {
@@ -148,14 +173,18 @@ fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State
         plans: RefCell::new(PlanLoop { planning, tasks, answers }),
         news: RefCell::new(news),
         states: RefCell::default(),
+        live: &live,
+        stands: Cell::new(PARKED),
     };
+    let places = Places::new(&lanes, Rate::from_hz(100.0));
     let mut ticks = TickLoop {
         clock: &hands,
         grid: TickGrid::new(ORIGIN, Rate::from_hz(100.0)),
         engine: engine.unknown(),
         conductor: Conductor::of_a_hall(ORIGIN),
         lanes,
-        sink: Link { tick: &hands.tick, frames: Vec::new() },
+        places,
+        sink: Link { hands: &hands, frames: Vec::new() },
         mail,
         desk: &desk,
         leave: &leave,
@@ -181,13 +210,7 @@ fn assert_played(script: &[(u64, Deed)], go: u64) {
 
 #[test]
 fn a_cue_that_was_loaded_before_the_seats_were_found_is_played() {
-    let script = [
-        (1, Load),
-        (2, READY),
-        (5, See(Alarm::Found(0, PARKED))),
-        (6, found(true, true)),
-        (9, Ask(Request::Arm)),
-    ];
+    let script = [(1, Load), (2, READY), (5, Found(PARKED)), (6, found(true, true)), (9, Ask(Request::Arm))];
     assert_played(&[&script[..], &[(10, Ask(Request::Go))]].concat(), 10);
 }
 
@@ -196,13 +219,13 @@ fn a_cue_that_was_loaded_before_the_seats_homed_is_played_from_where_they_are_th
     let mut home = PARKED;
     home[0] = 0.02;
     let script = [
-        (1, See(Alarm::Found(0, PARKED))),
+        (1, Found(PARKED)),
         (2, found(false, true)),
         (3, Load),
         (4, READY),
         (5, Ask(Request::HomeAndArm)),
         (50, See(Alarm::Leave(0))),
-        (60, See(Alarm::Found(0, home))),
+        (60, Found(home)),
         (70, Tell(Event::Homed)),
         (80, Ask(Request::Go)),
     ];
@@ -214,13 +237,13 @@ fn a_seat_that_was_moved_while_the_hall_was_armed_joins_from_where_it_was_found(
     let mut elsewhere = PARKED;
     elsewhere[0] = 0.3;
     let script = [
-        (1, See(Alarm::Found(0, PARKED))),
+        (1, Found(PARKED)),
         (2, found(true, true)),
         (3, Load),
         (4, READY),
         (5, Ask(Request::Arm)),
         (20, See(Alarm::Leave(0))),
-        (40, See(Alarm::Found(0, elsewhere))),
+        (40, Found(elsewhere)),
         (60, Ask(Request::Go)),
     ];
     assert_played(&script, 60);
@@ -232,7 +255,7 @@ fn a_seat_that_was_moved_while_the_hall_was_armed_joins_from_where_it_was_found(
 #[test]
 fn a_hall_that_was_stopped_cleared_and_homed_plays_what_was_loaded_meanwhile() {
     let script = [
-        (1, See(Alarm::Found(0, PARKED))),
+        (1, Found(PARKED)),
         (2, found(true, true)),
         (3, Load),
         (4, READY),
@@ -257,8 +280,8 @@ fn up(height: f64) -> Pose {
 
 /// Parked by a show, or before any, with a seat that comes back up at tick 20 and is asked to park at tick 100.
 fn astray(before: &[(u64, Deed)]) -> Vec<(u64, Deed)> {
-    let found = [(1, See(Alarm::Found(0, PARKED))), (2, found(true, true))];
-    let back = [(19, See(Alarm::Leave(0))), (20, See(Alarm::Found(0, up(0.3)))), (100, Ask(Request::Park))];
+    let found = [(1, Found(PARKED)), (2, found(true, true))];
+    let back = [(19, See(Alarm::Leave(0))), (20, Found(up(0.3))), (100, Ask(Request::Park))];
     [&found[..], before, &back[..]].concat()
 }
 
@@ -285,7 +308,7 @@ fn a_seat_that_was_parked_between_shows_plays_the_next_one() {
 
 #[test]
 fn a_seat_that_comes_up_again_is_parked_again_though_nothing_was_loaded_since() {
-    let again = [(700, See(Alarm::Found(0, up(0.1)))), (710, Ask(Request::Park))];
+    let again = [(700, Found(up(0.1))), (710, Ask(Request::Park))];
     let (frames, states) = live_through(&[&astray(&[])[..], &again].concat(), 1_000);
     assert_eq!(states.iter().filter(|state| **state == State::Parking).count(), 2, "{states:?}");
     let (_, from) = frames.iter().find(|(tick, _)| *tick > 700).expect("frames go out");
@@ -296,7 +319,7 @@ fn a_seat_that_comes_up_again_is_parked_again_though_nothing_was_loaded_since() 
 #[test]
 fn a_park_of_seats_that_are_all_at_park_sends_nothing() {
     for before in [&[(3, Load), (4, READY)][..], &[]] {
-        let found = [(1, See(Alarm::Found(0, PARKED))), (2, found(true, true)), (100, Ask(Request::Park))];
+        let found = [(1, Found(PARKED)), (2, found(true, true)), (100, Ask(Request::Park))];
         let (frames, states) = live_through(&[&found[..], before].concat(), 200);
         assert_eq!((frames, states), (vec![], vec![State::Boot, State::Parked]));
     }

@@ -13,7 +13,7 @@ mod trial;
 mod wild;
 
 use kinocue::gate::{Asked, Gate, Limit, Verdict};
-use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType};
+use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType, Window};
 use kinocue::time::Rate;
 use sound::Sound;
 use trial::{Trial, window};
@@ -57,9 +57,13 @@ fn at(position: f64) -> Pose {
     pose
 }
 
+fn bench() -> Window {
+    window(Limits::of(&SeatType::bench3(1)))
+}
+
 /// A gate at 100 Hz that stands in the middle of the stroke.
 fn standing() -> Gate {
-    Gate::new(&window(Limits::of(&SeatType::bench3(1))), Rate::from_hz(100.0), at(0.5))
+    trial::standing(&bench(), Rate::from_hz(100.0), at(0.5))
 }
 
 /// What it sends from frame `from` on when it is asked for these.
@@ -115,6 +119,6 @@ fn after_a_rest_what_was_before_is_forgotten() {
     let stands = gate.sent()[0];
     gate.rest();
     assert_eq!(sent(&mut gate, 60, [stands; 100]), [stands; 100], "it stands where it was");
-    gate.restart(at(0.25));
+    gate.restart(&trial::read(&bench(), at(0.25)));
     assert_eq!(sent(&mut gate, 160, [0.25; 100]), [0.25; 100]);
 }

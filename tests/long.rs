@@ -7,14 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use kinocue::app::Staged;
+use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Ending, Show};
 use kinocue::fanout::{Lane, Manner};
+use kinocue::motion::MAX_AXES;
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Conductor, Ended, FrameSink, Live, MailEnds, PlanLoop, Planning, Sent, Task, TickLoop, TickReport,
-    mailboxes,
+    Conductor, Ended, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Sent, Task, TickLoop,
+    TickReport, mailboxes,
 };
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
@@ -60,16 +62,20 @@ impl Run {
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
         let lanes: Vec<Lane> = lanes.into_iter().map(|lane| lane.starting_at(self.first)).collect();
-        let live = Arc::new(Live::default());
+        let live = Arc::new(Live::new(1));
+        let evidence = || live.evidence(0).expect("there is one lane");
+        evidence().on_reading(&Reading::at_rest([0.0; MAX_AXES], ORIGIN));
+        let places = Places::new(&lanes, rate);
         let (mail, MailEnds { sent, ticks, tasks, answers, .. }) = mailboxes(1, rate, Arc::clone(&live));
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let stop = AtomicBool::new(false);
-        let books = Books { sent, ticks, tracker: Tracker::starting_at(&[self.first], 1) };
+        let books =
+            Books { sent, ticks, live: Arc::clone(&live), tracker: Tracker::starting_at(&[self.first], 1) };
         let clock = Jumps {
             run: self,
             wake_ups: Cell::new(0),
             now: Cell::new(ORIGIN),
-            live,
+            live: Arc::clone(&live),
             shown: Cell::default(),
             laps: Cell::new(0),
             given: Cell::new(1),
@@ -81,8 +87,18 @@ impl Run {
         let sink = Link { next: self.first, timing: self.timing, sum_ms: 0, bridges: 0 };
         let conductor = Conductor::of_a_play(ORIGIN, false);
         let grid = TickGrid::new(ORIGIN, rate);
-        let mut tick_loop =
-            TickLoop { clock: &clock, grid, engine, conductor, lanes, sink, mail, desk: &desk, leave: &stop };
+        let mut tick_loop = TickLoop {
+            clock: &clock,
+            grid,
+            engine,
+            conductor,
+            lanes,
+            places,
+            sink,
+            mail,
+            desk: &desk,
+            leave: &stop,
+        };
         let ended = tick_loop.run();
         let (bridges, last) = (tick_loop.sink.bridges, tick_loop.lanes[0].last_frame());
         let laps = clock.laps.get();
@@ -123,6 +139,7 @@ impl Left {
 struct Books {
     sent: Consumer<Sent>,
     ticks: Consumer<TickReport>,
+    live: Arc<Live>,
     tracker: Tracker,
 }
 
@@ -132,6 +149,7 @@ impl Books {
             let Sent::Posted { frame, asked, at, .. } = sent else { panic!("nothing fails: {sent:?}") };
             self.tracker.on_sent(0, frame, asked, at);
             self.tracker.on_reply(0, frame, ReplyCode::Running, at);
+            self.live.evidence(0).expect("there is one lane").on_ack(frame);
             self.tracker.expire(at);
         }
         while let Ok(report) = self.ticks.pop() {

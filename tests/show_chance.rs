@@ -89,7 +89,7 @@ fn worst(played: &Played) -> Worst {
         let since = first.checked_sub(1).map_or(MonoTime::default(), |last| played.frames[last].at);
         let between = |at: MonoTime| at > since && at <= played.frames[first].at;
         played.happened.iter().find_map(|(at, event)| match event {
-            Event::Alarm(Alarm::Found(_, pose)) if between(*at) => Some(150.0 * pose[0]),
+            Event::Found(_, pose) if between(*at) => Some(150.0 * pose[0]),
             _ => None,
         })
     };
@@ -168,8 +168,8 @@ proptest! {
         if let Some((share, at_once, place)) = loss {
             let order = if at_once { Alarm::Cut(0) } else { Alarm::Leave(0) };
             show = show.with(wake_up(&waves, rate, share), Event::Alarm(order));
-            let back = Alarm::Found(0, [place; MAX_AXES]);
-            show = show.with(wake_up(&waves, rate, share + 0.35), Event::Alarm(back));
+            let back = Event::Found(0, [place; MAX_AXES]);
+            show = show.with(wake_up(&waves, rate, share + 0.35), back);
         }
         // Whatever state that left it in, a person clears it, and parks.
         let read = Event::Alarm(Alarm::Event(state::Event::PositionsRead));

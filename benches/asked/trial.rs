@@ -3,8 +3,10 @@
 use super::judge::Judge;
 use super::sound::Sound;
 use super::wild::Wild;
+use kinocue::belief::{KnownPose, Reading};
 use kinocue::gate::{Asked, Counts, Gate};
 use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType, Slot, Window};
+use kinocue::time::{MonoTime, Rate};
 
 /// What a sequence made of a gate.
 pub(crate) struct Trial {
@@ -18,7 +20,7 @@ pub(crate) struct Trial {
 impl Trial {
     /// A sequence of anything.
     pub(crate) fn of_wild(wild: &mut Wild) -> Self {
-        let mut gate = Gate::new(&window(wild.limits), wild.rate, first(wild.start));
+        let mut gate = standing(&window(wild.limits), wild.rate, first(wild.start));
         let mut judge = Judge::new(wild.limits, wild.rate.hz(), wild.start);
         let (mut share, mut unchanged, mut ms) = (0.0_f64, true, 0);
         for (index, frame) in (0..).zip(0..wild.frames) {
@@ -35,7 +37,7 @@ impl Trial {
 
     /// A motion that keeps the limits.
     pub(crate) fn of_sound(sound: &Sound) -> Self {
-        let mut gate = Gate::new(&window(sound.limits), sound.rate, first(sound.start));
+        let mut gate = standing(&window(sound.limits), sound.rate, first(sound.start));
         let mut sent = sound.frames.clone();
         for (index, (position, _)) in (0..).zip(&mut sent) {
             let mut pose = first(*position);
@@ -65,4 +67,16 @@ pub(crate) fn window(limits: Limits) -> Window {
     let mut slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
     slot.limits = limits;
     Window::new(vec![slot])
+}
+
+/// What a reading of a seat at rest in that pose makes known.
+pub(crate) fn read(window: &Window, pose: Pose) -> KnownPose {
+    KnownPose::of(&Reading::at_rest(pose, MonoTime::default()), window).expect("it tells of every axis")
+}
+
+/// The gate of a lane that was read at rest in that pose.
+pub(crate) fn standing(window: &Window, rate: Rate, pose: Pose) -> Gate {
+    let mut gate = Gate::new(window, rate);
+    gate.restart(&read(window, pose));
+    gate
 }

@@ -7,12 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use kinocue::belief::Reading;
 use kinocue::fanout::Lane;
+use kinocue::motion::MAX_AXES;
 use kinocue::net::{DrainGrid, Ports, Sender};
-use kinocue::rt::{Accounts, AckLoop, Conductor, Live, MailEnds, PlanLoop, Planning, TickLoop, mailboxes};
+use kinocue::rt::{
+    Accounts, AckLoop, Conductor, Live, MailEnds, Places, PlanLoop, Planning, TickLoop, mailboxes,
+};
 use kinocue::sys::clock::{Monotonic, thread_cpu_time};
 use kinocue::sys::realtime::{RealTime, normal_priority, request};
-use kinocue::time::{Clock, TickGrid};
+use kinocue::time::{Clock, MonoTime, TickGrid};
 use kinocue::tracker::histogram;
 
 use super::outcome::{Outcome, Quantiles, each};
@@ -37,20 +41,40 @@ pub(crate) fn run(clock: &impl Clock, seconds: u32, to: &[SocketAddrV4], silent:
     let rate = staged.show.rate;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
-    let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
+    let live = Arc::new(Live::new(to.len()));
+    let (mail, ends) = mailboxes(to.len(), rate, Arc::clone(&live));
     let MailEnds { sent, ticks, tasks, answers, .. } = ends;
-    let acks = AckLoop::new(receiver, watched, u32::from(!silent), sent, ticks);
+    let mut acks = AckLoop::new(receiver, watched, u32::from(!silent), sent, ticks);
+    acks.tell(Arc::clone(&live));
     let desk = staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
     let origin = Monotonic.now() + RUN_UP;
+    stand_at_park(&live, to.len(), origin);
+    let places = Places::new(&lanes, rate);
     let conductor = Conductor::of_a_play(origin, false);
     let grid = TickGrid::new(origin, rate);
     let drains = if silent { DrainGrid::rare } else { DrainGrid::new }(origin, rate.period());
     let never = AtomicBool::new(false);
-    let tick_loop =
-        TickLoop { clock, grid, engine, conductor, lanes, sink: sender, mail, desk: &desk, leave: &never };
+    let tick_loop = TickLoop {
+        clock,
+        grid,
+        engine,
+        conductor,
+        lanes,
+        places,
+        sink: sender,
+        mail,
+        desk: &desk,
+        leave: &never,
+    };
     outcome(to.len(), run_threads(tick_loop, acks, plans, drains))
+}
+
+/// Every seat was read at park.
+pub(crate) fn stand_at_park(live: &Live, lanes: usize, at: MonoTime) {
+    let parked = Reading::at_rest([0.0; MAX_AXES], at);
+    (0..lanes).filter_map(|lane| live.evidence(lane)).for_each(|evidence| evidence.on_reading(&parked));
 }
 
 /// The calling thread becomes the tick thread, once the others have been started.

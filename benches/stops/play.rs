@@ -6,8 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use kinocue::belief::Reading;
+use kinocue::motion::MAX_AXES;
 use kinocue::net::{DrainGrid, Ports};
-use kinocue::rt::{AckLoop, Conductor, Desk, Live, MailEnds, PlanLoop, Planning, TickLoop, mailboxes};
+use kinocue::rt::{
+    AckLoop, Conductor, Desk, Live, MailEnds, Places, PlanLoop, Planning, TickLoop, mailboxes,
+};
 use kinocue::sys::clock::Monotonic;
 use kinocue::sys::realtime;
 use kinocue::time::{Clock as _, MonoTime, TickGrid};
@@ -43,21 +47,27 @@ pub(crate) fn stop(rate_hz: f64, to: &[SocketAddrV4], after: Duration) -> Option
     let rate = staged.show.rate;
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, to).expect("loopback has a free port").split();
-    let (mail, ends) = mailboxes(to.len(), rate, Arc::new(Live::default()));
+    let live = Arc::new(Live::new(to.len()));
+    let (mail, ends) = mailboxes(to.len(), rate, Arc::clone(&live));
     let MailEnds { sent, ticks, tasks, answers, commands, alarms: _alarms, news: _news } = ends;
-    let acks = AckLoop::new(receiver, watched, 1, sent, ticks);
+    let mut acks = AckLoop::new(receiver, watched, 1, sent, ticks);
+    acks.tell(Arc::clone(&live));
     let desk = &staged.desk();
     let (engine, lanes, planner, timeline) = staged.split();
     let mut plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
     let (done, never) = (&AtomicBool::new(false), AtomicBool::new(false));
     let policy = realtime::request().policy.to_string();
     let origin = Monotonic.now() + RUN_UP;
+    let parked = Reading::at_rest([0.0; MAX_AXES], origin);
+    (0..to.len()).filter_map(|lane| live.evidence(lane)).for_each(|evidence| evidence.on_reading(&parked));
+    let places = Places::new(&lanes, rate);
     let mut tick_loop = TickLoop {
         clock: &Monotonic,
         grid: TickGrid::new(origin, rate),
         engine,
         conductor: Conductor::of_a_play(origin, false),
         lanes,
+        places,
         sink: Watch::new(sender, to.len()),
         mail,
         desk,

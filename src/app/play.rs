@@ -8,22 +8,24 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer};
 
-use super::prepare::Preparation;
+use super::prepare::{Preparation, Unready};
 use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
 use super::sum_up::{About, sum_up};
+use crate::belief::{Evidence, Reading};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
-use crate::engine::Show;
+use crate::engine::{Ending, Show};
 use crate::fanout::{Lane, Manner};
 use crate::health::{Groups, Health};
+use crate::motion::Window;
 use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
 use crate::rt::{
-    AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, PlanLoop, Planning, Watch, mailboxes,
+    AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, Places, PlanLoop, Planning, Watch, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
@@ -67,6 +69,19 @@ pub enum PlayError {
     /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
     #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
     Unsure(Vec<String>),
+    /// Seats that move though nothing was sent to them from here.
+    #[error(
+        "{}: moves, though nothing was sent to it from here: another machine drives it, or it is being homed; nothing was sent",
+        .0.join(", ")
+    )]
+    Moving(Vec<String>),
+    /// Seats that do not tell where all of their axes are, and cannot be known to have come to park.
+    #[error(
+        "{}: does not tell where all of its axes are, and cannot be brought to park for certain: it does not ack, or its longest \
+         Time (PA0b, max_interval_ms) is too short for the stroke; home it, and try again",
+        .0.join(", ")
+    )]
+    Unplaced(Vec<String>),
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
@@ -129,6 +144,8 @@ pub struct Played {
     pub notes: Vec<String>,
     /// Controllers that acked nothing, or were lost at the end; none where no replies were asked for.
     pub silent: Vec<String>,
+    /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
+    pub astray: Vec<String>,
 }
 
 impl Play {
@@ -157,7 +174,7 @@ impl Play {
     }
 
     fn of(config: Config, staged: Staged, manner: Manner) -> Self {
-        let live = Arc::new(Live::default());
+        let live = Arc::new(Live::new(staged.lanes.len()));
         let (mail, ends) = mailboxes(staged.lanes.len(), staged.show.rate, Arc::clone(&live));
         let control = Control { desk: Arc::new(staged.desk()), live, leave: Arc::default() };
         Self { config, manner, staged, mail, ends, control, holds: false }
@@ -193,24 +210,24 @@ impl Play {
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
-        if self.holds {
-            acks.tell(Arc::clone(live));
-        }
+        acks.tell(Arc::clone(live));
+        acks.watched_by(watch(&self.config, self.manner, &self.staged, &sender, alarms, live));
+        let mut places = Places::new(&self.staged.lanes, show.rate);
         let mut preparation = Preparation {
             clock: &Monotonic,
             sender: &sender,
             acks: &mut acks,
             controllers: &self.config.controllers,
             lanes: &mut self.staged.lanes,
+            places: &mut places,
             stop: leave,
             live,
         };
         let prepared = if self.holds {
             preparation.make_sure().map_err(PlayError::Unsure)?
         } else {
-            preparation.run(!self.manner.silent)
+            preparation.run(!self.manner.silent).map_err(PlayError::of)?
         };
-        acks.watched_by(watch(&self.config, self.manner, &self.staged, &sender, alarms, live));
         let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
@@ -221,13 +238,42 @@ impl Play {
             spin,
             engine,
             lanes,
+            places,
             sender,
             mail: self.mail,
         };
         let attended = lead(Reins { commands, news });
+        let parks: Vec<Window> = stage.lanes.iter().map(|lane| lane.window.clone()).collect();
         let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
         let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
-        Ok(sum_up(about, &self.config.controllers, &prepared, &run))
+        let mut played = sum_up(about, &self.config.controllers, &prepared, &run);
+        if run.ended.ending == Ending::Completed {
+            played.astray = astray(&self.config, &parks, &self.control.live);
+        }
+        Ok(played)
+    }
+}
+
+/// The seats that told, after the last frame, that they are not at park.
+fn astray(config: &Config, windows: &[Window], live: &Live) -> Vec<String> {
+    let is_up = |lane: &usize| {
+        let window = &windows[*lane];
+        let reading = live.evidence(*lane).and_then(Evidence::reading);
+        reading.is_some_and(|(_, Reading { pose, slots, .. })| {
+            let told = window.moving().filter(|(slot, _)| slots >> slot & 1 == 1);
+            told.into_iter().any(|(slot, axis)| (pose[slot] - axis.park).abs() > PARKED)
+        })
+    };
+    (0..windows.len()).filter(is_up).map(|lane| config.controllers[lane].name.clone()).collect()
+}
+
+/// How far from park a seat may be read that was brought there, in strokes: 0.3 mm of 150.
+const PARKED: f64 = 0.002;
+
+impl PlayError {
+    fn of(unready: Unready) -> Self {
+        let Unready { moving, unsure } = unready;
+        if moving.is_empty() { Self::Unplaced(unsure) } else { Self::Moving(moving) }
     }
 }
 

@@ -1,21 +1,26 @@
-//! Before tick 0: reads where every seat stands, and brings those that are not at park, or do not tell, there by one
-//! slow frame.
+//! Before tick 0: reads where every seat stands, so that it joins from there. A seat of which not all axes tell is brought to
+//! park by one frame that is slow enough from anywhere in the stroke, and has to be acked where acks are asked for.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::belief::Taken;
 use crate::config::Controller;
 use crate::fanout::Lane;
-use crate::motion::{MAX_AXES, Pulses};
 use crate::net::{Delivery, Sender};
 use crate::plan::homing_time;
-use crate::rt::{AckLoop, Live, Phase, Sent};
+use crate::rt::{AckLoop, Live, Phase, Places, Sent};
 use crate::time::{Clock, MonoTime};
-use crate::wire::{Code, MAX_LEN, PerAxis, RegisterReply, position_reads, positions};
+use crate::wire::{MAX_LEN, position_reads};
 
-/// Tries of a position read, and how long each waits.
-const READ_TRIES: usize = 3;
-const READ_WAIT: Duration = Duration::from_millis(200);
+/// Rounds of position reads, and how long each waits for the answers. A seat is at rest where two rounds find it.
+const READ_TRIES: usize = 4;
+const READ_WAIT: Duration = Duration::from_millis(150);
+/// How often the slow frame is sent, where its ack does not come.
+const PARK_TRIES: usize = 3;
+/// How long that ack is waited for.
+const ACK_WAIT: Duration = Duration::from_millis(200);
 /// How often replies are looked for meanwhile.
 const LOOK: Duration = Duration::from_millis(2);
 /// What is waited beyond the Time of the slow frame.
@@ -44,37 +49,43 @@ pub(super) struct Preparation<'a, C> {
     pub(super) acks: &'a mut AckLoop,
     pub(super) controllers: &'a [Controller],
     pub(super) lanes: &'a mut [Lane],
+    pub(super) places: &'a mut Places,
     /// Read throughout: somebody wants the show to stop.
     pub(super) stop: &'a AtomicBool,
-    /// Told of the seats that are brought to park.
-    pub(super) live: &'a Live,
+    /// Has what the ack thread sees; told of the seats that are brought to park.
+    pub(super) live: &'a Arc<Live>,
 }
 
-/// The positions that a controller has told so far, its own axes from the first on.
-type Told = [Option<Pulses>; MAX_AXES];
+/// Why nothing can begin.
+#[derive(Debug, Default)]
+pub(super) struct Unready {
+    /// Seats that move, though no frame has left from here.
+    pub(super) moving: Vec<String>,
+    /// Seats of which it cannot be known where they are.
+    pub(super) unsure: Vec<String>,
+}
 
 impl<C: Clock> Preparation<'_, C> {
-    /// Brings every seat to its park pose, as far as it can be known.
-    pub(super) fn run(&mut self, ask: bool) -> Prepared {
-        let told = if ask { self.ask() } else { vec![Told::default(); self.lanes.len()] };
+    /// Finds out where every seat stands, and brings those to park that do not tell.
+    ///
+    /// # Errors
+    /// The seats that move already, or cannot be brought to park for certain.
+    pub(super) fn run(&mut self, ask: bool) -> Result<Prepared, Unready> {
+        if ask {
+            self.read_positions();
+        }
         let mut prepared = Prepared::nothing(self.lanes.len());
+        let moving = self.names(|this, lane| this.reading(lane).is_some_and(|(_, rests)| !rests));
         if self.stopped() {
-            return prepared;
+            return Ok(prepared);
         }
-        let mut arrival = None;
-        for (lane, told) in told.iter().enumerate() {
-            if !self.is_parked(lane, told) {
-                let time_ms = self.send_home(lane, &mut prepared);
-                self.live.on_homing(time_ms);
-                arrival =
-                    arrival.max(Some(self.clock.now() + Duration::from_millis(u64::from(time_ms)) + SETTLE));
-            }
+        if !moving.is_empty() {
+            return Err(Unready { moving, ..Unready::default() });
         }
-        if let Some(arrival) = arrival {
-            self.live.enter(Phase::Homing);
-            self.wait_until(arrival, &mut |_, _| false, &mut || false);
-        }
-        prepared
+        let untold: Vec<usize> =
+            (0..self.lanes.len()).filter(|&lane| self.reading(lane).is_none_or(|(all, _)| !all)).collect();
+        let unsure = self.park_slowly(&untold, &mut prepared);
+        if unsure.is_empty() { Ok(prepared) } else { Err(Unready { unsure, ..Unready::default() }) }
     }
 
     /// Moves nothing: only makes sure that every seat stands at its park pose.
@@ -82,107 +93,125 @@ impl<C: Clock> Preparation<'_, C> {
     /// # Errors
     /// The names of the controllers whose seat does not tell that it does.
     pub(super) fn make_sure(&mut self) -> Result<Prepared, Vec<String>> {
-        let told = self.ask();
-        let unsure = told.iter().enumerate().filter(|(lane, told)| !self.is_parked(*lane, told));
-        let unsure: Vec<_> = unsure.map(|(lane, _)| self.controllers[lane].name.clone()).collect();
+        self.read_positions();
+        let unsure = self.names(|this, lane| !this.is_at_park(lane));
         if unsure.is_empty() { Ok(Prepared::nothing(self.lanes.len())) } else { Err(unsure) }
     }
 
-    /// Reads where the seats stand, for the report as well.
-    fn ask(&mut self) -> Vec<Told> {
-        let told = self.read_positions();
-        for (lane, told) in told.iter().enumerate().filter(|(_, told)| told[0].is_some()) {
-            let known = told.iter().take_while(|place| place.is_some()).count();
-            let positions = PerAxis::from_fn(known, |axis| told[axis].unwrap_or_default());
-            self.acks.on_positions(lane, positions, self.clock.now());
-        }
-        told
+    fn names(&self, which: impl Fn(&Self, usize) -> bool) -> Vec<String> {
+        let lanes = (0..self.lanes.len()).filter(|&lane| which(self, lane));
+        lanes.map(|lane| self.controllers[lane].name.clone()).collect()
     }
 
-    fn read_positions(&mut self) -> Vec<Told> {
-        let mut told = vec![Told::default(); self.lanes.len()];
+    /// Whether a seat told of all its axes, and whether it was at rest; none where it told nothing.
+    fn reading(&self, lane: usize) -> Option<(bool, bool)> {
+        let (_, reading) = self.live.evidence(lane)?.reading()?;
+        let own = self.lanes[lane].window.own();
+        Some((reading.slots & own == own, reading.rests))
+    }
+
+    /// Whether a seat tells that it stands at park, to a pulse.
+    fn is_at_park(&self, lane: usize) -> bool {
+        let reading = self.live.evidence(lane).and_then(|evidence| evidence.reading());
+        let window = &self.lanes[lane].window;
+        reading.is_some_and(|(_, reading)| {
+            let own = window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own);
+            own.into_iter().all(|(index, slot)| {
+                let apart = slot.pulses(reading.pose[index]).0.abs_diff(slot.pulses(slot.park).0);
+                let held = (reading.pose[index] - slot.park).abs() * slot.stroke_pulses <= 1.5;
+                reading.rests && reading.slots >> index & 1 == 1 && apart <= 1 && held
+            })
+        })
+    }
+
+    /// Reads where the seats stand, twice at the least.
+    fn read_positions(&mut self) {
         for _ in 0..READ_TRIES {
-            let open: Vec<usize> =
-                (0..told.len()).filter(|&lane| !tells_all(&self.controllers[lane], &told[lane])).collect();
+            let open: Vec<usize> = (0..self.lanes.len())
+                .filter(|&lane| !self.reading(lane).is_some_and(|(_, rests)| rests))
+                .collect();
             if open.is_empty() || self.stopped() {
                 break;
             }
             for lane in open {
-                self.send_reads(lane);
-            }
-            let until = self.clock.now() + READ_WAIT;
-            self.wait_for_positions(until, &mut told);
-        }
-        told
-    }
-
-    fn send_reads(&self, lane: usize) {
-        let code = self.lanes[lane].code;
-        for read in position_reads(self.controllers[lane].seat.axes, code, code) {
-            // A read that the kernel does not take is like one that is lost: there are further tries.
-            let _ = self.sender.send(lane, read.emit(&mut [0; MAX_LEN]));
-        }
-    }
-
-    fn wait_for_positions(&mut self, until: MonoTime, told: &mut [Told]) {
-        let controllers = self.controllers;
-        let told = std::cell::RefCell::new(told);
-        let mut take = |lane: usize, octets: &[u8]| {
-            let Ok(reply) = RegisterReply::parse(octets) else { return false };
-            let Some(first) = first_axis(&reply) else { return false };
-            let dialect = controllers[lane].dialect;
-            for (axis, pulses) in positions(reply.data, dialect).iter().enumerate() {
-                if let Some(place) = told.borrow_mut()[lane].get_mut(first + axis) {
-                    *place = Some(*pulses);
+                let code = self.lanes[lane].code;
+                for read in position_reads(self.controllers[lane].seat.axes, code, code) {
+                    // A read that the kernel does not take is like one that is lost: there are further tries.
+                    let _ = self.sender.send(lane, read.emit(&mut [0; MAX_LEN]));
                 }
             }
-            true
-        };
-        let mut all = || controllers.iter().zip(told.borrow().iter()).all(|(one, told)| tells_all(one, told));
-        self.wait_until(until, &mut take, &mut all);
+            let until = self.clock.now() + READ_WAIT;
+            self.wait_until(until, |_| false);
+        }
     }
 
-    /// Whether every own axis told a position within a pulse of park. Axes past the sixth have no position register.
-    fn is_parked(&self, lane: usize, told: &Told) -> bool {
-        let seat = &self.controllers[lane].seat;
-        (0..seat.axes).all(|axis| {
-            told[axis].is_some_and(|pulses| pulses.0.abs_diff(seat.pulses(seat.park[axis]).0) <= 1)
-        })
+    /// Sends those seats to park by a frame that is slow enough from anywhere; gives the names of those that cannot be known to
+    /// get there.
+    fn park_slowly(&mut self, lanes: &[usize], prepared: &mut Prepared) -> Vec<String> {
+        let mut open = lanes.to_vec();
+        let mut unsure = Vec::new();
+        for _ in 0..PARK_TRIES {
+            let arrivals: Vec<(usize, Option<MonoTime>)> =
+                open.iter().map(|&lane| (lane, self.send_to_park(lane, prepared))).collect();
+            let refused = arrivals.iter().filter(|(_, arrival)| arrival.is_none());
+            unsure.extend(refused.map(|(lane, _)| self.controllers[*lane].name.clone()));
+            let under_way = arrivals.into_iter().filter_map(|(lane, arrival)| Some((lane, arrival?)));
+            let (sent, arrivals): (Vec<usize>, Vec<MonoTime>) = under_way.unzip();
+            let Some(arrival) = arrivals.into_iter().max() else { break };
+            self.live.enter(Phase::Homing);
+            // One that is silent altogether is no more silent after the whole way.
+            let acked = |this: &Self| sent.iter().all(|&lane| this.is_acked(lane));
+            self.wait_until((self.clock.now() + ACK_WAIT).min(arrival), acked);
+            self.wait_until(arrival, |_| false);
+            let was_heard = |lane: &usize| self.live.evidence(*lane).is_some_and(|seen| seen.version() > 0);
+            open = sent.into_iter().filter(|&lane| !self.is_acked(lane)).filter(was_heard).collect();
+            if open.is_empty() || self.stopped() {
+                return unsure;
+            }
+        }
+        unsure.extend(open.into_iter().map(|lane| self.controllers[lane].name.clone()));
+        unsure
     }
 
-    fn send_home(&mut self, lane: usize, prepared: &mut Prepared) -> u32 {
-        let stroke_mm = self.controllers[lane].seat.stroke_mm;
-        let (time_ms, hurried) = homing_time(stroke_mm);
+    /// Whether the last frame to a lane was acked, or asked for no ack.
+    fn is_acked(&self, lane: usize) -> bool {
+        let last = self.lanes[lane].last_frame();
+        let acked = self.live.evidence(lane).and_then(|evidence| evidence.acked());
+        self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(last) >= 0)
+    }
+
+    /// When it arrives; none where no Time that the controller executes is long enough.
+    fn send_to_park(&mut self, lane: usize, prepared: &mut Prepared) -> Option<MonoTime> {
+        let (time_ms, hurried) = homing_time(self.controllers[lane].seat.stroke_mm);
+        let time_ms = time_ms.min(self.lanes[lane].longest_ms);
+        let (park, at) = (self.lanes[lane].window.park(), self.clock.now());
+        if !self.places.belief(lane).allows(&park, time_ms, at) {
+            return None;
+        }
         let mut buf = [0; MAX_LEN];
         let (stamped, datagram) = self.lanes[lane].encode_homing(time_ms, &mut buf);
         let of = u16::try_from(lane).expect("fewer controllers than ports");
-        self.acks.on_sent(Sent::Posted {
-            lane: of,
-            frame: stamped.frame,
-            asked: stamped.asked,
-            at: self.clock.now(),
-        });
+        self.acks.on_sent(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at });
         if let Delivery::Failed(_) = self.sender.send(lane, datagram) {
             self.acks.on_sent(Sent::Failed { lane: of, frame: stamped.frame });
+        } else {
+            let (frame, asked) = (stamped.frame, stamped.asked);
+            self.places.taken(lane, &Taken { frame, asked, pose: &park, lasts_ms: time_ms, at });
         }
         prepared.homing[lane] += 1;
         if hurried {
             prepared.hurried.push(lane);
         }
-        time_ms
+        self.live.on_homing(time_ms);
+        Some(at + Duration::from_millis(u64::from(time_ms)) + SETTLE)
     }
 
     /// Drains replies until an instant, or until there is nothing left to wait for.
-    fn wait_until(
-        &mut self,
-        until: MonoTime,
-        take: &mut dyn FnMut(usize, &[u8]) -> bool,
-        enough: &mut dyn FnMut() -> bool,
-    ) {
+    fn wait_until(&mut self, until: MonoTime, enough: impl Fn(&Self) -> bool) {
         while self.clock.now() < until && !self.stopped() {
             self.clock.sleep_until((self.clock.now() + LOOK).min(until));
-            self.acks.drain(take);
-            if enough() {
+            self.acks.drain(&mut |_, _| false);
+            if enough(self) {
                 return;
             }
         }
@@ -191,16 +220,4 @@ impl<C: Clock> Preparation<'_, C> {
     fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
-}
-
-/// The axis, from 0, of the first position that a reply to one of our reads tells.
-fn first_axis(reply: &RegisterReply<'_>) -> Option<usize> {
-    let asked = position_reads(MAX_AXES, Code::ALL, Code::ALL);
-    let block =
-        asked.enumerate().find(|(_, read)| read.channel == reply.channel && read.start == reply.start)?.0;
-    Some(3 * block)
-}
-
-fn tells_all(controller: &Controller, told: &Told) -> bool {
-    told.iter().take(controller.seat.axes.min(6)).all(Option::is_some)
 }

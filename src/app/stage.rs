@@ -10,7 +10,7 @@ use super::run::Run;
 use crate::engine::Engine;
 use crate::fanout::Lane;
 use crate::net::{DrainGrid, Sender};
-use crate::rt::{AckLoop, Conductor, Mail, PlanLoop, Spinning, TickLoop};
+use crate::rt::{AckLoop, Conductor, Mail, Places, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate, TickGrid};
@@ -27,6 +27,8 @@ pub(super) struct Stage {
     pub(super) spin: Duration,
     pub(super) engine: Engine,
     pub(super) lanes: Vec<Lane>,
+    /// What is known of where their seats are.
+    pub(super) places: Places,
     pub(super) sender: Sender,
     pub(super) mail: Mail,
 }
@@ -44,7 +46,7 @@ impl Stage {
         attended: bool,
         control: &Control,
     ) -> io::Result<Run> {
-        let Self { silent, rate, spin, engine, lanes, sender, mut mail } = self;
+        let Self { silent, rate, spin, engine, lanes, places, sender, mut mail } = self;
         let over = Over::default();
         let granted = realtime::request();
         thread::scope(|scope| {
@@ -58,8 +60,18 @@ impl Stage {
             let clock = Spinning::new(&Monotonic, spin, period);
             let conductor = Conductor::of_a_play(origin, attended);
             let (desk, leave) = (&*control.desk, &*control.leave);
-            let mut ticks =
-                TickLoop { clock: &clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave };
+            let mut ticks = TickLoop {
+                clock: &clock,
+                grid,
+                engine,
+                conductor,
+                lanes,
+                places,
+                sink: sender,
+                mail,
+                desk,
+                leave,
+            };
             let ended = ticks.run();
             Ok(helpers.end(&ticks, ended, granted, origin))
         })

@@ -71,6 +71,7 @@ pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepar
         refusals: run.granted.refusals.clone(),
         notes: notes(controllers, prepared, run),
         silent: lost.map(|index| controllers[index].name.clone()).collect(),
+        astray: Vec::new(),
     }
 }
 

@@ -222,7 +222,8 @@ fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
 fn failed(error: PlayError) -> Failure {
     let exit = match &error {
         PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
-        PlayError::Unsure(_) => Exit::TryAgain,
+        PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
+        PlayError::Moving(_) => Exit::OtherMaster,
         _ => Exit::Internal,
     };
     Failure { exit, error: error.into() }

@@ -165,6 +165,8 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
     let exit = match error {
         PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
+        PlayError::Moving(_) => Exit::OtherMaster,
+        PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
         _ => Exit::BadCue,
     };
     let names_cue = !matches!(error, PlayError::Plan(_));

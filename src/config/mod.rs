@@ -277,6 +277,15 @@ impl Controller {
         self.window().contains(&axis)
     }
 
+    /// The place of its first own axis in its frames.
+    #[must_use]
+    pub const fn first_slot(&self) -> usize {
+        match self.fan_out {
+            FanOut::Slice => 0,
+            FanOut::Shared => self.axis_offset,
+        }
+    }
+
     /// The axes of the cue that are its own, counted from 0.
     #[must_use]
     pub fn window(&self) -> Range<usize> {

@@ -69,6 +69,8 @@ pub struct Beat {
     pub timing: Timing,
     /// The Time field.
     pub time_ms: u32,
+    /// How long the frame takes, ms: what a relative one says, and the difference to the one before of an absolute one.
+    pub lasts_ms: u32,
     /// The vibration of each of the cue's axes, in its unit.
     pub vibration: [Vibration; MAX_AXES],
     /// The effects that are on.
@@ -79,7 +81,14 @@ impl Beat {
     /// Frames without vibration and effects.
     #[must_use]
     pub fn still(timing: Timing, time_ms: u32) -> Self {
-        Self { timing, time_ms, vibration: [Vibration::default(); MAX_AXES], effects: EffectSet::Named(0) }
+        let vibration = [Vibration::default(); MAX_AXES];
+        Self { timing, time_ms, lasts_ms: time_ms, vibration, effects: EffectSet::Named(0) }
+    }
+
+    /// The same for a frame that takes so many milliseconds, whatever its Time says.
+    #[must_use]
+    pub const fn lasting(self, lasts_ms: u32) -> Self {
+        Self { lasts_ms, ..self }
     }
 }
 
@@ -172,7 +181,8 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// An engine whose lanes are in their park poses, at the levels of their windows; `course` begins at the show's start.
+    /// An engine of which nobody has told where its lanes stand, at the levels of their windows; `course` begins at the show's
+    /// start with those that are found at park ([`Engine::found`]).
     #[must_use]
     pub fn new(
         show: Show,
@@ -185,7 +195,7 @@ impl Engine {
         Self {
             greatest_level: levels.fold(headroom.greatest_level(), f64::max),
             scenes: Scenes::like(&Scene::parked(&windows)),
-            riders: windows.into_iter().map(|window| Rider::parked(window, show.rate)).collect(),
+            riders: windows.into_iter().map(|window| Rider::unseen(window, show.rate)).collect(),
             hint: Hint::default(),
             phase: first_phase(&show),
             ending: Ending::Completed,
@@ -215,12 +225,57 @@ impl Engine {
         }
     }
 
-    /// What the frame of this tick says for a lane: its pose, as fractions of each slot's stroke, and what is left of
-    /// vibration and effects. None where the lane gets none.
+    /// Whether this tick sends a lane a frame, if it sends any.
     #[must_use]
-    pub fn frame(&self, lane: usize) -> Option<(&Pose, Mix)> {
+    pub fn gets_a_frame(&self, lane: usize) -> bool {
+        self.riders[lane].gets_a_frame()
+    }
+
+    /// Where a lane's frame leads, as fractions of each slot's stroke.
+    #[must_use]
+    pub fn pose(&self, lane: usize) -> &Pose {
+        self.riders[lane].pose()
+    }
+
+    /// What a lane's frame leaves of vibration and effects.
+    #[must_use]
+    pub fn mix_of(&self, lane: usize) -> Mix {
+        self.riders[lane].mix()
+    }
+
+    /// Whether frames lead a lane, be it to rest.
+    #[must_use]
+    pub fn is_led(&self, lane: usize) -> bool {
+        self.riders[lane].is_there() && !self.sends_nothing()
+    }
+
+    /// Leads a lane of which nobody knows which frames reach it so far ahead with this tick's frame that `is_enough` of the pose
+    /// and of the milliseconds that it takes there. Says how many; none where no frame of up to `at_most` will do.
+    pub fn stretch(
+        &mut self,
+        lane: usize,
+        at_most: u32,
+        is_enough: impl Fn(&Pose, u32) -> bool,
+    ) -> Option<u32> {
+        self.riders[lane].stretch(self.frames - 1, self.show.rate, at_most, is_enough)
+    }
+
+    /// A lane that has just fallen out, and is to be looked at; each is said once.
+    pub fn take_fallen(&mut self) -> Option<usize> {
+        self.riders.iter_mut().position(Rider::take_fall)
+    }
+
+    /// Whether a lane takes part that nobody has told of where it stands.
+    #[must_use]
+    pub fn is_unseen(&self, lane: usize) -> bool {
+        self.riders[lane].part == Part::Unseen
+    }
+
+    /// The pose that a lane was sent last, or in which it was found since; none where nothing goes to it.
+    #[must_use]
+    pub fn rests_at(&self, lane: usize) -> Option<&Pose> {
         let rider = &self.riders[lane];
-        (rider.part != Part::Away).then(|| (rider.pose(), rider.mix()))
+        (rider.is_there() && self.sends_nothing()).then(|| rider.pose())
     }
 
     /// The show time of the next tick: where in the cue the lanes are.
@@ -295,8 +350,8 @@ impl Engine {
             self.look_ahead();
             return self.hold(rest, time_ms);
         }
-        let (timing, time_ms) = self.stamps.next(time_ms);
-        let mut beat = Beat::still(timing, time_ms);
+        let (timing, stamp_ms) = self.stamps.next(time_ms);
+        let mut beat = Beat::still(timing, stamp_ms).lasting(time_ms);
         if self.phase == Phase::Riding {
             // They act when the frame comes, not when its pose is reached.
             beat.vibration = self.timeline.vibration(show, &mut self.hint);
@@ -327,19 +382,22 @@ impl Engine {
         // Before the poses: one past the change of course is the new course's.
         self.take_switch(time);
         self.end_the_cue();
-        self.pose(time);
+        self.set_poses(time);
         self.come_to_rest();
         if let Phase::Closing(left) = self.phase {
             self.close(left);
         }
     }
 
-    fn pose(&mut self, time: Duration) {
+    fn set_poses(&mut self, time: Duration) {
         self.reached = self.playhead;
         let index = self.frames - 1;
         let cue = self.timeline.sample(self.reached, &mut self.hint);
-        let there = self.riders.iter_mut().enumerate().filter(|(_, rider)| rider.part != Part::Away);
+        let there = self.riders.iter_mut().enumerate().filter(|(_, rider)| rider.is_there());
         for (lane, rider) in there {
+            if rider.take_ahead() {
+                continue;
+            }
             let pose = rider.next(lane, time, &mut self.course, self.reached, &cue);
             rider.send(index, time, pose);
         }

@@ -2,6 +2,7 @@
 
 use super::wait::is_at;
 use super::{Ending, Engine, Mix, Part, Phase, Rest};
+use crate::belief::KnownPose;
 use crate::motion::Pose;
 use crate::time::{ShowTime, TRIM_MS};
 
@@ -113,28 +114,44 @@ impl Engine {
         self.riders[lane].leave();
     }
 
+    /// Nobody knows which frames reach a lane: it is brought to rest by frames that are slow enough from wherever it may be
+    /// ([`Engine::stretch`]), and then it is away, until it is found.
+    pub fn go_blind(&mut self, lane: usize) {
+        if self.sends_nothing() {
+            return self.fall_out(lane);
+        }
+        self.brake(lane);
+        self.riders[lane].go_blind();
+    }
+
     /// Nothing goes to that lane from now on.
     pub fn cut(&mut self, lane: usize) {
         self.riders[lane].cut();
     }
 
-    /// A lane's controller was read: it is at rest in that pose. One that was away is there again, and joins the others where
-    /// they follow the cue; one that rests goes on from there; one that is still being brought to rest goes on from where that ends.
-    pub fn found(&mut self, lane: usize, pose: Pose) {
+    /// The same, and it is to be looked at.
+    pub fn fall_out(&mut self, lane: usize) {
+        self.riders[lane].fall_out();
+    }
+
+    /// A lane's seat is known to be at rest in that pose, `near` of which is noise. One that was away is there again, and joins the
+    /// others where they follow the cue; one that rests goes on from there; one that is under way goes on.
+    pub fn found(&mut self, lane: usize, known: &KnownPose, near: &Pose) {
+        let is_fresh = self.frames == 0 && self.phase != Phase::Resting(Rest::Stopped);
+        let rests = self.sends_nothing() && self.switch.is_none();
         let rider = &mut self.riders[lane];
-        if rider.part == Part::Away {
-            rider.come_back(pose);
-            // Its controller's sum of Times has been broken off.
-            self.stamps.break_off();
-        } else if self.phase == Phase::Resting(Rest::Stopped) && self.switch.is_none() {
-            rider.come_back(pose);
-        } else if matches!(self.phase, Phase::Waiting | Phase::Done)
-            && !is_at(&rider.window, &pose, rider.pose())
-        {
+        let at_park = is_at(&rider.window, known.pose(), &rider.window.park(), near);
+        match rider.part {
+            // The course begins at park.
+            Part::Unseen | Part::Still if is_fresh && at_park => rider.begin_at_park(known),
+            Part::Unseen | Part::Away => {
+                rider.come_back(known);
+                // Its controller's sum of Times has been broken off.
+                self.stamps.break_off();
+            }
             // Somebody moved it, or it was homed.
-            rider.come_back(pose);
-        } else if rider.is_leaving() {
-            rider.hear_again();
+            _ if rests && !is_at(&rider.window, known.pose(), rider.pose(), near) => rider.come_back(known),
+            _ => {}
         }
     }
 

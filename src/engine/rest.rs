@@ -10,30 +10,29 @@ use crate::timeline::Hint;
 /// Hold frames of a pause, per second.
 const HOLD_HZ: f64 = 10.0;
 
-/// Which ticks of a rest send a hold frame.
+/// Which ticks of a rest send a hold frame. Each takes one period, however long it is to the next: a controller that is still
+/// busy with one keeps the frames of a join waiting, and hurries or lags from then on.
 #[derive(Debug, Clone)]
 pub(super) struct Holds {
     /// One in so many ticks of a pause.
     every: u32,
     ticks: u32,
-    /// Time since the last frame.
-    time_ms: u32,
 }
 
 impl Holds {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 100 periods")]
     pub(super) fn new(rate: Rate) -> Self {
-        Self { every: ((rate.hz() / HOLD_HZ).round() as u32).max(1), ticks: 0, time_ms: 0 }
+        Self { every: ((rate.hz() / HOLD_HZ).round() as u32).max(1), ticks: 0 }
     }
 
     /// A rest begins.
     pub(super) const fn begin(&mut self) {
-        (self.ticks, self.time_ms) = (0, 0);
+        self.ticks = 0;
     }
 
     /// A rest of which no frame tells.
     pub(super) const fn skip(&mut self) {
-        (self.ticks, self.time_ms) = (HOLD_FRAMES as u32, 0);
+        self.ticks = HOLD_FRAMES as u32;
     }
 
     /// Whether a stop has been told often enough.
@@ -41,9 +40,8 @@ impl Holds {
         self.ticks >= HOLD_FRAMES as u32
     }
 
-    /// The Time of the frame of this tick, `time_ms` after the one before; none where none is sent.
-    fn next(&mut self, rest: Rest, time_ms: u32) -> Option<u32> {
-        self.time_ms += time_ms;
+    /// Whether this tick sends one.
+    fn next(&mut self, rest: Rest) -> bool {
         let is_due = match rest {
             Rest::Late | Rest::Ended => true,
             Rest::Paused => self.ticks.is_multiple_of(self.every),
@@ -51,7 +49,7 @@ impl Holds {
         };
         self.ticks =
             if rest == Rest::Stopped { self.ticks.saturating_add(1) } else { (self.ticks + 1) % self.every };
-        is_due.then(|| std::mem::take(&mut self.time_ms))
+        is_due
     }
 }
 
@@ -108,12 +106,14 @@ impl Engine {
 
     /// What a tick at rest sends.
     pub(super) fn hold(&mut self, rest: Rest, time_ms: u32) -> Step {
-        let Some(time_ms) = self.holds.next(rest, time_ms) else { return Step::Quiet };
+        if !self.holds.next(rest) {
+            return Step::Quiet;
+        }
         if matches!(rest, Rest::Paused | Rest::Stopped) {
             self.stamps.hold();
         }
-        let (timing, time_ms) = self.stamps.next(time_ms);
-        Step::Send(Beat::still(timing, time_ms))
+        let (timing, stamp_ms) = self.stamps.next(time_ms);
+        Step::Send(Beat::still(timing, stamp_ms).lasting(time_ms))
     }
 
     /// Moves the levels on while the lanes follow the cue.
@@ -160,7 +160,7 @@ impl Engine {
     /// present motion hangs on it.
     pub(super) fn describe(&mut self, scene: &mut Scene) {
         for (rider, scene) in self.riders.iter_mut().zip(&mut scene.lanes) {
-            if rider.out || matches!(rider.part, Part::Still | Part::Away) {
+            if rider.out || !rider.is_there() || rider.part == Part::Still {
                 rider.set_level(rider.wanted.motion.min(self.greatest_level));
             }
             *scene = rider.scene();

@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
+use crate::belief::KnownPose;
 use crate::gate::{Asked, Counts, Gate, Verdict};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
@@ -25,7 +26,9 @@ pub(super) enum Part {
     Braking(Duration),
     /// Rests where it is, until a course leads on from there.
     Still,
-    /// Nothing goes to it.
+    /// Nothing goes to it: nobody has told yet where it stands.
+    Unseen,
+    /// Nothing goes to it, until it is said to be found.
     Away,
 }
 
@@ -41,8 +44,12 @@ pub(super) struct Rider {
     pub(super) out: bool,
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
-    /// Whether its controller was heard again before it was away: it stays then, and comes back from where it rests.
-    heard_again: bool,
+    /// Whether nobody knows which frames reach it: it is brought to rest by slow ones, and is away then.
+    blind: bool,
+    /// Whether it has just come to be away, and is to be looked at before it can come back.
+    fallen: bool,
+    /// Ticks for which nothing goes to it, as its last frame leads that far ahead.
+    ahead: u32,
     /// Whether it was away, and is not where the others are yet.
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
@@ -62,15 +69,18 @@ pub(super) struct Rider {
 }
 
 impl Rider {
-    /// A lane at rest in its park pose; motion at its window's level.
-    pub(super) fn parked(window: Window, rate: Rate) -> Self {
+    /// A lane of which nobody has told where it stands; motion at its window's level.
+    pub(super) fn unseen(window: Window, rate: Rate) -> Self {
         let level = window.level();
+        let nowhere = Trail::at_rest([0.0; MAX_AXES]);
         Self {
-            part: Part::With,
+            part: Part::Unseen,
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             leaving: None,
-            heard_again: false,
+            blind: false,
+            fallen: false,
+            ahead: 0,
             returning: false,
             refused: false,
             refusal_untold: false,
@@ -78,11 +88,28 @@ impl Rider {
             fader: Fader::at(level),
             on_cue: true,
             vibration: level,
-            trail: Trail::at_rest(window.park()),
-            brake: Brake::new(&window, &Trail::at_rest(window.park()).states()),
-            gate: Gate::new(&window, rate, window.park()),
+            brake: Brake::new(&window, &nowhere.states()),
+            trail: nowhere,
+            gate: Gate::new(&window, rate),
             window,
         }
+    }
+
+    /// Whether frames go to it.
+    pub(super) const fn is_there(&self) -> bool {
+        !matches!(self.part, Part::Unseen | Part::Away)
+    }
+
+    /// Whether this tick is one of those that its last frame leads ahead.
+    pub(super) const fn take_ahead(&mut self) -> bool {
+        let is_ahead = self.ahead > 0;
+        self.ahead = self.ahead.saturating_sub(1);
+        is_ahead
+    }
+
+    /// Whether a frame goes to it in this tick.
+    pub(super) const fn gets_a_frame(&self) -> bool {
+        self.is_there() && self.ahead == 0
     }
 
     /// The pose sent last.
@@ -107,47 +134,55 @@ impl Rider {
 
     /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
     pub(super) fn leave(&mut self) {
-        if self.part != Part::Away {
+        if self.is_there() {
             self.leaving.get_or_insert(HOLD_FRAMES);
-            self.heard_again = false;
         }
     }
 
-    /// Whether it is to be away, and is still being brought to rest.
-    pub(super) const fn is_leaving(&self) -> bool {
-        self.leaving.is_some()
-    }
-
-    /// It is there again before it was away: the frames that bring it to rest reach it, so that it goes on from their end.
-    pub(super) const fn hear_again(&mut self) {
-        self.heard_again = true;
+    /// Nobody knows which frames reach it; to be called after [`Rider::brake`].
+    pub(super) const fn go_blind(&mut self) {
+        self.blind = self.is_there();
     }
 
     /// Nothing goes to it from now on.
-    pub(super) fn cut(&mut self) {
-        (self.part, self.leaving, self.heard_again) = (Part::Away, None, false);
+    pub(super) const fn cut(&mut self) {
+        (self.part, self.leaving, self.blind, self.ahead) = (Part::Away, None, false, 0);
     }
 
-    /// It is there again, its moving slots at rest in that pose; the others are at park throughout.
-    pub(super) fn come_back(&mut self, found: Pose) {
-        let mut pose = self.window.park();
-        self.window.moving().for_each(|(slot, _)| pose[slot] = found[slot]);
-        self.rest_at(pose);
-        (self.part, self.leaving, self.heard_again) = (Part::Still, None, false);
+    /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
+    pub(super) const fn fall_out(&mut self) {
+        self.cut();
+        self.fallen = true;
+    }
+
+    /// Whether it has just fallen out; said once.
+    pub(super) const fn take_fall(&mut self) -> bool {
+        std::mem::replace(&mut self.fallen, false)
+    }
+
+    /// It is there (again), at rest in that pose.
+    pub(super) fn come_back(&mut self, known: &KnownPose) {
+        self.trail.rest(*known.pose());
+        self.gate.restart(known);
+        (self.part, self.leaving, self.blind, self.ahead) = (Part::Still, None, false, 0);
         (self.refused, self.returning) = (false, true);
     }
 
-    /// Frames stopped: the controller reached the last pose and stands there.
-    pub(super) fn halt(&mut self) {
-        self.rest_at(*self.pose());
-        if self.part != Part::Away {
-            self.part = Part::Still;
-        }
+    /// It is known to be where the course begins, but for what is noise: it follows that.
+    pub(super) fn begin_at_park(&mut self, known: &KnownPose) {
+        self.come_back(known);
+        self.trail.rest(self.window.park());
+        self.gate.restart_at_park(known, &self.window);
+        (self.part, self.returning) = (Part::With, false);
     }
 
-    fn rest_at(&mut self, pose: Pose) {
-        self.trail.rest(pose);
-        self.gate.restart(pose);
+    /// Frames stopped: none leads elsewhere than to the last pose, and the way goes on from there.
+    pub(super) fn halt(&mut self) {
+        self.trail.rest(*self.pose());
+        self.gate.rest();
+        if self.is_there() {
+            self.part = Part::Still;
+        }
     }
 
     /// Goes on counting what the gate has to do where another left off.
@@ -180,29 +215,65 @@ impl Rider {
         cue: &Pose,
     ) -> Pose {
         self.on_cue = self.part == Part::With && course.is_on_cue(lane, at);
-        match &mut self.part {
+        match self.part {
             Part::With => course.pose(lane, at, &self.window, cue),
-            Part::Braking(since) => {
-                *since += time;
-                let since = since.as_secs_f64();
-                if since >= self.brake.seconds() {
-                    self.part = Part::Still;
-                }
-                self.brake.pose(since)
-            }
+            Part::Braking(since) => self.brake_on(since + time),
             Part::Still => {
-                if let Some(left) = &mut self.leaving {
-                    *left -= 1;
-                    if *left == 0 && self.heard_again {
-                        self.come_back(*self.pose());
-                    } else if *left == 0 {
-                        self.cut();
-                    }
-                }
+                self.count_holds();
                 *self.pose()
             }
-            Part::Away => *self.pose(),
+            Part::Unseen | Part::Away => *self.pose(),
         }
+    }
+
+    fn brake_on(&mut self, since: Duration) -> Pose {
+        let seconds = since.as_secs_f64();
+        self.part = if seconds >= self.brake.seconds() { Part::Still } else { Part::Braking(since) };
+        self.brake.pose(seconds)
+    }
+
+    /// One more frame that holds it, or none if there have been enough.
+    fn count_holds(&mut self) {
+        if self.blind {
+            return self.fall_out(); // it was told where to rest, in a frame that took its time
+        }
+        if let Some(left) = &mut self.leaving {
+            *left -= 1;
+            if *left == 0 {
+                self.fall_out();
+            }
+        }
+    }
+
+    /// Goes on along its way to rest until `is_enough` of the pose and of the milliseconds that lead there, those of its next
+    /// frame included, of which `times` gives the Times that follow it. Says how many milliseconds that makes; none where it is
+    /// not on such a way, or it takes longer than `at_most`.
+    pub(super) fn stretch(
+        &mut self,
+        mut index: u64,
+        rate: Rate,
+        at_most: u32,
+        is_enough: impl Fn(&Pose, u32) -> bool,
+    ) -> Option<u32> {
+        let mut lasts = rate.time_ms(index);
+        if !self.blind {
+            return None;
+        }
+        while !is_enough(self.pose(), lasts) {
+            index += 1;
+            let time_ms = rate.time_ms(index);
+            lasts += time_ms;
+            if lasts > at_most {
+                return None;
+            }
+            self.ahead += 1;
+            if let Part::Braking(since) = self.part {
+                let time = Duration::from_millis(u64::from(time_ms));
+                let pose = self.brake_on(since + time);
+                self.send(index, time, pose);
+            }
+        }
+        Some(lasts)
     }
 
     /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the gate lets it pass.
@@ -224,8 +295,8 @@ impl Rider {
     pub(super) fn scene(&self) -> LaneScene {
         let place = match self.part {
             Part::With => Place::OnCourse,
-            Part::Away => Place::Away,
-            Part::Braking(_) | Part::Still if self.leaving.is_some() => Place::Away,
+            Part::Unseen | Part::Away => Place::Away,
+            Part::Braking(_) | Part::Still if self.leaving.is_some() || self.blind => Place::Away,
             Part::Braking(_) | Part::Still => Place::Still(*self.pose()),
         };
         LaneScene { place, level: self.fader.level(), out: self.wants_out() }
@@ -240,8 +311,8 @@ impl Rider {
     pub(super) fn needs_a_course(&self) -> bool {
         let apart = match self.part {
             Part::With => self.out != self.wants_out(),
-            Part::Still => self.leaving.is_none(),
-            Part::Braking(_) | Part::Away => false,
+            Part::Still => self.leaving.is_none() && !self.blind,
+            Part::Braking(_) | Part::Unseen | Part::Away => false,
         };
         apart && !self.refused
     }

@@ -3,10 +3,10 @@
 
 use super::{Engine, Part, Phase, Rest, Rider, first_phase};
 use crate::engine::Mix;
-use crate::motion::{Pose, Slot, Window};
+use crate::motion::{MAX_AXES, Pose, Window};
 
-/// A seat this near its park pose is there, pulses: positions are read in whole ones.
-const AT_PARK: f64 = 1.5;
+/// A seat this near its park pose is there, strokes: 0.1 mm of 150.
+const AT_PARK: Pose = [0.000_7; MAX_AXES];
 
 impl Engine {
     /// The same, waiting for [`Engine::go`].
@@ -17,7 +17,7 @@ impl Engine {
         self
     }
 
-    /// The same with nothing known of any lane, and at rest: nothing goes to a lane before it is found.
+    /// The same with nothing known of any lane, and at rest: nothing goes to a lane before it is said to be found.
     #[must_use]
     pub fn unknown(mut self) -> Self {
         self.riders.iter_mut().for_each(Rider::cut);
@@ -51,19 +51,14 @@ impl Engine {
         }
     }
 
-    /// Takes over where the seats are from the engine that is done: lanes to which nothing goes stay so, and those that rest
-    /// elsewhere than at park go on from there. Where the hall is not ready to play (`ready` false), it rests.
+    /// Takes over from the engine that is done: lanes to which nothing goes stay so, and the others are to be found. Where the hall
+    /// is not ready to play (`ready` false), it rests.
     pub fn take_over(&mut self, before: &Self, ready: bool) {
         self.trim_ms = before.trim_ms;
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
             rider.count_on(old);
-            match old.part {
-                Part::Away => rider.cut(),
-                Part::With | Part::Still | Part::Braking(_) => {
-                    if !is_at(&rider.window, old.pose(), rider.pose()) {
-                        rider.come_back(*old.pose());
-                    }
-                }
+            if old.part == Part::Away {
+                rider.cut();
             }
         }
         if !ready {
@@ -74,8 +69,8 @@ impl Engine {
     /// Whether a lane that frames may go to is elsewhere than at park.
     #[must_use]
     pub fn is_astray(&self) -> bool {
-        let is_up = |rider: &Rider| !is_at(&rider.window, rider.pose(), &rider.window.park());
-        self.riders.iter().any(|rider| rider.part != Part::Away && is_up(rider))
+        let is_up = |rider: &Rider| !is_at(&rider.window, rider.pose(), &rider.window.park(), &AT_PARK);
+        self.riders.iter().any(|rider| rider.is_there() && is_up(rider))
     }
 
     /// At rest, and no frame says so: the seats have not moved.
@@ -95,8 +90,7 @@ impl Engine {
     }
 }
 
-/// Whether two poses are the same as far as the window moves.
-pub(super) fn is_at(window: &Window, pose: &Pose, other: &Pose) -> bool {
-    let apart = |(index, slot): (usize, &Slot)| (pose[index] - other[index]).abs() * slot.stroke_pulses;
-    window.moving().map(apart).all(|pulses| pulses <= AT_PARK)
+/// Whether two poses are the same as far as the window moves, to so many strokes of each slot.
+pub(super) fn is_at(window: &Window, pose: &Pose, other: &Pose, near: &Pose) -> bool {
+    window.moving().all(|(slot, _)| (pose[slot] - other[slot]).abs() <= near[slot])
 }

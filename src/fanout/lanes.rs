@@ -43,6 +43,7 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         vibrates,
         wiring: wiring(config, controller, timeline),
         ack_every: manner.ack_every(config),
+        longest_ms: controller.seat.max_interval_ms,
         next_frame: FrameNo::FIRST,
     }
 }
@@ -52,7 +53,8 @@ fn slice(controller: &Controller, slots: usize, timeline: &Timeline, level: f64)
     let own_slot = |index: usize| {
         let axis = controller.axis_offset + index;
         let own = (index < controller.seat.axes && axis < timeline.axes()).then_some(axis);
-        slot(&controller.seat, index, own, timeline, level)
+        let slot = slot(&controller.seat, index, own, timeline, level);
+        if index < controller.seat.axes { slot } else { slot.of_others() }
     };
     Window::new((0..slots).map(own_slot).collect())
 }
@@ -65,7 +67,8 @@ fn shared(config: &Config, controller: &Controller, slots: usize, timeline: &Tim
             if controller.takes(axis) { Some(controller) } else { config.controllers.iter().find(takes) };
         let taker = taker.unwrap_or(controller);
         let own = (axis < timeline.axes()).then_some(axis);
-        slot(&taker.seat, axis.saturating_sub(taker.axis_offset), own, timeline, level)
+        let slot = slot(&taker.seat, axis.saturating_sub(taker.axis_offset), own, timeline, level);
+        if controller.takes(axis) { slot } else { slot.of_others() }
     };
     Window::new((0..slots).map(any_slot).collect())
 }

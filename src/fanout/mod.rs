@@ -49,6 +49,8 @@ pub struct Lane {
     pub wiring: Wiring,
     /// Asks for a reply in each so-manieth frame; 0 never asks.
     pub ack_every: u32,
+    /// The longest Time that its controller executes as it is, ms (PA0b).
+    pub longest_ms: u32,
     next_frame: FrameNo,
 }
 

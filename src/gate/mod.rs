@@ -26,7 +26,8 @@ use limits::{AxisLimits, Next, SLACK};
 use outlook::Outlook;
 use times::Times;
 
-use crate::motion::{Pose, Spacing, Window};
+use crate::belief::KnownPose;
+use crate::motion::{MAX_AXES, Pose, Spacing, Window};
 use crate::time::Rate;
 
 /// What became of a pose.
@@ -58,6 +59,8 @@ pub struct Gate {
     times: Times,
     /// Whether every axis is sent what is asked.
     following: bool,
+    /// Whether it was told where the lane stands.
+    is_seeded: bool,
     counter: Counter,
 }
 
@@ -73,13 +76,13 @@ struct Frame {
 }
 
 impl Gate {
-    /// The gate of a lane at rest in `pose`, as fractions of each slot's stroke.
+    /// The gate of a lane. It lets nothing pass before it is told where the lane stands ([`Self::restart`]).
     #[must_use]
-    pub fn new(window: &Window, rate: Rate, pose: Pose) -> Self {
+    pub fn new(window: &Window, rate: Rate) -> Self {
         let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
         let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, times.period()));
         let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
-        let pose = held_inside(pose);
+        let pose = [0.0; MAX_AXES];
         Self {
             calm: Calm::new(
                 axes.iter().map(|axis| &axis.limits),
@@ -90,18 +93,30 @@ impl Gate {
             axes,
             history: History::new(spacing, pose, times.usual_ms()),
             times,
-            following: true,
+            following: false,
+            is_seeded: false,
             counter: Counter::default(),
         }
     }
 
-    /// Tells that frames stopped for long: the controller reached the last pose and stands there.
+    /// Tells that frames stopped for long: what comes next goes on from the last pose.
     pub fn rest(&mut self) {
-        self.restart(*self.history.last());
+        self.rest_in(*self.history.last());
     }
 
-    /// Tells that the lane has stood in `pose` for long, wherever it was before.
-    pub fn restart(&mut self, pose: Pose) {
+    /// Tells that the lane is known to have stood in that pose for long, wherever it was before.
+    pub fn restart(&mut self, known: &KnownPose) {
+        self.is_seeded = true;
+        self.rest_in(*known.pose());
+    }
+
+    /// The same for a lane that is known to stand in its park pose, but for what is noise.
+    pub fn restart_at_park(&mut self, known: &KnownPose, window: &Window) {
+        self.restart(known);
+        self.rest_in(window.park());
+    }
+
+    fn rest_in(&mut self, pose: Pose) {
         let pose = held_inside(pose);
         self.history.rest(pose, self.times.usual_ms());
         self.calm.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
@@ -170,6 +185,10 @@ impl Gate {
     #[cold]
     #[inline(never)]
     fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32, asked: Asked) -> Verdict {
+        if !self.is_seeded {
+            *pose = *self.history.last();
+            return Verdict::Fault;
+        }
         let frame = &self.frame(index, time_ms);
         let (mut refused, mut held) = (false, false);
         for (axis, position) in pose.iter_mut().enumerate().take(self.axes.len()) {

@@ -12,6 +12,8 @@ struct Findings {
     silent: Option<Why>,
     poor: Option<Why>,
     moved: Option<Why>,
+    unsure: Option<Why>,
+    outside: Option<Why>,
     unseen: bool,
 }
 
@@ -24,10 +26,10 @@ impl Health {
         }
         let before = *place;
         let (standing, why) = before.after(findings, self.watched, now);
+        (place.standing, place.why) = (standing, why);
         if standing == before.standing {
             return;
         }
-        (place.standing, place.why) = (standing, why);
         self.settle(group, before.standing, standing);
         on(Notice::Group(Change { group, at: now, from: before.standing, to: standing, why }));
         if let (Standing::Excluded, Some(controller)) = (standing, why.controller()) {
@@ -50,6 +52,9 @@ impl Health {
             found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
             found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
             found.moved = found.moved.or(when(member.moved, Why::Moved(controller)));
+            found.unsure = found.unsure.or(when(member.unsure, Why::Unsure(controller)));
+            let outside = |(axis, pulses)| Why::Outside { controller, axis, pulses };
+            found.outside = found.outside.or(member.outside.map(outside));
             found.unseen |= !member.is_seen(now);
         }
         found
@@ -137,9 +142,15 @@ impl Place {
             (Standing::Stopped | Standing::Error, _) => same,
             (_, Findings { outcast: Some(why), .. }) => (Standing::Excluded, why),
             (Standing::Excluded, _) => (Standing::Lost, Why::NotSeenYet),
+            (_, Findings { outside: Some(why), .. }) => (Standing::Lost, why),
+            (Standing::Lost, _) if matches!(self.why, Why::Outside { .. }) => {
+                (Standing::Lost, Why::NotSeenYet)
+            }
             (Standing::Lost, Findings { unseen: false, .. }) => (Standing::Rejoining, self.why.once_seen()),
             (Standing::Lost | Standing::Unwatched, _) => same,
-            (_, Findings { moved: Some(why), .. }) => (Standing::Lost, why),
+            (_, Findings { moved: Some(why), .. } | Findings { unsure: Some(why), .. }) => {
+                (Standing::Lost, why)
+            }
             (_, Findings { silent: Some(why), .. }) if watched => (Standing::Lost, why),
             (Standing::Rejoining, _) => same,
             (_, Findings { poor: Some(why), .. }) => (Standing::Degraded, why),

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::Why;
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::window::Window;
-use crate::motion::MAX_AXES;
+use crate::motion::{MAX_AXES, Pulses};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
@@ -62,6 +62,10 @@ pub(super) struct Member {
     pub(super) ailed: Option<Why>,
     /// Its seat was found elsewhere than frames left it.
     pub(super) moved: bool,
+    /// Nobody knows where its frames have led it.
+    pub(super) unsure: bool,
+    /// The axis, from 0, that told a position outside of its stroke, and which.
+    pub(super) outside: Option<(usize, Pulses)>,
     /// Another master was found, and nobody was told yet.
     crowd_untold: bool,
 }
@@ -94,6 +98,8 @@ impl Member {
             refusing: false,
             ailed: None,
             moved: false,
+            unsure: false,
+            outside: None,
             crowd_untold: false,
         }
     }
@@ -227,6 +233,16 @@ impl Member {
         std::mem::replace(&mut self.crowd_untold, false)
     }
 
+    /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
+    pub(super) const fn on_fell_out(&mut self) {
+        (self.unsure, self.seen, self.reading) = (true, None, false);
+    }
+
+    /// Not all of its axes tell where they are.
+    pub(super) fn on_unread(&mut self) {
+        self.outcast.get_or_insert(Why::Unread(self.controller));
+    }
+
     /// It was homed: its position is known, and what it counts from here on is the new measure.
     pub(super) const fn on_homed(&mut self) {
         self.outcast = None;
@@ -275,7 +291,7 @@ impl Member {
     /// Whatever was on its way, or was seen, does not count from here on.
     pub(super) fn forget(&mut self) {
         self.seen = None;
-        self.moved = false;
+        (self.moved, self.unsure) = (false, false);
         self.reading = false;
         self.next_read = None;
         self.rest();

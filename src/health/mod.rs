@@ -24,6 +24,7 @@ pub use standing::{Change, Notice, Standing, Why};
 pub use words::ACKS_OFF;
 
 use crate::config::LossPolicy;
+use crate::motion::Pulses;
 use crate::observe;
 use crate::state::{self, Demand};
 use crate::time::MonoTime;
@@ -151,6 +152,22 @@ impl Health {
     /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
     pub fn on_moved(&mut self, controller: usize) {
         self.members[controller].moved = true;
+    }
+
+    /// It is not known where the frames to a controller have led its seat, and none goes there any more: its group is out until it was
+    /// looked at.
+    pub fn on_fell_out(&mut self, controller: usize) {
+        self.members[controller].on_fell_out();
+    }
+
+    /// A seat was found, but not all of its axes tell where they are: its group is out until it was homed.
+    pub fn on_unread(&mut self, controller: usize) {
+        self.members[controller].on_unread();
+    }
+
+    /// An axis, from 0, says that it is outside of its stroke, and where; none once all are inside. That is no position.
+    pub fn on_outside(&mut self, controller: usize, outside: Option<(usize, Pulses)>) {
+        self.members[controller].outside = outside;
     }
 
     /// A controller is home; a person homes one only while the hall is paused or parked. Where that was all its group was

@@ -1,5 +1,6 @@
 //! How a group of controllers stands, why, and what follows from it.
 
+use crate::motion::Pulses;
 use crate::state;
 use crate::time::MonoTime;
 
@@ -55,6 +56,19 @@ pub enum Why {
     SeenAgain,
     /// This controller's seat is elsewhere than frames left it.
     Moved(usize),
+    /// It is not known where the frames to this controller have led its seat.
+    Unsure(usize),
+    /// Not all axes of this controller tell where they are.
+    Unread(usize),
+    /// An axis of this controller, from 0, says that it is outside of its stroke.
+    Outside {
+        /// Which controller.
+        controller: usize,
+        /// Which axis.
+        axis: usize,
+        /// Where.
+        pulses: Pulses,
+    },
     /// An emergency stop at this controller.
     EmergencyStop(usize),
     /// This controller has an error.
@@ -95,6 +109,9 @@ impl Why {
             Self::AcksMissing(controller)
             | Self::Silent(controller)
             | Self::Moved(controller)
+            | Self::Unsure(controller)
+            | Self::Unread(controller)
+            | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)
             | Self::Error { controller, .. }
             | Self::Drive { controller, .. }

@@ -67,6 +67,18 @@ impl fmt::Display for Why {
             Self::NotSeenYet => "no answer yet",
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
+            Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
+            Self::Unread(_) => {
+                "not all of its axes tell where they are: those past the sixth have no register"
+            }
+            Self::Outside { axis, pulses, .. } => {
+                return write!(
+                    f,
+                    "its axis {} says that it is at {} pulses, outside of its stroke: wrong word order (dialect), or not home",
+                    axis + 1,
+                    pulses.0
+                );
+            }
             Self::EmergencyStop(_) => "emergency stop",
             Self::Error { error, .. } => return write!(f, "{}", crate::wire::DeviceError(*error)),
             Self::Drive { axis, error, .. } => return write!(f, "drive of axis {axis}: error {error}"),

@@ -8,7 +8,7 @@ const FACTORY_RPM: u32 = 3_000;
 pub const FACTORY_INTERVAL_MS: u32 = 3_000;
 
 /// A motor position as the controller counts it: whole pulses from the lower end of the stroke.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Pulses(pub i32);
 
 /// Geometry and limits of a seat's axes; every axis of one controller has the same.

@@ -28,8 +28,10 @@ impl Limits {
 /// One position of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slot {
-    /// The axis of the cue it carries, counted from 0; none where the slot rests at park throughout.
+    /// The axis of the cue it carries, counted from 0; none where the cue has nothing for it: it is led to park then.
     pub axis: Option<usize>,
+    /// Whether the lane's own seat has such an axis: what is sent in the slot moves it.
+    pub is_own: bool,
     /// Cue unit to fraction of this slot's stroke.
     pub to_stroke: f64,
     /// Where it rests, fraction of the stroke.
@@ -54,6 +56,7 @@ impl Slot {
     pub fn new(seat: &SeatType, seat_axis: usize, axis: Option<usize>, to_stroke: f64) -> Self {
         Self {
             axis,
+            is_own: true,
             to_stroke,
             park: seat.park.get(seat_axis).copied().unwrap_or(0.0),
             neutral: seat.neutral.get(seat_axis).copied().unwrap_or(0.0),
@@ -63,6 +66,12 @@ impl Slot {
             limits: Limits::of(seat),
             reach: (0.0, 1.0),
         }
+    }
+
+    /// The same slot of a lane whose seat has no such axis: padding of the frame, or another controller's.
+    #[must_use]
+    pub const fn of_others(self) -> Self {
+        Self { is_own: false, ..self }
     }
 
     /// The same slot with motion at `level`, 0 to 1.
@@ -136,9 +145,16 @@ impl Window {
         &self.slots
     }
 
-    /// The slots that follow the cue, with their place in the frame.
+    /// The slots that the lane's seat has, a bit each.
+    #[must_use]
+    pub fn own(&self) -> u16 {
+        self.slots.iter().rev().fold(0, |own, slot| own << 1 | u16::from(slot.is_own))
+    }
+
+    /// The slots that are led somewhere, with their place in the frame: those that follow the cue, and those of the seat that have
+    /// to be at park while others follow it. What is left rests at park throughout, and moves nothing.
     pub fn moving(&self) -> impl Iterator<Item = (usize, &Slot)> {
-        self.slots.iter().enumerate().filter(|(_, slot)| slot.axis.is_some())
+        self.slots.iter().enumerate().filter(|(_, slot)| slot.axis.is_some() || slot.is_own)
     }
 
     /// Holds every slot at its park pose: whatever it is asked for from now on, it is sent there and nowhere else.

@@ -13,7 +13,7 @@ use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply, PerAxis};
+use crate::wire::{FrameNo, MotionReply, PerAxis, ReplyCode};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
@@ -72,7 +72,7 @@ pub struct AckLoop {
     last_sent: MonoTime,
     /// Who judges how the controllers stand.
     watch: Option<Watch>,
-    /// Whom to tell the times so far.
+    /// Whom to tell which frames were acked, and the times so far.
     live: Option<Arc<Live>>,
 }
 
@@ -105,7 +105,7 @@ impl AckLoop {
         acks
     }
 
-    /// Tells `live` the times so far, again and again while it runs.
+    /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);
     }
@@ -166,7 +166,7 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, watch, .. } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, live } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
@@ -180,7 +180,7 @@ impl AckLoop {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
                     let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
-                    let mut records = Records { sent, last_sent, watch };
+                    let mut records = Records { sent, last_sent, watch, live };
                     books.on_reply(reply, &mut records);
                 }
                 Err(_) if observer.hear(controller, octets, at) => {}
@@ -190,7 +190,7 @@ impl AckLoop {
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
-        books.settle(began, &mut Records { sent, last_sent, watch });
+        books.settle(began, &mut Records { sent, last_sent, watch, live });
         for controller in 0..receiver.lanes() {
             let closed = receiver.port_closed(controller);
             books.tracker_mut().on_port_closed(controller, closed);
@@ -239,6 +239,7 @@ struct Records<'a> {
     sent: &'a mut Consumer<Sent>,
     last_sent: &'a mut MonoTime,
     watch: &'a mut Option<Watch>,
+    live: &'a Option<Arc<Live>>,
 }
 
 impl Ledger for Records<'_> {
@@ -252,6 +253,12 @@ impl Ledger for Records<'_> {
     }
 
     fn on_fate(&mut self, reply: &Reply, fate: Fate) {
+        // One that was refused leads nowhere.
+        if let (Some(live), Fate::Answered(ReplyCode::Running)) = (self.live, fate)
+            && let Some(evidence) = live.evidence(reply.controller)
+        {
+            evidence.on_ack(reply.frame);
+        }
         if let Some(watch) = self.watch {
             watch.on_fate(reply, fate);
         }
@@ -265,6 +272,6 @@ fn record(sent: Sent, tracker: &mut Tracker, last_sent: &mut MonoTime) {
             *last_sent = at.max(*last_sent);
         }
         Sent::Failed { lane, frame } => tracker.on_send_failed(usize::from(lane), frame),
-        Sent::Joined { .. } => {}
+        Sent::Joined { .. } | Sent::FellOut { .. } | Sent::Unread { .. } => {}
     }
 }

@@ -93,7 +93,8 @@ impl Conductor {
             Alarm::Event(event) => self.machine.event(event, now),
             Alarm::Leave(lane) => engine.leave(usize::from(lane)),
             Alarm::Cut(lane) => engine.cut(usize::from(lane)),
-            Alarm::Found(lane, pose) => engine.found(usize::from(lane), pose),
+            // Where it was found is looked up by whoever knows what the lane was sent.
+            Alarm::Found(_) => {}
         }
         self.steer(engine);
     }

@@ -14,8 +14,6 @@ use crate::wire::{
 
 /// From one beat to the next.
 const EVERY: Duration = Duration::from_millis(250);
-/// So many answers in a row have to find a seat away from where it rests: the first may come on the heels of the last frames.
-const SURE_AFTER: u8 = 2;
 
 /// Who beats, and when next.
 #[derive(Debug)]
@@ -27,15 +25,11 @@ pub(super) struct Beats {
 }
 
 /// What has to be known of a controller to beat.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 struct Heart {
     code: Code,
     dialect: Dialect,
     axes: usize,
-    /// Where its axes stand, as far as it was asked since it rests.
-    places: [Option<Pulses>; DP_POSITIONS.len()],
-    /// Answers in a row that found it away from where it rests.
-    away: u8,
 }
 
 impl Beats {
@@ -44,8 +38,6 @@ impl Beats {
             code: lane.code,
             dialect: one.dialect,
             axes: one.seat.axes.min(DP_POSITIONS.len()),
-            places: [None; DP_POSITIONS.len()],
-            away: 0,
         };
         Self {
             next: MonoTime::default(),
@@ -64,14 +56,6 @@ impl Beats {
         due
     }
 
-    /// Seats move, or are worked on: where they stood says nothing any more.
-    pub(super) fn forget(&mut self) {
-        for heart in &mut self.hearts {
-            heart.places = [None; DP_POSITIONS.len()];
-            heart.away = 0;
-        }
-    }
-
     /// Asks a controller; says whether the kernel took it.
     pub(super) fn send(&self, controller: usize, sender: &Sender) -> bool {
         let Heart { code, axes, .. } = self.hearts[controller];
@@ -82,33 +66,16 @@ impl Beats {
         })
     }
 
-    /// Where the axes stand, from the first one on, as far as it is known with this answer to a beat; none where it is none.
-    pub(super) fn hear(&mut self, controller: usize, octets: &[u8]) -> Option<PerAxis<Pulses>> {
-        let heart = &mut self.hearts[controller];
+    /// Which axes an answer to a beat tells of, the first of them counted from 0, and where they are; none where it is none.
+    pub(super) fn hear(&mut self, controller: usize, octets: &[u8]) -> Option<(usize, PerAxis<Pulses>)> {
+        let Heart { axes, code, dialect } = self.hearts[controller];
         let reply = RegisterReply::parse(octets).ok()?;
-        let mut reads = position_reads(heart.axes, heart.code, heart.code);
+        let mut reads = position_reads(axes, code, code);
         let is_ours = reply.access == Access::Read
             && reply.channel == 0
             && reads.any(|read| (read.start, read.num) == (reply.start, reply.num));
         let first = DP_POSITIONS.iter().position(|register| is_ours && *register == reply.start)?;
-        for (place, pulses) in
-            heart.places[first..].iter_mut().zip(positions(reply.data, heart.dialect).iter())
-        {
-            *place = Some(*pulses);
-        }
-        let known = heart.places.iter().take_while(|place| place.is_some()).count();
-        Some(PerAxis::from_fn(known, |axis| heart.places[axis].unwrap_or_default()))
-    }
-
-    /// Notes whether a seat stands where it rests, by an answer that was just heard; says whether it is surely elsewhere, once.
-    pub(super) fn is_away(
-        &mut self,
-        controller: usize,
-        rests: impl FnOnce(&[Option<Pulses>]) -> bool,
-    ) -> bool {
-        let heart = &mut self.hearts[controller];
-        heart.away = if rests(&heart.places) { 0 } else { heart.away.saturating_add(1) };
-        heart.away == SURE_AFTER
+        Some((first, positions(reply.data, dialect)))
     }
 }
 
@@ -117,43 +84,27 @@ mod tests {
     use super::*;
     use crate::wire::{ReplyCode, Words, position_words};
 
-    fn beats(axes: usize) -> Beats {
-        let heart =
-            Heart { code: Code(1), dialect: Dialect::Smc, axes, places: [None; DP_POSITIONS.len()], away: 0 };
-        Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] }
-    }
-
-    /// Hears that three axes from `first` on stand there, and says what is known then.
-    fn hear(beats: &mut Beats, first: usize, stand: [i32; 3]) -> Option<Vec<i32>> {
-        let words: Vec<u16> = stand.iter().flat_map(|at| position_words(Pulses(*at), Dialect::Smc)).collect();
-        let reply = RegisterReply {
-            access: Access::Read,
-            code: ReplyCode::Running,
-            channel: 0,
-            error: 0,
-            start: DP_POSITIONS[first],
-            num: 6,
-            data: Words::from(&words[..]),
+    #[test]
+    fn an_answer_to_a_beat_tells_of_three_axes_and_no_other_answer_is_one() {
+        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 6 };
+        let mut beats = Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] };
+        let mut hear = |start, stand: [i32; 3]| {
+            let words: Vec<u16> =
+                stand.iter().flat_map(|at| position_words(Pulses(*at), Dialect::Smc)).collect();
+            let reply = RegisterReply {
+                access: Access::Read,
+                code: ReplyCode::Running,
+                channel: 0,
+                error: 0,
+                start,
+                num: 6,
+                data: Words::from(&words[..]),
+            };
+            let (first, told) = beats.hear(0, reply.emit(&mut [0; MAX_LEN]))?;
+            Some((first, told.iter().map(|pulses| pulses.0).collect::<Vec<_>>()))
         };
-        let known = beats.hear(0, reply.emit(&mut [0; MAX_LEN]))?;
-        Some(known.iter().map(|pulses| pulses.0).collect())
-    }
-
-    #[test]
-    fn what_two_beats_tell_of_six_axes_is_put_together() {
-        let mut beats = beats(6);
-        assert_eq!(hear(&mut beats, 3, [4, 5, 6]), Some(vec![]), "nothing is known of the first yet");
-        assert_eq!(hear(&mut beats, 0, [1, 2, 3]), Some(vec![1, 2, 3, 4, 5, 6]));
-        beats.forget();
-        assert_eq!(hear(&mut beats, 0, [1, 2, 3]), Some(vec![1, 2, 3]));
-        assert_eq!(hear(&mut beats, 1, [1, 2, 3]), None, "nobody asks so");
-    }
-
-    #[test]
-    fn a_seat_is_away_once_two_answers_in_a_row_say_so() {
-        let mut beats = beats(3);
-        let said = [true, false, true, false, false, false, true, false, false];
-        let surely = said.map(|rests| beats.is_away(0, |_| rests));
-        assert_eq!(surely, [false, false, false, false, true, false, false, false, true]);
+        assert_eq!(hear(DP_POSITIONS[3], [4, 5, 6]), Some((3, vec![4, 5, 6])));
+        assert_eq!(hear(DP_POSITIONS[0], [1, 2, 3]), Some((0, vec![1, 2, 3])));
+        assert_eq!(hear(DP_POSITIONS[1], [1, 2, 3]), None, "nobody asks so");
     }
 }

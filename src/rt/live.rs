@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::TickReport;
 use super::table::Row;
+use crate::belief::Evidence;
 use crate::state::{Ride, State};
 use crate::time::ShowTime;
 use crate::tracker::{Histogram, histogram};
@@ -99,16 +100,28 @@ pub struct Live {
     beats: AtomicU64,
     closed: AtomicBool,
     moving: AtomicBool,
-    /// How often the last gate held each lane back; empty where nobody wants to know.
+    /// How often the last gate held each lane back.
     clamps: Box<[AtomicU64]>,
+    /// What the ack thread has seen of each lane.
+    evidence: Box<[Evidence]>,
     table: Mutex<Vec<Row>>,
 }
 
 impl Live {
-    /// One that tells as well how often the last gate held back each of so many lanes.
+    /// That of a play of so many lanes.
     #[must_use]
-    pub fn with_clamps(lanes: usize) -> Self {
-        Self { clamps: (0..lanes).map(|_| AtomicU64::new(0)).collect(), ..Self::default() }
+    pub fn new(lanes: usize) -> Self {
+        Self {
+            clamps: (0..lanes).map(|_| AtomicU64::new(0)).collect(),
+            evidence: (0..lanes).map(|_| Evidence::default()).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// What the ack thread has seen of a lane; none where there is no such lane.
+    #[must_use]
+    pub fn evidence(&self, lane: usize) -> Option<&Evidence> {
+        self.evidence.get(lane)
     }
 
     /// How often the last gate held a lane back since the program started; 0 where that is not told.

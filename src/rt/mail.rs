@@ -6,9 +6,9 @@ use std::thread::Thread;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::live::Live;
+use crate::belief::Evidence;
 use crate::engine::{Engine, Unplanned};
 use crate::fanout::Lane;
-use crate::motion::Pose;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
 use crate::state::{Cause, Event, Next, Refusal, Request, State};
 use crate::time::{MonoTime, Rate, ShowTime};
@@ -47,6 +47,16 @@ pub enum Sent {
     },
     /// A lane that was away is where the others are again.
     Joined {
+        /// The controller.
+        lane: u16,
+    },
+    /// Nothing goes to a lane any more, as it is not known where its seat is; it is to be looked at.
+    FellOut {
+        /// The controller.
+        lane: u16,
+    },
+    /// A seat was found, but not all of its axes tell where they are: it has to be homed.
+    Unread {
         /// The controller.
         lane: u16,
     },
@@ -127,8 +137,8 @@ pub enum Alarm {
     Leave(u16),
     /// Nothing goes to that lane from now on.
     Cut(u16),
-    /// A controller was read: its seat is at rest in that pose, fractions of each slot's stroke.
-    Found(u16, Pose),
+    /// A controller takes part again: where its seat was read at rest stands in [`crate::belief::Evidence`].
+    Found(u16),
 }
 
 /// What the tick thread makes known.
@@ -250,6 +260,11 @@ impl Mail {
 
     pub(super) fn answer(&mut self) -> Option<Answer> {
         self.answers.pop().ok()
+    }
+
+    /// What the ack thread has seen of a lane; none where nobody tells.
+    pub(super) fn evidence(&self, lane: usize) -> Option<&Evidence> {
+        self.live.evidence(lane)
     }
 
     /// Notes how often the last gate held a lane back.

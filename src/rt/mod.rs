@@ -10,7 +10,9 @@ mod idle;
 mod line;
 mod live;
 mod mail;
+mod places;
 mod planning;
+mod positions;
 mod sight;
 mod spin;
 mod standby;
@@ -25,6 +27,7 @@ pub use live::{Live, Phase, Times};
 pub use mail::{
     Alarm, Answer, Command, Loaded, Mail, MailEnds, News, Planning, Sent, Task, TickReport, mailboxes,
 };
+pub use places::Places;
 pub use planning::PlanLoop;
 pub use spin::{Spinning, Spun};
 pub use standby::{Order, Standby};
@@ -33,8 +36,9 @@ pub use watch::Watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::belief::Taken;
 use crate::engine::{Beat, Ending, Engine, Step};
-use crate::fanout::Lane;
+use crate::fanout::{Lane, Stamped};
 use crate::net::{Delivery, Sender};
 use crate::state::{Refusal, State};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
@@ -91,6 +95,8 @@ pub struct TickLoop<'a, C, S> {
     pub conductor: Conductor,
     /// The lanes, in the order of the sink's.
     pub lanes: Vec<Lane>,
+    /// What is known of their seats.
+    pub places: Places,
     /// Where frames go.
     pub sink: S,
     /// Its ends of the mailboxes.
@@ -117,6 +123,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let now = self.clock.now();
         let tick = self.grid.take(now);
         self.take_mail(now);
+        let moving = self.conductor.machine().may_send_motion();
+        self.places.look(&mut self.engine, &self.mail, now, moving);
         let step = self.engine.tick(tick.missed);
         match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
@@ -137,7 +145,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
     /// them.
     fn take_mail(&mut self, now: MonoTime) {
-        let Self { conductor, engine, lanes, mail, desk, .. } = self;
+        let Self { conductor, engine, lanes, places, mail, desk, .. } = self;
         if desk.take_stop() {
             conductor.stop(engine, now);
         }
@@ -148,6 +156,9 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         engine.trim(desk.trim_ms());
         for _ in 0..ALARMS_PER_TICK {
             let Some(alarm) = mail.alarm() else { break };
+            if let Alarm::Found(lane) = alarm {
+                places.find(usize::from(lane), engine, mail, now);
+            }
             conductor.alarm(alarm, engine, now);
         }
         for _ in 0..COMMANDS_PER_TICK {
@@ -179,18 +190,25 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     fn send(&mut self, tick: Tick, beat: &Beat) {
         let mut buf = [0; MAX_LEN];
         let mut first = None;
-        for (index, lane) in self.lanes.iter_mut().enumerate() {
-            let Some((pose, mix)) = self.engine.frame(index) else { continue };
-            let (stamped, datagram) = lane.encode(beat, pose, mix, &mut buf);
-            let at = self.clock.now();
-            first.get_or_insert(at);
-            let of = u16::try_from(index).expect("fewer controllers than ports");
-            // Posted before it is sent: a reply can overtake what is posted after.
-            self.mail.post(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at });
-            if let Delivery::Failed(_) = self.sink.send(index, datagram) {
-                self.mail.post(Sent::Failed { lane: of, frame: stamped.frame });
+        let Self { lanes, places, engine, mail, sink, clock, .. } = self;
+        for (index, lane) in lanes.iter_mut().enumerate() {
+            if !engine.gets_a_frame(index) {
+                continue;
             }
-            self.mail.clamps(index, self.engine.clamps(index).clamps);
+            let at = clock.now();
+            let Some(beat) = places.admit(index, engine, beat, at) else { continue };
+            let pose = engine.pose(index);
+            let (Stamped { frame, asked }, datagram) =
+                lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
+            first.get_or_insert(at);
+            // Posted before it is sent: a reply can overtake what is posted after.
+            mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
+            let delivery = sink.send(index, datagram);
+            places.sent(index, &Taken { frame, asked, pose, lasts_ms: beat.lasts_ms, at }, delivery);
+            if let Delivery::Failed(_) = delivery {
+                mail.post(Sent::Failed { lane: places::number(index), frame });
+            }
+            mail.clamps(index, engine.clamps(index).clamps);
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
         let report = TickReport { late_ns, missed: tick.missed, show: self.engine.film() };
@@ -209,8 +227,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             self.mail.task(Task::Plan(request));
         }
         while let Some(lane) = self.engine.take_joined() {
-            let lane = u16::try_from(lane).expect("fewer controllers than ports");
-            self.mail.post(Sent::Joined { lane });
+            self.mail.post(Sent::Joined { lane: places::number(lane) });
+        }
+        while let Some(lane) = self.engine.take_fallen() {
+            self.mail.post(Sent::FellOut { lane: places::number(lane) });
         }
         while let Some(course) = self.engine.take_retired() {
             self.mail.task(Task::Retire(course));

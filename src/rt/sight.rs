@@ -1,19 +1,16 @@
 //! Looking at a controller while a show runs: the registers that tell what it is, whether it has rebooted, and where its
 //! seat stands. Ack thread; allocates nothing.
 
-use std::ops::RangeInclusive;
 use std::sync::Arc;
-use std::time::Duration;
 
-use crate::config::{Controller, FanOut};
+use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Identity, Sighting};
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::net::{Delivery, Sender};
-use crate::time::MonoTime;
 use crate::wire::{
-    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, position_reads,
-    positions,
+    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, ReadRequest, RegisterReply, ReplyCode,
+    position_reads, positions,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -28,10 +25,6 @@ const RESET: u16 = 0xf0;
 const RESET_DONE: u16 = 2;
 /// How far from where it rests a seat has to be found to have been moved, in strokes: 0.3 mm of 150.
 const NEAR: f64 = 0.002;
-/// How far apart two answers may see a seat at rest, in strokes.
-const STILL: f64 = 0.001;
-/// How long after each other they come: looks are 200 ms apart.
-const REST: RangeInclusive<Duration> = Duration::from_millis(100)..=Duration::from_secs(1);
 /// DPFE and DPFF: versions.
 const VERSIONS: (u16, u16) = (0xfe, 2);
 
@@ -43,11 +36,10 @@ pub(super) struct Looker {
     seat: Arc<SeatType>,
     /// The place of its first own axis in a frame.
     first_slot: usize,
-    /// What it was seen in last, and when.
-    before: Option<(Pose, MonoTime)>,
-    /// Where the slots of a frame rest that are not its own.
     park: Pose,
     seen: Seen,
+    /// The positions of the last answer, from which axis on, until they are taken.
+    told: Option<(usize, PerAxis<Pulses>)>,
 }
 
 /// What it has told since it was asked last.
@@ -58,7 +50,8 @@ struct Seen {
     versions: Option<(u16, u16)>,
     packets: Option<u16>,
     homed: Option<bool>,
-    places: [Option<Pulses>; DP_POSITIONS.len()],
+    /// The axes whose positions were told, a bit each.
+    axes: u16,
     error: u16,
 }
 
@@ -69,12 +62,9 @@ impl Looker {
             code: lane.code,
             dialect: controller.dialect,
             seat: Arc::clone(&controller.seat),
-            first_slot: match controller.fan_out {
-                FanOut::Slice => 0,
-                FanOut::Shared => controller.axis_offset,
-            },
+            first_slot: controller.first_slot(),
             park: lane.window.park(),
-            before: None,
+            told: None,
             seen: Seen::default(),
         }
     }
@@ -133,31 +123,29 @@ impl Looker {
 
     fn hear_positions(&mut self, start: u16, reply: &RegisterReply<'_>) -> bool {
         let Some(first) = DP_POSITIONS.iter().position(|register| *register == start) else { return false };
-        for (place, pulses) in
-            self.seen.places[first..].iter_mut().zip(positions(reply.data, self.dialect).iter())
-        {
-            *place = Some(*pulses);
-        }
+        let told = positions(reply.data, self.dialect);
+        self.seen.axes |= ((1 << told.len()) - 1) << first;
+        self.told = Some((first, told));
         true
     }
 
-    /// What was seen, and where the seat stands, once all has been told; once for each time it was asked.
-    pub(super) fn take(&mut self) -> Option<(Sighting, Pose)> {
-        let Seen { asked, mode, versions, packets, homed, error, .. } = self.seen;
-        let ((work_mode, axes), (minor_version, version), homed) = (mode?, versions?, homed?);
-        let told = packets.is_some() || self.dialect != Dialect::Smc;
-        let pose = self.pose().filter(|_| asked && told)?;
-        self.seen.asked = false;
-        let identity = Identity { version, minor_version, work_mode, axes };
-        Some((Sighting { identity, error, packets, homed }, pose))
+    /// The positions that the answer told which was just heard, and the first of their axes.
+    pub(super) const fn take_positions(&mut self) -> Option<(usize, PerAxis<Pulses>)> {
+        self.told.take()
     }
 
-    /// Notes the pose that a seat is seen in, by an answer that came at `at`; says whether it rests there. One that was lost may
-    /// still be on its way, through frames that its controller has kept; what comes in one burst proves nothing.
-    pub(super) fn is_at_rest(&mut self, pose: &Pose, at: MonoTime) -> bool {
-        let Some((before, then)) = self.before.replace((*pose, at)) else { return false };
-        let still = pose.iter().zip(before).all(|(now, before)| (now - before).abs() <= STILL);
-        still && REST.contains(&at.since(then))
+    /// What was seen, once all has been told; once for each time it was asked.
+    pub(super) fn take(&mut self) -> Option<Sighting> {
+        let Seen { asked, mode, versions, packets, homed, error, axes } = self.seen;
+        let ((work_mode, of_frame), (minor_version, version), homed) = (mode?, versions?, homed?);
+        let all = (1 << self.seat.axes.min(DP_POSITIONS.len())) - 1;
+        let told = packets.is_some() || self.dialect != Dialect::Smc;
+        if !asked || !told || axes & all != all {
+            return None;
+        }
+        self.seen.asked = false;
+        let identity = Identity { version, minor_version, work_mode, axes: of_frame };
+        Some(Sighting { identity, error, packets, homed })
     }
 
     /// Whether a seat in that pose stands at park, to a pulse.
@@ -170,28 +158,10 @@ impl Looker {
         )
     }
 
-    /// Whether a seat of which that is known by beats stands in a pose.
-    pub(super) fn rests_at(&self, places: &[Option<Pulses>], pose: &Pose) -> bool {
-        let own = self.first_slot..MAX_AXES;
-        let mut axes = places.iter().take(self.seat.axes).zip(own);
-        axes.all(|(place, slot)| place.is_none_or(|at| (self.seat.fraction(at) - pose[slot]).abs() <= NEAR))
-    }
-
-    /// The pose it is parked in.
-    pub(super) const fn park(&self) -> &Pose {
-        &self.park
-    }
-
-    /// Axes past the sixth have no position register: they count as parked.
-    fn pose(&self) -> Option<Pose> {
-        let mut pose = self.park;
-        for (axis, place) in self.seen.places.iter().enumerate().take(self.seat.axes) {
-            let slot = self.first_slot + axis;
-            if slot < MAX_AXES {
-                pose[slot] = self.seat.fraction((*place)?).clamp(0.0, 1.0);
-            }
-        }
-        Some(pose)
+    /// Whether a seat that is read in that pose is where it is parked, but for what is noise.
+    pub(super) fn rests_at_park(&self, pose: &Pose) -> bool {
+        let own = self.first_slot..MAX_AXES.min(self.first_slot + self.seat.axes.min(DP_POSITIONS.len()));
+        own.into_iter().all(|slot| (self.park[slot] - pose[slot]).abs() <= NEAR)
     }
 }
 
@@ -241,10 +211,11 @@ mod tests {
     fn what_a_controller_tells_is_taken_whole_and_once() {
         let mut looker = looker();
         assert_eq!(answer(&mut looker, ReplyCode::Running, 0), [true; 5]);
-        let (sighting, pose) = looker.take().unwrap();
+        let sighting = looker.take().unwrap();
+        let (first, told) = looker.take_positions().unwrap();
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
         assert_eq!(sighting, Sighting { identity, error: 0, packets: Some(77), homed: true });
-        assert!((pose[0] - 0.25).abs() < 1e-3, "{pose:?}");
+        assert_eq!((first, &told[..]), (0, &[Pulses(75_000)][..]));
         assert!(looker.take().is_none());
     }
 
@@ -252,31 +223,7 @@ mod tests {
     fn one_with_an_error_is_heard_as_well_though_its_answers_name_no_channel() {
         let mut looker = looker();
         assert_eq!(answer(&mut looker, ReplyCode::Fault, 21), [true; 5]);
-        assert_eq!(looker.take().unwrap().0.error, 21);
-    }
-
-    #[test]
-    fn a_seat_rests_where_two_looks_one_after_the_other_see_it() {
-        let pose = |first| {
-            let mut pose = [0.0; MAX_AXES];
-            pose[0] = first;
-            pose
-        };
-        let after = |ms| MonoTime::default() + Duration::from_millis(ms);
-        let mut looker = looker();
-        let looks = [
-            (0, 0.30, false),   // the first
-            (200, 0.32, false), // it moves
-            (201, 0.32, false), // of the same burst
-            (401, 0.32, true),
-            (601, 0.3205, true),
-            (801, 0.35, false),
-            (5_000, 0.35, false), // from before it was lost anew
-            (5_200, 0.35, true),
-        ];
-        for (ms, first, rests) in looks {
-            assert_eq!(looker.is_at_rest(&pose(first), after(ms)), rests, "at {ms} ms");
-        }
+        assert_eq!(looker.take().unwrap().error, 21);
     }
 
     #[test]

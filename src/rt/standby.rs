@@ -1,21 +1,16 @@
 //! What the ack thread does for a hall that lives on between shows: it finds out where all seats stand when the program
-//! starts, asks after controllers to which no frame goes, and keeps the books of what the control plane sends.
+//! starts, and keeps the books of what the control plane sends.
 
 use std::sync::Arc;
 
 use rtrb::Consumer;
 
 use super::desk::Desk;
-use super::idle::Beats;
 use super::line::LineEnd;
 use crate::config::Controller;
-use crate::fanout::Lane;
 use crate::health::Health;
-use crate::motion::Pulses;
-use crate::net::Sender;
 use crate::state::Finding;
 use crate::time::MonoTime;
-use crate::wire::PerAxis;
 
 /// What the control plane tells the ack thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +22,6 @@ pub enum Order {
 /// What a hall has beside a play.
 #[derive(Debug)]
 pub struct Standby {
-    beats: Beats,
     line: LineEnd,
     desk: Arc<Desk>,
     orders: Consumer<Order>,
@@ -49,39 +43,17 @@ impl Standby {
     #[must_use]
     pub fn new(
         controllers: &[Controller],
-        lanes: &[Lane],
         line: LineEnd,
         desk: Arc<Desk>,
         orders: Consumer<Order>,
         crashed: bool,
     ) -> Self {
-        Self {
-            beats: Beats::new(controllers, lanes),
-            line,
-            desk,
-            orders,
-            boot: Some(crashed),
-            seen: vec![None; controllers.len()],
-        }
+        Self { line, desk, orders, boot: Some(crashed), seen: vec![None; controllers.len()] }
     }
 
     /// Hands a datagram to the line; says whether somebody waits for one.
     pub(super) fn pass_on(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
         self.line.hear(controller, octets, at)
-    }
-
-    /// Where the axes stand by an answer to a beat; none where it is none.
-    pub(super) fn beat_of(&mut self, controller: usize, octets: &[u8]) -> Option<PerAxis<Pulses>> {
-        self.beats.hear(controller, octets)
-    }
-
-    /// Whether a seat is surely elsewhere than where it rests; to be asked with every answer to a beat.
-    pub(super) fn is_away(
-        &mut self,
-        controller: usize,
-        rests: impl FnOnce(&[Option<Pulses>]) -> bool,
-    ) -> bool {
-        self.beats.is_away(controller, rests)
     }
 
     /// Notes what was read of a controller.
@@ -109,28 +81,15 @@ impl Standby {
         self.line.is_open()
     }
 
-    /// Takes orders, counts what the line sent, and beats while nothing moves.
-    pub(super) fn serve(&mut self, health: &mut Health, sender: &Sender, moving: bool, now: MonoTime) {
+    /// Takes orders, and counts what the line sent; `on_homed` hears of every controller that is home.
+    pub(super) fn serve(&mut self, health: &mut Health, mut on_homed: impl FnMut(usize)) {
         while let Ok(Order::Homed(controller)) = self.orders.pop() {
+            on_homed(usize::from(controller));
             health.on_homed(usize::from(controller));
             health.look_anew(health.groups().group_of(usize::from(controller)));
         }
         for controller in 0..self.seen.len() {
             health.on_other_sent(controller, self.line.take_sent(controller));
-        }
-        // Preflight counts every datagram that a controller received: none of ours may come between.
-        if moving || self.line.is_open() {
-            self.beats.forget();
-            return;
-        }
-        if !self.beats.take(now) {
-            return;
-        }
-        for controller in 0..self.seen.len() {
-            let standing = health.standing(health.groups().group_of(controller));
-            if standing.may_move() && self.beats.send(controller, sender) {
-                health.on_beat_sent(controller, now);
-            }
         }
     }
 

@@ -5,15 +5,18 @@ use std::sync::Arc;
 
 use rtrb::Producer;
 
+use super::idle::Beats;
 use super::live::{Live, Phase};
 use super::mail::{Alarm, Sent};
+use super::positions::Positions;
 use super::sight::Looker;
 use super::standby::{Seen, Standby};
 use super::table::{Row, Turns};
+use crate::belief::Source;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Change, Health, Notice, Standing};
-use crate::motion::{Pose, Pulses};
+use crate::motion::Pulses;
 use crate::net::Sender;
 use crate::observe::Observer;
 use crate::state::Event;
@@ -29,11 +32,15 @@ const CHANGES_KEPT: usize = 1_000;
 pub struct Watch {
     health: Health,
     lookers: Vec<Looker>,
-    /// Where each seat stood when it was last looked at.
-    poses: Vec<Pose>,
+    /// What each seat tells of where it is.
+    positions: Vec<Positions>,
+    /// Asks for that while nothing moves.
+    beats: Beats,
     sender: Sender,
     alarms: Producer<Alarm>,
     live: Arc<Live>,
+    /// When the last status report of each came that was taken up.
+    reported: Vec<MonoTime>,
     /// Events of the observer that were heard.
     heard: u64,
     notices: Vec<Notice>,
@@ -66,9 +73,11 @@ impl Watch {
         let silent = (0..groups).all(|group| health.standing(group) == Standing::Unwatched);
         Self {
             lookers: controllers.iter().zip(lanes).map(|(one, lane)| Looker::new(one, lane)).collect(),
-            poses: lanes.iter().map(|lane| lane.window.park()).collect(),
+            positions: controllers.iter().map(positions).collect(),
+            beats: Beats::new(controllers, lanes),
             notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
             changes: Vec::with_capacity(CHANGES_KEPT),
+            reported: vec![MonoTime::default(); controllers.len()],
             heard: 0,
             anew: false,
             phase: Phase::default(),
@@ -107,11 +116,14 @@ impl Watch {
         match sent {
             Sent::Posted { lane, frame, asked, at } => {
                 self.health.on_sent(usize::from(lane), frame, asked, at);
+                self.positions[usize::from(lane)].on_sent();
             }
             Sent::Failed { .. } => {}
             Sent::Joined { lane } => {
                 self.on_joined(self.health.groups().group_of(usize::from(lane)));
             }
+            Sent::FellOut { lane } => self.health.on_fell_out(usize::from(lane)),
+            Sent::Unread { lane } => self.health.on_unread(usize::from(lane)),
         }
     }
 
@@ -153,23 +165,41 @@ impl Watch {
         let awaited = self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at));
         let looker = &mut self.lookers[controller];
         let is_answer = looker.hear(octets);
-        let standing = self.health.standing(self.health.groups().group_of(controller));
-        if let Some((sighting, pose)) = looker.take()
-            // Whoever joins from where it is found has to be at rest there.
-            && (looker.is_at_rest(&pose, at) || !standing.is_looked_at())
-        {
-            self.poses[controller] = pose;
+        if let Some((first, positions)) = looker.take_positions() {
+            self.on_positions(controller, first, &positions, at, Source::Registers);
+        }
+        self.take_sighting(controller, at);
+        is_answer || awaited
+    }
+
+    /// Where some axes of a seat are: what is known by now of all of them is for the tick thread, too.
+    fn on_positions(&mut self, controller: usize, first: usize, told: &[Pulses], at: MonoTime, by: Source) {
+        let positions = &mut self.positions[controller];
+        positions.hear(first, told, at, by);
+        self.health.on_outside(controller, positions.outside());
+        if let (Some(reading), Some(evidence)) = (positions.reading(at), self.live.evidence(controller)) {
+            evidence.on_reading(&reading);
+        }
+    }
+
+    /// Whoever joins from where it is found has to be at rest there.
+    fn take_sighting(&mut self, controller: usize, at: MonoTime) {
+        let standing = self.stands(controller);
+        let Some(reading) = self.positions[controller].reading(at) else { return };
+        let looker = &mut self.lookers[controller];
+        let Some(sighting) = looker.take() else { return };
+        if reading.rests || !standing.is_looked_at() {
             self.health.on_sighting(controller, &sighting, at);
             if let Some(standby) = &mut self.standby {
-                standby.on_seen(controller, Seen { homed: sighting.homed, at_park: looker.is_parked(&pose) });
+                let at_park = looker.is_parked(&reading.pose);
+                standby.on_seen(controller, Seen { homed: sighting.homed, at_park });
             }
         }
-        is_answer || awaited
     }
 
     /// Whether it is that of a hall that sends no frames.
     pub(super) fn is_idle(&self) -> bool {
-        self.standby.is_some() && !self.live.is_moving()
+        !self.silent && !self.live.is_moving()
     }
 
     /// Notes how often a controller's port was found closed so far.
@@ -179,32 +209,34 @@ impl Watch {
         }
     }
 
-    /// Hears an answer to a beat: a sign of life, and where the first axes of the seat stand; none where it is none.
+    /// Hears an answer to a beat: a sign of life, and where the axes of the seat are, as far as that is known by now; none where
+    /// it is none.
     pub(super) fn hear_beat(
         &mut self,
         controller: usize,
         octets: &[u8],
         at: MonoTime,
     ) -> Option<PerAxis<Pulses>> {
-        let positions = self.standby.as_mut()?.beat_of(controller, octets)?;
+        let (first, told) = self.beats.hear(controller, octets)?;
+        self.on_positions(controller, first, &told, at, Source::Registers);
         self.health.on_status(controller, at);
-        self.mind_rest(controller);
-        Some(positions)
+        self.mind_rest(controller, at);
+        self.positions[controller].told()
     }
 
-    /// The next show begins where the last one left the seats. One that somebody has moved since is found first, or it would
-    /// jump.
-    fn mind_rest(&mut self, controller: usize) {
-        let standing = self.health.standing(self.health.groups().group_of(controller));
+    /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
+    fn mind_rest(&mut self, controller: usize, at: MonoTime) {
         let is_set = matches!(self.phase, Phase::Parking | Phase::Joining) && !self.live.is_moving();
-        if !is_set || !standing.may_move() {
+        if !is_set || self.standby.is_none() || !self.stands(controller).may_move() {
             return;
         }
-        let Self { standby: Some(standby), lookers, poses, health, .. } = self else { return };
-        let looker = &lookers[controller];
-        let rest = if standing == Standing::Rejoining { &poses[controller] } else { looker.park() };
-        if standby.is_away(controller, |places| looker.rests_at(places, rest)) {
-            health.on_moved(controller);
+        let Some(reading) = self.positions[controller].reading(at).filter(|reading| reading.rests) else {
+            return;
+        };
+        if self.stands(controller) != Standing::Rejoining
+            && !self.lookers[controller].rests_at_park(&reading.pose)
+        {
+            self.health.on_moved(controller);
         }
     }
 
@@ -240,12 +272,17 @@ impl Watch {
         let health = &mut self.health;
         self.heard = observer.events_since(self.heard, |event| health.on_event(event));
         for (controller, state) in observer.states().iter().enumerate() {
-            if let Some(at) = state.reported_at {
-                self.health.on_status(controller, at);
+            let Some(at) = state.reported_at else { continue };
+            self.health.on_status(controller, at);
+            if let Some(told) = state.measured.filter(|told| told.at == at && at > self.reported[controller])
+            {
+                self.reported[controller] = at;
+                self.on_positions(controller, 0, &told.value, at, Source::Report);
             }
         }
         self.look_anew();
-        self.stand_by(now);
+        self.stand_by();
+        self.beat(now);
         let notices = &mut self.notices;
         self.health.tick(now, &mut |notice| notices.push(notice));
         for index in 0..self.notices.len() {
@@ -295,7 +332,7 @@ impl Watch {
         let lane = u16::try_from(controller).expect("fewer controllers than ports");
         match change.to {
             Standing::Stopped => self.alarm(Alarm::Cut(lane)),
-            Standing::Rejoining => self.alarm(Alarm::Found(lane, self.poses[controller])),
+            Standing::Rejoining => self.alarm(Alarm::Found(lane)),
             to if !to.may_move() => self.alarm(Alarm::Leave(lane)),
             _ => {}
         }
@@ -321,10 +358,23 @@ impl Watch {
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
     }
 
-    fn stand_by(&mut self, now: MonoTime) {
-        let Self { standby, health, sender, live, untold, .. } = self;
+    /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
+    fn beat(&mut self, now: MonoTime) {
+        // Preflight counts every datagram that a controller received: none of ours may come between.
+        if self.silent || self.live.is_moving() || self.is_asked_otherwise() || !self.beats.take(now) {
+            return;
+        }
+        for controller in 0..self.lookers.len() {
+            if self.stands(controller).may_move() && self.beats.send(controller, &self.sender) {
+                self.health.on_beat_sent(controller, now);
+            }
+        }
+    }
+
+    fn stand_by(&mut self) {
+        let Self { standby, health, positions, live, untold, .. } = self;
         let Some(standby) = standby else { return };
-        standby.serve(health, sender, live.is_moving(), now);
+        standby.serve(health, |homed| positions[homed].on_homed());
         if live.is_moving() {
             return;
         }
@@ -350,4 +400,9 @@ impl Watch {
             self.alarm(Alarm::Event(Event::PositionsRead));
         }
     }
+}
+
+/// What the seat of a controller tells of where it is.
+fn positions(controller: &Controller) -> Positions {
+    Positions::new(Arc::clone(&controller.seat), controller.first_slot())
 }

@@ -91,6 +91,12 @@ impl TickGrid {
         Self { origin, rate, next: 0 }
     }
 
+    /// Its rate.
+    #[must_use]
+    pub const fn rate(&self) -> Rate {
+        self.rate
+    }
+
     /// When the next tick is due.
     #[must_use]
     pub fn next_deadline(&self) -> MonoTime {

@@ -11,16 +11,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use kinocue::app::Staged;
+use kinocue::belief::Reading;
 use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Mix, Show};
 use kinocue::fanout::Manner;
 use kinocue::gate::Counts;
-use kinocue::motion::{Measure, SeatType, Spacing};
+use kinocue::motion::{MAX_AXES, Measure, Pose, SeatType, Spacing};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Alarm, Answer, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, PlanLoop, Planning,
-    Task, TickLoop, mailboxes,
+    Alarm, Answer, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, Places, PlanLoop,
+    Planning, Task, TickLoop, mailboxes,
 };
 use kinocue::state::Request;
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -46,6 +47,10 @@ pub enum Event {
     Seek(ShowTime),
     /// Something is seen of a controller.
     Alarm(Alarm),
+    /// A controller takes part again: its seat was read at rest in that pose.
+    Found(usize, Pose),
+    /// The same where its last frame led it.
+    FoundThere(usize),
     /// Somebody sets what a lane makes of the cue.
     Mix(usize, Mix),
     /// Somebody sets the trim.
@@ -116,22 +121,29 @@ impl Virtual {
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
-        let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
+        let live = Arc::new(Live::new(lanes.len()));
+        (0..lanes.len()).for_each(|lane| read_at_rest(&live, lane, [0.0; MAX_AXES], ORIGIN));
+        let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
         let planning = Box::new(Planning { planner, timeline: Arc::clone(&timeline) });
         let plans = PlanLoop { planning, tasks, answers };
         let leave = AtomicBool::new(false);
+        let stands = RefCell::new(vec![[0.0; MAX_AXES]; lanes.len()]);
         let hands = Hands {
             desk: &desk,
             leave: &leave,
             commands: RefCell::new(commands),
             alarms: RefCell::new(alarms),
+            live: &live,
+            stands: &stands,
         };
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
         let conductor = Conductor::of_a_play(clock.now(), true);
-        let sink = Link { now: &clock.now, frames: Vec::new() };
+        let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
+        let places = Places::new(&lanes, rate);
         let mut tick_loop = TickLoop {
+            places,
             clock: &clock,
             grid,
             engine,
@@ -157,6 +169,9 @@ struct Hands<'a> {
     leave: &'a AtomicBool,
     commands: RefCell<Producer<Command>>,
     alarms: RefCell<Producer<Alarm>>,
+    live: &'a Live,
+    /// Where the last frame of each lane led it.
+    stands: &'a RefCell<Vec<Pose>>,
 }
 
 impl Hands<'_> {
@@ -168,6 +183,7 @@ impl Hands<'_> {
 /// Turns the clock by hand, and does in between what other threads do.
 struct Stage<'a> {
     now: Cell<MonoTime>,
+    beat_at: Cell<MonoTime>,
     wake_ups: Cell<u64>,
     plans: RefCell<PlanLoop>,
     planner_delay: Cell<u32>,
@@ -183,6 +199,7 @@ impl<'a> Stage<'a> {
     fn new(plans: PlanLoop, hands: Hands<'a>, script: &'a [(u64, Event)], at_most: u64) -> Self {
         Self {
             now: Cell::new(ORIGIN),
+            beat_at: Cell::default(),
             wake_ups: Cell::new(0),
             plans: RefCell::new(plans),
             planner_delay: Cell::new(0),
@@ -192,6 +209,19 @@ impl<'a> Stage<'a> {
             happened: RefCell::default(),
             script,
             at_most,
+        }
+    }
+
+    /// While nothing moves each seat is read four times a second.
+    fn beat(&self) {
+        if self.now.get().since(self.beat_at.get()) < Duration::from_millis(250)
+            || self.hands.live.is_moving()
+        {
+            return;
+        }
+        self.beat_at.set(self.now.get());
+        for (lane, pose) in self.hands.stands.borrow().iter().enumerate() {
+            read_at_rest(self.hands.live, lane, *pose, self.now.get());
         }
     }
 
@@ -228,6 +258,7 @@ impl Clock for Stage<'_> {
         self.wake_ups.set(wake_up + 1);
         self.now.set(deadline.max(self.now.get()));
         self.serve_planner();
+        self.beat();
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
@@ -238,6 +269,18 @@ impl Clock for Stage<'_> {
                 Event::Seek(film) => self.hands.command(Command::Seek(*film)),
                 Event::Alarm(alarm) => {
                     self.hands.alarms.borrow_mut().push(*alarm).expect("there is room");
+                }
+                Event::Found(lane, pose) => {
+                    self.hands.stands.borrow_mut()[*lane] = *pose;
+                    read_at_rest(self.hands.live, *lane, *pose, self.now.get());
+                    let found = Alarm::Found(u16::try_from(*lane).expect("few lanes"));
+                    self.hands.alarms.borrow_mut().push(found).expect("there is room");
+                }
+                Event::FoundThere(lane) => {
+                    let pose = self.hands.stands.borrow()[*lane];
+                    read_at_rest(self.hands.live, *lane, pose, self.now.get());
+                    let found = Alarm::Found(u16::try_from(*lane).expect("few lanes"));
+                    self.hands.alarms.borrow_mut().push(found).expect("there is room");
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
@@ -251,14 +294,26 @@ impl Clock for Stage<'_> {
     }
 }
 
+/// The ack thread has read the seat of a lane at rest in that pose.
+pub fn read_at_rest(live: &Live, lane: usize, pose: Pose, at: MonoTime) {
+    live.evidence(lane).expect("there is such a lane").on_reading(&Reading::at_rest(pose, at));
+}
+
+/// A network that loses nothing: every frame is acked before the next tick.
 struct Link<'a> {
     now: &'a Cell<MonoTime>,
+    live: &'a Live,
+    stands: &'a RefCell<Vec<Pose>>,
     frames: Vec<Frame>,
 }
 
 impl FrameSink for Link<'_> {
     fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
         let request = MotionRequest::parse(datagram).expect("only frames are sent");
+        self.live.evidence(lane).expect("there is such a lane").on_ack(request.frame);
+        let stroke = SeatType::bench3(1).stroke_pulses();
+        let there = |slot: usize| request.positions.get(slot).map_or(0.0, |at| f64::from(at.0) / stroke);
+        self.stands.borrow_mut()[lane] = std::array::from_fn(there);
         self.frames.push(Frame { lane, at: self.now.get(), request, octets: datagram.to_vec() });
         Delivery::Sent
     }

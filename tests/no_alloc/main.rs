@@ -67,9 +67,9 @@ fn everything() -> Vec<(u64, Deed)> {
         (9_000, Deed::Mix(1, Mix::FULL)),
         (9_100, Deed::Trim(-500)),
         (11_500, Deed::See(Alarm::Leave(1))),
-        (12_000, Deed::See(Alarm::Found(1, found))),
+        (12_000, Deed::Found(1, found)),
         (14_500, Deed::See(Alarm::Cut(1))),
-        (14_600, Deed::See(Alarm::Found(1, found))),
+        (14_600, Deed::Found(1, found)),
         (17_000, Deed::Oversleep(80)),
         (17_010, Deed::Stop),
         (17_500, ask(Request::Resume)), // refused: a stop is latched

@@ -9,15 +9,17 @@ use std::thread;
 use std::time::Duration;
 
 use kinocue::app::Staged;
+use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
 use kinocue::engine::{Mix, Show};
 use kinocue::fanout::{Lane, Manner};
+use kinocue::motion::{MAX_AXES, Pose};
 use kinocue::net::{Delivery, DrainGrid, Ports, Sender};
 use kinocue::observe::Watched;
 use kinocue::rt::{
     Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
-    PlanLoop, Planning, Spinning, TickLoop, mailboxes,
+    Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
 };
 use kinocue::state::Request;
 use kinocue::sys::clock::Monotonic;
@@ -29,8 +31,8 @@ use rtrb::Producer;
 use super::counting::Calls;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(1);
-/// Frames whose replies may be under way; the least receive buffer that a system has by default holds them.
-const UNDER_WAY: u64 = 128;
+/// Frames whose replies may be under way: those of 12 ms, far from what would be a gap.
+const UNDER_WAY: u64 = 24;
 pub(crate) const CONTROLLERS: usize = 2;
 
 /// Something that happens before a tick.
@@ -46,6 +48,8 @@ pub(crate) enum Deed {
     Load,
     /// Something is seen of a controller.
     See(Alarm),
+    /// A controller takes part again: its seat was read at rest in that pose.
+    Found(usize, Pose),
     /// Somebody sets what a lane makes of the cue.
     Mix(usize, Mix),
     /// Somebody sets the trim.
@@ -130,12 +134,22 @@ impl Jumps<'_> {
         self.commands.borrow_mut().push(command).expect("there is room");
     }
 
+    fn read(&self, lane: usize, pose: Pose) {
+        let reading = Reading::at_rest(pose, self.now.get());
+        self.live.evidence(lane).expect("there is such a lane").on_reading(&reading);
+    }
+
     fn happen(&self, deed: Deed) {
         match deed {
             Deed::Oversleep(periods) => self.now.set(self.now.get() + PERIOD * periods),
             Deed::Ask(request) => self.command(Command::Request(request)),
             Deed::Seek(film) => self.command(Command::Seek(film)),
             Deed::Load => self.command(Command::Load(self.next.take().expect("there is one"))),
+            Deed::Found(lane, pose) => {
+                self.read(lane, pose);
+                let found = Alarm::Found(u16::try_from(lane).expect("few lanes"));
+                self.alarms.borrow_mut().push(found).expect("there is room");
+            }
             Deed::See(alarm) => self.alarms.borrow_mut().push(alarm).expect("there is room"),
             Deed::Mix(lane, mix) => self.desk.set(lane, mix),
             Deed::Trim(ms) => self.desk.set_trim_ms(ms),
@@ -283,7 +297,8 @@ fn play_to(
     let (engine, lanes, planner, timeline) = staged.split();
     let any = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0);
     let (sender, receiver) = Ports::open(any, addresses).expect("loopback has a free port").split();
-    let live = Arc::new(Live::default());
+    let live = Arc::new(Live::new(CONTROLLERS));
+    let seen = Arc::clone(&live);
     let (mut mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
     let MailEnds { sent, ticks, tasks, answers, commands, alarms, mut news } = ends;
     let mut plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
@@ -294,7 +309,9 @@ fn play_to(
         let ack_thread = scope.spawn(move || {
             let clock = Drains { now: Cell::new(origin), answered: Cell::new(0), pace };
             let over = || pace.over.load(Ordering::Acquire);
-            AckLoop::new(receiver, watched, 1, sent, ticks).run(&clock, DrainGrid::new(origin, PERIOD), over)
+            let mut acks = AckLoop::new(receiver, watched, 1, sent, ticks);
+            acks.tell(seen);
+            acks.run(&clock, DrainGrid::new(origin, PERIOD), over)
         });
         let plan_thread = scope.spawn(move || pace.serve(&mut plans));
         mail.wakes(plan_thread.thread().clone());
@@ -310,13 +327,16 @@ fn play_to(
             show: Cell::default(),
             laps: Cell::new(0),
         };
+        (0..CONTROLLERS).for_each(|lane| clock.read(lane, [0.0; MAX_AXES]));
         let spinning = Spinning::new(&clock, spin, PERIOD);
+        let places = Places::new(&lanes, rate);
         let mut tick_loop = TickLoop {
             clock: &spinning,
             grid: TickGrid::new(origin, rate),
             engine,
             conductor: Conductor::of_a_play(origin, attended),
             lanes,
+            places,
             sink: Counted { sender, pace },
             mail,
             desk,

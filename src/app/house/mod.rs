@@ -26,8 +26,8 @@ use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, News, Order, PlanLoop, Planning,
-    Spinning, Standby, TickLoop, Watch, line, mailboxes,
+    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, News, Order, Places, PlanLoop,
+    Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{self, Policy, RealTime};
@@ -133,12 +133,12 @@ impl House {
         let desk = Arc::new(opened.desk());
         let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
         let controllers = &config.controllers;
-        let live = Arc::new(Live::with_clamps(controllers.len()));
+        let live = Arc::new(Live::new(controllers.len()));
         let (mail, ends) = mailboxes(controllers.len(), rate, Arc::clone(&live));
         let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;
         let (line, line_end) = line(sender.clone(), controllers.len());
         let (orders, orders_end) = RingBuffer::new(ORDERS);
-        let standby = Standby::new(controllers, &lanes, line_end, Arc::clone(&desk), orders_end, crashed);
+        let standby = Standby::new(controllers, line_end, Arc::clone(&desk), orders_end, crashed);
         let watch = watch(&config, &lanes, &sender, alarms, &live).of_a_hall(standby);
         let watched = controllers.iter().map(Watched::of).collect();
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
@@ -266,7 +266,8 @@ impl Ticks {
     ) -> TickLoop<'a, C, Sender> {
         let Self { engine, lanes, sender, mail } = self;
         let conductor = Conductor::of_a_hall(grid.next_deadline());
-        TickLoop { clock, grid, engine, conductor, lanes, sink: sender, mail, desk, leave }
+        let places = Places::new(&lanes, grid.rate());
+        TickLoop { clock, grid, engine, conductor, lanes, places, sink: sender, mail, desk, leave }
     }
 }
 

@@ -171,7 +171,7 @@ impl Rig {
         let reins = Reins {
             config: Arc::clone(&config),
             desk: Arc::clone(&desk),
-            live: Arc::new(Live::with_clamps(2)),
+            live: Arc::new(Live::new(2)),
             leave: Arc::default(),
             commands,
             news: news_end,

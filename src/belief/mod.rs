@@ -1,0 +1,340 @@
+//! What is known of where each axis of a seat is, and from which evidence. The one place that holds it, and the one that makes
+//! the pose from which a motion may begin ([`KnownPose`]): nobody else can seed planner and limiter, and nothing in here
+//! makes a pose of what nobody measured or confirmed.
+//!
+//! An axis is somewhere between the places that it may have been left in: where the newest acked frame led it from, and where every
+//! frame since then would have it ([`span::Spans`]). Each frame is held against all of these before it is sent
+//! ([`Belief::allows`]). Tick thread; told the time; allocates nothing.
+
+mod evidence;
+mod span;
+
+use std::time::Duration;
+
+pub use evidence::{Evidence, Reading, Source};
+use span::{SPAN, Spans};
+
+use crate::motion::{MAX_AXES, Pose, Window};
+use crate::time::MonoTime;
+use crate::wire::FrameNo;
+
+/// So long without an ack, or without a frame that the kernel takes, is a gap: from then on nobody knows which frames arrive.
+pub const GAP: Duration = Duration::from_millis(50);
+/// Evidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
+/// three axes each, and one of them may be lost.
+pub const FRESH: Duration = Duration::from_millis(1_500);
+/// Frames further apart are not one motion: what comes after begins anew, from evidence. Hold frames are 100 ms apart.
+const QUIET: Duration = Duration::from_millis(500);
+/// What a seat may take to come to rest after the Time of its last frame is over; a reading before that is of a motion.
+const SETTLE: Duration = Duration::from_millis(50);
+/// Rounding to pulses, and the step from one whole millisecond to the next, may take a frame past the greatest speed by this.
+const ROUNDING: f64 = 1.01;
+/// How far from where it was left a seat at rest has to be found to have been moved, in strokes: 0.075 mm of 150.
+const NEAR: f64 = 0.000_5;
+/// The same as a share of the distance of one frame at the greatest speed, where that is less.
+const NEAR_SHARE: f64 = 0.25;
+/// Positions come in whole pulses.
+const NEAR_PULSES: f64 = 1.5;
+
+/// A pose, as fractions of each slot's stroke, in which a seat is known to be at rest. Only evidence makes one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownPose(Pose);
+
+impl KnownPose {
+    /// What a reading makes known of the seat of a lane with that window; none where it does not tell of every axis, or the seat was
+    /// not at rest.
+    #[must_use]
+    pub fn of(reading: &Reading, window: &Window) -> Option<Self> {
+        let whole = reading.rests && reading.slots & window.own() == window.own();
+        whole.then_some(Self(reading.pose))
+    }
+
+    /// The pose.
+    #[must_use]
+    pub const fn pose(&self) -> &Pose {
+        &self.0
+    }
+}
+
+/// What is known of where the axes of a seat are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Known {
+    /// Nothing: they may be anywhere in their strokes.
+    Nothing,
+    /// They were read, at that instant and from there.
+    Measured(MonoTime, Source),
+    /// The newest frame was acked; that was seen at this instant.
+    Confirmed(MonoTime),
+    /// The newest frames are not confirmed, the oldest of them since this instant. Where no acks are asked for this is all
+    /// there ever is.
+    Commanded(MonoTime),
+    /// They were found elsewhere than the frames that were confirmed had led them, and are not at rest.
+    Contradicted(MonoTime),
+}
+
+/// What the check before the kernel has done for one lane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Tally {
+    /// Frames that were not sent, because from somewhere that the seat may be they would have been too fast.
+    pub withheld: u64,
+    /// Gaps in which it was not known which frames arrive.
+    pub gaps: u64,
+    /// Frames that reached a controller which was still busy with the one before, by the sum of their Times.
+    pub late: u64,
+    /// Frames that reached one with more than two still to do: it plays them faster than they say (PA06).
+    pub hurried: u64,
+}
+
+/// A frame that the kernel took.
+#[derive(Debug, Clone, Copy)]
+pub struct Taken<'a> {
+    /// Its number.
+    pub frame: FrameNo,
+    /// Whether it asks for an ack.
+    pub asked: bool,
+    /// Where it leads, as fractions of each slot's stroke.
+    pub pose: &'a Pose,
+    /// How long it takes, ms.
+    pub lasts_ms: u32,
+    /// When it was sent.
+    pub at: MonoTime,
+}
+
+/// What is known of one lane.
+#[derive(Debug, Clone)]
+pub struct Belief {
+    /// Strokes that each slot may move in a millisecond; without bound where the seat has no such axis.
+    speed: Pose,
+    /// How far apart two places are the same, strokes.
+    near: Pose,
+    /// The slots that the seat has, a bit each.
+    own: u16,
+    /// Those of them that are known to be within the spans.
+    within: u16,
+    known: Known,
+    spans: Spans,
+    acked: Option<FrameNo>,
+    /// The version of the reading that was taken last.
+    reading: u32,
+    /// Until when the controller is busy with what it was sent.
+    busy_until: MonoTime,
+    /// The tick time at which the kernel first refused a frame since it last took one.
+    refused_since: Option<Duration>,
+    /// Whether acks are asked for: else what the kernel takes is all that can be known.
+    asks: bool,
+    gap: bool,
+    period: Duration,
+    tally: Tally,
+}
+
+impl Belief {
+    /// Nothing is known of a lane with that window, which gets a frame in each `period`; `asks` says whether frames ask for
+    /// acks.
+    #[must_use]
+    pub fn new(window: &Window, period: Duration, asks: bool) -> Self {
+        let (mut speed, mut near) = ([f64::INFINITY; MAX_AXES], [f64::INFINITY; MAX_AXES]);
+        for (index, slot) in window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own) {
+            speed[index] = ROUNDING * slot.limits.velocity * 1e-3;
+            let of_a_frame = NEAR_SHARE * slot.limits.velocity * period.as_secs_f64();
+            near[index] = NEAR.min(of_a_frame).max(NEAR_PULSES / slot.stroke_pulses);
+        }
+        Self {
+            speed,
+            near,
+            own: window.own(),
+            within: 0,
+            known: Known::Nothing,
+            spans: Spans::default(),
+            acked: None,
+            reading: 0,
+            busy_until: MonoTime::default(),
+            refused_since: None,
+            asks,
+            gap: false,
+            period,
+            tally: Tally::default(),
+        }
+    }
+
+    /// What is known, and from which evidence.
+    #[must_use]
+    pub const fn known(&self) -> Known {
+        self.known
+    }
+
+    /// What the check has done so far.
+    #[must_use]
+    pub const fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Whether it is not known which frames arrive; until the seat was read at rest.
+    #[must_use]
+    pub const fn is_in_a_gap(&self) -> bool {
+        self.gap
+    }
+
+    /// Takes up what the ack thread has seen so far. `awake` is the time of the ticks that were served: one that slept could
+    /// not hear of acks either. Says whether a gap has begun.
+    pub fn look(&mut self, evidence: &Evidence, now: MonoTime, awake: Duration) -> bool {
+        if let Some(acked) = evidence.acked()
+            && self.acked.is_none_or(|before| acked.since(before) > 0)
+        {
+            self.acked = Some(acked);
+            self.spans.confirm(acked);
+        }
+        if !self.spans.is_empty() {
+            self.settle(now);
+        }
+        if evidence.version() != self.reading
+            && let Some((version, reading)) = evidence.reading()
+        {
+            self.reading = version;
+            self.measure(&reading, now);
+        }
+        let begins = !self.gap && self.has_gap(awake);
+        if begins {
+            self.gap = true;
+            self.tally.gaps += 1;
+        }
+        begins
+    }
+
+    /// Where the seat has been led once all frames are confirmed and their Time is over. Where no acks are asked for, what
+    /// the kernel took counts as confirmed then, and README says what that costs.
+    fn settle(&mut self, now: MonoTime) {
+        let confirmed = !self.asks || self.acked.is_some_and(|acked| self.spans.are_confirmed(acked));
+        if !confirmed || now + self.period / 2 < self.busy_until {
+            return;
+        }
+        self.spans.end_at_last();
+        self.within = self.own;
+        self.known = if self.asks { Known::Confirmed(now) } else { Known::Commanded(now) };
+        self.gap &= self.asks;
+    }
+
+    /// Takes a reading of where the seat is. One from before the last frame was over says nothing. One that finds it where it
+    /// was left confirms that; else it has to have found the seat at rest, or nobody knows any more where it is. Of axes that a
+    /// reading does not tell, as much is known as before.
+    fn measure(&mut self, reading: &Reading, now: MonoTime) {
+        if self.busy_until > MonoTime::default() && reading.at < self.busy_until + SETTLE {
+            return;
+        }
+        let told = reading.slots & self.own;
+        let is_a_point = self.spans.is_a_point();
+        let agrees = is_a_point && told & !self.within == 0 && !self.is_elsewhere(told, &reading.pose);
+        if !agrees && !reading.rests {
+            self.within &= !told;
+            self.known = Known::Contradicted(now);
+            return;
+        }
+        let mut pose = *self.spans.last();
+        (0..MAX_AXES).filter(|slot| told >> slot & 1 == 1).for_each(|slot| pose[slot] = reading.pose[slot]);
+        self.within = told | if is_a_point { self.within } else { 0 };
+        self.spans = Spans::at(pose);
+        self.known = Known::Measured(reading.at, reading.by);
+        self.gap &= self.within != self.own;
+    }
+
+    fn has_gap(&self, awake: Duration) -> bool {
+        let refused = self.refused_since.is_some_and(|since| awake.saturating_sub(since) > GAP);
+        let unheard = || self.spans.waiting_since(self.acked);
+        refused || (self.asks && unheard().is_some_and(|since| awake.saturating_sub(since) > GAP + SPAN))
+    }
+
+    /// The pose in which the seat is known to be at rest at `now`; none where an axis of it may be elsewhere, or where that was
+    /// known too long ago.
+    #[must_use]
+    pub fn pose(&self, now: MonoTime) -> Option<KnownPose> {
+        let is_known = self.within == self.own && self.spans.is_a_point() && self.is_fresh(now);
+        is_known.then(|| KnownPose(*self.spans.last()))
+    }
+
+    /// Whether a reading told where some axes are, and of others nothing is known.
+    #[must_use]
+    pub const fn is_measured_in_part(&self) -> bool {
+        matches!(self.known, Known::Measured(..)) && self.within != self.own
+    }
+
+    /// Whether something that is known puts the seat elsewhere than in `pose`, by more than is noise.
+    #[must_use]
+    pub fn contradicts(&self, pose: &Pose) -> bool {
+        self.is_elsewhere(self.within, pose)
+    }
+
+    fn is_elsewhere(&self, slots: u16, pose: &Pose) -> bool {
+        (0..MAX_AXES).filter(|slot| slots >> slot & 1 == 1).any(|slot| {
+            let (low, high) = self.spans.reach(slot);
+            (high - pose[slot]).abs().max((low - pose[slot]).abs()) > self.near[slot]
+        })
+    }
+
+    /// The distances within which two places are the same, strokes.
+    #[must_use]
+    pub const fn near(&self) -> &Pose {
+        &self.near
+    }
+
+    fn is_fresh(&self, now: MonoTime) -> bool {
+        match self.known {
+            Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= FRESH,
+            Known::Commanded(_) => !self.asks,
+            Known::Nothing | Known::Contradicted(_) => false,
+        }
+    }
+
+    /// Whether no frame has been under way for so long that the next is the first of a motion.
+    #[must_use]
+    pub fn is_quiet(&self, now: MonoTime) -> bool {
+        now > self.busy_until + QUIET.max(2 * self.period)
+    }
+
+    /// Whether a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever
+    /// it may be. Losses shorter than [`GAP`] are left out: while acks come, an axis is where its last frame leads.
+    #[must_use]
+    pub fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
+        let time = f64::from(lasts_ms);
+        let begins = self.is_quiet(now);
+        if begins && !self.is_fresh(now) && self.within != 0 {
+            return false;
+        }
+        let from_all = self.gap || begins;
+        let last = self.spans.last();
+        (0..MAX_AXES).filter(|slot| self.own >> slot & 1 == 1).all(|slot| {
+            let (low, high) = if self.within >> slot & 1 == 0 {
+                (0.0, 1.0)
+            } else if from_all {
+                self.spans.reach(slot)
+            } else {
+                (last[slot], last[slot])
+            };
+            let farthest = (pose[slot] - low).abs().max((pose[slot] - high).abs());
+            farthest <= self.speed[slot] * time
+        })
+    }
+
+    /// Notes a frame that the kernel took; `awake` as in [`Self::look`].
+    pub fn taken(&mut self, taken: &Taken<'_>, awake: Duration) {
+        let Taken { frame, asked, pose, lasts_ms, at } = *taken;
+        let lasts = Duration::from_millis(u64::from(lasts_ms));
+        let behind = self.busy_until.since(at);
+        self.tally.late += u64::from(behind > lasts.max(self.period));
+        self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
+        self.busy_until = self.busy_until.max(at) + lasts;
+        self.refused_since = None;
+        self.spans.push(frame, asked, pose, awake);
+        if !matches!(self.known, Known::Commanded(_)) {
+            self.known = Known::Commanded(at);
+        }
+    }
+
+    /// Notes that the kernel did not take a frame.
+    pub fn refused(&mut self, awake: Duration) {
+        self.refused_since.get_or_insert(awake);
+    }
+
+    /// Notes that a frame was not sent.
+    pub const fn withheld(&mut self) {
+        self.tally.withheld += 1;
+    }
+}

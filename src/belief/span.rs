@@ -1,0 +1,115 @@
+//! Where an axis may have been left: the places that frames of a few milliseconds each led through, the oldest first.
+
+use std::time::Duration;
+
+use crate::motion::{MAX_AXES, Pose};
+use crate::wire::FrameNo;
+
+/// The ticks whose frames are kept together. What is acked within a span is told apart from the rest of it only once the next
+/// span is: shorter ones would tell more precisely, and cost more.
+pub(super) const SPAN: Duration = Duration::from_millis(10);
+/// More than a gap's worth; once they are used up the last one takes all that follows.
+const SPANS: usize = 8;
+
+/// The frames of one span, and where they lead.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    first: FrameNo,
+    /// The tick time of its first frame.
+    at: Duration,
+    /// The tick time of its first frame that asks for an ack, and the number of the last such.
+    asked: Option<(Duration, FrameNo)>,
+    low: Pose,
+    high: Pose,
+}
+
+/// The frames since the one that was acked last, at most so many spans of them.
+#[derive(Debug, Clone)]
+pub(super) struct Spans {
+    spans: [Span; SPANS],
+    /// How many hold frames; the first also holds the place that they began at.
+    count: usize,
+    last: Pose,
+    newest: FrameNo,
+}
+
+impl Default for Spans {
+    fn default() -> Self {
+        Self::at([0.0; MAX_AXES])
+    }
+}
+
+impl Spans {
+    /// No frame since the axes were there.
+    pub(super) const fn at(pose: Pose) -> Self {
+        let empty = Span { first: FrameNo::FIRST, at: Duration::ZERO, asked: None, low: pose, high: pose };
+        Self { spans: [empty; SPANS], count: 0, last: pose, newest: FrameNo::FIRST }
+    }
+
+    /// Where the newest frame leads.
+    pub(super) const fn last(&self) -> &Pose {
+        &self.last
+    }
+
+    /// Whether no frame is open.
+    pub(super) const fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    pub(super) fn push(&mut self, frame: FrameNo, asked: bool, pose: &Pose, at: Duration) {
+        let is_full = self.count == SPANS;
+        if self.count == 0 || (!is_full && at.saturating_sub(self.spans[self.count - 1].at) >= SPAN) {
+            // What is on its way to the first frame's pose is still between that and the one before.
+            self.spans[self.count] = Span { first: frame, at, asked: None, low: self.last, high: self.last };
+            self.count += 1;
+        }
+        let span = &mut self.spans[self.count - 1];
+        for (slot, place) in pose.iter().enumerate() {
+            span.low[slot] = span.low[slot].min(*place);
+            span.high[slot] = span.high[slot].max(*place);
+        }
+        if asked {
+            span.asked = Some((span.asked.map_or(at, |(since, _)| since), frame));
+        }
+        (self.last, self.newest) = (*pose, frame);
+    }
+
+    /// A frame was acked: those before its span say nothing any more.
+    pub(super) fn confirm(&mut self, acked: FrameNo) {
+        let over =
+            self.spans[..self.count].iter().skip(1).take_while(|next| acked.since(next.first) >= 0).count();
+        if over > 0 {
+            self.spans.copy_within(over..self.count, 0);
+            self.count -= over;
+        }
+    }
+
+    /// Whether the newest frame of all was acked.
+    pub(super) fn are_confirmed(&self, acked: FrameNo) -> bool {
+        acked.since(self.newest) >= 0
+    }
+
+    /// All frames were taken: the axes are where the last one leads.
+    pub(super) fn end_at_last(&mut self) {
+        self.count = 0;
+    }
+
+    /// The tick time since when an ack is waited for.
+    pub(super) fn waiting_since(&self, acked: Option<FrameNo>) -> Option<Duration> {
+        let open = |last: FrameNo| acked.is_none_or(|acked| last.since(acked) > 0);
+        let asked = self.spans[..self.count].iter().filter_map(|span| span.asked);
+        asked.filter(|(_, last)| open(*last)).map(|(since, _)| since).next()
+    }
+
+    /// Between which places a slot may be.
+    pub(super) fn reach(&self, slot: usize) -> (f64, f64) {
+        let place = self.last[slot];
+        let spans = self.spans[..self.count].iter();
+        spans.fold((place, place), |(low, high), span| (low.min(span.low[slot]), high.max(span.high[slot])))
+    }
+
+    /// Whether all frames lead to one place.
+    pub(super) fn is_a_point(&self) -> bool {
+        self.spans[..self.count].iter().all(|span| span.low == self.last && span.high == self.last)
+    }
+}

@@ -1,0 +1,142 @@
+//! Between what is known of where seats are and the engine that leads them: seats that were found go into the engine, lanes of
+//! which nobody knows which frames arrive go blind, and each frame is held against what is known before it leaves. Tick
+//! thread; allocates nothing.
+
+use std::time::Duration;
+
+use super::mail::{Mail, Sent};
+use crate::belief::{Belief, Taken, Tally};
+use crate::engine::{Beat, Engine};
+use crate::fanout::Lane;
+use crate::net::Delivery;
+use crate::time::{MonoTime, Rate};
+use crate::wire::Timing;
+
+/// What is known of the seats of all lanes, over all shows of a hall.
+#[derive(Debug)]
+pub struct Places {
+    lanes: Vec<Place>,
+    period: Duration,
+    /// The time of the ticks that were served.
+    awake: Duration,
+}
+
+#[derive(Debug)]
+struct Place {
+    belief: Belief,
+    /// The longest Time that its controller executes as it is, ms (PA0b).
+    longest_ms: u32,
+}
+
+impl Places {
+    /// Nothing is known of the seats of these lanes.
+    #[must_use]
+    pub fn new(lanes: &[Lane], rate: Rate) -> Self {
+        let place = |lane: &Lane| Place {
+            belief: Belief::new(&lane.window, rate.period(), lane.ack_every > 0),
+            longest_ms: lane.longest_ms,
+        };
+        Self { lanes: lanes.iter().map(place).collect(), period: rate.period(), awake: Duration::ZERO }
+    }
+
+    /// What is known of a lane's seat.
+    ///
+    /// # Panics
+    /// Where there is no such lane.
+    #[must_use]
+    pub fn belief(&self, lane: usize) -> &Belief {
+        &self.lanes[lane].belief
+    }
+
+    /// What was withheld, lane by lane.
+    pub fn tallies(&self) -> impl Iterator<Item = Tally> {
+        self.lanes.iter().map(|place| *place.belief.tally())
+    }
+
+    /// Notes a frame that was sent before the ticks begin.
+    pub fn taken(&mut self, lane: usize, taken: &Taken<'_>) {
+        self.lanes[lane].belief.taken(taken, self.awake);
+    }
+
+    /// Takes up what the ack thread has seen, once a tick; `moving` says whether frames go out.
+    pub fn look(&mut self, engine: &mut Engine, mail: &Mail, now: MonoTime, moving: bool) {
+        self.awake += self.period;
+        for lane in 0..self.lanes.len() {
+            if self.take_evidence(lane, mail, now) {
+                engine.go_blind(lane);
+            }
+            let Place { belief, .. } = &self.lanes[lane];
+            let is_unseen = engine.is_unseen(lane);
+            if !is_unseen && !engine.rests_at(lane).is_some_and(|pose| belief.contradicts(pose)) {
+                continue;
+            }
+            if let Some(known) = belief.pose(now) {
+                engine.found(lane, &known, belief.near());
+            } else if is_unseen && moving {
+                engine.fall_out(lane);
+            }
+        }
+    }
+
+    /// A controller takes part again. Where its seat stands is known by what was read since the last frame went to it; else it
+    /// is looked at once more.
+    pub(super) fn find(&mut self, lane: usize, engine: &mut Engine, mail: &mut Mail, now: MonoTime) {
+        self.take_evidence(lane, mail, now);
+        if engine.is_led(lane) {
+            return; // it is looked at again as soon as it is away
+        }
+        let belief = &self.lanes[lane].belief;
+        match belief.pose(now) {
+            Some(known) => engine.found(lane, &known, belief.near()),
+            None if belief.is_measured_in_part() => {
+                engine.cut(lane);
+                mail.post(Sent::Unread { lane: number(lane) });
+            }
+            None => engine.fall_out(lane),
+        }
+    }
+
+    fn take_evidence(&mut self, lane: usize, mail: &Mail, now: MonoTime) -> bool {
+        let Some(evidence) = mail.evidence(lane) else { return false };
+        self.lanes[lane].belief.look(evidence, now, self.awake)
+    }
+
+    /// Whether this tick's frame of a lane may leave, and what it says of time. Where it would be too fast from somewhere that
+    /// the seat may be, a lane that is blind is led further ahead, and any other is held: nothing is sent to it, and it is
+    /// looked at.
+    #[inline]
+    #[must_use]
+    pub fn admit(&mut self, lane: usize, engine: &mut Engine, beat: &Beat, at: MonoTime) -> Option<Beat> {
+        let belief = &mut self.lanes[lane].belief;
+        if belief.allows(engine.pose(lane), beat.lasts_ms, at) {
+            return Some(*beat);
+        }
+        self.stretch(lane, engine, beat, at)
+    }
+
+    #[cold]
+    fn stretch(&mut self, lane: usize, engine: &mut Engine, beat: &Beat, at: MonoTime) -> Option<Beat> {
+        let Place { belief, longest_ms } = &mut self.lanes[lane];
+        let lasts_ms = engine.stretch(lane, *longest_ms, |pose, lasts_ms| belief.allows(pose, lasts_ms, at));
+        if lasts_ms.is_none() {
+            belief.withheld();
+            engine.fall_out(lane);
+        }
+        lasts_ms.map(|lasts_ms| Beat::still(Timing::Relative, lasts_ms).lasting(beat.lasts_ms.max(lasts_ms)))
+    }
+
+    /// Notes what became of a frame.
+    #[inline]
+    pub fn sent(&mut self, lane: usize, taken: &Taken<'_>, delivery: Delivery) {
+        let belief = &mut self.lanes[lane].belief;
+        match delivery {
+            Delivery::Sent | Delivery::SentAfterRefusal => belief.taken(taken, self.awake),
+            Delivery::Failed(_) => belief.refused(self.awake),
+        }
+    }
+}
+
+/// A lane's number in the mail.
+pub(super) fn number(lane: usize) -> u16 {
+    u16::try_from(lane).expect("fewer controllers than ports")
+}
