@@ -90,7 +90,8 @@ fn different_slots(windows: &[Window]) -> Vec<(usize, Slot)> {
     let mut slots: Vec<(usize, Slot)> = Vec::new();
     for (_, slot) in windows.iter().flat_map(Window::moving) {
         let slot = slot.at_level(1.0);
-        let axis = slot.axis.expect("a moving slot has an axis");
+        // A slot without an axis of the cue is led to park, and loads nothing.
+        let Some(axis) = slot.axis else { continue };
         if !slots.contains(&(axis, slot)) {
             slots.push((axis, slot));
         }
