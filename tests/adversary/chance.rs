@@ -1,0 +1,147 @@
+//! Histories by chance.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+
+use kinocue::sys::clock::wall_now_ns;
+
+use super::cues::KINDS;
+use super::dice::Dice;
+use super::ether::Ether;
+use super::hall::{breaches, open, seats};
+use super::judge::{Breach, How};
+use super::person::{Close, Person};
+use super::seat::MS;
+
+/// Where the histories begin that are always the same.
+const FIXED: u64 = 12_000_000;
+
+/// What came of a history.
+#[derive(Debug)]
+struct Past {
+    seed: u64,
+    breaches: Vec<Breach>,
+    frames: u64,
+    diary: Vec<String>,
+}
+
+/// Lives through the history of a seed, with no more than so many deeds.
+fn live_through(seed: u64, deeds: u64, told: bool) -> Past {
+    let mut dice = Dice::new(seed ^ 0xadde);
+    let kind = dice.pick(&KINDS);
+    // The faster it sends, the shorter.
+    let ms = dice.range(2_500, 4_500) * 50 / (kind.hz as u64).clamp(50, 100);
+    let ms = if kind.hz > 500.0 { ms.min(1_500) } else { ms };
+    let ether = Ether::new(&seats(&kind), seed);
+    let mut person = Person::new(seed, deeds, ether.ns() + (ms + 800) * MS);
+    person.furnish(&ether);
+    let (mut numbers, mut crashed) = (BTreeMap::new(), dice.one_in(3));
+    let mut diary = Vec::new();
+    if told {
+        diary.push(format!("seed {seed}: {kind:?}"));
+        let world = ether.world();
+        for line in &world.lines {
+            let place: Vec<i64> = line.seat.place(0).iter().map(|at| (at / 2_000.0) as i64).collect();
+            diary.push(format!("{:?} at {place:?} mm", line.seat.settings));
+        }
+    }
+    loop {
+        let (close, next) = open(&ether, kind, crashed, &numbers, |hall| {
+            hall.diary = told.then(|| std::mem::take(&mut diary));
+            let close = person.lead(hall);
+            diary = hall.diary.take().unwrap_or_default();
+            close
+        });
+        let Close::Again { crashed: again } = close else { break };
+        ether.world().asked = false;
+        ether.pass_to(ether.ns() + 50 * MS);
+        (numbers, crashed) = (if again { BTreeMap::new() } else { next }, again);
+    }
+    // What is on its way still arrives.
+    ether.pass_to(ether.ns() + 1_000 * MS);
+    let frames = ether.world().lines.iter().map(|line| line.frames).sum();
+    Past { seed, breaches: breaches(&ether), frames, diary }
+}
+
+fn setting(name: &str) -> Option<u64> {
+    std::env::var(name)
+        .ok()
+        .map(|value| value.parse().unwrap_or_else(|_| panic!("{name}={value} is no number")))
+}
+
+/// Lives through so many histories on two threads: those in which a seat did what no seat may.
+fn histories(first: u64, count: u64) -> Vec<Past> {
+    let [next, frames] = [0; 2].map(AtomicU64::new);
+    let work = || {
+        let mut bad = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= count {
+                return bad;
+            }
+            let past = live_through(first + index, u64::MAX, false);
+            frames.fetch_add(past.frames, Ordering::Relaxed);
+            if !past.breaches.is_empty() {
+                bad.push(past);
+            }
+        }
+    };
+    let bad = thread::scope(|scope| {
+        let threads = [scope.spawn(work), scope.spawn(work)];
+        let mut bad: Vec<Past> =
+            threads.into_iter().flat_map(|thread| thread.join().expect("no history panics")).collect();
+        bad.sort_by_key(|past| past.seed);
+        bad
+    });
+    let each = frames.into_inner() / count.max(1);
+    assert!(each >= 50, "{each} frames in a history: nothing was played");
+    bad
+}
+
+/// One history in full.
+fn tell(seed: u64) {
+    let past = live_through(seed, setting("KINOCUE_DEEDS").unwrap_or(u64::MAX), true);
+    past.diary.iter().for_each(|line| println!("{line}"));
+    past.breaches.iter().for_each(|breach| println!("{breach}"));
+    println!("{} frames", past.frames);
+    assert!(past.breaches.is_empty(), "seed {seed}: {} moves that no seat may make", past.breaches.len());
+}
+
+#[track_caller]
+fn assert_none(first: u64, count: u64) {
+    println!("{count} histories from seed {first}");
+    let bad = histories(first, count);
+    for past in bad.iter().take(20) {
+        let worst = past.breaches.iter().max_by(|a, b| a.mm_s().total_cmp(&b.mm_s()));
+        println!("seed {}: {} times, worst {}", past.seed, past.breaches.len(), worst.expect("there is one"));
+    }
+    let unasked = bad.iter().filter(|past| past.breaches.iter().any(|one| one.how == How::Unasked)).count();
+    let farthest = bad.iter().flat_map(|past| &past.breaches).max_by(|a, b| a.mm.total_cmp(&b.mm));
+    if let Some(farthest) = farthest {
+        println!("{} of {count}, in {unasked} of them unasked; the farthest {farthest}", bad.len());
+    }
+    assert!(
+        bad.is_empty(),
+        "{} of {count} histories; KINOCUE_HISTORIES=1 KINOCUE_SEED={} tells the first",
+        bad.len(),
+        bad[0].seed
+    );
+}
+
+#[test]
+fn no_history_moves_a_seat_faster_than_its_type_allows_or_unasked() {
+    match (setting("KINOCUE_SEED"), setting("KINOCUE_HISTORIES").unwrap_or(5_000)) {
+        (Some(seed), 1) => tell(seed),
+        (seed, count) => assert_none(seed.unwrap_or(FIXED), count),
+    }
+}
+
+#[test]
+fn nor_does_one_that_was_drawn_anew() {
+    let count = setting("KINOCUE_HISTORIES").unwrap_or(5_000);
+    if setting("KINOCUE_SEED").is_some() {
+        return; // the other one plays them
+    }
+    assert_none(wall_now_ns() / 1_000, count);
+}

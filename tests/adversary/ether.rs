@@ -1,0 +1,261 @@
+//! The network of a virtual hall, and its clock: what it does to the datagrams of each seat, in either direction.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use kinocue::net::{Delivery, Network, Origin, SendFault};
+use kinocue::time::{Clock, MonoTime};
+
+use super::dice::Dice;
+use super::seat::{Arrival, MS, Seat, Settings};
+use super::words;
+
+/// What befalls the datagrams of a seat for a while.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Weather {
+    /// None arrives there.
+    Lost,
+    /// One in so many does not.
+    Thin(u64),
+    /// None comes back.
+    Mute,
+    /// One in so many of those that come back does not arrive.
+    Hoarse(u64),
+    /// Neither.
+    Cut,
+    /// All that goes there waits for the end of it.
+    Held,
+    /// All that comes back does.
+    HeldBack,
+    /// Some that go there come a little later, each by up to so many milliseconds, in their order.
+    Late(u64),
+    /// Some come twice, or in another order, by less than what README admits.
+    Shuffled,
+    /// Replies come twice or late, by up to so many milliseconds, in any order.
+    Echo(u64),
+    /// The kernel takes none.
+    Refused,
+    /// Frames of motion do not arrive whose Time is longer than so many milliseconds.
+    Slow(u32),
+}
+
+#[derive(Debug, Clone)]
+struct Packet {
+    at: u64,
+    sent: u64,
+    asked: bool,
+    octets: Vec<u8>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Line {
+    pub(crate) seat: Seat,
+    weather: Vec<(u64, Weather)>,
+    there: VecDeque<Packet>,
+    back: VecDeque<Packet>,
+    /// Frames of motion that the kernel took.
+    pub(crate) frames: u64,
+}
+
+impl Line {
+    fn is(&self, now: u64, weather: Weather) -> Option<u64> {
+        self.weather.iter().find(|(until, what)| *until > now && *what == weather).map(|(until, _)| *until)
+    }
+
+    fn until(&self, now: u64, is: impl Fn(&Weather) -> bool) -> Option<(u64, Weather)> {
+        self.weather.iter().find(|(until, what)| *until > now && is(what)).copied()
+    }
+}
+
+/// Everything but the program under test.
+#[derive(Debug)]
+pub(crate) struct World {
+    pub(crate) lines: Vec<Line>,
+    dice: Dice,
+    /// Whether a person has asked for motion.
+    pub(crate) asked: bool,
+}
+
+/// The network, with its clock.
+#[derive(Debug, Clone)]
+pub(crate) struct Ether {
+    now: Arc<AtomicU64>,
+    world: Arc<Mutex<World>>,
+}
+
+impl Ether {
+    pub(crate) fn new(seats: &[Settings], seed: u64) -> Self {
+        let line = |(index, settings): (usize, &Settings)| Line {
+            seat: Seat::new(index, *settings),
+            weather: Vec::new(),
+            there: VecDeque::new(),
+            back: VecDeque::new(),
+            frames: 0,
+        };
+        let lines = seats.iter().enumerate().map(line).collect();
+        let world = World { lines, dice: Dice::new(!seed), asked: false };
+        Self { now: Arc::new(AtomicU64::new(1_000 * MS)), world: Arc::new(Mutex::new(world)) }
+    }
+
+    pub(crate) fn ns(&self) -> u64 {
+        self.now.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn world(&self) -> MutexGuard<'_, World> {
+        self.world.lock().expect("nothing panics with it")
+    }
+
+    /// Lets time pass until then, never back.
+    pub(crate) fn pass_to(&self, ns: u64) {
+        let ns = ns.max(self.ns());
+        self.now.store(ns, Ordering::Relaxed);
+        self.world().deliver(ns);
+    }
+
+    /// What has come back from a seat.
+    pub(crate) fn take_back(&self, seat: usize) -> Option<Vec<u8>> {
+        let now = self.ns();
+        let back = &mut self.world().lines[seat].back;
+        let came = back.front().is_some_and(|packet| packet.at <= now);
+        if came { back.pop_front().map(|packet| packet.octets) } else { None }
+    }
+
+    /// It becomes so for a while.
+    pub(crate) fn turns(&self, seat: usize, weather: Weather, ms: u64) {
+        let now = self.ns();
+        let line = &mut self.world().lines[seat];
+        line.weather.retain(|(until, _)| *until > now);
+        line.weather.push((now + ms * MS, weather));
+    }
+}
+
+impl World {
+    /// Brings what has arrived at the seats by then, and has them answer.
+    fn deliver(&mut self, now: u64) {
+        let Self { lines, dice, .. } = self;
+        for (index, line) in lines.iter_mut().enumerate() {
+            while line.there.front().is_some_and(|packet| packet.at <= now) {
+                let Some(Packet { at, sent, asked, octets }) = line.there.pop_front() else { break };
+                if let Some(reply) = line.seat.hear(&octets, Arrival { at, sent, asked }) {
+                    line.answer(reply, at, dice);
+                }
+            }
+            line.seat.advance(now);
+            if let Some(report) = line.seat.report(index as u16 + 1, now) {
+                line.answer(report, now, dice);
+            }
+        }
+    }
+}
+
+/// How long a datagram takes where nothing is wrong: 100 to 400 µs.
+fn flight(dice: &mut Dice) -> u64 {
+    dice.range(100_000, 400_000)
+}
+
+impl Line {
+    fn answer(&mut self, octets: Vec<u8>, at: u64, dice: &mut Dice) {
+        let hoarse = self.until(at, |what| matches!(what, Weather::Hoarse(_)));
+        let lost = matches!(hoarse, Some((_, Weather::Hoarse(times))) if dice.one_in(times));
+        if lost || self.is(at, Weather::Mute).is_some() || self.is(at, Weather::Cut).is_some() {
+            return;
+        }
+        let held = self.is(at, Weather::HeldBack).map_or(0, |until| until - at);
+        let arrives = at + flight(dice) + held;
+        if let Some((_, Weather::Echo(ms))) = self.until(at, |what| matches!(what, Weather::Echo(_))) {
+            if dice.one_in(3) {
+                let later = arrives + dice.range(0, ms * MS);
+                insert(&mut self.back, Packet { at: later, sent: at, asked: false, octets: octets.clone() });
+            }
+            if dice.one_in(3) {
+                let later = arrives + dice.range(0, ms * MS);
+                return insert(&mut self.back, Packet { at: later, sent: at, asked: false, octets });
+            }
+        }
+        insert(&mut self.back, Packet { at: arrives, sent: at, asked: false, octets });
+    }
+
+    fn take(&mut self, octets: &[u8], now: u64, asked: bool, dice: &mut Dice) -> Delivery {
+        if self.is(now, Weather::Refused).is_some() {
+            return Delivery::Failed(SendFault::of(libc::ENOBUFS));
+        }
+        self.frames += u64::from(matches!(octets.get(4), Some(0x13 | 0x14 | 0x18 | 0x19)));
+        let thin = self.until(now, |what| matches!(what, Weather::Thin(_)));
+        let lost = matches!(thin, Some((_, Weather::Thin(times))) if dice.one_in(times));
+        let slow = self.until(now, |what| matches!(what, Weather::Slow(_)));
+        let lost = lost || matches!(slow, Some((_, Weather::Slow(ms))) if words::takes_longer(octets, ms));
+        if lost || self.is(now, Weather::Lost).is_some() || self.is(now, Weather::Cut).is_some() {
+            return Delivery::Sent;
+        }
+        let octets = octets.to_vec();
+        let held = self.is(now, Weather::Held).map_or(0, |until| until - now);
+        let mut at = now + flight(dice) + held;
+        if let Some((_, Weather::Late(ms))) = self.until(now, |what| matches!(what, Weather::Late(_))) {
+            at += dice.range(0, ms * MS);
+        }
+        let packet = Packet { at, sent: now, asked, octets };
+        if self.is(now, Weather::Shuffled).is_some() {
+            let later = now + dice.range(1, 40) * MS;
+            if dice.one_in(6) {
+                insert(&mut self.there, Packet { at: later, ..packet.clone() });
+            } else if dice.one_in(6) {
+                insert(&mut self.there, Packet { at: later, ..packet });
+                return Delivery::Sent;
+            }
+        } else {
+            // One way keeps the order of what goes along it.
+            at = at.max(self.there.back().map_or(0, |last| last.at));
+        }
+        insert(&mut self.there, Packet { at, ..packet });
+        Delivery::Sent
+    }
+}
+
+/// Puts a datagram where it belongs by the time of its arrival.
+fn insert(queue: &mut VecDeque<Packet>, packet: Packet) {
+    let place = queue.iter().rposition(|other| other.at <= packet.at).map_or(0, |last| last + 1);
+    queue.insert(place, packet);
+}
+
+impl Network for Ether {
+    fn lanes(&self) -> usize {
+        self.world().lines.len()
+    }
+
+    fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
+        let now = self.ns();
+        let World { lines, dice, asked } = &mut *self.world();
+        lines[lane].take(datagram, now, *asked, dice)
+    }
+
+    fn drain(&self, on: &mut dyn FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
+        let now = self.ns();
+        for lane in 0..self.lanes() {
+            loop {
+                // What hears it may send.
+                let mut world = self.world();
+                let back = &mut world.lines[lane].back;
+                let Some(packet) = back.front().filter(|packet| packet.at <= now).cloned() else { break };
+                back.pop_front();
+                drop(world);
+                on(Origin::Controller(lane), &packet.octets, MonoTime::from_nanos(packet.at));
+            }
+        }
+        MonoTime::from_nanos(now)
+    }
+
+    fn port_closed(&self, _lane: usize) -> u64 {
+        0
+    }
+}
+
+impl Clock for Ether {
+    fn now(&self) -> MonoTime {
+        MonoTime::from_nanos(self.ns())
+    }
+
+    fn sleep_until(&self, deadline: MonoTime) {
+        self.pass_to(deadline.as_nanos());
+    }
+}

@@ -1,0 +1,91 @@
+//! What is judged: where the axes of a seat really went, and how fast. Nothing that the program believes comes in here.
+
+use std::fmt;
+
+/// Losses, repeats and changes of order within this long are what README admits: what was to take so long is made up for in
+/// one frame.
+pub(crate) const ADMITTED_MS: f64 = 50.0;
+/// How much faster than its type allows a seat may be: roundings of pulses and milliseconds.
+const SLACK: f64 = 1.01;
+/// Pulses that rounding may add to a distance.
+const ROUNDING: f64 = 2.0;
+/// Pulses of the axes that are judged: 5 mm a turn of 10,000 pulses.
+pub(crate) const PULSES_PER_MM: f64 = 2_000.0;
+/// What a seat may move by though nobody asked, mm.
+const STILL_MM: f64 = 0.2;
+
+/// One move that no seat may make.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Breach {
+    pub(crate) at_ns: u64,
+    pub(crate) seat: usize,
+    pub(crate) axis: usize,
+    pub(crate) mm: f64,
+    pub(crate) ms: f64,
+    pub(crate) how: How,
+    pub(crate) frame: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum How {
+    Fast,
+    Unasked,
+}
+
+impl Breach {
+    pub(crate) fn mm_s(&self) -> f64 {
+        self.mm / self.ms * 1_000.0
+    }
+}
+
+impl fmt::Display for Breach {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let at = self.at_ns as f64 * 1e-9;
+        let (seat, axis, how) = (self.seat + 1, self.axis + 1, self.how);
+        let (mm, ms, frame) = (self.mm, self.ms, self.frame);
+        write!(
+            f,
+            "{at:.3} s: {how:?}: seat {seat}, axis {axis}: {mm:.2} mm in {ms:.0} ms, {:.0} mm/s, frame {frame}",
+            self.mm_s()
+        )
+    }
+}
+
+/// One move of one frame, as the seat executes it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Executed {
+    /// How far each axis goes, pulses.
+    pub(crate) far: [f64; 12],
+    /// In how long.
+    pub(crate) ms: f64,
+    /// What its Time said.
+    pub(crate) time_ms: f64,
+    /// From the sending of the frame that was executed before to that of this one.
+    pub(crate) apart_ms: f64,
+    /// From one frame to the next, as the hall sends.
+    pub(crate) period_ms: f64,
+    /// Whether the network brought frames closer together than they were sent.
+    pub(crate) bunched: bool,
+    /// How much later than they were sent datagrams may be noticed.
+    pub(crate) jitter_ms: f64,
+    /// Whether somebody had asked for motion when it was sent.
+    pub(crate) asked: bool,
+}
+
+impl Executed {
+    /// The first axis that goes too far, how far, mm, and in which way.
+    pub(crate) fn verdict(&self, mm_s: f64) -> Option<(usize, f64, How)> {
+        let admitted = self.apart_ms <= ADMITTED_MS + 2.0 * self.period_ms + self.jitter_ms;
+        // What was lost for a moment is made up for in one frame; what came in a heap is executed in haste, where the seat is
+        // set to.
+        let time = if self.bunched { self.time_ms } else { self.ms };
+        let may_take = if admitted { time.max(self.apart_ms) } else { time };
+        let far = may_take * mm_s * PULSES_PER_MM / 1_000.0 * SLACK + ROUNDING;
+        let axis = (0..12).max_by(|a, b| self.far[*a].abs().total_cmp(&self.far[*b].abs()))?;
+        let mm = self.far[axis].abs() / PULSES_PER_MM;
+        if self.far[axis].abs() > far {
+            return Some((axis, mm, How::Fast));
+        }
+        (!self.asked && mm > STILL_MM).then_some((axis, mm, How::Unasked))
+    }
+}

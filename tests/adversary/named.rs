@@ -1,0 +1,394 @@
+//! What one afternoon of attacks found, each as it was done then, with another like it beside it.
+
+use std::collections::BTreeMap;
+
+use kinocue::state::{Request, Ride, State};
+
+use super::cues::{KINDS, Kind};
+use super::ether::{Ether, Weather};
+use super::hall::{Hall, Thread, breaches, open, seats};
+use super::seat::{MS, Settings};
+
+const THREE: Kind = KINDS[0];
+const SIX: Kind = KINDS[1];
+const EIGHT: Kind = KINDS[3];
+const FAST: Kind = KINDS[7];
+
+/// How far apart each axis may stand from where it is meant to be, mm.
+const NEAR_MM: f64 = 0.5;
+
+fn ether(kind: Kind, set: impl Fn(&mut Settings)) -> Ether {
+    let mut seats = seats(&kind);
+    seats.iter_mut().for_each(set);
+    Ether::new(&seats, 1)
+}
+
+/// A hall that opens and is led; what the seats executed is left.
+fn lead<T>(kind: Kind, ether: &Ether, crashed: bool, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
+    let (led, _) = open(ether, kind, crashed, &BTreeMap::new(), lead);
+    ether.world().asked = false;
+    ether.pass_to(ether.ns() + 50 * MS);
+    led
+}
+
+/// That no seat made a move that it may not make.
+#[track_caller]
+fn assert_no_breach(ether: &Ether) {
+    let found = breaches(ether);
+    let worst = found.iter().max_by(|a, b| a.mm_s().total_cmp(&b.mm_s()));
+    let told: Vec<String> = found.iter().take(8).map(ToString::to_string).collect();
+    assert!(worst.is_none(), "{} moves that no seat may make: {told:#?}", found.len());
+}
+
+/// Where an axis stands, mm.
+fn mm(ether: &Ether, axis: usize) -> f64 {
+    ether.world().lines[0].seat.place(ether.ns())[axis] / 2_000.0
+}
+
+#[track_caller]
+fn assert_at_park(ether: &Ether, axes: usize) {
+    let places: Vec<f64> = (0..axes).map(|axis| mm(ether, axis)).collect();
+    assert!(places.iter().all(|place| place.abs() < NEAR_MM), "{places:?} mm");
+}
+
+impl Hall<'_, '_> {
+    /// From the start to a ride on the cue.
+    #[track_caller]
+    fn ride(&mut self, cue: usize) {
+        self.load(cue);
+        assert!(self.comes_to(|state| state == State::Parked, 5_000), "{:?}", self.state);
+        self.pass(300);
+        self.ask(Request::Arm);
+        assert!(self.comes_to(|state| state == State::Armed, 1_000), "{:?}", self.state);
+        self.ask(Request::Go);
+        self.follows(8_000);
+    }
+
+    #[track_caller]
+    fn follows(&mut self, within_ms: u64) {
+        let follows = self.comes_to(|state| state == State::Playing(Ride::Following), within_ms);
+        assert!(follows, "{:?}", self.state);
+    }
+
+    #[track_caller]
+    fn stops(&mut self) {
+        self.ask(Request::Stop);
+        assert!(self.comes_to(|state| state == State::Stopped, 6_000), "{:?}", self.state);
+    }
+
+    #[track_caller]
+    fn is_cleared(&mut self) {
+        self.ask(Request::Clear);
+        assert!(self.comes_to(|state| state == State::Recovering, 1_000), "{:?}", self.state);
+    }
+
+    /// Asks for park until the seats are on their way, and waits until they are there; says whether they are.
+    fn parks(&mut self) -> bool {
+        for _ in 0..20 {
+            self.ask(Request::Park);
+            if self.comes_to(|state| matches!(state, State::Parking | State::Parked), 300) {
+                break;
+            }
+        }
+        self.comes_to(|state| state == State::Parked, 30_000)
+    }
+}
+
+// D1: slots without an axis of the cue.
+
+#[test]
+fn a_three_axis_cue_that_is_loaded_while_six_axes_are_up_parks_all_six_of_them_from_where_they_are() {
+    let ether = ether(SIX, |_| {});
+    lead(SIX, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(1_500);
+        hall.stops();
+        hall.load(1);
+        hall.is_cleared();
+        assert!(hall.parks(), "{:?}", hall.state);
+    });
+    assert_no_breach(&ether);
+    assert_at_park(&ether, 6);
+}
+
+#[test]
+fn after_a_crash_in_a_six_axis_show_a_three_axis_cue_parks_all_six_axes_from_where_they_are() {
+    let ether = ether(SIX, |_| {});
+    lead(SIX, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(1_500);
+    });
+    lead(SIX, &ether, true, |hall| {
+        hall.load(1);
+        assert!(hall.comes_to(|state| state == State::Recovering, 5_000), "{:?}", hall.state);
+        assert!(hall.parks(), "{:?}", hall.state);
+    });
+    assert_no_breach(&ether);
+    assert_at_park(&ether, 6);
+}
+
+#[test]
+fn an_axis_that_no_cue_has_and_that_is_jogged_between_shows_is_not_yanked_by_the_next_show() {
+    let ether = ether(SIX, |_| {});
+    lead(SIX, &ether, false, |hall| {
+        hall.ride(1);
+        assert!(hall.parks(), "{:?}", hall.state);
+        hall.pass(1_000);
+        let now = hall.ether.ns();
+        assert!(hall.ether.world().lines[0].seat.jog(4, 40.0, now));
+        hall.pass(4_000);
+        hall.ask(Request::Arm);
+        hall.pass(300);
+        hall.ask(Request::Go);
+        hall.pass(3_000);
+    });
+    assert_no_breach(&ether);
+}
+
+// D2: a seat that moves while the hall recovers.
+
+fn moved_while_recovering(jogs: &[(usize, f64)]) {
+    let ether = ether(SIX, |_| {});
+    lead(SIX, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(1_500);
+        hall.stops();
+        hall.is_cleared();
+        hall.pass(2_000);
+        for (axis, by_mm) in jogs {
+            let now = hall.ether.ns();
+            assert!(hall.ether.world().lines[0].seat.jog(*axis, *by_mm, now), "it rests");
+            hall.pass(3_000);
+        }
+        assert!(hall.parks(), "{:?}", hall.state);
+    });
+    assert_no_breach(&ether);
+    assert_at_park(&ether, 6);
+}
+
+#[test]
+fn a_seat_that_is_jogged_after_a_stop_was_cleared_parks_from_where_it_was_jogged_to() {
+    moved_while_recovering(&[(0, -60.0)]);
+}
+
+#[test]
+fn a_seat_that_sinks_bit_by_bit_after_a_stop_was_cleared_parks_from_where_it_sank_to() {
+    moved_while_recovering(&[(4, -9.0), (4, -9.0), (4, -9.0), (4, -9.0)]);
+}
+
+#[test]
+fn a_seat_that_is_jogged_after_it_was_found_up_at_the_start_parks_from_where_it_was_jogged_to() {
+    let ether = ether(SIX, |_| {});
+    ether.world().lines[0].seat.put(2, 100.0);
+    lead(SIX, &ether, false, |hall| {
+        hall.load(0);
+        assert!(hall.comes_to(|state| state == State::Recovering, 5_000), "{:?}", hall.state);
+        hall.pass(1_000);
+        let now = hall.ether.ns();
+        assert!(hall.ether.world().lines[0].seat.jog(2, -70.0, now));
+        hall.pass(3_000);
+        assert!(hall.parks(), "{:?}", hall.state);
+    });
+    assert_no_breach(&ether);
+    assert_at_park(&ether, 6);
+}
+
+// D3: more than six axes, of which no register tells.
+
+#[test]
+fn a_seat_of_eight_axes_that_was_silent_in_mid_show_is_not_led_from_where_its_last_two_are_not() {
+    let ether = ether(EIGHT, |_| {});
+    lead(EIGHT, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(1_000);
+        hall.ether.turns(0, Weather::Cut, 600);
+        hall.pass(4_000);
+    });
+    assert_no_breach(&ether);
+}
+
+#[test]
+fn after_a_crash_a_seat_of_eight_axes_is_not_parked_from_where_its_last_two_are_not() {
+    let ether = ether(EIGHT, |_| {});
+    lead(EIGHT, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(1_000);
+    });
+    lead(EIGHT, &ether, true, |hall| {
+        hall.load(0);
+        hall.comes_to(|state| state != State::Boot, 5_000);
+        hall.pass(1_000);
+        hall.parks();
+    });
+    assert_no_breach(&ether);
+}
+
+// D4: a position that is none.
+
+fn wrong_place(place_mm: f64, set: impl Fn(&mut Settings)) {
+    let ether = ether(THREE, set);
+    ether.world().lines[0].seat.put(0, place_mm);
+    lead(THREE, &ether, false, |hall| {
+        hall.load(0);
+        hall.comes_to(|state| state != State::Boot, 3_000);
+        hall.pass(500);
+        if hall.state == State::Recovering {
+            hall.parks();
+        }
+        hall.ask(Request::Arm);
+        hall.pass(500);
+        hall.ask(Request::Go);
+        hall.pass(3_000);
+    });
+    assert_no_breach(&ether);
+}
+
+#[test]
+fn a_seat_below_its_stroke_is_not_taken_for_parked() {
+    wrong_place(-10.0, |_| {});
+}
+
+#[test]
+fn a_seat_above_its_stroke_is_not_led_from_its_upper_end() {
+    wrong_place(163.0, |_| {});
+}
+
+#[test]
+fn a_controller_that_tells_positions_with_the_other_word_first_is_not_believed() {
+    wrong_place(140.0, |seat| seat.high_first = true);
+}
+
+#[test]
+fn nor_is_one_whose_words_the_wrong_way_round_read_as_parked() {
+    // 0x10000 pulses, with the words exchanged one pulse.
+    wrong_place(32.768, |seat| seat.high_first = true);
+}
+
+// D5: frames that are lost, or that the kernel refuses.
+
+/// A show with a spell of weather of each of these lengths, ms, now and then at its fastest.
+fn rides_through(kind: Kind, weather: Weather, lengths: &[u64]) {
+    for offset in [0, 310, 620, 930] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(offset);
+            for length in lengths {
+                hall.ether.turns(0, weather, *length);
+                hall.pass(length + 900);
+            }
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn frames_that_were_lost_for_a_while_are_not_made_up_for_in_one_frame() {
+    rides_through(THREE, Weather::Lost, &[100, 200]);
+    rides_through(THREE, Weather::Lost, &[330]);
+}
+
+#[test]
+fn frames_that_the_kernel_refused_for_a_while_are_not_made_up_for_in_one_frame() {
+    rides_through(THREE, Weather::Refused, &[100, 200]);
+}
+
+#[test]
+fn nor_are_those_of_a_cable_that_was_out_at_a_thousand_frames_a_second() {
+    rides_through(FAST, Weather::Cut, &[70, 150]);
+}
+
+#[test]
+fn nor_are_those_that_were_lost_while_replies_to_older_ones_still_came() {
+    for offset in [0, 310, 620, 930] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(offset);
+            hall.ether.turns(0, Weather::HeldBack, 120);
+            hall.pass(100);
+            hall.ether.turns(0, Weather::Lost, 150);
+            hall.pass(1_500);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap() {
+    let ether = ether(THREE, |_| {});
+    lead(THREE, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(600);
+        hall.ether.turns(0, Weather::Lost, 180);
+        hall.ask(Request::Park);
+        hall.pass(4_000);
+    });
+    assert_no_breach(&ether);
+}
+
+// A machine that was asleep.
+
+#[test]
+fn a_show_whose_machine_was_asleep_for_seconds_does_not_go_on_by_itself() {
+    for (kind, asleep_ms) in [(THREE, 3_000), (SIX, 9_000)] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(500);
+            hall.still(Thread::All, asleep_ms);
+            hall.pass(asleep_ms + 3_000);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+// D18: frames that pile up behind a long one.
+
+/// Moves that were hurried, and how long a frame waited in the queue at most, ms, of a show with that many pauses.
+fn paused(kind: Kind, hurry: bool, park: bool) -> (u32, f64) {
+    let ether = ether(kind, |seat| seat.hurry = hurry);
+    lead(kind, &ether, false, |hall| {
+        hall.ride(0);
+        for _ in 0..2 {
+            hall.pass(200);
+            hall.ask(Request::Pause);
+            // So that it resumes at another phase of what it sends while it holds.
+            hall.pass(1_530);
+            if park {
+                hall.ask(Request::Park);
+                break;
+            }
+            hall.ask(Request::Resume);
+            hall.follows(6_000);
+        }
+        hall.pass(1_000);
+    });
+    assert_no_breach(&ether);
+    let seat = &ether.world().lines[0].seat;
+    (seat.hurried, seat.waited_ns as f64 / MS as f64)
+}
+
+#[track_caller]
+fn assert_on_time(kind: Kind, park: bool) {
+    let (hurried, _) = paused(kind, true, park);
+    let (_, waited) = paused(kind, false, park);
+    let few = 2.0 * kind.period_ms() + 1.0;
+    assert!(hurried == 0 && waited <= few, "{hurried} hurried moves; without hurry {waited:.1} ms late");
+}
+
+#[test]
+fn whoever_resumes_finds_no_frames_in_front_of_those_of_the_join() {
+    assert_on_time(THREE, false);
+}
+
+#[test]
+fn nor_at_a_thousand_frames_a_second() {
+    assert_on_time(FAST, false);
+}
+
+#[test]
+fn nor_does_whoever_parks_out_of_a_pause() {
+    assert_on_time(THREE, true);
+    assert_on_time(FAST, true);
+}

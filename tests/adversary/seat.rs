@@ -1,0 +1,417 @@
+//! A seat as the manuals of its controller describe it: what it is told goes through a queue, a Time is how long a move
+//! takes, and whatever is wrong with a command is executed all the same. Between commands of motion it goes in straight
+//! lines.
+
+use std::collections::VecDeque;
+
+use super::judge::{Breach, Executed, PULSES_PER_MM};
+use super::words::{self, Frame, Heard};
+
+pub(crate) const MS: u64 = 1_000_000;
+/// More than so many waiting are gone through in haste, where PA06 says so.
+const PATIENT: usize = 2;
+/// Commands that find room.
+const DEPTH: usize = 200;
+/// PA09: how long a move takes that says no time.
+const NO_TIME_MS: u64 = 100;
+/// PA93: an input has to stay so long.
+const FILTER: u64 = 200 * MS;
+/// How fast an axis goes by itself: to its zero, or jogged, mm/s.
+const OWN_MM_S: f64 = 60.0;
+const JOG_MM_S: f64 = 40.0;
+/// How long after a frame it is led, and cannot be jogged.
+const LED: u64 = 150 * MS;
+/// How long frames count as bunched after two of them came closer together than they were sent.
+const BUNCHED: u64 = 500 * MS;
+/// Registers of the axes' positions.
+const POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
+
+/// How its controller is set.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Settings {
+    pub(crate) axes: usize,
+    /// What its type allows, mm/s; its own cap is off, so that it hides nothing.
+    pub(crate) mm_s: f64,
+    /// Whether the upper word of a position comes first.
+    pub(crate) high_first: bool,
+    /// PA06.
+    pub(crate) hurry: bool,
+    /// PA0b, 0 for none.
+    pub(crate) cut_ms: u32,
+    /// PA91.
+    pub(crate) stop_mode: u8,
+    /// PA1e, 0 for no reports.
+    pub(crate) report_ms: u32,
+    /// How often the hall sends.
+    pub(crate) period_ms: f64,
+    /// How much later than they were sent datagrams may be noticed, ms: none in virtual time, some on a busy machine.
+    pub(crate) jitter_ms: f64,
+    /// Where its controller listens, as it knows.
+    pub(crate) address: ([u8; 4], u16),
+}
+
+/// A command on its way through the queue.
+#[derive(Debug, Clone, Copy)]
+struct Command {
+    to: [f64; 12],
+    axes: usize,
+    time_ns: u64,
+    sent_ns: u64,
+    asked: bool,
+    number: u32,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Move {
+    from: [f64; 12],
+    to: [f64; 12],
+    begin: u64,
+    end: u64,
+    homes: bool,
+}
+
+/// How a datagram came.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Arrival {
+    pub(crate) at: u64,
+    pub(crate) sent: u64,
+    pub(crate) asked: bool,
+}
+
+#[derive(Debug)]
+pub(crate) struct Seat {
+    pub(crate) settings: Settings,
+    index: usize,
+    /// Where its axes really stand, pulses from their zero, once the last move was over.
+    rest: [f64; 12],
+    /// What its controller takes for zero.
+    zero: [f64; 12],
+    moving: Option<Move>,
+    jogged: bool,
+    queue: VecDeque<Command>,
+    last_absolute: Option<u32>,
+    /// When the frame was sent that was executed last.
+    executed: Option<u64>,
+    came: Option<(u64, u64)>,
+    bunched_until: u64,
+    packets: u16,
+    pub(crate) homed: bool,
+    dead_until: u64,
+    rebooting: bool,
+    /// The button, and since when it is so; and whether the controller has seen it.
+    button: (bool, u64),
+    pub(crate) stopped: bool,
+    next_report: u64,
+    /// Moves that were hurried though the network brought them as they were sent; and the longest wait in the queue.
+    pub(crate) hurried: u32,
+    pub(crate) waited_ns: u64,
+    pub(crate) fastest: f64,
+    pub(crate) breaches: Vec<Breach>,
+}
+
+impl Seat {
+    pub(crate) fn new(index: usize, settings: Settings) -> Self {
+        Self {
+            settings,
+            index,
+            rest: [0.0; 12],
+            zero: [0.0; 12],
+            moving: None,
+            jogged: false,
+            queue: VecDeque::new(),
+            last_absolute: None,
+            executed: None,
+            came: None,
+            bunched_until: 0,
+            packets: 17,
+            homed: true,
+            dead_until: 0,
+            rebooting: false,
+            button: (false, 0),
+            stopped: false,
+            next_report: 0,
+            hurried: 0,
+            waited_ns: 0,
+            fastest: 0.0,
+            breaches: Vec::new(),
+        }
+    }
+
+    /// Where it really stands, pulses.
+    pub(crate) fn place(&self, now: u64) -> [f64; 12] {
+        let Some(Move { from, to, begin, end, .. }) = self.moving else { return self.rest };
+        let part = now.saturating_sub(begin) as f64 / (end - begin).max(1) as f64;
+        std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * part.min(1.0))
+    }
+
+    pub(crate) fn is_moving(&self) -> bool {
+        self.moving.is_some()
+    }
+
+    /// Puts an axis somewhere, as it was before anybody looked.
+    pub(crate) fn put(&mut self, axis: usize, mm: f64) {
+        self.rest[axis] = mm * PULSES_PER_MM;
+    }
+
+    fn hold(&mut self, now: u64) {
+        self.rest = self.place(now);
+        self.jogged = false;
+        self.moving = None;
+        self.queue.clear();
+    }
+
+    /// Goes somewhere by itself.
+    fn go(&mut self, to: [f64; 12], mm_s: f64, now: u64, homes: bool) {
+        self.hold(now);
+        let far = (0..12).map(|axis| (to[axis] - self.rest[axis]).abs()).fold(0.0, f64::max);
+        let takes = (far / PULSES_PER_MM / mm_s * 1e9) as u64;
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes.max(200 * MS), homes });
+    }
+
+    /// Somebody jogs an axis by so many millimetres, within its stroke; not while it is led or stopped. The next frame ends it.
+    pub(crate) fn jog(&mut self, axis: usize, mm: f64, now: u64) -> bool {
+        let led = self.came.is_some_and(|(came, _)| now < came + LED);
+        if self.is_moving() || self.rebooting || self.stopped || led {
+            return false;
+        }
+        let mut to = self.rest;
+        to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
+        self.go(to, JOG_MM_S, now, false);
+        self.jogged = true;
+        true
+    }
+
+    /// Its power goes, and is back after that long: it knows its place no longer.
+    pub(crate) fn reboot(&mut self, now: u64, dark: u64) {
+        self.hold(now);
+        (self.dead_until, self.rebooting, self.homed) = (now + dark, true, false);
+        (self.packets, self.last_absolute, self.executed, self.stopped) = (0, None, None, false);
+        self.zero = self.rest;
+    }
+
+    pub(crate) fn press(&mut self, pressed: bool, now: u64) {
+        if self.button.0 != pressed {
+            self.button = (pressed, now);
+        }
+    }
+
+    /// Lives until `now`.
+    pub(crate) fn advance(&mut self, now: u64) {
+        if self.rebooting && now >= self.dead_until {
+            self.rebooting = false;
+        }
+        let (pressed, since) = self.button;
+        if pressed != self.stopped && now >= since + FILTER {
+            self.advance_moves(since + FILTER);
+            self.on_button(pressed, since + FILTER);
+        }
+        self.advance_moves(now);
+    }
+
+    fn on_button(&mut self, pressed: bool, now: u64) {
+        match (pressed, self.settings.stop_mode) {
+            (true, 1) => {
+                let zero = self.zero;
+                self.go(zero, OWN_MM_S, now, false);
+            }
+            (true, _) => self.hold(now),
+            // Only a reset ends it.
+            (false, 2) => return,
+            (false, _) => {}
+        }
+        self.stopped = pressed;
+        self.executed = None;
+    }
+
+    fn advance_moves(&mut self, now: u64) {
+        while let Some(Move { to, end, homes, .. }) = self.moving.filter(|current| current.end <= now) {
+            self.rest = to;
+            self.moving = None;
+            self.homed |= homes;
+            self.begin_next(end);
+        }
+    }
+
+    fn begin_next(&mut self, now: u64) {
+        let waiting = self.queue.len();
+        let Some(command) = self.queue.pop_front() else { return };
+        let bunched = now < self.bunched_until;
+        let hurries = self.settings.hurry && waiting > PATIENT;
+        self.hurried += u32::from(hurries && !bunched);
+        let takes = (if hurries { command.time_ns / 2 } else { command.time_ns }).max(1);
+        let mut to = self.rest;
+        let axes = command.axes.min(self.settings.axes);
+        for (axis, to) in to.iter_mut().enumerate().take(axes) {
+            *to = command.to[axis] + self.zero[axis];
+        }
+        let executed = Executed {
+            far: std::array::from_fn(|axis| to[axis] - self.rest[axis]),
+            ms: takes as f64 / MS as f64,
+            time_ms: command.time_ns as f64 / MS as f64,
+            apart_ms: self
+                .executed
+                .map_or(f64::INFINITY, |sent| sent.abs_diff(command.sent_ns) as f64 / MS as f64),
+            period_ms: self.settings.period_ms,
+            bunched: bunched || self.settings.jitter_ms > 0.0,
+            jitter_ms: self.settings.jitter_ms,
+            asked: command.asked,
+        };
+        self.judge(&executed, command.number, now);
+        self.executed = Some(command.sent_ns);
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
+    }
+
+    fn judge(&mut self, executed: &Executed, frame: u32, at_ns: u64) {
+        let far = executed.far.iter().fold(0.0_f64, |far, one| far.max(one.abs()));
+        self.fastest = self.fastest.max(far / PULSES_PER_MM / executed.ms * 1_000.0);
+        if let Some((axis, mm, how)) = executed.verdict(self.settings.mm_s) {
+            let (seat, ms) = (self.index, executed.ms);
+            self.breaches.push(Breach { at_ns, seat, axis, mm, ms, how, frame });
+        }
+    }
+
+    /// Hears a datagram; what it answers, if anything.
+    pub(crate) fn hear(&mut self, octets: &[u8], arrival: Arrival) -> Option<Vec<u8>> {
+        self.advance(arrival.at);
+        if self.rebooting {
+            return None;
+        }
+        self.packets = self.packets.wrapping_add(1);
+        let x = if self.stopped { 4 } else { 2 };
+        let inputs = u16::from(self.button.0);
+        let reply = match words::hear(octets) {
+            Heard::Motion(frame) => {
+                self.on_motion(&frame, arrival);
+                words::motion_reply(octets, x, 0, inputs)
+            }
+            Heard::Read { channel, start, num } => {
+                let words: Vec<u16> = (start..start.saturating_add(num))
+                    .map(|at| self.register(channel, at, arrival.at))
+                    .collect();
+                words::register_reply(octets, x, 0, &words)
+            }
+            Heard::Write { channel, start, value } => {
+                if (channel, start, value) == (2, 0, 0) {
+                    let zero = [0.0; 12];
+                    (self.zero, self.homed, self.stopped) = (zero, false, self.button.0);
+                    (self.last_absolute, self.executed) = (None, None);
+                    self.go(zero, OWN_MM_S, arrival.at, true);
+                }
+                words::register_reply(octets, x, 0, &[value])
+            }
+            Heard::Else => return None,
+        };
+        words::wants_reply(octets).then_some(reply)
+    }
+
+    fn on_motion(&mut self, frame: &Frame, arrival: Arrival) {
+        let Arrival { at, sent, asked } = arrival;
+        if let Some((came, sent_before)) = self.came.replace((at, sent)) {
+            let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
+            if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
+                self.bunched_until = at + BUNCHED;
+            }
+        }
+        if self.jogged {
+            self.hold(at);
+        }
+        let homes = self.moving.is_some_and(|current| current.homes);
+        if self.stopped || homes || self.queue.len() >= DEPTH {
+            return;
+        }
+        let time_ms = self.time_of(frame);
+        let to = frame.positions.map(f64::from);
+        let (axes, number) = (frame.axes, frame.number);
+        self.queue.push_back(Command { to, axes, time_ns: time_ms * MS, sent_ns: sent, asked, number });
+        if self.moving.is_none() {
+            self.begin_next(at);
+        } else if at >= self.bunched_until {
+            let ahead: u64 = self.queue.iter().rev().skip(1).map(|command| command.time_ns).sum();
+            let end = self.moving.map_or(at, |current| current.end);
+            self.waited_ns = self.waited_ns.max(ahead + end.saturating_sub(at));
+        }
+    }
+
+    /// How long its move takes, ms: its Time, or the difference to that of the absolute frame before.
+    fn time_of(&mut self, frame: &Frame) -> u64 {
+        let said = u64::from(frame.time_ms);
+        let takes = if frame.absolute {
+            match self.last_absolute.replace(frame.time_ms) {
+                Some(before) => said.saturating_sub(u64::from(before)),
+                None => said.min(NO_TIME_MS),
+            }
+        } else {
+            self.last_absolute = None;
+            said
+        };
+        let takes = if takes == 0 { NO_TIME_MS } else { takes };
+        if self.settings.cut_ms == 0 { takes } else { takes.min(u64::from(self.settings.cut_ms)) }
+    }
+
+    /// Where its controller says that an axis stands.
+    fn told(&self, axis: usize, now: u64) -> i32 {
+        (self.place(now)[axis] - self.zero[axis]).round() as i32
+    }
+
+    fn register(&self, channel: u16, at: u16, now: u64) -> u16 {
+        if channel == 1 {
+            return self.parameter(at);
+        }
+        if let Some(axis) = POSITIONS.iter().position(|first| at == *first || at == *first + 1) {
+            if axis >= self.settings.axes {
+                return 0;
+            }
+            let position = self.told(axis, now).cast_unsigned();
+            let upper = (at == POSITIONS[axis]) == self.settings.high_first;
+            return if upper { (position >> 16) as u16 } else { position as u16 };
+        }
+        match at {
+            0x34 => self.packets,
+            0xf0 if self.homed => 2,
+            0xf0 => u16::from(self.moving.is_some_and(|current| current.homes)),
+            0xfe => 1,
+            0xff => 3,
+            _ => 0,
+        }
+    }
+
+    /// Its parameters: those of the factory but where a show needs others. It tells of caps on speed that it does not keep.
+    fn parameter(&self, at: u16) -> u16 {
+        let Settings { axes, hurry, cut_ms, stop_mode, report_ms, address: (ip, port), .. } = self.settings;
+        match at {
+            0x00 => 10,
+            0x02 => axes as u16,
+            0x06 => u16::from(hurry),
+            0x07 | 0x80..=0x85 => 2_880,
+            0x09 | 0x40 => 100,
+            0x0b => cut_ms as u16,
+            0x0c | 0x15 | 0x90 | 0x92 => 1,
+            0x10..=0x13 => u16::from(ip[usize::from(at - 0x10)]),
+            0x14 => port,
+            0x1e => report_ms as u16,
+            0x1f => u16::from(report_ms > 0),
+            0x20 => 127,
+            0x23 => 1,
+            0x24 => 8_410,
+            0x3d => 1_000,
+            0x41 => 50,
+            0x42 => 1_500,
+            0x91 => u16::from(stop_mode),
+            0x93 => (FILTER / MS) as u16,
+            0x94 => 300,
+            0xa0..=0xa5 => 2,
+            0xb0..=0xb5 => 1_500,
+            _ => 0,
+        }
+    }
+
+    /// A status report, when it is time for one.
+    pub(crate) fn report(&mut self, id: u16, now: u64) -> Option<Vec<u8>> {
+        if self.settings.report_ms == 0 || self.rebooting || now < self.next_report {
+            return None;
+        }
+        self.next_report = now + u64::from(self.settings.report_ms) * MS;
+        let positions: Vec<i32> = (0..self.settings.axes).map(|axis| self.told(axis, now)).collect();
+        Some(words::report(id, &positions, u16::from(self.button.0)))
+    }
+}

@@ -1,0 +1,83 @@
+//! The same seats and the same network on real sockets and in real time, for real processes.
+
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use kinocue::net::Network as _;
+use kinocue::sys::clock::Monotonic;
+use kinocue::time::{Clock as _, nanos};
+
+use super::ether::Ether;
+use super::seat::Settings;
+
+/// How long a seat's thread waits for a datagram until it looks after what else there is.
+const LOOK: Duration = Duration::from_millis(1);
+/// How late a thread may notice what came.
+const JITTER_MS: f64 = 40.0;
+
+/// Seats at addresses of this machine.
+pub(crate) struct Town {
+    pub(crate) ether: Ether,
+    pub(crate) addresses: Vec<SocketAddr>,
+    over: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Town {
+    pub(crate) fn open(seats: &[Settings], seed: u64) -> Self {
+        let bind = |index: usize| {
+            UdpSocket::bind(SocketAddr::from(([127, 0, 1, index as u8 + 1], 0)))
+                .expect("there is a free port")
+        };
+        let sockets: Vec<UdpSocket> = (0..seats.len()).map(bind).collect();
+        let addresses: Vec<SocketAddr> =
+            sockets.iter().map(|socket| socket.local_addr().expect("it is bound")).collect();
+        let settled = |(seat, address): (&Settings, &SocketAddr)| Settings {
+            jitter_ms: JITTER_MS,
+            address: (seat.address.0, address.port()),
+            ..*seat
+        };
+        let seats: Vec<Settings> = seats.iter().zip(&addresses).map(settled).collect();
+        let ether = Ether::new(&seats, seed);
+        ether.world().asked = true;
+        let over = Arc::<AtomicBool>::default();
+        let live = |(index, socket): (usize, UdpSocket)| {
+            let (ether, over) = (ether.clone(), Arc::clone(&over));
+            thread::spawn(move || live(&ether, index, &socket, &over))
+        };
+        let threads = sockets.into_iter().enumerate().map(live).collect();
+        Self { ether, addresses, over, threads }
+    }
+}
+
+impl Drop for Town {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Release);
+        self.threads.drain(..).for_each(|thread| drop(thread.join()));
+    }
+}
+
+/// One seat, until all is over.
+fn live(ether: &Ether, index: usize, socket: &UdpSocket, over: &AtomicBool) {
+    let (began, zero) = (Monotonic.now(), ether.ns());
+    let now = || zero + nanos(Monotonic.now().since(began));
+    socket.set_read_timeout(Some(LOOK)).expect("it is longer than nothing");
+    let (mut octets, mut host) = ([0; 2_048], None);
+    while !over.load(Ordering::Acquire) {
+        // Nothing came, or who is gone is gone.
+        if let Ok((len, from)) = socket.recv_from(&mut octets) {
+            host = Some(from);
+            ether.pass_to(now());
+            let _ = ether.send(index, &octets[..len]);
+        }
+        ether.pass_to(now());
+        while let Some(reply) = ether.take_back(index) {
+            if let Some(host) = host {
+                let _ = socket.send_to(&reply, host);
+            }
+        }
+    }
+}

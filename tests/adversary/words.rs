@@ -1,0 +1,121 @@
+//! Datagrams as the manuals lay them out (chapter 2.2.2), read and written octet by octet.
+
+/// A frame of motion, absolute or relative.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    pub(crate) absolute: bool,
+    pub(crate) number: u32,
+    pub(crate) time_ms: u32,
+    pub(crate) axes: usize,
+    pub(crate) positions: [i32; 12],
+}
+
+/// What a controller receives.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Heard {
+    Motion(Frame),
+    Read { channel: u16, start: u16, num: u16 },
+    Write { channel: u16, start: u16, value: u16 },
+    Else,
+}
+
+pub(crate) fn u16_at(octets: &[u8], at: usize) -> u16 {
+    octets.get(at..at + 2).map_or(0, |two| u16::from_be_bytes([two[0], two[1]]))
+}
+
+fn u32_at(octets: &[u8], at: usize) -> u32 {
+    octets.get(at..at + 4).map_or(0, |four| u32::from_be_bytes([four[0], four[1], four[2], four[3]]))
+}
+
+/// Whether the sender wants an answer.
+pub(crate) fn wants_reply(octets: &[u8]) -> bool {
+    u16_at(octets, 10) != 0
+}
+
+pub(crate) fn hear(octets: &[u8]) -> Heard {
+    if octets.len() < 16 || u16_at(octets, 0) != 0x55aa {
+        return Heard::Else;
+    }
+    let (function, channel) = (u16_at(octets, 4), u16_at(octets, 6));
+    match function {
+        0x1301 | 0x1401 | 0x1801 | 0x1901 => motion(octets, function, channel),
+        0x1101 => Heard::Read { channel, start: u16_at(octets, 12), num: u16_at(octets, 14) },
+        0x1201 => Heard::Write { channel, start: u16_at(octets, 12), value: u16_at(octets, 16) },
+        _ => Heard::Else,
+    }
+}
+
+/// Whether it is a frame of motion whose Time is longer than that.
+pub(crate) fn takes_longer(octets: &[u8], ms: u32) -> bool {
+    matches!(hear(octets), Heard::Motion(frame) if frame.time_ms > ms)
+}
+
+fn motion(octets: &[u8], function: u16, channel: u16) -> Heard {
+    let vibrating = function >= 0x1801;
+    let axes = match channel {
+        0 => 3,
+        1 => 6,
+        2 => octets.len().saturating_sub(26) / 4,
+        n => usize::from(n),
+    };
+    let needed = if vibrating { 22 + 8 * axes } else { 26 + 4 * axes };
+    if axes > 12 || octets.len() < needed {
+        return Heard::Else;
+    }
+    let mut positions = [0; 12];
+    for (axis, position) in positions.iter_mut().enumerate().take(axes) {
+        *position = u32_at(octets, 20 + 4 * axis).cast_signed();
+    }
+    let absolute = matches!(function, 0x1301 | 0x1801);
+    let (number, time_ms) = (u32_at(octets, 12), u32_at(octets, 16));
+    Heard::Motion(Frame { absolute, number, time_ms, axes, positions })
+}
+
+/// The answer to a frame: the frame again, with the inputs in place of the outputs.
+pub(crate) fn motion_reply(octets: &[u8], x: u8, error: u16, inputs: u16) -> Vec<u8> {
+    let mut reply = octets.to_vec();
+    reply[5] = x;
+    reply[8..12].fill(0);
+    if x > 2 {
+        reply[6..8].copy_from_slice(&error.to_be_bytes());
+    }
+    let axes = match u16_at(octets, 6) {
+        0 => 3,
+        1 => 6,
+        2 => octets.len().saturating_sub(26) / 4,
+        n => usize::from(n),
+    };
+    if let Some(port) = reply.get_mut(20 + 4 * axes..22 + 4 * axes) {
+        port.copy_from_slice(&inputs.to_be_bytes());
+    }
+    reply
+}
+
+/// The answer to a register request, which it begins with.
+pub(crate) fn register_reply(octets: &[u8], x: u8, error: u16, words: &[u16]) -> Vec<u8> {
+    let mut reply = octets[..16].to_vec();
+    reply[5] = x;
+    reply[8..12].fill(0);
+    if x > 2 {
+        reply[6..8].copy_from_slice(&error.to_be_bytes());
+    }
+    for word in words {
+        reply.extend_from_slice(&word.to_be_bytes());
+    }
+    reply
+}
+
+/// A status report, 0x3101.
+pub(crate) fn report(id: u16, positions: &[i32], inputs: u16) -> Vec<u8> {
+    let mut report = vec![0x33, 0xcc, 0, 0, 0x31, 0x01];
+    report.extend_from_slice(&id.to_be_bytes());
+    report.extend_from_slice(&(positions.len() as u16).to_be_bytes());
+    for position in positions {
+        report.extend_from_slice(&position.to_be_bytes());
+    }
+    report.resize(report.len() + 4 * positions.len(), 0);
+    for word in [0, 0, inputs] {
+        report.extend_from_slice(&u16::to_be_bytes(word));
+    }
+    report
+}
