@@ -9,11 +9,14 @@ use crate::motion::Pulses;
 use crate::net::{Delivery, Sender};
 use crate::time::MonoTime;
 use crate::wire::{
-    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, RegisterReply, position_reads, positions,
+    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, ReadRequest, RegisterReply, position_reads,
+    positions,
 };
 
 /// From one beat to the next.
 const EVERY: Duration = Duration::from_millis(250);
+/// DP5e: the inputs that are active.
+const INPUTS: u16 = 0x5e;
 /// So many answers in a row have to find a seat away from where it rests: the first may come on the heels of the last frames.
 const SURE_AFTER: u8 = 2;
 
@@ -32,6 +35,8 @@ struct Heart {
     code: Code,
     dialect: Dialect,
     axes: usize,
+    /// Whether its inputs are asked for as well: somebody waits for a belt.
+    inputs: bool,
     /// Where its axes stand, as far as it was asked since it rests.
     places: [Option<Pulses>; DP_POSITIONS.len()],
     /// Answers in a row that found it away from where it rests.
@@ -44,6 +49,7 @@ impl Beats {
             code: lane.code,
             dialect: one.dialect,
             axes: one.seat.axes.min(DP_POSITIONS.len()),
+            inputs: one.belt_inputs != 0,
             places: [None; DP_POSITIONS.len()],
             away: 0,
         };
@@ -74,9 +80,11 @@ impl Beats {
 
     /// Asks a controller; says whether the kernel took it.
     pub(super) fn send(&self, controller: usize, sender: &Sender) -> bool {
-        let Heart { code, axes, .. } = self.hearts[controller];
-        let reads = position_reads(axes, code, code).count().max(1);
-        let read = position_reads(axes, code, code).nth(self.turn % reads);
+        let Heart { code, axes, inputs, .. } = self.hearts[controller];
+        let inputs =
+            inputs.then_some(ReadRequest { channel: 0, accept: code, reply: code, start: INPUTS, num: 1 });
+        let reads = || position_reads(axes, code, code).chain(inputs);
+        let read = reads().nth(self.turn % reads().count().max(1));
         read.is_some_and(|read| {
             !matches!(sender.send(controller, read.emit(&mut [0; MAX_LEN])), Delivery::Failed(_))
         })
@@ -100,6 +108,14 @@ impl Beats {
         Some(PerAxis::from_fn(known, |axis| heart.places[axis].unwrap_or_default()))
     }
 
+    /// The inputs that are active, where this is the answer to a beat that asked for them.
+    pub(super) fn hear_inputs(&self, controller: usize, octets: &[u8]) -> Option<u16> {
+        let reply = RegisterReply::parse(octets).ok().filter(|_| self.hearts[controller].inputs)?;
+        let is_ours =
+            reply.access == Access::Read && (reply.channel, reply.start, reply.num) == (0, INPUTS, 1);
+        reply.data.get(0).filter(|_| is_ours)
+    }
+
     /// Notes whether a seat stands where it rests, by an answer that was just heard; says whether it is surely elsewhere, once.
     pub(super) fn is_away(
         &mut self,
@@ -118,8 +134,14 @@ mod tests {
     use crate::wire::{ReplyCode, Words, position_words};
 
     fn beats(axes: usize) -> Beats {
-        let heart =
-            Heart { code: Code(1), dialect: Dialect::Smc, axes, places: [None; DP_POSITIONS.len()], away: 0 };
+        let heart = Heart {
+            code: Code(1),
+            dialect: Dialect::Smc,
+            axes,
+            inputs: true,
+            places: [None; DP_POSITIONS.len()],
+            away: 0,
+        };
         Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] }
     }
 
@@ -147,6 +169,25 @@ mod tests {
         beats.forget();
         assert_eq!(hear(&mut beats, 0, [1, 2, 3]), Some(vec![1, 2, 3]));
         assert_eq!(hear(&mut beats, 1, [1, 2, 3]), None, "nobody asks so");
+    }
+
+    #[test]
+    fn inputs_are_heard_where_they_are_asked_for() {
+        let mut beats = beats(3);
+        let reply = |start| RegisterReply {
+            access: Access::Read,
+            code: ReplyCode::EmergencyStop,
+            channel: 0,
+            error: 0,
+            start,
+            num: 1,
+            data: Words::from(&[3][..]),
+        };
+        let octets = reply(INPUTS).emit(&mut [0; MAX_LEN]).to_vec();
+        assert_eq!(beats.hear_inputs(0, &octets), Some(3), "also while it says that no belt is closed");
+        assert_eq!(beats.hear_inputs(0, reply(0x66).emit(&mut [0; MAX_LEN])), None);
+        beats.hearts[0].inputs = false;
+        assert_eq!(beats.hear_inputs(0, &octets), None);
     }
 
     #[test]

@@ -75,6 +75,11 @@ impl Standby {
         self.beats.hear(controller, octets)
     }
 
+    /// The inputs by an answer to a beat; none where it is none.
+    pub(super) fn inputs_of(&self, controller: usize, octets: &[u8]) -> Option<u16> {
+        self.beats.hear_inputs(controller, octets)
+    }
+
     /// Whether a seat is surely elsewhere than where it rests; to be asked with every answer to a beat.
     pub(super) fn is_away(
         &mut self,

@@ -192,6 +192,13 @@ impl Watch {
         Some(positions)
     }
 
+    /// Hears an answer to a beat that asked for inputs: a sign of life, and which are active; none where it is none.
+    pub(super) fn hear_inputs(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> Option<u16> {
+        let inputs = self.standby.as_ref()?.inputs_of(controller, octets)?;
+        self.health.on_status(controller, at);
+        Some(inputs)
+    }
+
     /// The next show begins where the last one left the seats. One that somebody has moved since is found first, or it would
     /// jump.
     fn mind_rest(&mut self, controller: usize) {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::Keeper;
+use super::{Keeper, belts};
 use crate::config::Controller;
 use crate::engine::Unplanned;
 use crate::hall::{ControllerStatus, Histogram, Percentiles, RealTimeStatus, Status};
@@ -78,7 +78,7 @@ impl Keeper {
             uptime_s: now.since(self.ends.began).as_secs_f64(),
             state: self.known.state.word(),
             cause: self.cause(),
-            next: self.known.next.to_string(),
+            next: self.next_action(&table, now),
             arm_homes: self.known.next == Next::ArmAndHome,
             since_s: now.since(self.known.since).as_secs_f64(),
             lapses_s: self.known.lapses(now),
@@ -173,6 +173,7 @@ impl Keeper {
             error: state.error.map(|heard| heard.value),
             servo_errors: state.servo_errors.map(|heard| heard.value.to_vec()),
             inputs: state.inputs.map(|heard| heard.value),
+            belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
             positions_mm: state.measured.or(state.echoed).map(|heard| {
                 let mm = |pulses: &crate::motion::Pulses| {
