@@ -98,6 +98,8 @@ pub struct Show {
     pub spin_us: u32,
     /// The folder with the cues of the daemon.
     pub library: PathBuf,
+    /// Whose belts GO waits for.
+    pub belts: Belts,
     /// Findings of preflight that are accepted for good, of whichever controller.
     pub accept_findings: Vec<Acceptance>,
 }
@@ -113,9 +115,21 @@ impl Default for Show {
             loss_policy: LossPolicy::Continue,
             spin_us: 0,
             library: PathBuf::from("/var/lib/kinocue/cues"),
+            belts: Belts::Shown,
             accept_findings: Vec::new(),
         }
     }
+}
+
+/// Whose belts GO waits for, of the controllers that have `belt_inputs` and take part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Belts {
+    /// Nobody's: it is only shown which ones are open.
+    Shown,
+    /// At least one belt of each rigid seat.
+    One,
+    /// All.
+    All,
 }
 
 /// What the hall does when a group of controllers is lost.

@@ -21,8 +21,8 @@ use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
 use super::text::text;
 use super::{
-    Absent, Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show,
-    Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
+    Absent, Accept, Api, Belts, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN,
+    Show, Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] octets.
@@ -112,6 +112,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
     let timing = [("relative", Timing::Relative), ("absolute", Timing::Absolute)];
     let policy =
         [("continue", LossPolicy::Continue), ("pause", LossPolicy::Pause), ("park", LossPolicy::Park)];
+    let belts = [("shown", Belts::Shown), ("one", Belts::One), ("all", Belts::All)];
     let show = Show {
         name: section.text("name").unwrap_or(default.name),
         rate_hz: section.number_in("rate_hz", 1.0..=1000.0).unwrap_or(default.rate_hz),
@@ -121,6 +122,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
         loss_policy: section.choice("loss_policy", &policy).unwrap_or(default.loss_policy),
         spin_us: section.whole_in("spin_us", 0..=900).unwrap_or(default.spin_us),
         library: section.text("library").map_or(default.library, PathBuf::from),
+        belts: section.choice("belts", &belts).unwrap_or(default.belts),
         accept_findings: acceptances(&mut section),
     };
     section.finish();

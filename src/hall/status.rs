@@ -253,6 +253,8 @@ pub struct ControllerStatus {
     pub servo_errors: Option<Vec<u16>>,
     /// Inputs, bit 0 = X01; null where it never told.
     pub inputs: Option<u16>,
+    /// Inputs of belts that are open, from 1 for X01; null where it has no belts, or has not told lately.
+    pub belts_open: Option<Vec<u8>>,
     /// Outputs, bit 0 = Y01; null where it never told.
     pub outputs: Option<u16>,
     /// Where its axes are, mm: measured where it measures, else as it was commanded; null where nobody knows.

@@ -41,6 +41,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         emergency_stop: false,
         error: Some(0),
         servo_errors: None,
+        belts_open: None,
         inputs: Some(0),
         outputs: None,
         positions_mm: None,

@@ -234,7 +234,11 @@ fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &
     if let Some(positions) = beat {
         observer.on_positions(controller, positions, at);
     }
-    watch.hear(controller, octets, at) || beat.is_some()
+    let inputs = watch.hear_inputs(controller, octets, at);
+    if let Some(inputs) = inputs {
+        observer.on_inputs(controller, inputs, at);
+    }
+    watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some()
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.

@@ -258,7 +258,7 @@ impl Live {
     }
 
     /// Notes how the controllers stand. Ack thread.
-    pub(super) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
+    pub(crate) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
         note(&mut self.table.lock().unwrap_or_else(PoisonError::into_inner));
     }
 

@@ -231,6 +231,13 @@ impl Watch {
         self.positions[controller].told()
     }
 
+    /// Hears an answer to a beat that asked for inputs: a sign of life, and which are active; none where it is none.
+    pub(super) fn hear_inputs(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> Option<u16> {
+        let inputs = self.beats.hear_inputs(controller, octets)?;
+        self.health.on_status(controller, at);
+        Some(inputs)
+    }
+
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
     fn mind_rest(&mut self, controller: usize, at: MonoTime) {
         let is_set = matches!(self.phase, Phase::Parking | Phase::Joining) && !self.live.is_moving();

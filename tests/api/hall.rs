@@ -227,6 +227,7 @@ pub fn with_controller() -> Status {
         emergency_stop: false,
         error: None,
         servo_errors: None,
+        belts_open: None,
         inputs: None,
         outputs: None,
         positions_mm: None,

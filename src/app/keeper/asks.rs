@@ -32,12 +32,13 @@ impl Keeper {
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
                 let counted = self.count_before();
-                self.request(Request::Go)
-                    .inspect(|()| self.begin_show(&who.to_string(), who.surface, counted))
+                let go = self.are_buckled().and_then(|()| self.request(Request::Go));
+                go.inspect(|()| self.begin_show(&who.to_string(), who.surface, counted))
             }
             Ask::GoFrom(film) => {
                 let before = self.count_before();
-                self.go_from(film).inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
+                let go = self.are_buckled().and_then(|()| self.go_from(film));
+                go.inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
             }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),

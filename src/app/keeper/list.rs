@@ -210,6 +210,7 @@ impl Keeper {
     /// there.
     fn start_entry(&mut self, start: Start) -> Result<(), Problem> {
         self.tell_readiness();
+        self.are_buckled()?;
         if start == Start::GoOn {
             self.command(Command::Request(Request::Arm))?;
         }

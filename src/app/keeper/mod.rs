@@ -3,6 +3,7 @@
 //! (`errand`), so that a pause or a park never waits behind a preflight.
 
 mod asks;
+mod belts;
 mod board;
 mod errand;
 mod gear;

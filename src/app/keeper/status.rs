@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
-use super::Keeper;
+use super::{Keeper, belts};
 use crate::config::Controller;
 use crate::engine::Unplanned;
 use crate::hall::{ControllerStatus, Histogram, Percentiles, RealTimeStatus, Status};
@@ -80,7 +80,7 @@ impl Keeper {
             uptime_s: now.since(self.ends.began).as_secs_f64(),
             state: self.known.state.word(),
             cause: self.cause(),
-            next: self.next(),
+            next: self.next_action(&table, now),
             arm_homes: self.known.next == Next::ArmAndHome,
             since_s: now.since(self.known.since).as_secs_f64(),
             lapses_s: self.known.lapses(now),
@@ -110,7 +110,7 @@ impl Keeper {
     }
 
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
-    fn next(&self) -> String {
+    pub(super) fn next(&self) -> String {
         let next = self.known.next;
         match self.cued.as_ref().and_then(|cued| cued.left_at) {
             Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
@@ -195,6 +195,7 @@ impl Keeper {
             error: state.error.map(|heard| heard.value),
             servo_errors: state.servo_errors.map(|heard| heard.value.to_vec()),
             inputs: state.inputs.map(|heard| heard.value),
+            belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
             positions_mm: state.measured.or(state.echoed).map(|heard| {
                 let mm = |pulses: &crate::motion::Pulses| {

@@ -34,6 +34,7 @@ impl Keeper {
     pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
         warnings.extend(self.of_strangers());
+        warnings.extend(self.of_belts(table));
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
         warnings.extend(self.of_what_lasts());

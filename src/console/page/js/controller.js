@@ -23,6 +23,7 @@ const FIGURES = {
   'Emergency stop': ({ emergency_stop: stop }) => (stop ? 'IN EFFECT' : 'no'),
   'Error': ({ error }) => (error === null ? 'never told' : error === 0 ? 'none' : `number ${error}`),
   'Drive errors': ({ servo_errors: errors }) => drives(errors),
+  'Belts open': ({ belts_open: belts }) => (belts === null ? 'no belts known' : belts.length === 0 ? 'none' : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ')),
   'Inputs on': ({ inputs }) => bits(inputs, 'X'),
   'Outputs on': ({ outputs }) => bits(outputs, 'Y'),
   'Positions': ({ positions_mm: mm }) => (mm === null ? 'unknown' : `${mm.map((each) => each.toFixed(1)).join(', ')} mm`),
