@@ -57,7 +57,8 @@ impl Keeper {
                 self.board.gear_out.insert(self.group(name).to_owned());
             }
             Ask::Disable(name) if !by_gear => {
-                self.board.gear_out.remove(&self.group(name).to_owned());
+                let group = self.group(name).to_owned();
+                self.board.gear_out.remove(&group);
             }
             _ => {}
         }
