@@ -288,13 +288,14 @@ fn curves_are_drawn_once_until_the_file_changes() {
     assert_eq!(fixture.library.curve(&id, 10).unwrap().axes[0].max[0], 0.1);
     put("time_ms,a1\n0,0.5\n100,7\n");
     let problem = fixture.library.curve(&id, 10).unwrap_err();
-    assert_eq!((problem.code, problem.faults.len()), (Code::Check, 2), "{problem}");
+    assert_eq!(problem.code, Code::Check);
+    assert!(problem.faults.concat().contains("ride.csv:3:5: a1"), "{problem}");
 }
 
 #[test]
 fn a_curve_that_takes_too_much_memory_is_given_up_by_the_child_alone() {
     let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
-    let rows: String = (0..300_000).map(|row| format!("{row},0.5\n")).collect();
+    let rows: String = (0..1_000_000).map(|row| format!("{row},0.5\n")).collect();
     fs::write(fixture.cues().join("long.csv"), format!("time_ms,a1\n{rows}")).unwrap();
     let problem = fixture.library.curve(&"long".parse().unwrap(), 100).unwrap_err();
     assert!(problem.remedy.contains("max_memory_mib in [library]"), "{problem}");

@@ -1,7 +1,6 @@
 //! The gate that every request passes: is it meant for us, who asks, may they look, did it come before. Refusals leave it as
 //! problems, and every reply with the headers that keep pages of others out.
 
-use std::net::IpAddr;
 use std::panic::AssertUnwindSafe;
 use std::pin::pin;
 use std::sync::Arc;
@@ -61,8 +60,10 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
         return render(caught(next.run(request)).await, None);
     };
     let asker = format!("{who}");
-    if let Some(place) = request.extensions().get::<Arc<Place>>() {
-        show(place, &who);
+    // Who has shown a token, or may open the control socket, keeps a place before those who have not.
+    let known = who.surface == Surface::Socket || request.headers().contains_key(AUTHORIZATION);
+    if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| known) {
+        place.show(&who.name);
     }
     request.extensions_mut().insert(who);
     let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));
@@ -96,14 +97,6 @@ fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
         Peer::Tcp(_) if in_the_open => None,
         Peer::Tcp(address) => Some(shared.access.who(headers, *address, &shared.tries, Monotonic.now())?),
     })
-}
-
-/// Who has shown a token, or came by the control socket, keeps a place before those who have not.
-fn show(place: &Place, who: &Who) {
-    let by_address = who.surface == Surface::Http && who.name.parse::<IpAddr>().is_ok();
-    if !by_address {
-        place.show(&who.name);
-    }
 }
 
 /// What is no secret and changes nothing: the page and what belongs to it, the description of the API, whether it is well.

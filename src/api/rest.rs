@@ -15,7 +15,7 @@ use hyper::body::{Body as _, Bytes, Frame, SizeHint};
 use super::input::MAX_BODY;
 
 /// How long the rest may take to come; the answer waits meanwhile.
-const PATIENCE: Duration = Duration::from_millis(300);
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// A body that the handler reads as far as it likes, and the gate afterwards.
 #[derive(Debug, Clone)]

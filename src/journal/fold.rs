@@ -10,20 +10,42 @@ use crate::time::MonoTime;
 const WINDOW: Duration = Duration::from_secs(10);
 /// Kinds of asks that are folded at a time; of more the oldest is written out.
 const KINDS: usize = 64;
+/// Kinds that are told apart of one person; of more it is the word alone that tells them apart.
+const KINDS_OF_ONE: usize = 16;
 
 /// What was asked of late.
 #[derive(Debug, Default)]
 pub struct Folds(Vec<Fold>);
 
-/// One kind: asked by the same person with the same word, and done or refused alike.
+/// Asks of one kind.
 #[derive(Debug)]
 struct Fold {
-    who: String,
-    word: &'static str,
-    done: bool,
+    kind: Kind,
     since: MonoTime,
     /// The repeats so far, as one.
     repeats: Option<Action>,
+}
+
+/// What is a repeat of what: asked by the same person with the same word, done or refused alike, and where it was done, of the
+/// same things.
+#[derive(Debug, PartialEq, Eq)]
+struct Kind {
+    who: String,
+    word: &'static str,
+    done: bool,
+    of: String,
+}
+
+impl Kind {
+    fn new(action: &Action, word: &'static str) -> Self {
+        let of = match (action.is_done(), word) {
+            (false, _) => String::new(),
+            // Of a fader that moves it is the last value that counts.
+            (true, "levels" | "trim" | "seek") => action.what.replace(|c: char| c.is_ascii_digit(), ""),
+            (true, _) => action.what.clone(),
+        };
+        Self { who: action.who.clone(), word, done: action.is_done(), of }
+    }
 }
 
 impl Folds {
@@ -31,9 +53,12 @@ impl Folds {
     #[must_use]
     pub fn take(&mut self, action: Action, word: &'static str, now: MonoTime) -> Vec<Action> {
         let mut written = self.due(now);
-        let done = action.is_done();
-        let same = |fold: &&mut Fold| fold.word == word && fold.done == done && fold.who == action.who;
-        if let Some(fold) = self.0.iter_mut().find(same) {
+        let mut kind = Kind::new(&action, word);
+        let of_one = self.0.iter().filter(|fold| fold.kind.who == kind.who).count();
+        if of_one >= KINDS_OF_ONE && self.0.iter().all(|fold| fold.kind != kind) {
+            kind.of = String::new();
+        }
+        if let Some(fold) = self.0.iter_mut().find(|fold| fold.kind == kind) {
             let times = action.times + fold.repeats.as_ref().map_or(0, |repeats| repeats.times);
             fold.repeats = Some(Action { times, ..action });
             return written;
@@ -41,7 +66,7 @@ impl Folds {
         if self.0.len() == KINDS {
             written.extend(self.0.remove(0).repeats);
         }
-        self.0.push(Fold { who: action.who.clone(), word, done, since: now, repeats: None });
+        self.0.push(Fold { kind, since: now, repeats: None });
         written.push(action);
         written
     }
@@ -101,6 +126,32 @@ mod tests {
         );
         let later = folds.take(action("eve", "levels row 1", "no such row"), "levels", at(12));
         assert_eq!(later.len(), 1, "its time is over");
+    }
+
+    #[test]
+    fn what_was_done_to_each_seat_is_told_and_of_a_fader_the_last() {
+        let mut folds = Folds::default();
+        let mut written = Vec::new();
+        for (word, what) in [
+            ("disable", "disable A1"),
+            ("disable", "disable A2"),
+            ("disable", "disable A3"),
+            ("disable", "disable A2"),
+        ] {
+            written.extend(folds.take(action("ann", what, "done"), word, at(0)));
+        }
+        for percent in [90, 80, 70] {
+            let what = format!("levels motion {percent} %");
+            written.extend(folds.take(action("ann", &what, "done"), "levels", at(0)));
+        }
+        written.extend(folds.rest());
+        let lines: Vec<_> = written.iter().map(|one| (one.what.as_str(), one.times)).collect();
+        let each = [("disable A1", 1), ("disable A2", 1), ("disable A3", 1), ("levels motion 90 %", 1)];
+        assert_eq!(lines, [&each[..], &[("disable A2", 1), ("levels motion 70 %", 2)]].concat());
+        for n in 0..1000 {
+            let lines = folds.take(action("eve", &format!("enable A{n}"), "done"), "enable", at(0)).len();
+            assert_eq!(lines, usize::from(n <= KINDS_OF_ONE), "{n}");
+        }
     }
 
     #[test]
