@@ -1,13 +1,15 @@
 //! What is kept comes back as it was, or not at all.
 
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use jiff::Zoned;
 use jiff::civil::date;
 use proptest::prelude::*;
 
 use super::*;
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
 
 fn broken() -> Out {
     let at = "2026-11-21T21:14:00Z".to_owned();
@@ -34,9 +36,9 @@ fn at(day: i8, hour: i8) -> Zoned {
 /// Waits until a file is as it should be; the thread that writes it says nothing.
 #[track_caller]
 fn becomes(store: &SettingsFile, is_so: impl Fn(&SettingsFile) -> bool) {
-    let until = Instant::now() + Duration::from_secs(20);
+    let until = Monotonic.now() + Duration::from_secs(20);
     while !is_so(store) {
-        assert!(Instant::now() < until, "{store:?}");
+        assert!(Monotonic.now() < until, "{store:?}");
         std::thread::yield_now();
     }
 }

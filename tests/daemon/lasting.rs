@@ -151,3 +151,21 @@ fn a_controller_that_is_out_for_good_gets_no_datagram_and_is_waited_for_by_nobod
     let seen = hall.end();
     assert_eq!(seen.controllers[1]["received"], 0, "{}", seen.controllers[1]);
 }
+
+#[test]
+fn a_controller_goes_out_for_good_and_comes_back_with_another_configuration() {
+    let hall = Hall::open();
+    hall.done(&["load", "ride"]);
+    let reads = |status: &Value, standing: &str| {
+        let all = [seat(status, 0), seat(status, 1)].map(|one| one["standing"].as_str().unwrap());
+        status["state"] == "parked" && status["show"]["cue"] == "ride" && all == ["ok", standing]
+    };
+    hall.rewrite(|config| config + "enabled = false\n");
+    hall.done(&["reload"]);
+    hall.wait(|status| reads(status, "out"));
+    hall.rewrite(|config| config.replace("enabled = false", "enabled = true"));
+    hall.done(&["reload"]);
+    hall.wait(|status| reads(status, "ok"));
+    hall.arm("ride");
+    assert_eq!(hall.end().motion(), 0);
+}

@@ -121,14 +121,14 @@ impl Keeper {
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
     pub(super) fn note_place(&mut self, from: State, to: State) {
         let rides = |state| matches!(state, State::Playing(_) | State::Paused);
-        if rides(from) && !rides(to) {
+        if rides(from) && !rides(to) && self.known.cause != Cause::CueEnded {
             self.lasting.left_at = Some(self.reins.live.show());
         }
     }
 
     /// A show is over: where it was left is kept with its cue.
     pub(super) fn keep_place(&mut self) {
-        let left_at = self.lasting.left_at.take().filter(|_| self.ended != Cause::CueEnded);
+        let left_at = self.lasting.left_at.take();
         if let Some(cued) = &mut self.cued {
             let end = cued.timeline.duration();
             cued.left_at = left_at.filter(|film| (WORTH_IT..end).contains(film));

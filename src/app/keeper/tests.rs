@@ -169,6 +169,18 @@ fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before(
 }
 
 #[test]
+fn a_show_that_is_stopped_on_its_way_to_park_after_its_end_is_over() {
+    let mut rig = Rig::playing();
+    let show = ShowTime::from_millis(3_900);
+    rig.keeper.reins.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.tell(Event::CueEnded);
+    rig.ask(Ask::Stop).unwrap();
+    rig.tell(Event::AtRest);
+    rig.wait_until(|keeper| keeper.known.state == State::Stopped);
+    assert_eq!(rig.keeper.cued.as_ref().unwrap().left_at, None);
+}
+
+#[test]
 fn a_plain_go_after_a_stop_begins_at_the_beginning() {
     let mut rig = stopped_in_its_midst();
     rig.ask(ARM).unwrap();
