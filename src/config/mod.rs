@@ -175,7 +175,7 @@ pub struct Controller {
     pub axis_offset: usize,
     /// Who applies the axis offset.
     pub fan_out: FanOut,
-    /// The message set it speaks.
+    /// The message set it speaks; an IMAX speaks that of MBOX.
     pub dialect: Dialect,
     /// How it has Port Out in vibration frames.
     pub vibration_port: VibrationPort,

@@ -309,7 +309,7 @@ fn controller<'t>(
     }
     let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
     let fan_out = section.choice("fan_out", &[("slice", FanOut::Slice), ("shared", FanOut::Shared)]);
-    let dialect = section.choice("dialect", &[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)]);
+    let dialect = dialect(&mut section);
     let vibration_port = vibration_port(&mut section, dialect);
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
@@ -359,6 +359,15 @@ fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<Sea
         entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
     }
     site.seats.iter().find(|seat| seat.name == name).cloned()
+}
+
+fn dialect(section: &mut Section<'_, '_, '_>) -> Option<Dialect> {
+    let entry = section.get("dialect")?;
+    if entry.value.as_str() == Some("imax") {
+        entry.fault(section.faults, "an IMAX controller is \"mbox\" here");
+        return None;
+    }
+    entry.choice(&[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)], section.faults)
 }
 
 /// Octets of Port Out in vibration frames, which MBOX controllers do not have.

@@ -258,7 +258,7 @@ impl Options {
                 self.dialect = match value {
                     "smc" => Dialect::Smc,
                     "mbox" => Dialect::Mbox,
-                    _ => return Err(refuse("smc, mbox")),
+                    _ => return Err(refuse("smc, mbox (for IMAX too)")),
                 }
             }
             "vibration_port_octets" => {

@@ -205,6 +205,10 @@ fn port_out_of_vibration_frames_has_two_octets_or_four_and_mbox_controllers_have
     let port = |more: &str| with(more).map(|hall| hall.controllers[0].vibration_port);
     assert_eq!(port(""), Ok(VibrationPort::Two));
     assert_eq!(port("vibration_port_octets = 4\n"), Ok(VibrationPort::Four));
+    assert_eq!(
+        with("dialect = \"imax\"\n"),
+        Err(vec!["hall.toml:13:11: dialect: an IMAX controller is \"mbox\" here".to_owned()])
+    );
     let place = "hall.toml:13:25: vibration_port_octets: ";
     assert_eq!(port("vibration_port_octets = 3\n"), Err(vec![format!("{place}3 is neither 2 nor 4")]));
     let faults = port("vibration_port_octets = 2\ndialect = \"mbox\"\n").unwrap_err();

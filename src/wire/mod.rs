@@ -24,16 +24,14 @@ pub use error::{DeviceError, WireError};
 pub use frame_no::FrameNo;
 pub use header::{Code, Dialect, Header, ReplyCode};
 pub use imax::{ImaxMotion, ImaxRegisters};
-pub use motion::{
-    Motion, MotionReply, MotionRequest, Timing, VibrationPort, motion_channel_and_slots, motion_len,
-};
+pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_slots, motion_len};
 pub use per_axis::PerAxis;
 pub use position::{DP_POSITIONS, position, position_reads, position_words, positions};
 pub use register::{Access, ReadRequest, RegisterReply, Space, WriteRequest};
 pub use report::{DPFE, Report};
 pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
-pub use vibration::Vibration;
+pub use vibration::{Vibration, VibrationPort};
 pub use word_order::{WordOrder, word_order};
 pub use words::{MAX_WORDS, Words};
 

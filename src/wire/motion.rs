@@ -3,7 +3,7 @@
 
 use super::header::{self, Header, reply_function, request_function};
 use super::octets::{i32_at, put_i32, put_u16, put_u32, u16_at, u32_at};
-use super::{Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, WireError, vibration};
+use super::{Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, VibrationPort, WireError, vibration};
 use crate::motion::{MAX_AXES, Pulses};
 
 mod field {
@@ -27,37 +27,6 @@ pub enum Timing {
     /// From the end of the move before: the move takes the Time itself.
     #[default]
     Relative,
-}
-
-/// How many octets Port Out takes in a frame with vibration, and the inputs in the answer to it. The SMC manual prints 4
-/// (2.2.2.9), but so it does for other messages, in which everybody sends and answers 2. Nobody is known to have seen one with
-/// vibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum VibrationPort {
-    /// As in frames without vibration.
-    #[default]
-    Two,
-    /// As printed: bit 0 = Y01 in the last octet, the first two mean nothing.
-    Four,
-}
-
-impl VibrationPort {
-    /// The one of so many octets; none where that is neither 2 nor 4.
-    #[must_use]
-    pub const fn of_octets(octets: u8) -> Option<Self> {
-        match octets {
-            2 => Some(Self::Two),
-            4 => Some(Self::Four),
-            _ => None,
-        }
-    }
-
-    const fn len(self) -> usize {
-        match self {
-            Self::Two => 2,
-            Self::Four => 4,
-        }
-    }
 }
 
 /// The object channel and the number of positions for a controller of `axes` axes: padded to 3, 6 or 10, and 12.
