@@ -7,7 +7,6 @@
 //! for as long as the measure looks back, it fades from rest onto it.
 
 mod axis;
-mod brake;
 mod calm;
 mod counts;
 mod history;
@@ -18,7 +17,6 @@ mod times;
 pub use counts::{Clamp, Counts, Limit};
 
 use axis::{Axis, Mode};
-use brake::Brake;
 use calm::Calm;
 use counts::Counter;
 use history::{Difference, History};
@@ -26,7 +24,7 @@ use limits::{AxisLimits, Next, SLACK};
 use outlook::Outlook;
 use times::Times;
 
-use crate::motion::{Pose, Spacing, Window};
+use crate::motion::{Halt, Pose, Spacing, Window};
 use crate::time::Rate;
 
 /// What became of a pose.
@@ -233,7 +231,7 @@ impl Gate {
 
     /// Goes onto a way to rest: the one kept from the tick before, or one that is looked for now.
     fn brake(&mut self, axis: usize, frame: &Frame) -> f64 {
-        let begins_here = |&(index, _): &(u64, Brake)| index + 1 == frame.index;
+        let begins_here = |&(index, _): &(u64, Halt)| index + 1 == frame.index;
         if let Some((_, brake)) = self.axes[axis].way_out.take_if(|way| begins_here(way)) {
             let position = brake.position(frame.seconds);
             let next = self.next(axis, position, frame);
