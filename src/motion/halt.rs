@@ -170,6 +170,21 @@ impl Halt {
             .fold(f64::NEG_INFINITY, |past, position| past.max(-position).max(position - 1.0))
     }
 
+    /// How far an axis leaves its stroke at the least, with a share of its acceleration and jerk, in strokes; below 0 where
+    /// there is room to turn.
+    pub(crate) fn least_past(from: AxisState, limits: Limits, share: f64) -> f64 {
+        let means = Means::of(limits, share);
+        let most = means.velocity / means.acceleration + means.acceleration / means.jerk;
+        let past = |onward: f64| {
+            let away = Self::pulling(from, means, -onward, most);
+            let ends = away.stretches[..2].iter().flat_map(|stretch| {
+                stretch.turns().map(|after| stretch.from.under(stretch.jerk, after).position)
+            });
+            ends.map(|position| onward * (position - 0.5) - 0.5).fold(f64::NEG_INFINITY, f64::max)
+        };
+        past(1.0).max(past(-1.0))
+    }
+
     /// Its stretches of constant jerk that last: how it moves at the beginning of each, the jerk, and the seconds.
     pub(crate) fn stretches(&self) -> impl Iterator<Item = (AxisState, f64, f64)> {
         let lasting = self.stretches.iter().filter(|stretch| stretch.seconds > 0.0);
@@ -320,6 +335,8 @@ mod tests {
                     break;
                 }
             }
+            let past = Halt::least_past(from, limits, 1.0);
+            prop_assert!((past - (peak - 1.0).max(-position)).abs() < 1e-5, "{past} {peak}");
             let found = Halt::inside(from, limits, &[1.0]);
             prop_assert!(found.is_some() == (peak <= 1.0) || (peak - 1.0).abs() < 1e-5, "{peak} {found:?}");
         }

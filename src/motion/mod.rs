@@ -4,14 +4,12 @@
 mod brake;
 mod halt;
 mod measure;
-mod scan;
 mod seat;
 mod window;
 
 pub use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
 pub use measure::{Measure, Reading, Readings, Spacing};
-pub use scan::{Peak, Peaks, scan};
 pub use seat::{FACTORY_INTERVAL_MS, Pulses, SeatType};
 pub use window::{Limits, Slot, Window};
 
