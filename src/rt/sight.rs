@@ -12,8 +12,8 @@ use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::net::{Delivery, Sender};
 use crate::time::MonoTime;
 use crate::wire::{
-    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, position_reads,
-    positions,
+    Access, Code, DP_INPUTS, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode,
+    position_reads, positions,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -93,6 +93,7 @@ impl Looker {
             read(PARAMETERS, MODE.0, MODE.1),
             read(MONITORS, RESET, 1),
             read(MONITORS, VERSIONS.0, VERSIONS.1),
+            read(MONITORS, DP_INPUTS, 1),
         ];
         let reads =
             others.into_iter().chain(packets).chain(position_reads(self.seat.axes, self.code, self.code));
@@ -131,6 +132,8 @@ impl Looker {
             }
             (MONITORS, PACKETS) => self.seen.packets = word(0),
             (MONITORS, RESET) => self.seen.homed = word(0).map(|state| state == RESET_DONE),
+            // The observer hears those, whoever asked.
+            (MONITORS, DP_INPUTS) => {}
             (MONITORS, start) => return self.hear_positions(start, &reply),
             _ => return false,
         }
