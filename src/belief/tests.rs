@@ -228,6 +228,6 @@ fn a_reading_is_taken_whole_or_not_at_all() {
     evidence.on_reading(&reading);
     assert_eq!(evidence.reading(), Some((2, reading)));
     assert_eq!(evidence.acked(), None);
-    [3, 5, 4].map(|frame| evidence.on_ack(FrameNo(frame)));
+    [3, 5, 4].into_iter().for_each(|frame| evidence.on_ack(FrameNo(frame)));
     assert_eq!(evidence.acked(), Some(FrameNo(5)), "the newest");
 }

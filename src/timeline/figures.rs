@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn bits_of_a_raw_word_are_outputs() {
-        let uses = timeline("time_s,a1,io\n0,0,0x8001\n1,0,0x801\n2,0,0\n").effect_uses();
+        let uses = timeline("time_s,a1,io\n0,0,0x001\n1,0,0x801\n2,0,0\n").effect_uses();
         let names: Vec<_> = uses.iter().map(|usage| (usage.name.as_str(), usage.on.as_secs())).collect();
         assert_eq!(names, [("Y01", 2), ("Y12", 1)]);
     }
