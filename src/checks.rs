@@ -158,6 +158,12 @@ checks! {
     WorkMode "work-mode" Identity Fail
         "PA00 must be the work mode: 10, or 0 on RS-485 controllers of the IMAX manual. The others are for tests and \
          effects, and frames do not move the seat as meant.";
+    WorkModeOpen "work-mode-open" Identity Warn
+        "PA00 = 0 is the work mode of RS-485 units (SMC manual 5.2) and none of CAN units, whose work mode is 10; no \
+         register tells which of them this is.";
+    RotaryAxis "rotary-axis" Identity Fail
+        "With PA03 above 0 that axis has no stroke and takes for zero wherever it stands; kinocue proves and parks axes \
+         that have a stroke, and knows no others.";
     AxisOffset "axis-offset" Identity Fail
         "PA95 must be 0 where kinocue sends each controller its own axes (fan_out = slice), and axis_offset where each \
          takes its window of one frame (shared). Else the seat plays axes that are not its own.";
@@ -183,6 +189,45 @@ checks! {
         "A Time longer than PA0b is cut to it, so the move is made in less time: faster than anyone proved.";
     IntervalUnlimited "interval-unlimited" Motion Warn
         "PA0b = 0 means no limit by the SMC manual alone; the IMAX manual does not say what it does.";
+    TimeIgnored "time-ignored" Motion Fail
+        "With PA0a = 1 an IMAX controller goes by the time between packets and not by the Time in them: a frame that comes \
+         late or early is made slower or faster than anyone proved.";
+    HomesUnsearched "homes-unsearched" Motion Fail
+        "With PA0e = 1 a reset goes to where the controller believes zero to be, without a search. One that was switched \
+         off in between has no zero, and every position after that is wrong by as much; the hall's homing refuses it.";
+    Encoder "encoder" Motion Fail
+        "PA54 is how many lines the encoders have, 5,000 or 2,500, of which each makes two or four counts. Where \
+         pulses_per_rev is neither of these, the seat goes farther or less far than it is sent.";
+    EncoderUnsure "encoder-unsure" Motion Warn
+        "pulses_per_rev fits the encoder of PA54 with four counts for each line. Most seats have two, and no manual says \
+         which; with the wrong one every move is twice as far and twice as fast.";
+    EncoderDiffers "encoder-differs" Motion Fail
+        "Seats of one type whose controllers have other encoders set (PA54) go to other places by the same pulses.";
+    Lead "lead" Motion Fail
+        "PA41 is the lead of the screw, and the seat type's lead_mm should be the same: one of them is wrong, and with the \
+         seat type's every limit in millimetres; with the controller's the rise after homing (PA40).";
+    Stroke "stroke" Motion Fail
+        "PA42 is the stroke that the controller knows; the seat type has a longer one, so positions near its end are cut \
+         off or run into the stop.";
+    WordOrder "word-order" Motion Fail
+        "By the word order of its dialect the controller's position registers tell of places outside the stroke, or other \
+         than its reports tell, and by the other order they do not: whoever believes them takes the seat for somewhere \
+         else, and moves it from there.";
+    WordOrderOpen "word-order-open" Motion Warn
+        "Both word orders make a place inside the stroke of its position registers, and not the same one; the dialect's is \
+         taken.";
+    Position "position" Motion Fail
+        "An axis that says it is outside its stroke by more than rounding, or elsewhere than a report of the same rest \
+         says, is in no known place: its zero was lost, or pulses, lead or stroke of the seat type are not its own.";
+    BusPeriod "bus-period" Motion Fail
+        "PA59 is the shortest time between commands to the drives; where it is longer than the show's frames these pile up \
+         in the controller, which then hurries (PA06) or stops with Err21.";
+    MotionLate "motion-late" Motion Warn
+        "Filters and delays in the controller (PA50 and PA51 of IMAX, PA4c and PA4d of SMC) make motion later than the \
+         film, and smooth what was proved; trim can make up for the delay.";
+    AnaloguePosition "analogue-position" Motion Fail
+        "With PA60 = 1 positions come from the analogue inputs too (times PA61 over PA62): the seat does not go where it \
+         is sent.";
     AutoReset "auto-reset" Motion Fail
         "With PA0d above 0 the controller resets by itself some time after the last frame: the seat moves without a \
          command, perhaps in a pause with people on it.";
@@ -196,6 +241,13 @@ checks! {
          acknowledges is not where it stands.";
     OutputsIgnored "outputs-ignored" Motion Warn
         "With PA9d = 1 the controller ignores the outputs in frames: no effect of a cue comes on, and none goes off.";
+
+    OutputsInverted "outputs-inverted" Motion Fail
+        "With PA05 = 1 an output is on when a frame says off: every effect runs between shows, and pauses when it is \
+         called for.";
+    PowerOnOutputs "power-on-outputs" Motion Warn
+        "PA9f switches outputs on as soon as the controller has power, with nobody leading it; they stay on until the \
+         first frame.";
 
     SpeedUnlimited "speed-unlimited" Speed Fail
         "PA07 is the last limit on speed that the controller itself keeps; 0 is none that can be relied on.";
@@ -223,6 +275,12 @@ checks! {
          itself once it is let go.";
     EstopAction "estop-action" EmergencyStop Fail
         "PA91 has a value that no manual explains: what the seat does in an emergency stop is not known.";
+    EstopIsBelts "estop-is-belts" EmergencyStop Fail
+        "PA92 names the inputs of the belts (belt_inputs), as in the second example of the manual's section 5.6. The \
+         controller has one such function: so no input of it is an emergency stop, and opening the last belt does to \
+         the seat what PA91 says, in mid-show too.";
+    BeltsOpen "belts-open" EmergencyStop Warn
+        "All belts that PA92 names are open, so the controller takes no motion; it does once one of them is closed.";
     EstopFilter "estop-filter" EmergencyStop Fail
         "PA93 is how long the input must be active before anything happens; over 50 ms the seat moves on too long.";
     EstopRelease "estop-release" EmergencyStop Fail
@@ -277,7 +335,7 @@ impl Check {
     /// Whether it is about this moment, and no setting.
     #[must_use]
     pub const fn is_present(self) -> bool {
-        matches!(self, Self::EmergencyStopActive | Self::ActiveError)
+        matches!(self, Self::EmergencyStopActive | Self::ActiveError | Self::BeltsOpen | Self::Position)
     }
 }
 

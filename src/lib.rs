@@ -22,6 +22,7 @@
 )]
 
 pub mod motion;
+pub mod plain;
 pub mod time;
 pub mod wire;
 
@@ -52,6 +53,7 @@ pub mod hall;
 pub mod journal;
 pub mod library;
 pub mod playlist;
+pub mod settings;
 
 pub mod api;
 pub mod console;

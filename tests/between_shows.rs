@@ -31,6 +31,9 @@ use rtrb::{Consumer, Producer};
 #[derive(Debug, Clone, Copy)]
 enum Deed {
     Load,
+    /// The same, made for that trim.
+    LoadTrimmed(i32),
+    Trim(i32),
     Ask(Request),
     Tell(Event),
     See(Alarm),
@@ -41,7 +44,7 @@ enum Deed {
     Hear,
 }
 
-use Deed::{Ask, Found, Hear, Load, See, Stop, Tell};
+use Deed::{Ask, Found, Hear, Load, LoadTrimmed, See, Stop, Tell, Trim};
 
 const PARKED: Pose = [0.0; MAX_AXES];
 const READY: Deed = Tell(Event::Readiness(Readiness::Ready));
@@ -52,12 +55,16 @@ const fn found(homed: bool, at_park: bool) -> Deed {
 
 /// Four seconds for one seat of one axis.
 fn staged() -> Staged {
+    staged_at(ShowTime::ZERO)
+}
+
+fn staged_at(start: ShowTime) -> Staged {
     let text = swell(1, 4, 30.0, 0.2);
     let timeline = Timeline::new(
         cue::read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).expect("the cue is sound"),
     );
     let config = from_to_args(&["127.0.0.1:7408".to_owned()], &[], 1).expect("the address is sound");
-    let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
+    let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start, plays: 1 };
     Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false }).expect("there is a join")
 }
 
@@ -113,6 +120,8 @@ impl Clock for Hands<'_> {
         for (_, deed) in self.script.iter().filter(|(at, _)| *at == tick) {
             match deed {
                 Load => command(Command::Load(show())),
+                LoadTrimmed(ms) => command(Command::Load(show_trimmed(*ms))),
+                Trim(ms) => self.desk.set_trim_ms(*ms),
                 Ask(request) => command(Command::Request(*request)),
                 Tell(event) => command(Command::Event(*event)),
                 Found(pose) => {
@@ -133,6 +142,12 @@ impl Clock for Hands<'_> {
 
 fn show() -> Box<Loaded> {
     staged().loaded()
+}
+
+fn show_trimmed(ms: i32) -> Box<Loaded> {
+    let mut loaded = staged_at(ShowTime::from_millis(-i64::from(ms))).loaded();
+    loaded.engine.begin_trimmed(ms);
+    loaded
 }
 
 /// First axes of the frames, in pulses, each with its tick.
@@ -350,4 +365,28 @@ fn whoever_hears_nothing_for_a_while_still_hears_where_the_hall_stands() {
     script.extend([(220, Stop), (230, Hear)]);
     let (_, states) = live_through(&script, 240);
     assert_eq!(states.last(), Some(&State::Stopped));
+}
+
+/// Two shows, one after the other, each loaded by `load`: the positions of the second one while it follows the cue, by how many
+/// ticks after its go they came.
+fn second_show(load: Deed, trim_ms: i32) -> Vec<(u64, i32)> {
+    let show = |go: u64| [(go - 3, load), (go - 1, Ask(Request::Arm)), (go, Ask(Request::Go))];
+    let begin = [(1, Found(PARKED)), (2, Trim(trim_ms)), (3, found(true, true)), (4, READY), (1_900, Hear)];
+    let (frames, _) = live_through(&[&begin[..], &show(10), &show(2_000)].concat(), 3_900);
+    frames.into_iter().filter_map(|(tick, pulses)| Some((tick.checked_sub(2_000)?, pulses))).collect()
+}
+
+#[test]
+fn a_trim_that_was_set_before_two_shows_holds_in_the_second_as_well() {
+    let at = |frames: &[(u64, i32)], tick: u64| frames.iter().find(|one| one.0 == tick).expect("a frame").1;
+    let plain = second_show(Load, 0);
+    // The cue is joined by then, and 20 ms are slewed in.
+    for tick in (300..380).step_by(20) {
+        let (before, now) = (at(&plain, tick - 2), at(&plain, tick));
+        assert!((before - now).abs() > 20, "it moves: {before} {now}");
+        for load in [Load, LoadTrimmed(20)] {
+            let trimmed = at(&second_show(load, 20), tick);
+            assert!((trimmed - before).abs() <= 2, "{load:?} at {tick}: {trimmed}, not {before} but {now}");
+        }
+    }
 }

@@ -34,6 +34,54 @@ fn write(folder: &Path, name: &str, text: &str) -> String {
     path.display().to_string()
 }
 
+/// Whether a text is what a terminal shows and does not obey.
+fn is_plain(text: &str) -> bool {
+    !text.chars().any(|c| c.is_control() && c != '\n')
+}
+
+#[test]
+fn nothing_in_a_file_or_its_name_reaches_the_terminal_as_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let evil = "\x1b]0;owned\x07\u{9b}2J\x7f\u{202e}";
+    let bad = format!("# title: {evil}\ntime_ms,a1,{evil}\n0,{evil},0\n10,0,0\n");
+    let name = format!("ok: passed\n{evil}");
+    let good = format!("# title: {evil}\ntime_ms,a1\n0,0\n1000,0.001\n2000,0.001\n");
+    let files = [
+        write(folder.path(), &format!("{name}.csv"), &bad),
+        write(folder.path(), &format!("{name} well.csv"), &good),
+        write(folder.path(), &format!("{name}.toml"), &format!("[\"{evil}\"]\n[show]\nbind = \"{evil}\"\n")),
+        write(folder.path(), &format!("{name}.mcap"), evil),
+    ];
+    for file in &files {
+        for args in [
+            vec!["check", file],
+            vec!["info", file],
+            vec!["check", file, "--json"],
+            vec!["info", file, "--json"],
+            vec!["fit", file, "-o", "/dev/null/x.csv"],
+        ] {
+            let run = kinocue(&args);
+            assert!(
+                is_plain(&run.stdout) && is_plain(&run.stderr),
+                "{args:?}\n{}\n{}",
+                run.stdout,
+                run.stderr
+            );
+            let told = run.stdout + &run.stderr;
+            let forged = told.lines().any(|line| line.starts_with("\\u{1b}]0;owned"));
+            assert!(!forged, "a name makes no line of its own: {told}");
+        }
+    }
+    let json = kinocue(&["check", &files[0], "--json"]).json();
+    assert_eq!(json["faults"][0]["file"], files[0].as_str(), "a program gets the name as it is");
+    for args in
+        [vec![evil], vec!["play", evil], vec!["play", "x.csv", evil], vec!["check", "x", "--rate", evil]]
+    {
+        let run = kinocue(&args);
+        assert!(run.code != Some(0) && is_plain(&run.stderr), "{}", run.stderr);
+    }
+}
+
 #[test]
 fn a_sound_cue_and_a_sound_hall_pass() {
     let run = kinocue(&["check", CUE, HALL]);

@@ -143,8 +143,16 @@ fn a_hall_with_faults_proves_nothing() {
     assert!(fixture.files().is_empty());
 }
 
-/// A chunk of 60 MiB in some kilobytes.
-fn bomb() -> Vec<u8> {
+/// A chunk of 60 MiB, of which so many octets do not pack.
+fn bomb(noise: usize) -> Vec<u8> {
+    let mut message = vec![b' '; 60 << 20];
+    let mut seed = 1_u32;
+    for octet in &mut message[..noise] {
+        seed ^= seed << 13;
+        seed ^= seed >> 17;
+        seed ^= seed << 5;
+        *octet = seed.to_le_bytes()[1];
+    }
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new()
         .compression(Some(mcap::Compression::Zstd))
@@ -154,7 +162,7 @@ fn bomb() -> Vec<u8> {
     let channel = writer.add_channel(0, "/cue/axes", "json", &Default::default()).expect("it fits in memory");
     let header =
         mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
-    writer.write_to_known_channel(&header, &vec![b' '; 60 << 20]).expect("it fits in memory");
+    writer.write_to_known_channel(&header, &message).expect("it fits in memory");
     writer.finish().expect("it fits in memory");
     drop(writer);
     file.into_inner()
@@ -164,8 +172,11 @@ fn bomb() -> Vec<u8> {
 fn a_bomb_is_refused_within_its_bounds() {
     let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
     fixture.upload("ride", GOOD.as_bytes()).unwrap();
-    let octets = bomb();
-    assert!(octets.len() < 1 << 20, "{} octets", octets.len());
+    // What packs better than any cue is not even unpacked.
+    let problem = fixture.upload("bomb", &bomb(0)).unwrap_err();
+    assert!(problem.faults[0].contains("damaged: a chunk of "), "{problem}");
+    let octets = bomb(1 << 20);
+    assert!(octets.len() < 2 << 20, "{} octets", octets.len());
     let problem = fixture.upload("bomb", &octets).unwrap_err();
     assert_eq!(problem.code, Code::Check);
     assert!(problem.detail.contains("signal 6; it may take 48 MiB of memory"), "{problem}");
@@ -259,4 +270,33 @@ fn a_playlist_of_proved_cues_has_no_faults_and_unknown_ones_are_proved_when_it_i
     let faults = check("title = \"Day\"\n[[entry]]\ncue = \"wild\"\n[[entry]]\ncue = \"gone\"\n");
     assert!(faults[0].starts_with("day.toml:3:7: cue: wild does not pass: "), "{faults:?}");
     assert!(faults[1].starts_with("day.toml:5:7: cue: there is no cue gone"), "{faults:?}");
+}
+
+#[test]
+fn curves_are_drawn_once_until_the_file_changes() {
+    let fixture = Fixture::new();
+    let id = "ride".parse().unwrap();
+    let put = |text: &str| {
+        fs::write(fixture.cues().join("new"), text).unwrap();
+        fs::rename(fixture.cues().join("new"), fixture.cues().join("ride.csv")).unwrap();
+    };
+    put("time_ms,a1\n0,0.5\n100,0.5\n");
+    let first = fixture.library.curve(&id, 10).unwrap();
+    assert!(std::sync::Arc::ptr_eq(&first, &fixture.library.curve(&id, 10).unwrap()));
+    assert_eq!(fixture.library.curve(&id, 20).unwrap().t_s.len(), 20);
+    put("# units: mm\ntime_ms,a1\n0,15\n100,15\n");
+    assert_eq!(fixture.library.curve(&id, 10).unwrap().axes[0].max[0], 0.1);
+    put("time_ms,a1\n0,0.5\n100,7\n");
+    let problem = fixture.library.curve(&id, 10).unwrap_err();
+    assert_eq!(problem.code, Code::Check);
+    assert!(problem.faults.concat().contains("ride.csv:3:5: a1"), "{problem}");
+}
+
+#[test]
+fn a_curve_that_takes_too_much_memory_is_given_up_by_the_child_alone() {
+    let fixture = Fixture::bounded(Bounds { memory_mib: 48, ..Bounds::default() });
+    let rows: String = (0..1_000_000).map(|row| format!("{row},0.5\n")).collect();
+    fs::write(fixture.cues().join("long.csv"), format!("time_ms,a1\n{rows}")).unwrap();
+    let problem = fixture.library.curve(&"long".parse().unwrap(), 100).unwrap_err();
+    assert!(problem.remedy.contains("max_memory_mib in [library]"), "{problem}");
 }

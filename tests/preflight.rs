@@ -131,7 +131,7 @@ fn settings_of_the_factory_are_refused_in_sentences() {
         "FAIL estop-filter: all 2: PA93 = 200",
         "FAIL estop-release: all 2: PA94 = 0",
         "FAIL status-off: all 2: PA1f = 0",
-        "FAIL work-mode: all 2: PA00 = 0",
+        "work-mode-open: all 2: PA00 = 0",
     ] {
         assert!(said.out.contains(sentence), "{sentence}\n{}", said.out);
     }
@@ -139,9 +139,18 @@ fn settings_of_the_factory_are_refused_in_sentences() {
 
 #[test]
 fn each_of_these_settings_is_found_through_the_wire() {
-    for (setting, check) in
-        [("92=3", "estop-and"), ("0d=500", "auto-reset"), ("23=77", "reply-address"), ("95=3", "axis-offset")]
-    {
+    for (setting, check) in [
+        ("92=3", "estop-and"),
+        ("0d=500", "auto-reset"),
+        ("23=77", "reply-address"),
+        ("95=3", "axis-offset"),
+        ("03=3", "rotary-axis"),
+        ("05=1", "outputs-inverted"),
+        ("0e=1", "homes-unsearched"),
+        ("41=100", "lead"),
+        ("59=11", "bus-period"),
+        ("60=1", "analogue-position"),
+    ] {
         let sim = Sim::safe(3, &[setting]);
         let said = preflight(3, &["--to", &format!("{},axes=3", sim.addresses[0]), "--json"]);
         assert_eq!((said.exit, failed(&said.json(), 0)), (1, vec![check]), "{setting}");
@@ -260,12 +269,38 @@ fn a_cue_gives_the_axes_and_the_rate_the_longest_time() {
 
 #[test]
 fn mbox_controllers_are_judged_by_what_they_have() {
-    let parameters = ["06=0", "07=2880", "90=1", "91=2", "92=1", "93=20", "94=300"];
+    let parameters = ["06=0", "07=2880", "51=0", "90=1", "91=2", "92=1", "93=20", "94=300"];
     let sim = Sim::start(1, 11, &parameters, &["--dialect", "mbox"]);
     let folder = tempfile::tempdir().expect("a folder");
     let path = hall(&folder, &sim.addresses, "", "dialect = \"mbox\"\nestop_inputs = [1]");
     let said = preflight(11, &["--config", path.to_str().expect("text"), "--json"]);
     assert_eq!((said.exit, failed(&said.json(), 0)), (0, vec![]));
+    let timed = Sim::start(1, 11, &[&parameters[..], &["0a=1"]].concat(), &["--dialect", "mbox"]);
+    let path = hall(&folder, &timed.addresses, "", "dialect = \"mbox\"\nestop_inputs = [1]");
+    let said = preflight(11, &["--config", path.to_str().expect("text"), "--json"]);
+    assert_eq!((said.exit, failed(&said.json(), 0)), (1, vec!["time-ignored"]));
+}
+
+#[test]
+fn a_word_order_other_than_the_dialects_is_found_where_a_seat_is_up() {
+    let parameters = ["06=0", "07=2880", "51=0", "90=1", "91=2", "92=1", "93=20", "94=300"];
+    let sim = Sim::start(1, 14, &parameters, &["--dialect", "mbox"]);
+    let host = UdpSocket::bind("127.83.0.14:8410").expect("nobody else is there");
+    // 0x1401 to 20,000 pulses of axis 1 in 100 ms, with a reply.
+    let mut frame = vec![0x55, 0xaa, 0, 0, 0x14, 1, 0, 0, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 1, 0, 0, 0, 100];
+    frame.extend([20_000_i32, 0, 0].iter().flat_map(|axis| axis.to_be_bytes()).chain([0; 6]));
+    host.send_to(&frame, sim.addresses[0]).expect("loopback takes it");
+    host.recv(&mut [0; 64]).expect("a reply");
+    drop(host);
+    let folder = tempfile::tempdir().expect("a folder");
+    let judged = |dialect: &str| {
+        let path = hall(&folder, &sim.addresses, "", &format!("dialect = \"{dialect}\"\nestop_inputs = [1]"));
+        preflight(14, &["--config", path.to_str().expect("text"), "--json"]).json()
+    };
+    // Preflight takes longer than the frame.
+    let _ = judged("mbox");
+    assert!(failed(&judged("mbox"), 0).is_empty());
+    assert!(failed(&judged("smc"), 0).contains(&"word-order"), "as an smc it stands at 1310720000 pulses");
 }
 
 #[test]

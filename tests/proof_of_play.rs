@@ -70,6 +70,7 @@ fn journal(dir: &Path) {
         what: "arm".to_owned(),
         result: "done".to_owned(),
         state: "armed\u{1b}[31m".to_owned(),
+        times: 1,
     });
     let ends = [
         show(seven, "storm", "=Storm, \"II\"", Some(("2026-11-21T19:10:00.000+01:00", Ending::Completed))),

@@ -9,7 +9,7 @@ use kinocue::net::Ports;
 use kinocue::observe::Watched;
 use kinocue::rt::{Accounts, AckLoop, Live, MailEnds, mailboxes};
 use kinocue::time::Rate;
-use kinocue::wire::{Code, Dialect, MAX_LEN, PerAxis, Status};
+use kinocue::wire::{Code, Dialect, MAX_LEN, PerAxis, Status, VibrationPort};
 
 const ANY: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);
 
@@ -41,7 +41,12 @@ fn heard(send: impl FnOnce([UdpSocket; 2], SocketAddrV4)) -> Accounts {
     let addresses = [0, 1].map(|index: usize| address(&controllers[index]));
     let ports = Ports::open(ANY, &addresses).expect("there is a free port");
     let ours = SocketAddrV4::new(Ipv4Addr::LOCALHOST, ports.local().port());
-    let watched = addresses.map(|address| Watched { address, dialect: Dialect::Smc, estop_inputs: 0 });
+    let watched = addresses.map(|address| Watched {
+        address,
+        dialect: Dialect::Smc,
+        vibration_port: VibrationPort::Two,
+        estop_inputs: 0,
+    });
     let (_mail, MailEnds { sent, ticks, .. }) = mailboxes(2, Rate::from_hz(100.0), Arc::new(Live::default()));
     let (_sender, receiver) = ports.split();
     let mut acks = AckLoop::new(receiver, watched.to_vec(), 1, sent, ticks);

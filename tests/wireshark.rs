@@ -5,9 +5,10 @@
 mod common;
 #[path = "common/pcap.rs"]
 mod pcap;
+#[path = "common/programs.rs"]
+mod programs;
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
 use std::net::SocketAddrV4;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -17,10 +18,11 @@ use common::Virtual;
 use kinocue::motion::Pulses;
 use kinocue::sim::{Controller, Setup};
 use kinocue::wire::{
-    Access, Code, MAX_LEN, Message, ReadRequest, RegisterReply, ReplyCode, Status, Vibration, WireError,
-    Words, WriteRequest,
+    Access, Code, MAX_LEN, Message, ReadRequest, RegisterReply, ReplyCode, Status, Vibration, VibrationPort,
+    WireError, Words, WriteRequest,
 };
 use pcap::Pcap;
+use programs::is_installed;
 use serde::Deserialize;
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/wireshark/kinocue.lua");
@@ -59,16 +61,15 @@ const FIELDS: [&str; 27] = [
 /// The fields that a message has, several values joined by commas.
 type Fields = BTreeMap<&'static str, String>;
 
-/// Whether there is a tshark that runs Lua; says so where there is none.
+/// Whether there is a tshark; false where somebody asked for tests without it.
 fn tshark_runs() -> bool {
-    let output = Command::new("tshark").arg("--version").output();
-    let runs =
-        output.is_ok_and(|Output { stdout, .. }| String::from_utf8_lossy(&stdout).contains("with Lua"));
-    if !runs {
-        // Straight to the standard error: the test harness keeps what a passed test prints.
-        let _ = writeln!(std::io::stderr(), "skipped: no tshark with Lua is installed");
+    if !is_installed("tshark") {
+        return false;
     }
-    runs
+    let Output { stdout, .. } = Command::new("tshark").arg("--version").output().unwrap();
+    let version = String::from_utf8_lossy(&stdout);
+    assert!(version.contains("with Lua"), "this tshark runs no dissectors: {version}");
+    true
 }
 
 /// The lines that tshark prints of a capture, one for each packet.
@@ -134,14 +135,14 @@ fn put(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> usize {
             fields.insert("kinocue.output", format!("0x{:04x}", motion.outputs));
             body(fields, motion.frame.0, motion.time_ms, &motion.positions);
             tail(fields, motion.extend, motion.vibration.as_deref());
-            motion.layout_len()
+            motion.layout_len(VibrationPort::Two)
         }
         Message::MotionReply(reply) => {
             answer(fields, octets, reply.code, ("kinocue.channel", reply.channel), reply.error);
             fields.insert("kinocue.input", format!("0x{:04x}", reply.inputs));
             body(fields, reply.frame.0, reply.time_ms, &reply.positions);
             tail(fields, reply.extend, reply.vibration.as_deref());
-            reply.layout_len()
+            reply.layout_len(VibrationPort::Two)
         }
         Message::Status(status) => {
             put_status(fields, status);
@@ -466,22 +467,27 @@ fn decoded(path: &Path, args: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn the_info_column_says_what_decode_says_in_both_dialects() {
+fn the_info_column_says_what_decode_says_in_both_dialects_and_with_both_ports_of_vibration() {
     if !tshark_runs() {
         return;
     }
-    let mut datagrams = [golden(), monitored()].concat();
-    datagrams.retain(|octets| Message::parse(octets).is_ok());
-    let capture = captured(&datagrams);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("golden.pcap");
-    std::fs::write(&path, capture.octets()).unwrap();
-    for (dialect, preference) in [("smc", "kinocue.dialect:SMC"), ("mbox", "kinocue.dialect:MBOX")] {
+    let readings = [
+        (["--dialect", "smc"], "kinocue.dialect:SMC", VibrationPort::Two),
+        (["--dialect", "mbox"], "kinocue.dialect:MBOX", VibrationPort::Two),
+        (["--vibration-port-octets", "4"], "kinocue.vibration_port_octets:4", VibrationPort::Four),
+    ];
+    for (args, preference, port) in readings {
+        let mut datagrams = [golden(), monitored()].concat();
+        datagrams.retain(|octets| Message::parse_as(port, octets).is_ok());
+        let capture = captured(&datagrams);
+        std::fs::write(&path, capture.octets()).unwrap();
         let infos = tshark(&capture, &["-o", preference, "-e", "_ws.col.Info"]);
-        let words = decoded(&path, &["--dialect", dialect]);
+        let words = decoded(&path, &args);
         assert_eq!(infos.len(), words.len());
         for (info, words) in infos.iter().zip(words) {
-            assert_eq!(*info, words, "{dialect}");
+            assert_eq!(*info, words, "{preference}");
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::time::{Clock as _, MonoTime};
 /// When the person asked, unix milliseconds by the clock of their machine.
 pub(super) const SENT: HeaderName = HeaderName::from_static("x-kinocue-sent");
 /// How long a stop waits for the state that it led to; it is under way meanwhile.
-const STOP_PATIENCE: Duration = Duration::from_secs(1);
+const STOP_PATIENCE: Duration = Duration::from_millis(400);
 
 /// Who asks, and the way to the hall.
 pub(super) struct Asker {
@@ -90,7 +90,7 @@ impl Asker {
             return Ok(now);
         }
         let Some(age_ms) = self.age_ms.clone()? else {
-            if *ask == Ask::Go && self.who.surface != Surface::Socket {
+            if matches!(ask, Ask::Go | Ask::GoFrom(_)) && self.who.surface != Surface::Socket {
                 let remedy = format!("send the header {SENT}, unix milliseconds, with a go");
                 return Err(bad_value("nobody can tell how old this go is", remedy));
             }

@@ -4,11 +4,21 @@ use std::sync::Arc;
 
 use axum::Json as JsonReply;
 use axum::extract::State;
+use serde::Deserialize;
+use utoipa::ToSchema;
 
 use super::asker::{Asker, StatusReply};
-use super::input::{Name, Nothing};
+use super::input::{Name, Nothing, OrNothing};
 use super::shared::Shared;
 use crate::hall::{Ask, Code, ControllerStatus, Problem, Status};
+
+/// Why it is taken out.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Disable {
+    /// In a line, for whoever comes next.
+    why: Option<String>,
+}
 
 /// All controllers, in the order of the configuration.
 #[utoipa::path(
@@ -44,11 +54,15 @@ pub(super) async fn enable(asker: Asker, Name(name): Name, _: Nothing) -> Result
     asker.ask(Ask::Enable(name)).await
 }
 
-/// Takes the group of a controller out: its seat parks.
+/// Takes the group of a controller out: its seat parks. It stays out over a restart, until somebody takes it in.
 #[utoipa::path(
-    post, path = "/api/v1/controllers/{name}/disable", tag = "controllers",
+    post, path = "/api/v1/controllers/{name}/disable", tag = "controllers", request_body = Option<Disable>,
     params(("name" = String, Path, description = "Its name")), responses((status = 200, body = Status))
 )]
-pub(super) async fn disable(asker: Asker, Name(name): Name, _: Nothing) -> Result<StatusReply, Problem> {
-    asker.ask(Ask::Disable(name)).await
+pub(super) async fn disable(
+    asker: Asker,
+    Name(name): Name,
+    OrNothing(Disable { why }): OrNothing<Disable>,
+) -> Result<StatusReply, Problem> {
+    asker.ask(Ask::Disable { name, why }).await
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 use axum::Json as JsonReply;
 use axum::body::Body;
 use axum::extract::{Query, Request, State};
+use axum::http::HeaderValue;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse as _;
 use http_body_util::BodyExt as _;
@@ -19,7 +20,7 @@ use super::access::one as one_header;
 use super::asker::Asker;
 use super::input::{Id, check_length};
 use super::problem::bad_value;
-use super::shared::Shared;
+use super::shared::{Shared, turn};
 use crate::hall::{Code, Problem};
 use crate::library::{CueId, CueInfo, CurveData, Library, MAX_POINTS};
 
@@ -82,8 +83,14 @@ pub(super) async fn curve(
     })?;
     let points = query.points.unwrap_or(POINTS);
     let library = shared.library.clone();
-    let curve = shared.blocking(move || library.curve(&id, points)).await?;
-    Ok(JsonReply(&*curve).into_response())
+    let turn = turn(&shared.curves, "a curve").await?;
+    let curve = shared.blocking(move || {
+        let _turn = turn; // held until it is drawn, also where nobody waits for it any more
+        let curve = library.curve(&id, points)?;
+        Ok(serde_json::to_vec(&*curve).expect("numbers and names are written without fail"))
+    });
+    let json = HeaderValue::from_static("application/json");
+    Ok(([(CONTENT_TYPE, json)], curve.await?).into_response())
 }
 
 /// Takes a cue in, CSV or MCAP as it is in its file, of any type but a form's. It is checked and proved for the hall before it

@@ -19,9 +19,10 @@ use super::access::one;
 use super::once::Reply;
 use super::peer::{self, Peer};
 use super::problem::{bad_value, panicked, render};
+use super::rest::Rest;
 use super::shared::Shared;
 use super::show::STOP;
-use crate::hall::{Code, Problem, Who};
+use crate::hall::{Code, Place, Problem, Surface, Who};
 use crate::log::{Line, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
@@ -36,10 +37,14 @@ const POLICY: &str = "default-src 'self'; frame-ancestors 'none'; base-uri 'none
 /// Passes a request on, or refuses it. What was begun is ended also where the connection goes away meanwhile.
 pub(super) async fn gate(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
     let of_gate = Arc::clone(&shared);
+    let (request, rest) = Rest::of(request);
     let response = match tokio::spawn(async move { pass(&of_gate, request, next).await }).await {
         Ok(response) => response,
         Err(_) => render(panicked().into_response(), None),
     };
+    if let Some(rest) = rest {
+        rest.read_out().await;
+    }
     with_headers(response)
 }
 
@@ -55,14 +60,19 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
         return render(caught(next.run(request)).await, None);
     };
     let asker = format!("{who}");
+    // Who has shown a token, or may open the control socket, keeps a place before those who have not.
+    let known = who.surface == Surface::Socket || request.headers().contains_key(AUTHORIZATION);
+    if let Some(place) = request.extensions().get::<Arc<Place>>().filter(|_| known) {
+        place.show(&who.name);
+    }
     request.extensions_mut().insert(who);
     let key = one(request.headers(), &IDEMPOTENCY_KEY).map(|key| key.map(str::to_owned));
-    let is_stop = request.uri().path() == STOP;
     let response = match key {
+        // A stop is done each time that it comes.
+        _ if request.uri().path() == STOP => caught(next.run(request)).await,
         Ok(Some(key)) if request.method() == Method::POST => once(shared, &asker, &key, request, next).await,
         Ok(_) => caught(next.run(request)).await,
-        Err(problem) if !is_stop => problem.into_response(),
-        Err(_) => caught(next.run(request)).await,
+        Err(problem) => problem.into_response(),
     };
     render(response, Some(&shared.handle.status()))
 }
@@ -118,7 +128,6 @@ async fn once(shared: &Shared, asker: &str, key: &str, request: Request, next: N
     let what = format!("{} {}", request.method(), request.uri().path());
     let first = match shared.once.first(asker, key, &what, Monotonic.now()) {
         Ok(first) => first,
-        Err(_) if request.uri().path() == STOP => return caught(next.run(request)).await,
         Err(problem) => return problem.into_response(),
     };
     let reply = first.get_or_init(|| async {

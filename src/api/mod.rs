@@ -5,7 +5,8 @@
 //!   the configuration says otherwise, a token says who asks; names of hosts and origins of pages are exact.
 //! - **What**: each change is a POST or PUT, and replies with the state that it led to. GET changes nothing.
 //! - **When**: what came twice is done once, and what would move a seat is refused when it comes late.
-//! - **How much**: connections, heads, bodies, waits and what is remembered are bounded; the rest is refused or cut off.
+//! - **How much**: connections, heads, bodies, waits and what is remembered are bounded; the rest is refused or cut off, before
+//!   others whoever has shown nothing. A stop waits for none of it.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -32,19 +33,21 @@ mod guarded;
 mod input;
 mod once;
 mod peer;
+mod pieces;
 mod playlist;
 mod problem;
 mod reports;
+mod rest;
 mod routes;
 mod serve;
 mod service;
 mod settings;
 mod shared;
 mod show;
-mod slots;
 mod socket;
 mod status;
 mod stop;
+mod streams;
 mod tries;
 
 pub use stop::{StopSocket, stop_socket};
@@ -170,8 +173,10 @@ pub fn start(setup: Setup) -> Result<Running, ApiError> {
         access: Access::new(&config, &addresses),
         tries: Default::default(),
         once: Default::default(),
-        streams: shared::streams(),
+        streams: Default::default(),
         errands: shared::errands(),
+        reports: shared::one_at_a_time(),
+        curves: shared::one_at_a_time(),
         closing: closed.clone(),
         document: document.to_json().expect("a description is text").into(),
         library,
@@ -212,11 +217,11 @@ fn run(runtime: Runtime, sockets: Sockets, shared: Arc<Shared>, router: axum::Ro
     let hall = serve::Hall { router, closing: closing.clone(), alive, log };
     runtime.block_on(async move {
         tokio::spawn(Pulse::follow(shared));
-        let slots = serve::tcp_slots();
+        let places = serve::tcp_places();
         for listener in tcp {
             let listener = tokio::net::TcpListener::from_std(listener);
             let listener = listener.expect("the runtime has just been made, and takes sockets");
-            tokio::spawn(serve::tcp(listener, slots.clone(), hall.clone()));
+            tokio::spawn(serve::tcp(listener, places.clone(), hall.clone()));
         }
         let local = tokio::net::UnixListener::from_std(local);
         tokio::spawn(serve::local(local.expect("the runtime takes sockets"), hall));

@@ -1,34 +1,85 @@
-//! `/api/v1/reports/{day}`: what was played on a day, and what was asked.
+//! `/api/v1/reports/{day}`: what was played on a day, and what was asked. Read and written on a thread for that, sent piece by
+//! piece, one at a time: a great day takes no more memory than a small one, and nobody else's time.
 
+use std::io::{self, BufWriter, Write};
 use std::sync::Arc;
+use std::time::Duration;
 
-use axum::Json as JsonReply;
+use axum::body::Body;
 use axum::extract::State;
+use axum::http::HeaderValue;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::{IntoResponse as _, Response};
+use hyper::body::Bytes;
 use jiff::civil::Date;
+use tokio::sync::mpsc;
+use tokio::time::timeout;
 
 use super::input::Name;
+use super::pieces::Pieces;
 use super::problem::bad_value;
-use super::shared::Shared;
+use super::shared::{Shared, turn};
 use crate::hall::{Code, Problem};
-use crate::journal::{self, Report};
+use crate::journal::{self, Most, Report};
 
-/// The report of a day, by the clock of the hall; empty where nothing was played.
+/// The newest of a day, and no more.
+const MOST: Most = Most { shows: 500, actions: 5_000 };
+/// Octets of a piece, and how many wait for whoever reads them.
+const PIECE: usize = 64 << 10;
+const WAITING: usize = 2;
+/// How long somebody may take to read a report, so that the next one gets a turn.
+const READING: Duration = Duration::from_secs(30);
+
+/// The report of a day, by the clock of the hall; empty where nothing was played. Of a day with more than 500 shows or 5,000
+/// things that were asked, the newest; `kinocue report` has all. One at a time.
 #[utoipa::path(
     get, path = "/api/v1/reports/{day}", tag = "library",
     params(("day" = String, Path, description = "YYYY-MM-DD")), responses((status = 200, body = Report))
 )]
-pub(super) async fn one(
-    State(shared): State<Arc<Shared>>,
-    Name(day): Name,
-) -> Result<JsonReply<Report>, Problem> {
+pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> Result<Response, Problem> {
     let day = date(&day)?;
+    let turn = turn(&shared.reports, "a report").await?;
     let dir = shared.journal.clone();
     let report = shared.blocking(move || {
-        journal::report(&dir, day, day).map_err(|error| {
+        journal::report(&dir, day, day, MOST).map_err(|error| {
             Problem::new(Code::File, error.to_string(), "look at the folder of the journal and its disk")
         })
     });
-    report.await.map(JsonReply)
+    let report = report.await?;
+    let (to, mut written) = mpsc::channel(WAITING);
+    let (pieces, body) = mpsc::channel(WAITING);
+    tokio::task::spawn_blocking(move || {
+        let mut out = BufWriter::with_capacity(PIECE, Out(to));
+        // Where it cannot be written, nobody reads it any more.
+        let _ = serde_json::to_writer(&mut out, &report).map_err(io::Error::from).and_then(|()| out.flush());
+    });
+    tokio::spawn(async move {
+        let _turn = turn;
+        let pass_on = async {
+            while let Some(piece) = written.recv().await {
+                if pieces.send(piece).await.is_err() {
+                    return;
+                }
+            }
+        };
+        let _ = timeout(READING, pass_on).await; // who reads too slowly gets a part, which is no JSON
+    });
+    let json = HeaderValue::from_static("application/json");
+    Ok(([(CONTENT_TYPE, json)], Body::new(Pieces(body))).into_response())
+}
+
+/// Pieces on their way out; each write waits until there is room.
+struct Out(mpsc::Sender<Bytes>);
+
+impl Write for Out {
+    fn write(&mut self, octets: &[u8]) -> io::Result<usize> {
+        let sent = self.0.blocking_send(Bytes::copy_from_slice(octets));
+        sent.map(|()| octets.len()).map_err(|_| io::ErrorKind::BrokenPipe.into())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// `YYYY-MM-DD` and nothing else that could be taken for a day.

@@ -1,6 +1,7 @@
-//! Connections in, each served on the one thread of the control plane; beyond their number they are closed at once.
+//! Connections in, each served on the one thread of the control plane; beyond their number another one is closed.
 
 use std::convert::Infallible;
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,11 +16,11 @@ use tokio::sync::{mpsc, watch};
 
 use super::guarded::Guarded;
 use super::peer::Peer;
-use super::slots::{Slot, Slots};
+use crate::hall::{Place, Places};
 use crate::log::{Line, Log, Priority};
 
-/// Connections over TCP, and of one address.
-const TCP: (usize, usize) = (256, 64);
+/// Connections over TCP.
+const TCP: usize = 256;
 /// Connections over the control socket.
 const LOCAL: usize = 64;
 /// How long the head of a request may take to come; a connection that is kept waits no longer for its next one either.
@@ -45,15 +46,24 @@ pub(super) struct Hall {
 }
 
 impl Hall {
+    /// A place for a connection, for which another may have to leave.
+    fn place(&self, places: &Places, address: Option<IpAddr>, from: &str) -> Place {
+        let (place, crowded) = places.take(address);
+        if crowded {
+            self.no_room(from);
+        }
+        place
+    }
+
     fn no_room(&self, from: &str) {
-        let text = format!("there is no room for more connections from {from}; they are closed");
+        let text = format!("there is no room for more connections; another was closed for one from {from}");
         self.log.say(Line::new(Priority::Warning, "connections", text).with("from", from));
     }
 }
 
 /// Serves the control socket until the server ends.
 pub(super) async fn local(listener: UnixListener, hall: Hall) {
-    let slots = Slots::new(LOCAL, LOCAL);
+    let places = Places::new(LOCAL);
     let mut closing = hall.closing.clone();
     loop {
         let accepted = tokio::select! {
@@ -62,12 +72,9 @@ pub(super) async fn local(listener: UnixListener, hall: Hall) {
         };
         match accepted {
             Ok((stream, _)) => {
-                let Some(slot) = slots.take(None) else {
-                    hall.no_room("the control socket");
-                    continue;
-                };
                 let Ok(user) = stream.peer_cred() else { continue };
-                tokio::spawn(connection(stream, Peer::of_user(user.uid()), slot, hall.clone()));
+                let place = hall.place(&places, None, "the control socket");
+                tokio::spawn(connection(stream, Peer::of_user(user.uid()), place, hall.clone()));
             }
             Err(_) => tokio::time::sleep(PAUSE).await, // out of descriptors or memory: a moment later there may be some
         }
@@ -75,7 +82,7 @@ pub(super) async fn local(listener: UnixListener, hall: Hall) {
 }
 
 /// Serves one TCP port until the server ends.
-pub(super) async fn tcp(listener: TcpListener, slots: Slots, hall: Hall) {
+pub(super) async fn tcp(listener: TcpListener, places: Places, hall: Hall) {
     let mut closing = hall.closing.clone();
     loop {
         let accepted = tokio::select! {
@@ -85,12 +92,9 @@ pub(super) async fn tcp(listener: TcpListener, slots: Slots, hall: Hall) {
         match accepted {
             Ok((stream, from)) => {
                 let address = from.ip().to_canonical();
-                let Some(slot) = slots.take(Some(address)) else {
-                    hall.no_room(&address.to_string());
-                    continue;
-                };
+                let place = hall.place(&places, Some(address), &address.to_string());
                 let _ = stream.set_nodelay(true); // a stop is worth a packet of its own
-                tokio::spawn(connection(stream, Peer::Tcp(address), slot, hall.clone()));
+                tokio::spawn(connection(stream, Peer::Tcp(address), place, hall.clone()));
             }
             Err(_) => tokio::time::sleep(PAUSE).await,
         }
@@ -98,18 +102,21 @@ pub(super) async fn tcp(listener: TcpListener, slots: Slots, hall: Hall) {
 }
 
 /// Room for all connections over TCP.
-pub(super) fn tcp_slots() -> Slots {
-    Slots::new(TCP.0, TCP.1)
+pub(super) fn tcp_places() -> Places {
+    Places::new(TCP)
 }
 
-async fn connection<S>(stream: S, peer: Peer, _slot: Slot, hall: Hall)
+async fn connection<S>(stream: S, peer: Peer, place: Place, hall: Hall)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
     let Hall { router, mut closing, alive: _alive, .. } = hall;
     let router = Arc::new(TowerToHyperService::new(router));
+    let place = Arc::new(place);
+    let of_requests = Arc::clone(&place);
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer.clone());
+        request.extensions_mut().insert(Arc::clone(&of_requests));
         router.call(request)
     });
     let mut http = http1::Builder::new();
@@ -118,8 +125,12 @@ where
     tokio::pin!(served);
     tokio::select! {
         _ = served.as_mut() => return, // whatever ended it, the other end has gone
+        () = place.leave() => return,
         _ = closing.changed() => {}
     }
     served.as_mut().graceful_shutdown();
-    let _ = served.await;
+    tokio::select! {
+        _ = served => {}
+        () = place.leave() => {}
+    }
 }

@@ -6,14 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use hyper::body::Bytes;
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::Pages;
 use super::access::Access;
 use super::once::Once;
-use super::peer::Peer;
 use super::problem::panicked;
-use super::slots::{Slot, Slots};
+use super::streams::Streams;
 use super::tries::Tries;
 use crate::hall::{Code, Handle, Problem, Status};
 use crate::library::Library;
@@ -24,10 +23,8 @@ use crate::time::{Clock as _, MonoTime};
 
 /// How long the tick counter may stand still in a process that is well.
 const STILL: Duration = Duration::from_secs(2);
-/// How many are pushed to at a time over the control socket.
-const LOCAL_STREAMS: usize = 16;
-/// The same over TCP, and of one address.
-const TCP_STREAMS: (usize, usize) = (32, 16);
+/// How long somebody waits for their turn at what is done for one at a time.
+const TURN: Duration = Duration::from_secs(5);
 /// What waits for a disk at the most.
 const ERRANDS: usize = 32;
 
@@ -41,10 +38,14 @@ pub(super) struct Shared {
     pub(super) tries: Tries,
     /// Requests that may come twice.
     pub(super) once: Once,
-    /// Room for those who are pushed to: over the control socket, over TCP.
-    pub(super) streams: [Slots; 2],
+    /// Room for those who are pushed to.
+    pub(super) streams: Streams,
     /// Room for what waits for a disk.
     pub(super) errands: Arc<Semaphore>,
+    /// Held by the report that is being read and sent.
+    pub(super) reports: Arc<Semaphore>,
+    /// Held by whoever has a curve drawn.
+    pub(super) curves: Arc<Semaphore>,
     /// Whether the server ends.
     pub(super) closing: watch::Receiver<bool>,
     /// The description of all this, JSON.
@@ -65,30 +66,26 @@ pub(super) struct Shared {
     pub(super) written: Mutex<Option<(Arc<Status>, Bytes)>>,
 }
 
-/// Room for those who are pushed to.
-pub(super) fn streams() -> [Slots; 2] {
-    [Slots::new(LOCAL_STREAMS, LOCAL_STREAMS), Slots::new(TCP_STREAMS.0, TCP_STREAMS.1)]
-}
-
 /// Room for what waits for a disk.
 pub(super) fn errands() -> Arc<Semaphore> {
     Arc::new(Semaphore::new(ERRANDS))
 }
 
-impl Shared {
-    /// A place among those who are pushed to.
-    pub(super) fn stream(&self, peer: &Peer) -> Result<Slot, Problem> {
-        let [local, tcp] = &self.streams;
-        let slot = match peer {
-            Peer::Socket(_) => local.take(None),
-            Peer::Tcp(address) => tcp.take(Some(*address)),
-        };
-        slot.ok_or_else(|| {
-            let remedy = "close a page elsewhere, or ask for the status now and then";
-            Problem::new(Code::Busy, "too many are watching already", remedy)
-        })
-    }
+/// Room for one, so that many who ask for much take no more than one does.
+pub(super) fn one_at_a_time() -> Arc<Semaphore> {
+    Arc::new(Semaphore::new(1))
+}
 
+/// A turn at what is done for one at a time.
+pub(super) async fn turn(of: &Arc<Semaphore>, what: &str) -> Result<OwnedSemaphorePermit, Problem> {
+    let turn = tokio::time::timeout(TURN, Arc::clone(of).acquire_owned()).await;
+    turn.ok().and_then(Result::ok).ok_or_else(|| {
+        let detail = format!("{what} is being made for somebody else already");
+        Problem::new(Code::Busy, detail, "ask again in a few seconds")
+    })
+}
+
+impl Shared {
     /// Does what waits for a disk, on a thread for that.
     pub(super) async fn blocking<T: Send + 'static>(
         &self,

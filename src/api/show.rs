@@ -31,6 +31,15 @@ pub(super) struct Arm {
     seats_empty: bool,
 }
 
+/// From where on.
+#[derive(Debug, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Go {
+    /// Seconds from the beginning of the cue, 0 or more; the seats join the cue there. `show.resume_s` of the status is where
+    /// the last show was left. From where a seek has set it, or the beginning, where this is left out.
+    from_s: Option<f64>,
+}
+
 /// Where to.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -69,9 +78,14 @@ pub(super) async fn disarm(asker: Asker, _: Nothing) -> Reply {
 }
 
 /// Starts what is loaded and armed. Over TCP X-Kinocue-Sent has to say when it was asked; one that is older than 2 s is refused.
-#[utoipa::path(post, path = "/api/v1/show/go", tag = "show", responses((status = 200, body = Status)))]
-pub(super) async fn go(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Go).await
+#[utoipa::path(
+    post, path = "/api/v1/show/go", tag = "show", request_body = Option<Go>, responses((status = 200, body = Status))
+)]
+pub(super) async fn go(asker: Asker, OrNothing(Go { from_s }): OrNothing<Go>) -> Reply {
+    match from_s {
+        None => asker.ask(Ask::Go).await,
+        Some(from_s) => asker.ask(Ask::GoFrom(film("from_s", from_s)?)).await,
+    }
 }
 
 /// Holds; the film waits.
@@ -91,11 +105,16 @@ pub(super) async fn resume(asker: Asker, _: Nothing) -> Reply {
     post, path = "/api/v1/show/seek", tag = "show", request_body = Seek, responses((status = 200, body = Status))
 )]
 pub(super) async fn seek(asker: Asker, Json(Seek { position_s }): Json<Seek>) -> Reply {
-    if position_s < 0.0 {
-        let detail = format!("position_s: {position_s} is before the beginning");
+    asker.ask(Ask::Seek(film("position_s", position_s)?)).await
+}
+
+/// A time of the film.
+fn film(key: &str, seconds: f64) -> Result<ShowTime, Problem> {
+    if seconds < 0.0 {
+        let detail = format!("{key}: {seconds} is before the beginning");
         return Err(bad_value(detail, "give seconds from the beginning of the cue"));
     }
-    asker.ask(Ask::Seek(ShowTime::from_secs_f64(position_s))).await
+    Ok(ShowTime::from_secs_f64(seconds))
 }
 
 /// Brings the seats to rest at once. Not a safety device: the emergency stop is hard-wired.

@@ -5,13 +5,20 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, bind, listen, socket_with};
 
 use super::ApiError;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
 
 /// The owner and the group of the service may connect, nobody else.
 const MODE: u32 = 0o660;
+/// How long the socket of a dead process may seem to live.
+const AFTERLIFE: Duration = Duration::from_millis(500);
 /// Connections that the kernel keeps until they are accepted.
 const BACKLOG: i32 = 128;
 
@@ -56,12 +63,28 @@ fn make_room(path: &Path) -> Result<(), ApiError> {
         }
         Ok(_) => {}
     }
-    match UnixStream::connect(path) {
-        Err(error) if error.kind() == ErrorKind::ConnectionRefused => fs::remove_file(path).map_err(failed),
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        Err(error) if error.kind() != ErrorKind::WouldBlock => Err(failed(error)),
-        _ => Err(ApiError::Served { path: path.to_owned() }),
+    let until = Monotonic.now() + AFTERLIFE;
+    loop {
+        match UnixStream::connect(path) {
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => {
+                return fs::remove_file(path).map_err(failed);
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error) if error.kind() != ErrorKind::WouldBlock => return Err(failed(error)),
+            Ok(stream) if hangs_up(&stream, until) => {}
+            _ => return Err(ApiError::Served { path: path.to_owned() }),
+        }
     }
+}
+
+/// Whether the other end goes away until then: a child that this or a dead process has just forked holds all its sockets for
+/// an instant, until it executes its program, and serves none.
+fn hangs_up(stream: &UnixStream, until: MonoTime) -> bool {
+    let left = Timespec::try_from(until.since(Monotonic.now())).expect("a moment fits");
+    let mut ends = [PollFd::new(stream, PollFlags::RDHUP)];
+    // A signal is as good as an end: it is looked at once more.
+    let ended = poll(&mut ends, Some(&left)).map_or_else(|error| error == Errno::INTR, |ready| ready > 0);
+    ended && Monotonic.now() < until
 }
 
 #[cfg(test)]
@@ -91,6 +114,20 @@ mod tests {
         let (_listener, _file) = unix(&path).unwrap();
         assert!(matches!(unix(&path), Err(ApiError::Served { .. })));
         assert!(UnixStream::connect(&path).is_ok(), "it still serves");
+    }
+
+    #[test]
+    fn a_dead_socket_that_a_forked_child_holds_for_an_instant_is_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("control.sock");
+        let held = UnixListener::bind(&path).unwrap();
+        let child = std::thread::spawn(move || {
+            // It goes once somebody has been taken in by it.
+            poll(&mut [PollFd::new(&held, PollFlags::IN)], None).unwrap();
+        });
+        let (_listener, _file) = unix(&path).unwrap();
+        child.join().unwrap();
+        assert!(UnixStream::connect(&path).is_ok(), "the new one serves");
     }
 
     #[test]

@@ -1,8 +1,6 @@
 //! `/api/v1/status` and `/api/v1/events`: the status of the hall, once or as it changes.
 
-use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 use std::time::Duration;
 
 use axum::Extension;
@@ -11,15 +9,15 @@ use axum::extract::State;
 use axum::http::HeaderValue;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::{IntoResponse as _, Response};
-use hyper::body::{Bytes, Frame};
+use hyper::body::Bytes;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::asker::StatusReply;
-use super::peer::Peer;
+use super::pieces::Pieces;
 use super::shared::Shared;
-use super::slots::Slot;
-use crate::hall::{Code, Problem, Status};
+use super::streams::Stream;
+use crate::hall::{Code, Problem, Status, Who};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -46,18 +44,18 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusRe
 )]
 pub(super) async fn events(
     State(shared): State<Arc<Shared>>,
-    Extension(peer): Extension<Peer>,
+    Extension(who): Extension<Who>,
 ) -> Result<Response, Problem> {
-    let place = shared.stream(&peer)?;
+    let place = shared.streams.take(&who)?;
     // One event waits at the most, beside what the connection holds.
     let (to, events) = mpsc::channel(1);
     tokio::spawn(push(shared, to, place));
-    let body = Body::new(Events(events));
+    let body = Body::new(Pieces(events));
     Ok(([(CONTENT_TYPE, HeaderValue::from_static("text/event-stream"))], body).into_response())
 }
 
 /// Pushes statuses until the other end has gone, or the server ends.
-async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: Slot) {
+async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, place: Stream) {
     let mut statuses = shared.handle.watch();
     let mut closing = shared.closing.clone();
     let mut pace = interval(PACE);
@@ -81,6 +79,7 @@ async fn push(shared: Arc<Shared>, to: mpsc::Sender<Bytes>, _place: Slot) {
                 Err(_) => false,
             },
             () = to.closed() => return,
+            () = place.leave() => return,
             _ = closing.changed() => return,
         };
     }
@@ -93,19 +92,4 @@ fn event(json: &Bytes) -> Bytes {
     text.extend_from_slice(json);
     text.extend_from_slice(b"\n\n");
     text.into()
-}
-
-/// Events as the body of a reply.
-struct Events(mpsc::Receiver<Bytes>);
-
-impl hyper::body::Body for Events {
-    type Data = Bytes;
-    type Error = std::convert::Infallible;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
-        self.0.poll_recv(cx).map(|event| event.map(|event| Ok(Frame::data(event))))
-    }
 }

@@ -1,4 +1,4 @@
-//! The stop socket: a line `stop` is a stop, whatever else is stuck. Its own thread, no runtime, no locks but the flag that
+//! The stop socket: `stop` is a stop, whatever else is stuck. Its own thread, no runtime, no locks but the flag that
 //! the tick thread reads; no peer can hold it up, because it never waits for one.
 
 use std::collections::VecDeque;
@@ -143,12 +143,12 @@ impl Caller {
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 Err(_) => return false,
             }
-            if self.line.contains(&b'\n') || self.line.len() >= LINE {
+            // A stop waits for no end of its line.
+            if self.is_stop() || self.line.contains(&b'\n') || self.line.len() >= LINE {
                 break;
             }
         }
-        let line = self.line.split(|&octet| octet == b'\n').next().unwrap_or_default();
-        let reply = if line.trim_ascii().eq_ignore_ascii_case(b"stop") {
+        let reply = if self.is_stop() {
             handle.stop(); // before anything that reads a file
             handle.note_stop(peer::local(&self.user()));
             "stopping\n"
@@ -157,6 +157,11 @@ impl Caller {
         };
         let _ = self.stream.write_all(reply.as_bytes()); // fits into an empty socket; who has gone needs none
         false
+    }
+
+    fn is_stop(&self) -> bool {
+        let line = self.line.split(|&octet| octet == b'\n').next().unwrap_or_default();
+        line.trim_ascii().eq_ignore_ascii_case(b"stop")
     }
 
     fn user(&self) -> String {
@@ -238,6 +243,17 @@ mod tests {
         let mut reply = [0; 9];
         idle[4 * PEERS - 1].read_exact(&mut reply).unwrap();
         assert_eq!(&reply, b"stopping\n", "the newest of the idle ones was kept, and half a line too");
+    }
+
+    #[test]
+    fn a_stop_waits_for_no_end_of_its_line() {
+        let hall = hall();
+        let mut stream = UnixStream::connect(&hall.path).unwrap();
+        stream.write_all(b"stop").unwrap();
+        let mut reply = String::new();
+        BufReader::new(&stream).read_line(&mut reply).unwrap();
+        assert_eq!(reply, "stopping\n");
+        assert!(hall.desk.take_stop());
     }
 
     #[test]

@@ -1,13 +1,14 @@
-//! Wrong tokens, counted by address, so that nobody goes on guessing.
+//! Wrong tokens, counted by address, so that whoever goes on guessing is told to wait. A right token is never kept waiting.
 
 use std::collections::HashMap;
-use std::net::{IpAddr, Ipv6Addr};
+use std::net::IpAddr;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+use crate::hall::network;
 use crate::time::MonoTime;
 
-/// Wrong tries of one address within [`WINDOW`]; after that none is looked at.
+/// Wrong tries of one address within [`WINDOW`]; after that it is told to wait.
 const MOST: u32 = 5;
 /// Counted from the first wrong try.
 const WINDOW: Duration = Duration::from_secs(60);
@@ -25,7 +26,7 @@ struct Wrong {
 }
 
 impl Tries {
-    /// How long that address has to wait before its next token is looked at; none where it has not to.
+    /// How long that address is told to wait; none where it is not.
     pub(super) fn wait(&self, address: IpAddr, now: MonoTime) -> Option<Duration> {
         let table = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let wrong = table.get(&network(address)).filter(|wrong| wrong.tries >= MOST)?;
@@ -51,20 +52,9 @@ impl Tries {
     }
 }
 
-/// What one machine can take another address of at will: the whole /64 of IPv6.
-fn network(address: IpAddr) -> IpAddr {
-    match address.to_canonical() {
-        IpAddr::V6(v6) => {
-            let [a, b, c, d, ..] = v6.segments();
-            Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0).into()
-        }
-        v4 => v4,
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::net::Ipv4Addr;
+    use std::net::{Ipv4Addr, Ipv6Addr};
 
     use super::*;
 

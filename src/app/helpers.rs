@@ -32,7 +32,8 @@ pub(super) struct Helpers<'scope> {
 }
 
 impl<'scope> Helpers<'scope> {
-    /// Starts them, as ordinary threads whatever the calling one has been granted.
+    /// Starts them, whatever the calling thread has been granted: the planner as an ordinary thread, the ack thread below the
+    /// tick thread.
     ///
     /// # Errors
     /// That of the system where it starts no further thread; none is left then.
@@ -44,7 +45,7 @@ impl<'scope> Helpers<'scope> {
         mut plans: PlanLoop,
     ) -> io::Result<Self> {
         let acks = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
-            let _ = realtime::normal_priority();
+            realtime::below_the_tick_thread();
             acks.run(&Monotonic, drains, || over.acks.load(Ordering::Acquire))
         })?;
         let planner = Builder::new().name("planner".to_owned()).spawn_scoped(scope, move || {

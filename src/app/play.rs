@@ -22,6 +22,7 @@ use crate::health::{Groups, Health};
 use crate::motion::Window;
 use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
+use crate::plain;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
 use crate::rt::{
@@ -85,12 +86,12 @@ pub enum PlayError {
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
-    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", cue.display());
+    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", plain::path(cue));
     misfits.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
-    let cue = cue.display();
+    let cue = plain::path(cue);
     let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
     if more > 0 {
         text += &format!("{cue}: and {more} more\n");

@@ -29,6 +29,7 @@ use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, Feeder};
+use crate::settings::SettingsFile;
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
@@ -184,8 +185,10 @@ fn serve_halls(
     let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
-    let memory = Memory::default();
-    let mut ends = Ends { inbox, source, config: places.config, began, signals, voice, memory };
+    let (settings_file, kept) = SettingsFile::open(&places.state);
+    let memory = Memory::of(kept);
+    let mut ends =
+        Ends { inbox, source, config: places.config, began, signals, voice, memory, settings_file };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
@@ -237,6 +240,7 @@ fn keep(
     let (tell, closed) = channel();
     let mut keeper = None;
     let mut failed = None;
+    ends.memory.set_desk(house.config(), &house.desk());
     let run = house.run(|reins, line| {
         let leave = Arc::clone(&reins.leave);
         // The one before it has fed until now, so that nobody takes the time between two halls for a hang.

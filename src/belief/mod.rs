@@ -118,8 +118,8 @@ pub struct Belief {
     reading: u32,
     /// Until when the controller is busy with what it was sent.
     busy_until: MonoTime,
-    /// The tick time at which the kernel first refused a frame since it last took one.
-    refused_since: Option<Duration>,
+    /// When the kernel first refused a frame since it last took one.
+    refused_since: Option<MonoTime>,
     /// Whether acks are asked for: else what the kernel takes is all that can be known.
     asks: bool,
     gap: bool,
@@ -174,9 +174,8 @@ impl Belief {
         self.gap
     }
 
-    /// Takes up what the ack thread has seen so far. `awake` is the time of the ticks that were served: one that slept could
-    /// not hear of acks either. Says whether a gap has begun.
-    pub fn look(&mut self, evidence: &Evidence, now: MonoTime, awake: Duration) -> bool {
+    /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it. Says whether a gap has begun.
+    pub fn look(&mut self, evidence: &Evidence, told: MonoTime, now: MonoTime) -> bool {
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {
@@ -192,7 +191,7 @@ impl Belief {
             self.reading = version;
             self.measure(&reading, now);
         }
-        let begins = !self.gap && self.has_gap(awake);
+        let begins = !self.gap && self.has_gap(told, now);
         if begins {
             self.gap = true;
             self.tally.gaps += 1;
@@ -236,10 +235,12 @@ impl Belief {
         self.gap &= self.within != self.own;
     }
 
-    fn has_gap(&self, awake: Duration) -> bool {
-        let refused = self.refused_since.is_some_and(|since| awake.saturating_sub(since) > GAP);
-        let unheard = || self.spans.waiting_since(self.acked);
-        refused || (self.asks && unheard().is_some_and(|since| awake.saturating_sub(since) > GAP + SPAN))
+    /// That the ack thread is slow is no gap: what an ack may still be read for is not missing.
+    fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
+        let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
+        let unheard =
+            || self.spans.waiting_since(self.acked).is_some_and(|since| told.since(since) > GAP + SPAN);
+        refused || (self.asks && unheard())
     }
 
     /// The pose in which the seat is known to be at rest at `now`; none where an axis of it may be elsewhere, or where that was
@@ -313,8 +314,8 @@ impl Belief {
         })
     }
 
-    /// Notes a frame that the kernel took; `awake` as in [`Self::look`].
-    pub fn taken(&mut self, taken: &Taken<'_>, awake: Duration) {
+    /// Notes a frame that the kernel took.
+    pub fn taken(&mut self, taken: &Taken<'_>) {
         let Taken { frame, asked, pose, lasts_ms, at } = *taken;
         let lasts = Duration::from_millis(u64::from(lasts_ms));
         let behind = self.busy_until.since(at);
@@ -322,15 +323,15 @@ impl Belief {
         self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
         self.busy_until = self.busy_until.max(at) + lasts;
         self.refused_since = None;
-        self.spans.push(frame, asked, pose, awake);
+        self.spans.push(frame, asked, pose, at);
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);
         }
     }
 
     /// Notes that the kernel did not take a frame.
-    pub fn refused(&mut self, awake: Duration) {
-        self.refused_since.get_or_insert(awake);
+    pub fn refused(&mut self, at: MonoTime) {
+        self.refused_since.get_or_insert(at);
     }
 
     /// Notes that a frame was not sent.

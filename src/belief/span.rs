@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::motion::{MAX_AXES, Pose};
+use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
 /// The ticks whose frames are kept together. What is acked within a span is told apart from the rest of it only once the next
@@ -15,10 +16,10 @@ const SPANS: usize = 8;
 #[derive(Debug, Clone, Copy)]
 struct Span {
     first: FrameNo,
-    /// The tick time of its first frame.
-    at: Duration,
-    /// The tick time of its first frame that asks for an ack, and the number of the last such.
-    asked: Option<(Duration, FrameNo)>,
+    /// When its first frame was sent.
+    at: MonoTime,
+    /// When its first frame was sent that asks for an ack, and the number of the last such.
+    asked: Option<(MonoTime, FrameNo)>,
     low: Pose,
     high: Pose,
 }
@@ -42,7 +43,8 @@ impl Default for Spans {
 impl Spans {
     /// No frame since the axes were there.
     pub(super) const fn at(pose: Pose) -> Self {
-        let empty = Span { first: FrameNo::FIRST, at: Duration::ZERO, asked: None, low: pose, high: pose };
+        let empty =
+            Span { first: FrameNo::FIRST, at: MonoTime::from_nanos(0), asked: None, low: pose, high: pose };
         Self { spans: [empty; SPANS], count: 0, last: pose, newest: FrameNo::FIRST }
     }
 
@@ -56,9 +58,9 @@ impl Spans {
         self.count == 0
     }
 
-    pub(super) fn push(&mut self, frame: FrameNo, asked: bool, pose: &Pose, at: Duration) {
+    pub(super) fn push(&mut self, frame: FrameNo, asked: bool, pose: &Pose, at: MonoTime) {
         let is_full = self.count == SPANS;
-        if self.count == 0 || (!is_full && at.saturating_sub(self.spans[self.count - 1].at) >= SPAN) {
+        if self.count == 0 || (!is_full && at.since(self.spans[self.count - 1].at) >= SPAN) {
             // What is on its way to the first frame's pose is still between that and the one before.
             self.spans[self.count] = Span { first: frame, at, asked: None, low: self.last, high: self.last };
             self.count += 1;
@@ -94,8 +96,8 @@ impl Spans {
         self.count = 0;
     }
 
-    /// The tick time since when an ack is waited for.
-    pub(super) fn waiting_since(&self, acked: Option<FrameNo>) -> Option<Duration> {
+    /// Since when an ack is waited for.
+    pub(super) fn waiting_since(&self, acked: Option<FrameNo>) -> Option<MonoTime> {
         let open = |last: FrameNo| acked.is_none_or(|acked| last.since(acked) > 0);
         let asked = self.spans[..self.count].iter().filter_map(|span| span.asked);
         asked.filter(|(_, last)| open(*last)).map(|(since, _)| since).next()

@@ -5,6 +5,7 @@ use std::io::{self, IsTerminal as _, Write as _};
 use anyhow::anyhow;
 
 use super::{Exit, Failure, OrExit as _};
+use crate::plain;
 
 /// Whether the person agrees: by the option `flag`, else by a word on the terminal. Without either it is wrong use.
 pub(super) fn agreed(question: &str, given: bool, flag: &str) -> Result<bool, Failure> {
@@ -13,7 +14,7 @@ pub(super) fn agreed(question: &str, given: bool, flag: &str) -> Result<bool, Fa
     }
     somebody(question, flag)?;
     let mut asked = io::stderr().lock();
-    write!(asked, "{question} [yes/no] ").and_then(|()| asked.flush()).or_exit(Exit::Io)?;
+    write!(asked, "{} [yes/no] ", plain::lines(question)).and_then(|()| asked.flush()).or_exit(Exit::Io)?;
     let mut answer = String::new();
     io::stdin().read_line(&mut answer).or_exit(Exit::Io)?;
     Ok(matches!(answer.trim().to_lowercase().as_str(), "y" | "yes"))

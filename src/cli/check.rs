@@ -10,6 +10,7 @@ use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place, Source};
+use crate::plain;
 use crate::proof::{Proof, Violation, prove};
 use crate::time::parse_trim;
 use crate::timeline::Timeline;
@@ -233,7 +234,7 @@ impl Report {
     }
 
     fn passes(&mut self, path: &Path, words: &str) {
-        self.text += &format!("{}: passed: {words}\n", path.display());
+        self.text += &format!("{}: passed: {words}\n", plain::path(path));
     }
 
     /// Every fault on a line of its own, and how many there are.
@@ -244,7 +245,7 @@ impl Report {
                 (Some(line), Some(column)) => format!("{line}:{column}:"),
                 _ => String::new(),
             };
-            text += &format!("{}:{place} {}\n", fault.file, fault.message);
+            text += &format!("{}:{place} {}\n", plain::path(Path::new(&fault.file)), fault.message);
         }
         if self.faults_unlisted > 0 {
             text += &format!("and {} more\n", self.faults_unlisted);
@@ -263,10 +264,11 @@ impl Report {
 
 fn hall_in_words(hall: &Config) -> String {
     let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
-    [
+    let mut words = vec![
         counted(hall.controllers.len(), "controller"),
         counted(hall.seats.len(), "seat type"),
         counted(hall.effects.len(), "effect"),
-    ]
-    .join(", ")
+    ];
+    words.extend(hall.absent.iter().map(|one| format!("{} out for good", one.controller.name)));
+    words.join(", ")
 }

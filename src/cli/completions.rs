@@ -17,6 +17,6 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "kinocue", &mut script);
-    print::out(&String::from_utf8_lossy(&script))?;
+    print::data(&String::from_utf8_lossy(&script))?;
     Ok(Exit::Done)
 }

@@ -5,8 +5,9 @@ use std::io::{self, BufWriter, Write};
 
 use anyhow::{Context as _, anyhow};
 
-use super::{Exit, Failure, OrExit as _};
+use super::{Exit, Failure, OrExit as _, vibration_port};
 use crate::capture::{CaptureError, Datagram, Fragment};
+use crate::wire::VibrationPort;
 
 mod desk;
 mod input;
@@ -49,6 +50,10 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = Reading::Smc)]
     dialect: Reading,
 
+    /// Octets of Port Out in frames with vibration, and of the inputs in the answers: 2 or 4.
+    #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
+    vibration_port_octets: VibrationPort,
+
     /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; may be given several times.
     #[arg(long, value_name = "N", conflicts_with = "all")]
     port: Vec<u16>,
@@ -67,7 +72,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let manner = Manner { reading: args.dialect, json: args.json, full: args.verbose };
+    let port = args.vibration_port_octets;
+    let manner = Manner { reading: args.dialect, port, json: args.json, full: args.verbose };
     match Input::of(&args.input)? {
         Input::Messages(messages) => {
             let mut desk = Desk::new(io::stdout().lock(), Manner { full: true, ..manner });

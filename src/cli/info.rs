@@ -1,13 +1,14 @@
 //! `kinocue info`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
+use crate::plain;
 use crate::time::ShowTime;
 use crate::timeline::{AxisFigures, EffectUse, Held, Hint, Timeline};
 
@@ -144,7 +145,7 @@ impl Info {
 
     fn text(&self, timeline: &Timeline) -> String {
         let title = self.title.as_ref().map_or_else(String::new, |title| format!(": {title}"));
-        let mut text = format!("{}{title}\n\n", self.cue);
+        let mut text = format!("{}{title}\n\n", plain::path(Path::new(&self.cue)));
         for (word, value) in self.facts(timeline) {
             append(&mut text, format_args!("{word:<14}{value}\n"));
         }

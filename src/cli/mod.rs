@@ -1,11 +1,13 @@
 //! The commands: one small file each; arguments in, exit code out.
 
+use std::borrow::Cow;
 use std::process::{self, ExitCode};
 use std::{panic, thread};
 
 use clap::{Parser, Subcommand};
 
-use crate::api;
+use crate::wire::VibrationPort;
+use crate::{api, plain};
 
 mod ask;
 mod check;
@@ -99,7 +101,7 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             let exit = if error.use_stderr() { Exit::Usage } else { Exit::Done };
-            let _ = error.print(); // a closed terminal is no reason to end otherwise
+            tell_usage(&error);
             return exit.into();
         }
     };
@@ -108,6 +110,18 @@ pub fn main() -> ExitCode {
         Err(failure) => {
             print::tell(&format!("kinocue: {failure}"));
             failure.exit.into()
+        }
+    }
+}
+
+/// Says what is wrong with the arguments, or what was asked about them: in colours, unless that would bring a control character
+/// of an argument to the terminal.
+fn tell_usage(error: &clap::Error) {
+    let text = error.render().to_string();
+    match plain::lines(&text) {
+        Cow::Owned(escaped) => print::tell(escaped.trim_end()),
+        Cow::Borrowed(_) => {
+            let _ = error.print(); // a closed terminal is no reason to end otherwise
         }
     }
 }
@@ -147,4 +161,10 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Prove(args) => prove::run(&args),
         Command::Man(args) => man::run(&args),
     }
+}
+
+/// Octets of Port Out in vibration frames.
+fn vibration_port(text: &str) -> Result<VibrationPort, String> {
+    let port = text.parse().ok().and_then(VibrationPort::of_octets);
+    port.ok_or_else(|| "it is 2 or 4".to_owned())
 }

@@ -9,6 +9,7 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::load::{self, SourceArgs, after_help, parse_rate};
+use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
@@ -24,6 +25,7 @@ mod keys;
 mod leader;
 mod progress;
 mod said;
+mod standings;
 
 use progress::Progress;
 use said::Said;
@@ -37,8 +39,9 @@ const EXAMPLES: [&str; 4] = [
 
 /// Plays one cue to the controllers, and reports what became of every frame.
 ///
-/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C ends at once. On a terminal keys lead the play; ?
-/// says which. None of it is an emergency stop: that one is hard-wired.
+/// Ctrl-C parks the seats and ends with the report; a second Ctrl-C, half a second after the first or later, ends at once and
+/// leaves the seats where they are. On a terminal keys lead the play; ? says which. None of it is an emergency stop: that one is
+/// hard-wired.
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help(&EXAMPLES))]
 pub(super) struct Args {
@@ -116,6 +119,7 @@ fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bo
         let name = &controller.name;
         print::tell(&format!("{name}: effects stay off; name its outputs with --effect NAME=N or effects"));
     }
+    config.absent.iter().for_each(|one| tell_absent(&one.controller));
     if manner.silent {
         print::tell(&format!("kinocue: {ACKS_OFF}"));
     }

@@ -158,7 +158,7 @@ fn survey_all(targets: &Targets) -> Result<Vec<Survey>, Failure> {
         bar
     });
     let count = targets.controllers.len();
-    let wanted: Vec<_> = targets.controllers.iter().map(|controller| wanted(controller.dialect)).collect();
+    let wanted: Vec<_> = targets.controllers.iter().map(wanted).collect();
     let surveys = survey(&mut talk, &targets.controllers, &wanted, &mut |doing| {
         if let Some(bar) = &bar {
             bar.set_message(format!("{count} controllers: {doing}"));

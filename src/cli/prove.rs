@@ -1,11 +1,10 @@
-//! `kinocue prove`: the process that the library has cues checked by.
+//! `kinocue prove`: the process that the library has cues checked and drawn by.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use sha2::{Digest as _, Sha256};
 
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::Staged;
@@ -13,7 +12,7 @@ use crate::config::Config;
 use crate::cue::{self, Cue, CueFaults, Source};
 use crate::engine::Show;
 use crate::fanout::Manner;
-use crate::library::Verdict;
+use crate::library::{Drawing, Hashed, MAX_POINTS, Verdict, draw, needs_hall};
 use crate::proof::{Digest, Terms, prove};
 use crate::sys::humble::{self, Bounds};
 use crate::time::{Rate, ShowTime};
@@ -32,6 +31,9 @@ pub(super) struct Args {
     /// The most memory that it may take, MiB.
     #[arg(long, value_name = "N", default_value_t = 4096)]
     memory_mib: u64,
+    /// Print its curves in so many stretches of time instead, as JSON; nothing is proved.
+    #[arg(long, value_name = "N", value_parser = parse_points)]
+    curve: Option<usize>,
     /// The most processor time that it may take, s.
     #[arg(long, value_name = "N", default_value_t = 300)]
     seconds: u64,
@@ -40,6 +42,10 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let bounds = Bounds { memory: args.memory_mib.saturating_mul(1 << 20), cpu_s: args.seconds.max(1) };
     humble::lower(bounds).context("cannot bound the check").or_exit(Exit::System)?;
+    if let Some(points) = args.curve {
+        print::json(&draw_curves(&args.cue, &args.config, points)?)?;
+        return Ok(Exit::Done);
+    }
     let config = load::config(&args.config)?;
     let verdict = judge(&args.cue, config).context("cannot read the cue").or_exit(Exit::Io)?;
     if args.json {
@@ -50,22 +56,40 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     Ok(if verdict.passed { Exit::Done } else { Exit::CheckFailed })
 }
 
+fn parse_points(text: &str) -> Result<usize, String> {
+    let points = text.parse().ok().filter(|points| (1..=MAX_POINTS).contains(points));
+    points.ok_or_else(|| format!("write 1 to {MAX_POINTS}"))
+}
+
+/// The curves of a cue; the hall is looked at for those in mm or pulses alone.
+fn draw_curves(path: &Path, config: &Path, points: usize) -> Result<Drawing, Failure> {
+    let file = File::open(path).context("cannot read the cue").or_exit(Exit::Io)?;
+    let cue = match cue::read(path, file, &Source::Native) {
+        Ok(cue) => cue,
+        Err(faults) => return Ok(Drawing::Faults(faults.to_string().lines().map(str::to_owned).collect())),
+    };
+    let timeline = Timeline::new(cue);
+    let hall = needs_hall(timeline.unit()).then(|| load::config(config)).transpose()?;
+    Ok(Drawing::Curve(draw(&timeline, hall.as_ref(), points)))
+}
+
 /// Reads a cue and proves it for all seats of a hall, at full level, as `play` does before it starts.
 fn judge(path: &Path, config: Config) -> io::Result<Verdict> {
-    let mut input = Hashed { file: File::open(path)?, hash: Sha256::new(), front: Vec::new() };
+    let mut input = Hashed::new(File::open(path)?);
     let cue = cue::read(path, &mut input, &Source::Native);
-    io::copy(&mut input, &mut io::sink())?; // reading ends at the first fault of some kinds
+    let mcap = cue::is_mcap(input.front());
+    let sha256 = input.finish()?; // reading ends at the first fault of some kinds
     let mut verdict = Verdict {
         passed: false,
         faults: Vec::new(),
         more: 0,
-        sha256: input.hash.finalize().iter().map(|octet| format!("{octet:02x}")).collect(),
+        sha256,
         digest: None,
         title: None,
         length_s: None,
         axes: None,
         effects: Vec::new(),
-        mcap: cue::is_mcap(&input.front),
+        mcap,
     };
     match cue {
         Ok(cue) => of_cue(cue, config, &mut verdict),
@@ -102,22 +126,4 @@ fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
 fn note(faults: &CueFaults, verdict: &mut Verdict) {
     verdict.faults.extend(faults.told().iter().map(|fault| fault.to_string().trim_start().to_owned()));
     verdict.more += faults.more();
-}
-
-/// A file whose octets are hashed as they are read.
-struct Hashed {
-    file: File,
-    hash: Sha256,
-    /// Its first octets.
-    front: Vec<u8>,
-}
-
-impl Read for Hashed {
-    fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
-        let octets = self.file.read(buf)?;
-        self.hash.update(&buf[..octets]);
-        let wanted = 16_usize.saturating_sub(self.front.len()).min(octets);
-        self.front.extend_from_slice(&buf[..wanted]);
-        Ok(octets)
-    }
 }

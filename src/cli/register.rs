@@ -21,8 +21,9 @@ Examples:
   kinocue register diff hall-settings.toml --config hall.toml --name A7
 
 Registers are named as the manuals name them (PA95, pa 0x95, dp 06..0b, dpf0, servo 1 508),
-or by their names in `kinocue register list`. Numbers of PA and DP are hexadecimal; values are
-decimal, or hexadecimal behind 0x.";
+as the panel of an integrated controller shows them (CP149, cd 006..011), or by their names in
+`kinocue register list`. Numbers of PA and DP are hexadecimal, those of CP and CD decimal;
+values are decimal, or hexadecimal behind 0x.";
 
 /// Reads, writes, keeps and compares the registers of controllers.
 #[derive(Debug, clap::Args)]

@@ -7,7 +7,7 @@ use jiff::civil::Date;
 
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::config::Log;
-use crate::journal::{self, JournalError, Report};
+use crate::journal::{self, JournalError, Most, Report};
 use crate::sys::clock::local_now;
 
 mod csv;
@@ -87,12 +87,12 @@ impl Day {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let (from, to) = days(args, local_now().date())?;
     let dir = folder(args)?;
-    let report = journal::report(&dir, from, to)
+    let report = journal::report(&dir, from, to, Most::ALL)
         .map_err(|error| Failure { exit: exit(&error), error: error.into() })?;
     if args.json {
         print::json(&report)?;
     } else if args.csv {
-        print::out(&if args.actions { csv::actions(&report) } else { csv::shows(&report) })?;
+        print::data(&if args.actions { csv::actions(&report) } else { csv::shows(&report) })?;
         tell_notes(&report);
     } else {
         print::out(&if args.actions { table::actions(&report) } else { table::shows(&report) })?;

@@ -65,7 +65,7 @@ pub(super) struct Args {
     #[arg(long = "pa", value_name = "HEX=VALUE", value_parser = parse::parameter)]
     parameters: Vec<(u8, u16)>,
 
-    /// Which family they belong to.
+    /// Which family they belong to: smc, or mbox for MBOX and IMAX.
     #[arg(long, value_enum, default_value_t = Family::Smc)]
     dialect: Family,
 

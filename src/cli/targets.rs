@@ -17,7 +17,7 @@ use crate::wire::ReplyCode;
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct TargetArgs {
     /// A controller: HOST:PORT, and behind commas name=A1, axes=3, offset=0, fan_out=slice or shared, dialect=smc or
-    /// mbox; repeatable.
+    /// mbox, vibration_port_octets=2 or 4; repeatable.
     #[arg(long, value_name = "ADDR", conflicts_with = "config")]
     to: Vec<String>,
     /// The controllers of a configuration: all of them, unless --row or names choose.
@@ -48,12 +48,18 @@ impl TargetArgs {
 
     /// The same, for a cue of `cue_axes` axes.
     pub(super) fn resolve_for(&self, names: &[String], cue_axes: usize) -> Result<Targets, Failure> {
-        let Config { mut show, controllers, .. } = match &self.config {
+        let Config { mut show, controllers, absent, .. } = match &self.config {
             Some(path) => load::config(path)?,
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
         show.bind = self.bind.unwrap_or(show.bind);
-        Ok(Targets { controllers: self.choose(controllers, names)?, show })
+        // What is out for good is meant only where it is named: whoever repairs it has to reach it.
+        let (meant, left): (Vec<Controller>, Vec<_>) =
+            absent.into_iter().map(|one| one.controller).partition(|one| names.contains(&one.name));
+        if names.is_empty() && self.row.is_empty() {
+            left.iter().for_each(tell_absent);
+        }
+        Ok(Targets { controllers: self.choose(controllers.into_iter().chain(meant).collect(), names)?, show })
     }
 
     /// Whether anybody is meant: without, `home` and `preflight` ask the daemon for its own.
@@ -177,6 +183,11 @@ impl Troubles {
             (false, false) => Exit::Done,
         }
     }
+}
+
+/// Tells that a controller has no part in this.
+pub(super) fn tell_absent(controller: &Controller) {
+    print::tell(&format!("kinocue: {} is out for good (enabled = false), and left alone", controller.name));
 }
 
 /// What a controller's state is, where it is not the normal one.

@@ -154,7 +154,8 @@ fn token(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<ApiToken> {
     Some(ApiToken { name: name?, role: role?, sha256: sha256? })
 }
 
-fn hash(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<[u8; 32]> {
+/// The SHA-256 of a token, as `kinocue token` writes it.
+pub(super) fn hash(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<[u8; 32]> {
     let text = entry.text(faults)?;
     let hash = from_hex(text);
     if hash.is_none() {

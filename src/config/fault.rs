@@ -4,6 +4,11 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use crate::plain;
+
+/// How much of a fault is told, octets.
+const TOLD: usize = 1_000;
+
 /// One fault of a configuration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigFault {
@@ -19,7 +24,7 @@ pub struct ConfigFault {
 
 impl fmt::Display for ConfigFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}: {}", self.path.display(), self.line, self.column, self.message)
+        write!(f, "{}:{}:{}: {}", plain::path(&self.path), self.line, self.column, self.message)
     }
 }
 
@@ -28,7 +33,7 @@ impl fmt::Display for ConfigFault {
 #[non_exhaustive]
 pub enum ConfigFaults {
     /// The file is missing, a folder, or cannot be read.
-    #[error("cannot read the configuration {}", path.display())]
+    #[error("cannot read the configuration {}", plain::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -96,8 +101,10 @@ impl<'t> Faults<'t> {
     pub(crate) fn into_list(mut self, path: &std::path::Path) -> Vec<ConfigFault> {
         self.found.sort_by_key(|&(at, _)| at);
         let text = self.text.as_bytes();
-        let at_place = |(at, message)| {
+        let at_place = |(at, message): (usize, String)| {
             let (line, column) = place(text, at);
+            // It may name a key as it stands in the file.
+            let message = plain::escaped(&message, TOLD).into_owned();
             ConfigFault { path: path.to_owned(), line, column, message }
         };
         self.found.into_iter().map(at_place).collect()

@@ -10,13 +10,15 @@ use super::section::{Entry, Section};
 pub struct Store {
     /// The longest cue that can be uploaded, MiB, 1 to 2,048.
     pub max_cue_mib: u32,
+    /// The most memory that a cue may take to be checked, and so to be played, MiB, 64 to 8,192.
+    pub max_memory_mib: u32,
     /// The folder with the playlists; none for `playlists` beside the library.
     pub playlists: Option<PathBuf>,
 }
 
 impl Default for Store {
     fn default() -> Self {
-        Self { max_cue_mib: 256, playlists: None }
+        Self { max_cue_mib: 256, max_memory_mib: 768, playlists: None }
     }
 }
 
@@ -26,6 +28,7 @@ pub(super) fn store(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Store> 
     let mut section = Section::new("[library]", entry.at, entry.table(faults)?, faults);
     let store = Store {
         max_cue_mib: section.whole_in("max_cue_mib", 1..=2048).unwrap_or(default.max_cue_mib),
+        max_memory_mib: section.whole_in("max_memory_mib", 64..=8192).unwrap_or(default.max_memory_mib),
         playlists: section.text("playlists").map(PathBuf::from),
     };
     section.finish();
@@ -42,9 +45,11 @@ mod tests {
     fn playlists_lie_beside_the_library_unless_told_otherwise() {
         let hall = hall_with("[show]\nlibrary = \"/srv/hall/cues\"\n");
         assert_eq!(hall.playlists(), Path::new("/srv/hall/playlists"));
-        assert_eq!(hall.store.max_cue_mib, 256);
-        let hall = hall_with("[library]\nmax_cue_mib = 8\nplaylists = \"/srv/lists\"\n");
+        assert_eq!((hall.store.max_cue_mib, hall.store.max_memory_mib), (256, 768));
+        let hall =
+            hall_with("[library]\nmax_cue_mib = 8\nmax_memory_mib = 2048\nplaylists = \"/srv/lists\"\n");
         assert_eq!((hall.playlists().as_path(), hall.store.max_cue_mib), (Path::new("/srv/lists"), 8));
+        assert_eq!(hall.store.max_memory_mib, 2048);
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod api;
 mod effect_limits;
 mod fault;
 mod fit;
+mod gear;
 mod level;
 mod library;
 mod log;
@@ -21,23 +22,23 @@ mod osc;
 mod preset;
 mod read;
 mod section;
-mod sources;
 mod target;
 #[cfg(test)]
 mod tests;
 mod text;
 
-pub use crate::wire::{Dialect, Timing};
+pub use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
 pub use effect_limits::EffectLimit;
 pub(crate) use fault::Faults;
 pub use fault::{ConfigFault, ConfigFaults};
 pub use fit::{Amplitude, HallStroke, Misfit, Swing};
+pub use gear::GearWord;
 pub use level::parse_level;
 pub(crate) use level::{level, switches, trim};
 pub use library::Store;
 pub use log::{Hours, Log};
-pub use osc::{OscPort, OscWord};
+pub use osc::OscPort;
 pub use preset::Preset;
 pub(crate) use section::{Entry, Section, did_you_mean};
 pub use target::{TargetError, from_to_args};
@@ -66,8 +67,10 @@ pub struct Config {
     pub store: Store,
     /// Where the journal is kept, and how much of it.
     pub log: Log,
-    /// The controllers, at least one, in the order of the file.
+    /// The controllers that take part, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
+    /// Those that are out for good, in the order of the file.
+    pub absent: Vec<Absent>,
     /// The port that takes OSC, where there is one.
     pub osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
@@ -95,6 +98,8 @@ pub struct Show {
     pub spin_us: u32,
     /// The folder with the cues of the daemon.
     pub library: PathBuf,
+    /// Whose belts GO waits for.
+    pub belts: Belts,
     /// Findings of preflight that are accepted for good, of whichever controller.
     pub accept_findings: Vec<Acceptance>,
 }
@@ -110,9 +115,21 @@ impl Default for Show {
             loss_policy: LossPolicy::Continue,
             spin_us: 0,
             library: PathBuf::from("/var/lib/kinocue/cues"),
+            belts: Belts::Shown,
             accept_findings: Vec::new(),
         }
     }
+}
+
+/// Whose belts GO waits for, of the controllers that have `belt_inputs` and take part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Belts {
+    /// Nobody's: it is only shown which ones are open.
+    Shown,
+    /// At least one belt of each rigid seat.
+    One,
+    /// All.
+    All,
 }
 
 /// What the hall does when a group of controllers is lost.
@@ -158,8 +175,10 @@ pub struct Controller {
     pub axis_offset: usize,
     /// Who applies the axis offset.
     pub fan_out: FanOut,
-    /// The message set it speaks.
+    /// The message set it speaks; an IMAX speaks that of MBOX.
     pub dialect: Dialect,
+    /// How it has Port Out in vibration frames.
+    pub vibration_port: VibrationPort,
     /// Controllers under one rigid seat share a group; its own name by default.
     pub group: String,
     /// The accept and reply code of its frames.
@@ -168,8 +187,19 @@ pub struct Controller {
     pub effects: Option<Vec<String>>,
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where only its replies tell.
     pub estop_inputs: u16,
+    /// The inputs of its belts, each active while its belt is open, bit 0 = X01; 0 for none.
+    pub belt_inputs: u16,
     /// Findings of preflight that are accepted for good of this controller.
     pub accept_findings: Vec<Acceptance>,
+}
+
+/// A controller that is out for good (`enabled = false`): no frame goes to it, nobody waits for it, and nothing is asked of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Absent {
+    /// What the configuration says of it.
+    pub controller: Controller,
+    /// How many of those that take part stand before it in the file.
+    pub after: usize,
 }
 
 /// A finding of preflight that the site lives with.
@@ -235,10 +265,15 @@ impl Config {
         }
     }
 
-    /// The axes of a cue of `cue_axes` axes that no controller takes, counted from 1.
+    /// Every controller that the file names: those that take part, and those that are out for good.
+    pub fn named(&self) -> impl Iterator<Item = &Controller> {
+        self.controllers.iter().chain(self.absent.iter().map(|one| &one.controller))
+    }
+
+    /// The axes of a cue of `cue_axes` axes that are no controller's, also of none that is out for good, counted from 1.
     #[must_use]
     pub fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
-        (1..=cue_axes).filter(|&axis| !self.controllers.iter().any(|c| c.takes(axis - 1))).collect()
+        (1..=cue_axes).filter(|&axis| !self.named().any(|c| c.takes(axis - 1))).collect()
     }
 
     /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.

@@ -3,8 +3,8 @@
 use std::net::{Ipv4Addr, SocketAddrV4};
 
 use super::fault::Faults;
+use super::gear::{GearWord, allowed, sources};
 use super::section::{Entry, Section};
-use super::sources::sources;
 
 /// The port that takes OSC messages over UDP.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,45 +14,10 @@ pub struct OscPort {
     /// Whose messages are taken, at least one.
     pub sources: Vec<Ipv4Addr>,
     /// What they may ask; stop may be asked always.
-    pub allow: Vec<OscWord>,
+    pub allow: Vec<GearWord>,
 }
 
-/// What OSC may ask at the most. Arming, homing and clearing are not among it: the address of a datagram proves nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum OscWord {
-    /// `/kinocue/go`.
-    Go,
-    /// `/kinocue/pause`.
-    Pause,
-    /// `/kinocue/resume`.
-    Resume,
-    /// `/kinocue/park`.
-    Park,
-    /// `/kinocue/seek`.
-    Seek,
-    /// `/kinocue/trim`.
-    Trim,
-    /// `/kinocue/level/…`, `/kinocue/effect/…` and `/kinocue/row/…`.
-    Levels,
-    /// `/kinocue/seat/…`.
-    Seats,
-}
-
-impl OscWord {
-    /// All of them, by the words of the configuration.
-    pub const ALL: [(&'static str, Self); 8] = [
-        ("go", Self::Go),
-        ("pause", Self::Pause),
-        ("resume", Self::Resume),
-        ("park", Self::Park),
-        ("seek", Self::Seek),
-        ("trim", Self::Trim),
-        ("levels", Self::Levels),
-        ("seats", Self::Seats),
-    ];
-}
-
-/// Reads the table; what it may ask is everything where `allow` is left out.
+/// Reads the table.
 pub(super) fn osc(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<OscPort> {
     let mut section = Section::new("[osc]", entry.at, entry.table(faults)?, faults);
     section.require(&["listen", "sources"]);
@@ -61,29 +26,6 @@ pub(super) fn osc(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<OscPort> 
     let allow = allowed(&mut section);
     section.finish();
     Some(OscPort { listen: listen?, sources: sources?, allow })
-}
-
-fn allowed(section: &mut Section<'_, '_, '_>) -> Vec<OscWord> {
-    let Some(entry) = section.get("allow") else { return OscWord::ALL.map(|(_, word)| word).to_vec() };
-    let words = entry.array(section.faults).unwrap_or_default();
-    words.iter().filter_map(|entry| allowed_word(*entry, section.faults)).collect()
-}
-
-fn allowed_word(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<OscWord> {
-    let text = entry.text(faults)?;
-    let found = OscWord::ALL.iter().find(|(word, _)| *word == text).map(|&(_, word)| word);
-    // Whoever lists what is allowed will list it too.
-    if found.is_none() && text != "stop" {
-        let message = match text {
-            "arm" | "home" | "clear" => format!("{text} is nothing that OSC may ever ask"),
-            _ => {
-                let words = OscWord::ALL.map(|(word, _)| word).join(", ");
-                format!("{text:?} is none of {words}, stop")
-            }
-        };
-        entry.fault(faults, &message);
-    }
-    found
 }
 
 #[cfg(test)]
@@ -97,13 +39,16 @@ mod tests {
     }
 
     #[test]
-    fn a_port_may_be_asked_everything_unless_it_says_what() {
-        let all = with("[osc]\nlisten = \"10.0.0.2:53000\"\nsources = [\"10.0.0.5\"]").unwrap().osc.unwrap();
-        assert_eq!(all.listen, "10.0.0.2:53000".parse().unwrap());
-        assert_eq!(all.sources, [Ipv4Addr::new(10, 0, 0, 5)]);
-        assert_eq!(all.allow.len(), OscWord::ALL.len());
+    fn a_port_may_be_asked_what_it_lists_and_little_unless_it_does() {
+        let bare = with("[osc]\nlisten = \"10.0.0.2:53000\"\nsources = [\"10.0.0.5\"]").unwrap().osc.unwrap();
+        assert_eq!(bare.listen, "10.0.0.2:53000".parse().unwrap());
+        assert_eq!(bare.sources, [Ipv4Addr::new(10, 0, 0, 5)]);
+        assert_eq!(bare.allow, GearWord::DEFAULT);
+        assert!(
+            !bare.allow.iter().any(|word| matches!(word, GearWord::Park | GearWord::Seek | GearWord::Trim))
+        );
         let few = "[osc]\nlisten = \"10.0.0.2:53000\"\nsources = [\"10.0.0.5\"]\nallow = [\"stop\", \"go\"]";
-        assert_eq!(with(few).unwrap().osc.unwrap().allow, [OscWord::Go]);
+        assert_eq!(with(few).unwrap().osc.unwrap().allow, [GearWord::Go]);
     }
 
     #[test]
@@ -112,7 +57,7 @@ mod tests {
         assert!(faults[0].ends_with("[osc] has no sources, which is needed"), "{faults:?}");
         let faults = with("[osc]\nlisten = \"10.0.0.2:53000\"\nsources = []\nallow = [\"arm\"]").unwrap_err();
         assert!(faults[0].contains("sources: names nobody"), "{faults:?}");
-        assert!(faults[1].ends_with("allow: arm is nothing that OSC may ever ask"), "{faults:?}");
+        assert!(faults[1].ends_with("allow: arm is nothing that gear may ever ask"), "{faults:?}");
         let faults = with("[osc]\nlisten = \"x\"\nsources = [\"box\"]\nallow = [\"gone\"]").unwrap_err();
         assert!(faults.iter().any(|fault| fault.contains("\"box\" is no IPv4 address")), "{faults:?}");
         assert!(faults.iter().any(|fault| fault.contains("\"gone\" is none of go, pause")), "{faults:?}");

@@ -21,8 +21,8 @@ use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
 use super::text::text;
 use super::{
-    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN, Show, Store,
-    Timing, check_effect_name, check_peer, check_window,
+    Absent, Accept, Api, Belts, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN,
+    Show, Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] octets.
@@ -85,7 +85,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
-    let controllers = controller_at.map_or_else(Vec::new, |entry| controllers(entry, &site, faults));
+    let (controllers, absent) =
+        controller_at.map_or_else(Default::default, |entry| controllers(entry, &site, faults));
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -98,6 +99,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         store: store?,
         log: log?,
         controllers,
+        absent,
         osc,
         text,
         api: api?,
@@ -110,6 +112,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
     let timing = [("relative", Timing::Relative), ("absolute", Timing::Absolute)];
     let policy =
         [("continue", LossPolicy::Continue), ("pause", LossPolicy::Pause), ("park", LossPolicy::Park)];
+    let belts = [("shown", Belts::Shown), ("one", Belts::One), ("all", Belts::All)];
     let show = Show {
         name: section.text("name").unwrap_or(default.name),
         rate_hz: section.number_in("rate_hz", 1.0..=1000.0).unwrap_or(default.rate_hz),
@@ -119,6 +122,7 @@ fn show(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Show> {
         loss_policy: section.choice("loss_policy", &policy).unwrap_or(default.loss_policy),
         spin_us: section.whole_in("spin_us", 0..=900).unwrap_or(default.spin_us),
         library: section.text("library").map_or(default.library, PathBuf::from),
+        belts: section.choice("belts", &belts).unwrap_or(default.belts),
         accept_findings: acceptances(&mut section),
     };
     section.finish();
@@ -224,24 +228,50 @@ struct Site<'a> {
     effects: &'a [Effect],
 }
 
-fn controllers(entry: Entry<'_>, site: &Site<'_>, faults: &mut Faults<'_>) -> Vec<Controller> {
+/// Those that take part, and those that are out for good.
+fn controllers(entry: Entry<'_>, site: &Site<'_>, faults: &mut Faults<'_>) -> (Vec<Controller>, Vec<Absent>) {
     if entry.value.is_table() {
         entry.fault(faults, "write [[controller]], with two brackets, once for each controller");
-        return Vec::new();
+        return Default::default();
     }
-    let Some(entries) = entry.array(faults) else { return Vec::new() };
+    let Some(entries) = entry.array(faults) else { return Default::default() };
     let mut taken = Vec::new();
-    let mut sound = Vec::new();
+    let (mut present, mut absent, mut at) = (Vec::new(), Vec::new(), Vec::new());
     for entry in entries {
         let Some(table) = entry.table(faults) else { continue };
-        sound.extend(controller(entry.at, table, site, faults));
+        match controller(entry.at, table, site, faults) {
+            Some((controller, true)) => present.push(controller),
+            Some((controller, false)) => {
+                absent.push(Absent { controller, after: present.len() });
+                at.push(table.get("enabled").map_or(entry.at, |value| value.span().start));
+            }
+            None => {}
+        }
         for key in ["name", "address"] {
             if let Some(value) = table.get(key) {
                 refuse_repeat(Entry::new(key, value), &mut taken, faults);
             }
         }
     }
-    sound
+    absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &present, faults));
+    if let ([], [_, ..]) = (&present[..], &absent[..]) {
+        faults.note_missing(entry.at, "enabled: every [[controller]] is out for good; leave at least one in");
+    }
+    (present, absent)
+}
+
+/// Notes where a rigid seat is to move by only a part of its controllers.
+fn refuse_parted(absent: &Absent, at: usize, present: &[Controller], faults: &mut Faults<'_>) {
+    let Controller { name, group, .. } = &absent.controller;
+    if let Some(other) = present.iter().find(|one| one.group == *group) {
+        let (other, text) = (&other.name, "one rigid seat does not move by a part of its controllers");
+        faults.note(
+            at,
+            format!(
+                "enabled: {name} shares the group {group} with {other}, and {text}; give {other} the same"
+            ),
+        );
+    }
 }
 
 /// Notes a name or address that a controller before has too; `taken` holds key, value and place of each.
@@ -258,12 +288,13 @@ fn refuse_repeat<'t>(entry: Entry<'t>, taken: &mut Vec<(&'t str, String, usize)>
     }
 }
 
+/// One controller, and whether it takes part.
 fn controller<'t>(
     at: usize,
     table: &'t DeTable<'t>,
     site: &Site<'_>,
     faults: &mut Faults<'_>,
-) -> Option<Controller> {
+) -> Option<(Controller, bool)> {
     let mut section = Section::new("[[controller]]", at, table, faults);
     section.require(&["name", "seat", "address"]);
     let name = section.text("name");
@@ -278,17 +309,23 @@ fn controller<'t>(
     }
     let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
     let fan_out = section.choice("fan_out", &[("slice", FanOut::Slice), ("shared", FanOut::Shared)]);
-    let dialect = section.choice("dialect", &[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)]);
+    let dialect = dialect(&mut section);
+    let vibration_port = vibration_port(&mut section, dialect);
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
     let estop_inputs = inputs_of(&mut section, "estop_inputs");
+    let belt_inputs = inputs_of(&mut section, "belt_inputs");
+    if let Some(entry) = section.get("belt_inputs").filter(|_| estop_inputs & belt_inputs != 0) {
+        entry.fault(section.faults, "an input of estop_inputs is none of a belt");
+    }
     let accept_findings = acceptances(&mut section);
+    let enabled = section.get("enabled").and_then(|entry| entry.switch(section.faults)).unwrap_or(true);
     section.finish();
     let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
     if let Err(reason) = check_window(axis_offset, seat.axes, fan_out) {
         faults.note(table.get("axis_offset").map_or(at, |value| value.span().start), reason);
     }
-    Some(Controller {
+    let controller = Controller {
         group: group.unwrap_or_else(|| name.clone()),
         name,
         row,
@@ -297,11 +334,14 @@ fn controller<'t>(
         axis_offset,
         fan_out,
         dialect: dialect.unwrap_or(Dialect::Smc),
+        vibration_port: vibration_port.unwrap_or_default(),
         accept,
         effects,
         estop_inputs,
+        belt_inputs,
         accept_findings,
-    })
+    };
+    Some((controller, enabled))
 }
 
 /// A list of inputs, X01 to X12, as a word.
@@ -319,6 +359,29 @@ fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<Sea
         entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
     }
     site.seats.iter().find(|seat| seat.name == name).cloned()
+}
+
+fn dialect(section: &mut Section<'_, '_, '_>) -> Option<Dialect> {
+    let entry = section.get("dialect")?;
+    if entry.value.as_str() == Some("imax") {
+        entry.fault(section.faults, "an IMAX controller is \"mbox\" here");
+        return None;
+    }
+    entry.choice(&[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)], section.faults)
+}
+
+/// Octets of Port Out in vibration frames, which MBOX controllers do not have.
+fn vibration_port(section: &mut Section<'_, '_, '_>, dialect: Option<Dialect>) -> Option<VibrationPort> {
+    let entry = section.get("vibration_port_octets")?;
+    if dialect == Some(Dialect::Mbox) {
+        entry.fault(section.faults, "mbox controllers have no vibration frames; leave it out");
+    }
+    let octets: u8 = entry.whole_in(2..=4, section.faults)?;
+    let port = VibrationPort::of_octets(octets);
+    if port.is_none() {
+        entry.fault(section.faults, &format!("{octets} is neither 2 nor 4"));
+    }
+    port
 }
 
 fn accept(section: &mut Section<'_, '_, '_>) -> Option<Accept> {

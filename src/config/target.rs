@@ -7,14 +7,14 @@ use crate::motion::{MAX_AXES, SeatType};
 
 use super::section::did_you_mean;
 use super::{
-    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, Show, Store, check_effect_name,
-    check_peer, check_window,
+    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, Show, Store, VibrationPort,
+    check_effect_name, check_peer, check_window,
 };
 
 /// What the outputs of a controller on this machine mean unless told otherwise: Y01 to Y06.
 const BENCH_EFFECTS: [&str; 6] = ["air", "water", "wind", "leg", "smoke", "light"];
 
-const KEYS: [&str; 5] = ["name", "axes", "offset", "fan_out", "dialect"];
+const KEYS: [&str; 6] = ["name", "axes", "offset", "fan_out", "dialect", "vibration_port_octets"];
 
 /// Why `--to` or `--effect` makes no configuration.
 #[derive(Debug, thiserror::Error)]
@@ -89,6 +89,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         store: Store::default(),
         log: Log::default(),
         controllers,
+        absent: Vec::new(),
         osc: None,
         text: None,
         api: Api::default(),
@@ -185,9 +186,11 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
         axis_offset: options.offset,
         fan_out: options.fan_out,
         dialect: options.dialect,
+        vibration_port: options.vibration_port,
         accept: Accept::All,
         effects: None,
         estop_inputs: 0,
+        belt_inputs: 0,
         accept_findings: Vec::new(),
     })
 }
@@ -213,11 +216,19 @@ struct Options {
     offset: usize,
     fan_out: FanOut,
     dialect: Dialect,
+    vibration_port: VibrationPort,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { name: String::new(), axes: None, offset: 0, fan_out: FanOut::Slice, dialect: Dialect::Smc }
+        Self {
+            name: String::new(),
+            axes: None,
+            offset: 0,
+            fan_out: FanOut::Slice,
+            dialect: Dialect::Smc,
+            vibration_port: VibrationPort::Two,
+        }
     }
 }
 
@@ -247,8 +258,12 @@ impl Options {
                 self.dialect = match value {
                     "smc" => Dialect::Smc,
                     "mbox" => Dialect::Mbox,
-                    _ => return Err(refuse("smc, mbox")),
+                    _ => return Err(refuse("smc, mbox (for IMAX too)")),
                 }
+            }
+            "vibration_port_octets" => {
+                let port = value.parse().ok().and_then(VibrationPort::of_octets);
+                self.vibration_port = port.ok_or_else(|| refuse("2, 4"))?;
             }
             _ => {
                 let hint = did_you_mean(key, KEYS.into_iter());

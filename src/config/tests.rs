@@ -53,6 +53,29 @@ fn a_hall_reads_as_it_is_written() {
 }
 
 #[test]
+fn a_controller_that_is_out_for_good_takes_no_part_and_its_axes_still_belong_to_somebody() {
+    let more = "[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.2:7408\"\naxis_offset = 6\n\
+        enabled = false\n[[controller]]\nname = \"A3\"\nseat = \"s\"\naddress = \"10.0.0.3:7408\"\nenabled = true\n";
+    let hall = hall_with(more);
+    let names: Vec<_> = hall.controllers.iter().map(|one| one.name.as_str()).collect();
+    let [absent] = &hall.absent[..] else { panic!("one: {:?}", hall.absent) };
+    assert_eq!((names, absent.controller.name.as_str(), absent.after), (vec!["A1", "A3"], "A2", 1));
+    assert_eq!(hall.untaken_axes(12), [0; 0]);
+}
+
+#[test]
+fn not_all_are_out_for_good_and_no_seat_loses_a_part_of_its_controllers() {
+    let [fault] = &faults_of("enabled = false\n")[..] else { panic!("one fault") };
+    assert!(fault.contains("leave at least one in"), "{fault}");
+    let more = "group = \"g\"\n[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.2:7408\"\ngroup = \"g\"\n\
+        enabled = false\n";
+    let [fault] = &faults_of(more)[..] else { panic!("one fault") };
+    assert!(fault.starts_with("hall.toml:19:") && fault.contains("give A1 the same"), "{fault}");
+    let [fault] = &faults_of("enabled = 0\n")[..] else { panic!("one fault") };
+    assert!(fault.contains("true or false is wanted here"), "{fault}");
+}
+
+#[test]
 fn what_is_left_out_has_its_default() {
     let config = with("").unwrap();
     assert_eq!(config.show, Show::default());
@@ -175,6 +198,21 @@ fn a_shared_frame_reaches_no_axis_past_the_twelfth() {
     assert_eq!(faults.len(), 1);
     assert!(faults[0].starts_with("hall.toml:13:15: axes 8 to 13 reach past axis 12"), "{faults:?}");
     assert_eq!(with("axis_offset = 7\n").unwrap().untaken_axes(12), [1, 2, 3, 4, 5, 6, 7]);
+}
+
+#[test]
+fn port_out_of_vibration_frames_has_two_octets_or_four_and_mbox_controllers_have_none() {
+    let port = |more: &str| with(more).map(|hall| hall.controllers[0].vibration_port);
+    assert_eq!(port(""), Ok(VibrationPort::Two));
+    assert_eq!(port("vibration_port_octets = 4\n"), Ok(VibrationPort::Four));
+    assert_eq!(
+        with("dialect = \"imax\"\n"),
+        Err(vec!["hall.toml:13:11: dialect: an IMAX controller is \"mbox\" here".to_owned()])
+    );
+    let place = "hall.toml:13:25: vibration_port_octets: ";
+    assert_eq!(port("vibration_port_octets = 3\n"), Err(vec![format!("{place}3 is neither 2 nor 4")]));
+    let faults = port("vibration_port_octets = 2\ndialect = \"mbox\"\n").unwrap_err();
+    assert_eq!(faults, [format!("{place}mbox controllers have no vibration frames; leave it out")]);
 }
 
 #[test]

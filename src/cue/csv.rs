@@ -10,7 +10,7 @@ use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
 use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
-use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, value};
+use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, title_of, value};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -77,7 +77,7 @@ impl Declared {
             "kinocue-csv" if text == "1" => Ok(()),
             "kinocue-csv" => Err("this program reads version 1".to_owned()),
             "title" => {
-                self.title = Some(text.to_owned()).filter(|title| !title.is_empty());
+                self.title = Some(title_of(text)).filter(|title| !title.is_empty());
                 Ok(())
             }
             "units" => parsed(text).map(|unit| self.unit = unit),

@@ -4,9 +4,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::problem::Problem;
+use crate::plain;
 
 /// How many faults of a file are told; the rest is counted.
 pub const FAULTS_TOLD: usize = 20;
+/// How much of a column's name is told, octets.
+const NAME_TOLD: usize = 80;
 
 /// Where in a cue something stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -125,12 +128,13 @@ impl CueFaults {
 impl fmt::Display for CueFaults {
     /// One fault a line, as `file:line:column: column name: value and limit`, and how many more there are.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let path = plain::path(&self.path);
         for (i, fault) in self.told.iter().enumerate() {
             let line_end = if i == 0 { "" } else { "\n" };
-            write!(f, "{line_end}{}:{fault}", self.path.display())?;
+            write!(f, "{line_end}{path}:{fault}")?;
         }
         if self.more > 0 {
-            write!(f, "\n{}: and {} more", self.path.display(), self.more)?;
+            write!(f, "\n{path}: and {} more", self.more)?;
         }
         Ok(())
     }
@@ -150,7 +154,8 @@ impl Collector {
         if self.is_full() {
             self.count();
         } else {
-            self.told.push(Fault { place, column: column.map(str::to_owned), problem });
+            let column = column.map(|name| plain::escaped(name, NAME_TOLD).into_owned());
+            self.told.push(Fault { place, column, problem });
         }
     }
 

@@ -14,6 +14,8 @@ pub const MAX_EFFECTS: usize = 32;
 pub const MAX_MARKERS: usize = 10_000;
 /// The most octets of a marker's name.
 pub const MAX_MARKER_NAME: usize = 256;
+/// The octets of a title that are kept.
+pub(super) const MAX_TITLE: usize = 1_024;
 /// The last show time a row may have: a day.
 pub const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);
 /// The greatest position in mm, far beyond any seat.

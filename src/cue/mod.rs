@@ -30,6 +30,8 @@ pub use problem::Problem;
 pub use steps::{Step, Steps};
 pub use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation, UnknownUnit};
 
+use crate::plain;
+use crate::sys;
 use crate::time::ShowTime;
 
 /// What a file is said to be; nothing about it is guessed but CSV or MCAP.
@@ -138,7 +140,7 @@ impl Cue {
 
     /// Gives it another title.
     pub fn set_title(&mut self, title: String) {
-        self.title = Some(title);
+        self.title = Some(title_of(&title));
     }
 
     /// The unit of positions and amplitudes in memory.
@@ -286,18 +288,18 @@ pub fn load(path: &Path, source: &Source) -> Result<Cue, CueFaults> {
 /// Opens a cue file.
 ///
 /// # Errors
-/// A fault of class [`FaultClass::NoInput`] where there is none, it is a folder, or the system refuses; one of class
+/// A fault of class [`FaultClass::NoInput`] where there is none, it is a folder, a pipe or a device, or the system refuses; one of class
 /// [`FaultClass::BadCue`] where it is over [`limits::MAX_FILE`].
 pub fn open(path: &Path) -> Result<File, CueFaults> {
-    let file = File::open(path).map_err(|error| {
+    let file = sys::file::open(path).map_err(|error| {
         let problem = match error.kind() {
             io::ErrorKind::NotFound => Problem::Missing,
+            io::ErrorKind::IsADirectory => Problem::Folder,
             _ => Problem::Unopened(error.to_string()),
         };
         CueFaults::one(path, problem)
     })?;
     match file.metadata() {
-        Ok(metadata) if metadata.is_dir() => Err(CueFaults::one(path, Problem::Folder)),
         Ok(metadata) if metadata.len() > limits::MAX_FILE => Err(CueFaults::one(path, Problem::FileTooLarge)),
         _ => Ok(file),
     }
@@ -315,6 +317,11 @@ pub fn read(path: &Path, input: impl Read, source: &Source) -> Result<Cue, CueFa
     };
     cue.shrink();
     Ok(cue)
+}
+
+/// A title as it is kept: one line that does nothing but be read, in reports, on pages and in the files that are made of the cue.
+fn title_of(text: &str) -> String {
+    plain::escaped(text, limits::MAX_TITLE).into_owned()
 }
 
 /// Whether a file that begins so is MCAP.
@@ -346,6 +353,7 @@ mod tests {
         let class = |path: &Path| load(path, &Source::Native).unwrap_err().class();
         assert_eq!(class(&folder.path().join("none.csv")), FaultClass::NoInput);
         assert_eq!(class(folder.path()), FaultClass::NoInput);
+        assert_eq!(class(Path::new("/dev/zero")), FaultClass::NoInput);
         let path = folder.path().join("empty.csv");
         File::create(&path).unwrap();
         assert_eq!(class(&path), FaultClass::BadCue);

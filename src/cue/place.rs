@@ -1,11 +1,11 @@
 //! Where the rows of a cue came from, kept small: a line number is stored only where the count of lines jumps.
 
-use std::fs::File;
 use std::path::Path;
 
 use super::fault::Place;
 use super::table::{Lines, Splitter, column_of};
 use crate::motion::MAX_AXES;
+use crate::sys;
 use crate::time::ShowTime;
 
 /// Where the rows of a cue came from.
@@ -77,7 +77,7 @@ impl Origin {
 }
 
 fn column_in_header(path: &Path, column: &str) -> Option<Place> {
-    let mut lines = Lines::new(File::open(path).ok()?);
+    let mut lines = Lines::new(sys::file::open(path).ok()?);
     loop {
         let (number, text) = lines.next().ok()??;
         if text.trim_start().starts_with('#') {
@@ -91,7 +91,7 @@ fn column_in_header(path: &Path, column: &str) -> Option<Place> {
 }
 
 fn column_in_file(path: &Path, line: u64, cell: usize) -> Option<u64> {
-    let mut lines = Lines::new(File::open(path).ok()?);
+    let mut lines = Lines::new(sys::file::open(path).ok()?);
     loop {
         let (number, text) = lines.next().ok()??;
         if number >= line {

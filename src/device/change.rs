@@ -148,6 +148,11 @@ mod tests {
     }
 
     #[test]
+    fn what_the_imax_manual_recommends_is_not_refused() {
+        assert_eq!(objection(Address::Pa(0x52), 5, Dialect::Mbox, false), None, "IMAX manual 5.8");
+    }
+
+    #[test]
     fn measured_and_disputed_registers_are_not_written_even_by_force() {
         assert!(objection(Address::Dp(0x06), 1, Dialect::Smc, true).unwrap().ends_with("it is measured"));
         for disputed in [0x00, 0x42, 0x48] {

@@ -42,6 +42,12 @@ pub enum HomeError {
         /// By which the code is to be read.
         dialect: Dialect,
     },
+    /// It would go to where it believes zero to be.
+    #[error(
+        "would go to zero without searching it (PA0e = {0}), wherever that is since it was last switched off; set PA0e = 0 \
+         (kinocue register write PA0e=0 --keep), then home. No seat was moved"
+    )]
+    Unsearched(u16),
     /// It would not tell how far it is.
     #[error("does not let DPF0 be read: {0}")]
     Unreadable(Fault),
@@ -119,6 +125,21 @@ pub fn home<L: Link, C: Clock>(
         }
     }
     seats.into_iter().map(|seat| seat.result.expect("the loop ends with the last of them")).collect()
+}
+
+/// The controllers among `lanes` that would not search their zero (PA0e), each with what is wrong. One that does not
+/// answer is not among them: the order to home will tell.
+pub fn unsearched<L: Link, C: Clock>(
+    talk: &mut Talk<L, C>,
+    lanes: &[(usize, Dialect)],
+) -> Vec<(usize, HomeError)> {
+    let requests = lanes.iter().map(|(lane, _)| (*lane, Request::read(PA0E))).collect();
+    let value = |answer: &Answer| answer.words.first().copied().filter(|value| *value != 0);
+    let told = talk.ask(requests, Patience::default()).into_iter();
+    told.filter_map(|outcome| {
+        Some((outcome.lane, HomeError::Unsearched(value(outcome.result.as_ref().ok()?)?)))
+    })
+    .collect()
 }
 
 fn start<L: Link, C: Clock>(
@@ -241,6 +262,17 @@ mod tests {
         let rig = Rig::of(vec![Setup { estop_at: Some(Duration::ZERO), ..Setup::default() }]);
         let error = run(&rig, TIMEOUT)[0].clone().unwrap_err().to_string();
         assert_eq!(error, "cannot home: an emergency stop is in effect (x = 4)");
+    }
+
+    #[test]
+    fn a_controller_that_would_not_search_its_zero_is_named_before_anything_moves() {
+        let without = Setup { parameters: vec![(0x0e, 1)], ..Setup::default() };
+        let mute = Setup { mute: true, ..Setup::default() };
+        let rig = Rig::of(vec![Setup::default(), without, mute]);
+        let lanes: Vec<_> = (0..3).map(|lane| (lane, Dialect::Smc)).collect();
+        let found = unsearched(&mut rig.talk(), &lanes);
+        assert_eq!(found, [(1, HomeError::Unsearched(1))]);
+        assert!(found[0].1.to_string().contains("without searching it (PA0e = 1)"));
     }
 
     #[test]

@@ -33,5 +33,6 @@ pub use exchange::{Answer, Exchange, Odds, Outcome, Patience, Peer};
 pub use fault::{Fault, Odd, refusal};
 pub use request::{MAX_READ, Request, reads};
 pub use select::{Assignment, SelectError, Selection, assignments, selections};
+pub use stand::{places, position_words_of};
 pub use table::{Family, Flags, Register, Table, table};
 pub use talk::{Link, Talk, Watch, peers};

@@ -1,8 +1,8 @@
-//! Registers as a person names them: `PA95`, `pa 0x95`, `dp 06..0b`, `dpf0`, `axis-offset`, `servo 1 508..510`; with
-//! `=VALUE` behind them to be written.
+//! Registers as a person names them: `PA95`, `pa 0x95`, `dp 06..0b`, `dpf0`, `axis-offset`, `servo 1 508..510`, or as the
+//! panel of an integrated controller shows them: `CP149`, `cd 006..011`; with `=VALUE` behind them to be written.
 //!
-//! Numbers of PA and DP are hexadecimal, as both manuals print them; numbers of drives and values are decimal unless
-//! they begin with `0x`.
+//! Numbers of PA and DP are hexadecimal, as both manuals print them; those of CP and CD are decimal, as the panel shows
+//! them (SMC manual 2.3); numbers of drives and values are decimal unless they begin with `0x`.
 
 use super::address::CONTROL;
 use super::{Address, table};
@@ -45,7 +45,8 @@ pub enum SelectError {
     Nothing(String),
     /// No name of a register.
     #[error(
-        "{word:?} names no register{hint}; write PA95, dp 06..0b, dpf0, a name of `kinocue register list`, or servo 1 508"
+        "{word:?} names no register{hint}; write PA95, dp 06..0b, dpf0, CP149 as the panel shows it, a name of `kinocue \
+         register list`, or servo 1 508"
     )]
     Name {
         /// What was read.
@@ -158,6 +159,8 @@ fn selection(words: &mut Words) -> Result<Selection, SelectError> {
     match word.as_str() {
         "pa" => of_table("PA", Address::Pa, words),
         "dp" => of_table("DP", Address::Dp, words),
+        "cp" => of_panel(PARAMETERS, words),
+        "cd" => of_panel(MONITORS, words),
         "dpf" => control(words),
         "servo" => servo(words),
         _ => attached(&word),
@@ -174,6 +177,48 @@ fn of_table(space: &'static str, of: fn(u8) -> Address, words: &mut Words) -> Re
         }
         _ => Ok(whole(of)),
     }
+}
+
+/// Names on the panel of an integrated controller count as PA and DP do, in decimal (SMC manual 2.3): CP149 is PA95.
+struct Panel {
+    name: &'static str,
+    space: &'static str,
+    of: fn(u8) -> Address,
+}
+
+const PARAMETERS: Panel = Panel { name: "CP", space: "PA", of: Address::Pa };
+const MONITORS: Panel = Panel { name: "CD", space: "DP", of: Address::Dp };
+
+/// `cp 149`, `cd 006..011`; without numbers, the whole table.
+fn of_panel(panel: Panel, words: &mut Words) -> Result<Selection, SelectError> {
+    match words.peek() {
+        Some(next) if next.starts_with(|c: char| c.is_ascii_digit()) => {
+            let next = next.to_owned();
+            words.next();
+            on_panel(&next, &panel)
+        }
+        _ => Ok(whole(panel.of)),
+    }
+}
+
+/// The documented registers among `numbers` of a panel.
+fn on_panel(numbers: &str, panel: &Panel) -> Result<Selection, SelectError> {
+    let bad = || SelectError::Number {
+        word: numbers.to_owned(),
+        space: panel.name,
+        wanted: "000 to 255, or a range as 128..133",
+    };
+    let decimal = |text: &str| {
+        let digits = text.bytes().all(|octet| octet.is_ascii_digit());
+        text.parse::<u8>().ok().filter(|_| digits && text.len() <= 3).ok_or_else(bad)
+    };
+    let (first, last) = ends(numbers).ok_or_else(bad)?;
+    let (first, last) = (decimal(first)?, decimal(last)?);
+    if last < first {
+        return Err(SelectError::Backward(numbers.to_owned()));
+    }
+    let range = format!("{first:02x}..{last:02x}");
+    documented(if numbers.contains('.') { &range } else { &range[..2] }, panel.space, panel.of)
 }
 
 /// `dpf 0`: the control registers by their last digit.
@@ -214,6 +259,12 @@ fn attached(word: &str) -> Result<Selection, SelectError> {
     if let Some(numbers) = word.strip_prefix("dp").filter(|numbers| begins_with_digits(numbers)) {
         return documented(numbers, "DP", Address::Dp);
     }
+    for (prefix, panel) in [("cp", PARAMETERS), ("cd", MONITORS)] {
+        let digit = |numbers: &&str| numbers.starts_with(|c: char| c.is_ascii_digit());
+        if let Some(numbers) = word.strip_prefix(prefix).filter(digit) {
+            return on_panel(numbers, &panel);
+        }
+    }
     Err(SelectError::Name { word: word.to_owned(), hint: alike(word) })
 }
 
@@ -252,7 +303,7 @@ fn whole(of: fn(u8) -> Address) -> Selection {
 /// First and last of `06..0b`, which may repeat its prefix (`PA80..PA85`); twice the same of a single one.
 fn ends(text: &str) -> Option<(&str, &str)> {
     let (first, last) = text.split_once("..").unwrap_or((text, text));
-    let last = last.strip_prefix("pa").or_else(|| last.strip_prefix("dp")).unwrap_or(last);
+    let last = ["pa", "dp", "cp", "cd"].iter().find_map(|space| last.strip_prefix(space)).unwrap_or(last);
     (!first.is_empty() && !last.is_empty()).then_some((first, last))
 }
 
@@ -308,6 +359,21 @@ mod tests {
     }
 
     #[test]
+    fn registers_are_named_as_the_panel_of_an_integrated_controller_shows_them() {
+        for (text, register) in [("CP149", "PA95"), ("cp 149", "PA95"), ("Cd006", "DP06"), ("cd 240", "DPF0")]
+        {
+            assert_eq!(named(text), register, "{text}");
+        }
+        assert_eq!(named("cp128..130 CD006..CD007"), "PA80 PA81 PA82 DP06 DP07");
+        assert_eq!(selections(&words("cp")).unwrap(), selections(&words("pa")).unwrap());
+        assert!(named("cp 256").contains("CP takes 000 to 255"));
+        assert!(named("CP09a").contains("no register number"));
+        assert!(named("CP153").starts_with("PA99 is in neither manual"));
+        let given = assignments(&words("CP082=5")).unwrap();
+        assert_eq!(given, [Assignment { address: Address::Pa(0x52), value: 5 }]);
+    }
+
+    #[test]
     fn a_range_or_a_table_names_what_the_manuals_have_of_it() {
         assert_eq!(named("pa 98..9d"), "PA98 PA9d");
         assert_eq!(selections(&words("pa")).unwrap()[0].addresses.len(), whole(Address::Pa).addresses.len());
@@ -329,7 +395,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn no_words_panic(words in proptest::collection::vec("(pa|dp|dpf|servo|=|\\.\\.|0x|[0-9a-f]{1,3}|é| |[A-Z-]{0,4}){0,5}", 0..5)) {
+        fn no_words_panic(words in proptest::collection::vec("(pa|dp|dpf|cp|cd|servo|=|\\.\\.|0x|[0-9a-f]{1,3}|é| |[A-Z-]{0,4}){0,5}", 0..5)) {
             let _ = selections(&words);
             let _ = assignments(&words);
         }

@@ -144,13 +144,26 @@ fn settings(controller: &Controller) -> Vec<Address> {
 }
 
 /// The registers with the positions of the first `axes` axes.
-fn places(axes: usize) -> impl Iterator<Item = Address> {
-    DP_POSITIONS.iter().take(axes).filter_map(|&first| u8::try_from(first).ok()).flat_map(words)
+pub fn places(axes: usize) -> impl Iterator<Item = Address> {
+    (0..axes).map_while(words).flatten()
 }
 
-/// The two words of a position.
-const fn words(first: u8) -> [Address; 2] {
-    [Address::Dp(first), Address::Dp(first + 1)]
+/// The two registers of an axis's position, from 0; none where it has none.
+fn words(axis: usize) -> Option<[Address; 2]> {
+    let first = u8::try_from(*DP_POSITIONS.get(axis)?).ok()?;
+    Some([Address::Dp(first), Address::Dp(first + 1)])
+}
+
+/// What the position registers of the first `axes` axes hold, two words each; none where one of them is missing.
+#[must_use]
+pub fn position_words_of(values: &Values, axes: usize) -> Option<Vec<[u16; 2]>> {
+    let held = |address| values.get(&address).copied();
+    (0..axes.min(DP_POSITIONS.len()))
+        .map(|axis| {
+            let [first, second] = words(axis)?;
+            Some([held(first)?, held(second)?])
+        })
+        .collect()
 }
 
 fn ask<L: Link, C: Clock>(
@@ -185,8 +198,8 @@ fn judge(controller: &Controller, first: &Values, again: &Values) -> Result<Vec<
     }
     judge_settings(controller, first)?;
     let place = |values: &Values, axis: usize, dialect| {
-        let first = u8::try_from(DP_POSITIONS[axis]).unwrap_or_default();
-        position(words(first).map(|word| values.get(&word).copied().unwrap_or_default()), dialect)
+        let held = |address| values.get(&address).copied().unwrap_or_default();
+        position(words(axis).map_or([0; 2], |words| words.map(held)), dialect)
     };
     let stroke = controller.seat.stroke_pulses();
     let inside = |pulses: Pulses| (0.0..=stroke).contains(&f64::from(pulses.0));

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::settings::Values;
 use super::talk::Link;
-use super::{Address, Answer, Fault, Odds, Outcome, Patience, Request, Talk, reads, table};
+use super::{Address, Answer, Fault, Odds, Outcome, Patience, Request, Talk, places, reads, table};
 use crate::config::Controller;
 use crate::net::Origin;
 use crate::observe::{ControllerState, Observer, Watched};
@@ -52,6 +52,8 @@ pub struct Survey {
     pub odds: Odds,
     /// Registers that told two values, though nobody here wrote them.
     pub changed: Vec<Address>,
+    /// Where its axes stood the second time, by the position registers.
+    pub again: Values,
     /// Datagrams that it received beyond those sent from here; none where that is not known.
     pub foreign_packets: Option<u16>,
     /// What it reported unasked.
@@ -189,6 +191,11 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
 
     fn last(&mut self) {
         let mut requests: Vec<_> = self.live().into_iter().map(|lane| (lane, IDENTITY)).collect();
+        for lane in self.live() {
+            let known = places(self.controllers[lane].seat.axes);
+            let known: Vec<_> = known.filter(|it| self.found[lane].values.contains_key(it)).collect();
+            requests.extend(reads(&known).into_iter().map(|read| (lane, read)));
+        }
         requests.extend(self.each_smc(Request::read(PACKETS)));
         for Outcome { lane, request, result } in self.ask(requests, LAST) {
             let Ok(answer) = result else { continue };
@@ -198,13 +205,19 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
                     |(address, word): &(Address, u16)| before.get(address).is_some_and(|it| it != word);
                 self.found[lane].changed =
                     told(&request, &answer).filter(differs).map(|(address, _)| address).collect();
+            } else if request == Request::read(PACKETS) {
+                self.count_packets(lane, answer.words.first().copied());
             } else {
-                let Packets { first, sent } = self.packets[lane];
-                let grown = first.zip(answer.words.first()).map(|(first, now)| now.wrapping_sub(first));
-                let sent = u16::try_from(sent).unwrap_or(u16::MAX);
-                self.found[lane].foreign_packets = grown.map(|grown| grown.saturating_sub(sent));
+                self.found[lane].again.extend(told(&request, &answer));
             }
         }
+    }
+
+    fn count_packets(&mut self, lane: usize, now: Option<u16>) {
+        let Packets { first, sent } = self.packets[lane];
+        let grown = first.zip(now).map(|(first, now)| now.wrapping_sub(first));
+        let sent = u16::try_from(sent).unwrap_or(u16::MAX);
+        self.found[lane].foreign_packets = grown.map(|grown| grown.saturating_sub(sent));
     }
 
     fn listen(&mut self) {

@@ -90,7 +90,6 @@ fn different_slots(windows: &[Window]) -> Vec<(usize, Slot)> {
     let mut slots: Vec<(usize, Slot)> = Vec::new();
     for (_, slot) in windows.iter().flat_map(Window::moving) {
         let slot = slot.at_level(1.0);
-        // A slot without an axis of the cue is led to park, and loads nothing.
         let Some(axis) = slot.axis else { continue };
         if !slots.contains(&(axis, slot)) {
             slots.push((axis, slot));

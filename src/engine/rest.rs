@@ -152,8 +152,9 @@ impl Engine {
         self.riders.iter().all(|rider| rider.fader.is_still())
     }
 
+    /// Once the cue is over the way to park waits for nobody: it leads those as well that are elsewhere.
     pub(super) fn lanes_need_a_course(&self) -> bool {
-        self.riders.iter().any(Rider::needs_a_course)
+        self.playhead < self.timeline.duration() && self.riders.iter().any(Rider::needs_a_course)
     }
 
     /// Describes the lanes for the planner. The level of those that do not follow the cue is set at once: nothing of their

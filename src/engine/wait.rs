@@ -4,6 +4,7 @@
 use super::{Engine, Part, Phase, Rest, Rider, first_phase};
 use crate::engine::Mix;
 use crate::motion::{MAX_AXES, Pose, Window};
+use crate::time::TRIM_MS;
 
 /// A seat this near its park pose is there, strokes: 0.1 mm of 150.
 const AT_PARK: Pose = [0.000_7; MAX_AXES];
@@ -35,6 +36,12 @@ impl Engine {
         self
     }
 
+    /// It was made for that trim: its show starts where the motion then is in the cue, so that nothing has to be slewed in. What
+    /// it is told of any other trim counts from there.
+    pub fn begin_trimmed(&mut self, ms: i32) {
+        self.trim_ms = ms.clamp(-TRIM_MS, TRIM_MS);
+    }
+
     /// Begins, where it waits.
     pub fn go(&mut self) {
         if self.phase == Phase::Waiting {
@@ -54,7 +61,6 @@ impl Engine {
     /// Takes over from the engine that is done: lanes to which nothing goes stay so, and the others are to be found. Where the hall
     /// is not ready to play (`ready` false), it rests.
     pub fn take_over(&mut self, before: &Self, ready: bool) {
-        self.trim_ms = before.trim_ms;
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
             rider.count_on(old);
             if old.part == Part::Away {

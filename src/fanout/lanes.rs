@@ -41,6 +41,7 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
         channel,
         code: Code(controller.accept.code(controller.address)),
         vibrates,
+        vibration_port: controller.vibration_port,
         wiring: wiring(config, controller, timeline),
         ack_every: manner.ack_every(config),
         longest_ms: controller.seat.max_interval_ms,
@@ -63,8 +64,7 @@ fn slice(controller: &Controller, slots: usize, timeline: &Timeline, level: f64)
 fn shared(config: &Config, controller: &Controller, slots: usize, timeline: &Timeline, level: f64) -> Window {
     let any_slot = |axis: usize| {
         let takes = |other: &&Controller| other.fan_out == FanOut::Shared && other.takes(axis);
-        let taker =
-            if controller.takes(axis) { Some(controller) } else { config.controllers.iter().find(takes) };
+        let taker = if controller.takes(axis) { Some(controller) } else { config.named().find(takes) };
         let taker = taker.unwrap_or(controller);
         let own = (axis < timeline.axes()).then_some(axis);
         let slot = slot(&taker.seat, axis.saturating_sub(taker.axis_offset), own, timeline, level);

@@ -9,7 +9,7 @@ use crate::cue;
 use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
 use crate::timeline::EffectSet;
-use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration};
+use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
 
 /// Which outputs a cue's effects switch on one controller.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -45,6 +45,8 @@ pub struct Lane {
     pub code: Code,
     /// Whether its frames carry vibration.
     pub vibrates: bool,
+    /// How these have Port Out.
+    pub vibration_port: VibrationPort,
     /// Which outputs it switches.
     pub wiring: Wiring,
     /// Asks for a reply in each so-manieth frame; 0 never asks.
@@ -94,7 +96,7 @@ impl Lane {
             outputs: self.wiring.outputs(mix.effects(beat.effects)),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };
-        (stamped, motion.emit(buf))
+        (stamped, motion.emit_as(self.vibration_port, buf))
     }
 
     /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects off.

@@ -86,6 +86,25 @@ fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
 }
 
 #[test]
+fn vibration_stands_two_octets_further_back_where_port_out_takes_four() {
+    let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
+    let mut config = hall(&["127.0.0.1:1"], 1);
+    config.controllers[0].vibration_port = VibrationPort::Four;
+    let mut lane = lanes(&config, &cue, FULL).remove(0);
+    let mut beat = Beat::still(Timing::Relative, 10);
+    beat.effects = EffectSet::Word(0x0003);
+    beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
+    let mut buf = [0xa5; MAX_LEN];
+    let park = lane.window.park();
+    let (_, octets) = lane.encode(&beat, &park, Mix::FULL, &mut buf);
+    assert_eq!((octets.len(), &octets[32..36]), (48, &[0, 0, 0, 3][..]));
+    let frame = MotionRequest::parse_as(VibrationPort::Four, octets).unwrap();
+    assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
+    let (_, octets) = lane.encode_homing(3_000, &mut buf);
+    assert_eq!(octets.len(), 38, "a frame without vibration is the same for all");
+}
+
+#[test]
 fn the_way_home_is_relative_and_plain_and_takes_a_frame_number() {
     let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
     let mut lane = lanes(&hall(&["127.0.0.1:1"], 1), &cue, FULL).remove(0);

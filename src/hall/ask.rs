@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Role;
-use crate::config::Preset;
+use crate::config::{GearWord, Preset};
 use crate::time::ShowTime;
 
 /// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
@@ -40,6 +40,8 @@ pub enum Ask {
     Disarm,
     /// Start what is loaded.
     Go,
+    /// Start what is loaded at that time of the film.
+    GoFrom(ShowTime),
     /// Hold; the film waits.
     Pause,
     /// Go on.
@@ -61,7 +63,12 @@ pub enum Ask {
     /// Take a controller's group in.
     Enable(String),
     /// Take a controller's group out: its seat parks.
-    Disable(String),
+    Disable {
+        /// Which.
+        name: String,
+        /// Why, for whoever comes next.
+        why: Option<String>,
+    },
     /// Ask all controllers for their registers and judge them.
     Preflight,
     /// Move each axis and effect of empty, armed seats slowly in turn, and store a table of acks and latency.
@@ -115,7 +122,7 @@ impl Ask {
             Self::Select { .. } => "select",
             Self::Arm { .. } => "arm",
             Self::Disarm => "disarm",
-            Self::Go => "go",
+            Self::Go | Self::GoFrom(_) => "go",
             Self::Pause => "pause",
             Self::Resume => "resume",
             Self::Seek(_) => "seek",
@@ -126,7 +133,7 @@ impl Ask {
             Self::Levels(_) => "levels",
             Self::Preset(_) => "preset",
             Self::Enable(_) => "enable",
-            Self::Disable(_) => "disable",
+            Self::Disable { .. } => "disable",
             Self::Preflight => "preflight",
             Self::Test { .. } => "test",
             Self::Reload => "reload",
@@ -142,12 +149,29 @@ impl Ask {
             Self::Home
                 | Self::Arm { .. }
                 | Self::Go
+                | Self::GoFrom(_)
                 | Self::Resume
                 | Self::Seek(_)
                 | Self::Clear
                 | Self::Enable(_)
                 | Self::Test { .. }
         )
+    }
+
+    /// What gear has to be allowed for it; none for what needs no leave, a stop, and for what gear has no way to ask.
+    #[must_use]
+    pub const fn gear_word(&self) -> Option<GearWord> {
+        Some(match self {
+            Self::Go => GearWord::Go,
+            Self::Pause => GearWord::Pause,
+            Self::Resume => GearWord::Resume,
+            Self::Park => GearWord::Park,
+            Self::Seek(_) => GearWord::Seek,
+            Self::Trim(_) => GearWord::Trim,
+            Self::Levels(_) => GearWord::Levels,
+            Self::Enable(_) | Self::Disable { .. } => GearWord::Seats,
+            _ => return None,
+        })
     }
 
     /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.
@@ -182,7 +206,11 @@ impl fmt::Display for Ask {
             Self::Seek(film) => write!(f, " {film}"),
             Self::Trim(ms) => write!(f, " {ms} ms"),
             Self::Levels(change) => change.fmt(f),
-            Self::Preset(name) | Self::Enable(name) | Self::Disable(name) => write!(f, " {name}"),
+            Self::GoFrom(film) => write!(f, " from {film}"),
+            Self::Preset(name) | Self::Enable(name) | Self::Disable { name, why: None } => {
+                write!(f, " {name}")
+            }
+            Self::Disable { name, why: Some(why) } => write!(f, " {name}: {}", why.escape_debug()),
             Self::Arm { seats_empty: true } => f.write_str(" with empty seats"),
             Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
             Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),

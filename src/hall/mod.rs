@@ -4,6 +4,7 @@
 
 mod ask;
 mod handle;
+mod places;
 mod problem;
 mod status;
 mod who;
@@ -11,6 +12,7 @@ mod who;
 pub use crate::config::Role;
 pub use ask::{Ask, Levels, LevelsChange};
 pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle, overtaken};
+pub use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub use status::{
     ControllerStatus, EntryStatus, Histogram, JournalLine, Percentiles, PlaylistStatus, PreflightStatus,

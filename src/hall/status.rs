@@ -117,6 +117,9 @@ pub struct ShowStatus {
     pub position_s: f64,
     /// How long the first move onto it takes, s.
     pub join_s: f64,
+    /// Where the film was when its last show ended before the cue did, s: a go may go on from there (`from_s`); null where
+    /// there is nothing to go on from.
+    pub resume_s: Option<f64>,
     /// How many axes it has.
     pub axes: usize,
     /// The effects that it uses.
@@ -199,7 +202,7 @@ pub struct RealTimeStatus {
 }
 
 /// One controller.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct ControllerStatus {
     /// Its name.
     pub name: String,
@@ -213,7 +216,8 @@ pub struct ControllerStatus {
     pub group: String,
     /// Whether it is to take part.
     pub enabled: bool,
-    /// `ok`, `degraded`, `lost`, `rejoining`, `stopped`, `error`, `excluded`, `unwatched` or `unknown`.
+    /// `ok`, `degraded`, `lost`, `rejoining`, `stopped`, `error`, `excluded`, `unwatched`, `unknown`, or
+    /// `out` where the configuration has it out for good.
     pub standing: &'static str,
     /// Why it stands so, and what to do.
     pub why: String,
@@ -249,6 +253,8 @@ pub struct ControllerStatus {
     pub servo_errors: Option<Vec<u16>>,
     /// Inputs, bit 0 = X01; null where it never told.
     pub inputs: Option<u16>,
+    /// Inputs of belts that are open, from 1 for X01; null where it has no belts, or has not told lately.
+    pub belts_open: Option<Vec<u8>>,
     /// Outputs, bit 0 = Y01; null where it never told.
     pub outputs: Option<u16>,
     /// Where its axes are, mm: measured where it measures, else as it was commanded; null where nobody knows.
@@ -340,4 +346,6 @@ pub struct JournalLine {
     pub what: String,
     /// What came of it: `done`, or why not.
     pub result: String,
+    /// How often the same was asked in a row.
+    pub times: u32,
 }

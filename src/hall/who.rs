@@ -37,17 +37,31 @@ pub struct Who {
     pub name: String,
 }
 
+impl Surface {
+    /// Whether it is that of show-control gear, which is known by its address alone.
+    #[must_use]
+    pub const fn is_gear(self) -> bool {
+        matches!(self, Self::Osc | Self::Text)
+    }
+}
+
+impl fmt::Display for Surface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Socket => "socket",
+            Self::Http => "http",
+            Self::Osc => "osc",
+            Self::Text => "text",
+            Self::Schedule => "schedule",
+            Self::Signal => "signal",
+            Self::Program => "program",
+        })
+    }
+}
+
 impl fmt::Display for Who {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let surface = match self.surface {
-            Surface::Socket => "socket",
-            Surface::Http => "http",
-            Surface::Osc => "osc",
-            Surface::Text => "text",
-            Surface::Schedule => "schedule",
-            Surface::Signal => "signal",
-            Surface::Program => "program",
-        };
-        write!(f, "{} ({surface}, {})", self.name, self.role)
+        let Self { name, surface, role } = self;
+        write!(f, "{name} ({surface}, {role})")
     }
 }

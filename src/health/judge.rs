@@ -2,6 +2,7 @@
 
 use super::{Change, Demand, Health, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well};
 use crate::time::MonoTime;
+use crate::wire::DPFE;
 
 /// What the members of one group amount to: of each kind the first that there is.
 #[derive(Debug, Clone, Copy, Default)]
@@ -27,7 +28,10 @@ impl Health {
         let before = *place;
         let (standing, why) = before.after(findings, self.watched, now);
         (place.standing, place.why) = (standing, why);
-        if standing == before.standing {
+        let is_explained = standing == Standing::Error
+            && matches!(before.why, Why::Refuses(_))
+            && !matches!(why, Why::Refuses(_));
+        if standing == before.standing && !is_explained {
             return;
         }
         self.settle(group, before.standing, standing);
@@ -35,7 +39,7 @@ impl Health {
         if let (Standing::Excluded, Some(controller)) = (standing, why.controller()) {
             on(Notice::Hall(state::Event::Rebooted(controller)));
         }
-        let falls_out = before.standing.may_move() && !standing.may_move();
+        let falls_out = (before.standing.may_move() || is_explained) && !standing.may_move();
         if let Some(demand) = self.demand(standing, why).filter(|_| falls_out) {
             on(Notice::Hall(state::Event::Policy(demand, group)));
         }
@@ -77,7 +81,9 @@ impl Health {
     const fn demand(&self, standing: Standing, why: Why) -> Option<Demand> {
         match (standing, why, self.policy) {
             (Standing::Stopped, ..) => None,
-            (_, Why::Drive { .. }, _) | (.., LossPolicy::Park) => Some(Demand::Park),
+            (_, Why::Drive { .. } | Why::Alarm { register: DPFE, .. }, _) | (.., LossPolicy::Park) => {
+                Some(Demand::Park)
+            }
             (.., LossPolicy::Pause) => Some(Demand::Pause),
             (.., LossPolicy::Continue) => None,
         }
@@ -110,7 +116,7 @@ impl Health {
     pub(super) fn tell_of_reads(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {
         for (controller, member) in self.members.iter_mut().enumerate() {
             let standing = self.places[self.groups.group_of(controller)].standing;
-            let wanted = standing.is_looked_at() || (self.watched && member.wants_baseline());
+            let wanted = standing.is_looked_at() || (self.watched && member.wants_baseline(now));
             if wanted && member.take_read(now) {
                 on(Notice::Read(controller));
             }

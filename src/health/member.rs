@@ -7,7 +7,7 @@ use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::window::Window;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::time::MonoTime;
-use crate::wire::FrameNo;
+use crate::wire::{DPFE, FrameNo};
 
 /// A controller is lost when it was not heard for this long, and for ten frames that asked.
 const SILENCE: Duration = Duration::from_millis(250);
@@ -20,6 +20,11 @@ const SEEN_FOR: Duration = Duration::from_secs(1);
 const APART: Duration = Duration::from_secs(2);
 /// While nothing moves, what a controller is and whether it knows its zero is read this often: nobody sees it being reset.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
+/// A seat that falls out three times within so long is not led back and forth any more.
+const UNSTEADY: Duration = Duration::from_mins(1);
+/// A controller needs a second to start (PA3d), and may have begun to just before it was asked: where all that was asked of
+/// it found an answer sooner, it has not rebooted.
+const GAP: Duration = Duration::from_millis(600);
 /// From one read to the next: 5 Hz.
 const READ_EVERY: Duration = Duration::from_millis(200);
 
@@ -33,6 +38,10 @@ pub(super) struct Member {
     unheard: u32,
     heard: MonoTime,
     asked: MonoTime,
+    /// The first of what it was asked that it has not answered by anything yet; whether by a frame, a beat or a read.
+    unanswered: Option<MonoTime>,
+    /// It took long enough to answer to have rebooted, since it was believed last.
+    gap: bool,
     traffic: Traffic,
     baseline: Option<Baseline>,
     /// Its position is known from homing or preflight, so that the next sighting needs no proof.
@@ -56,6 +65,8 @@ pub(super) struct Member {
     /// It began, and nobody was told yet.
     press_untold: bool,
     error: u16,
+    /// The alarm that it tells of itself (MBOX): a register, and what stands there; over with 0.
+    alarm: (u16, u16),
     drives: [u16; MAX_AXES],
     refusing: bool,
     /// What went wrong first since it was cleared.
@@ -64,6 +75,8 @@ pub(super) struct Member {
     pub(super) moved: bool,
     /// Nobody knows where its frames have led it.
     pub(super) unsure: bool,
+    /// When it was sent to last before each of the last two times that nobody knew that any more.
+    falls: [Option<MonoTime>; 2],
     /// The axis, from 0, that told a position outside of its stroke, and which.
     pub(super) outside: Option<(usize, Pulses)>,
     /// Another master was found, and nobody was told yet.
@@ -80,6 +93,8 @@ impl Member {
             unheard: 0,
             heard: MonoTime::default(),
             asked: MonoTime::default(),
+            unanswered: None,
+            gap: false,
             traffic: Traffic::default(),
             baseline: None,
             trusted: true,
@@ -94,11 +109,13 @@ impl Member {
             tripped: false,
             press_untold: false,
             error: 0,
+            alarm: (0, 0),
             drives: [0; MAX_AXES],
             refusing: false,
             ailed: None,
             moved: false,
             unsure: false,
+            falls: [None; 2],
             outside: None,
             crowd_untold: false,
         }
@@ -113,6 +130,7 @@ impl Member {
             self.rest();
         }
         self.asked = at;
+        self.unanswered.get_or_insert(at);
         self.window.on_asked(frame, at);
         self.unheard = self.unheard.saturating_add(1);
         // After a time without frames, silence begins with the first of them.
@@ -129,11 +147,18 @@ impl Member {
         }
     }
 
+    /// It has answered something.
+    pub(super) fn on_answer(&mut self, at: MonoTime) {
+        let late = GAP.max(2 * self.interval);
+        self.gap |= self.unanswered.take().is_some_and(|since| at.since(since) > late);
+    }
+
     /// A sign of life, told again at every look, is one only once.
     pub(super) fn on_life(&mut self, at: MonoTime) {
         if at <= self.heard {
             return;
         }
+        self.on_answer(at);
         self.heard = at;
         self.waiting = None;
         self.unheard = 0;
@@ -142,6 +167,7 @@ impl Member {
     pub(super) fn on_read_sent(&mut self, datagrams: u32) {
         self.traffic.sent += u64::from(datagrams);
         self.reading = true;
+        self.unanswered.get_or_insert(self.read);
     }
 
     /// So many datagrams went out that ask for nothing of this.
@@ -154,6 +180,7 @@ impl Member {
         self.traffic.sent += 1;
         self.unheard = self.unheard.saturating_add(BEAT_WEIGHT);
         self.waiting.get_or_insert(at);
+        self.unanswered.get_or_insert(at);
         self.look_again = self.must_be_home && at.since(self.read) >= LOOK_AGAIN;
     }
 
@@ -162,15 +189,18 @@ impl Member {
         if !std::mem::take(&mut self.reading) {
             return;
         }
+        self.on_answer(at);
         self.on_error(sighting.error);
-        self.refusing &= sighting.error != 0;
+        self.on_alarm(DPFE, sighting.alarm);
+        let is_well = sighting.error == 0 && sighting.alarm == 0;
+        self.refusing &= !is_well;
         if let Some(why) = self.against(sighting) {
             self.crowd_untold |= self.outcast.is_none() && matches!(why, Why::Crowded(_));
             self.outcast.get_or_insert(why);
         } else {
             self.baseline = Some(Baseline::of(sighting, self.traffic));
-            self.trusted = false;
-            self.seen = (sighting.error == 0).then_some(at);
+            (self.trusted, self.gap) = (false, false);
+            self.seen = is_well.then_some(at);
         }
     }
 
@@ -182,7 +212,7 @@ impl Member {
     fn against(&self, sighting: &Sighting) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.baseline {
-            Some(baseline) => baseline.judge(sighting, self.traffic),
+            Some(baseline) => baseline.judge(sighting, self.traffic, self.gap),
             None if self.trusted => Verdict::Same,
             None => Verdict::Unproved,
         };
@@ -193,6 +223,7 @@ impl Member {
             Verdict::NotHome => Some(Why::NotHome(controller)),
             Verdict::Rebooted => Some(Why::Rebooted(controller)),
             Verdict::Crowded => Some(Why::Crowded(controller)),
+            Verdict::Gap => Some(Why::Gap(controller)),
             Verdict::Unproved => Some(Why::Unproved(controller)),
         }
     }
@@ -200,15 +231,34 @@ impl Member {
     pub(super) fn on_error(&mut self, error: u16) {
         self.error = error;
         if error != 0 {
-            self.ailed.get_or_insert(Why::Error { controller: self.controller, error });
+            self.ail(Why::Error { controller: self.controller, error });
         }
+    }
+
+    pub(super) fn on_alarm(&mut self, register: u16, value: u16) {
+        self.alarm = (register, value);
+        if value != 0 {
+            self.ail(Why::Alarm { controller: self.controller, register, value });
+        }
+    }
+
+    /// It answers with registers that nobody here can read.
+    pub(super) fn on_wide_registers(&mut self) {
+        self.ailed.get_or_insert(Why::Wide(self.controller));
     }
 
     pub(super) fn on_drive(&mut self, axis: usize, error: u16) {
         let Some(known) = axis.checked_sub(1).and_then(|index| self.drives.get_mut(index)) else { return };
         *known = error;
         if error != 0 {
-            self.ailed.get_or_insert(Why::Drive { controller: self.controller, axis, error });
+            self.ail(Why::Drive { controller: self.controller, axis, error });
+        }
+    }
+
+    /// The first that went wrong counts; but that frames are refused is soon explained by what is read.
+    fn ail(&mut self, why: Why) {
+        if self.ailed.is_none_or(|before| matches!(before, Why::Refuses(_))) {
+            self.ailed = Some(why);
         }
     }
 
@@ -234,8 +284,13 @@ impl Member {
     }
 
     /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
-    pub(super) const fn on_fell_out(&mut self) {
+    pub(super) fn on_fell_out(&mut self) {
         (self.unsure, self.seen, self.reading) = (true, None, false);
+        let [last, before] = self.falls;
+        self.falls = [Some(self.asked), last];
+        if before.is_some_and(|first| self.asked.since(first) < UNSTEADY) {
+            self.ailed.get_or_insert(Why::Unsteady(self.controller));
+        }
     }
 
     /// Not all of its axes tell where they are.
@@ -249,11 +304,12 @@ impl Member {
         self.baseline = None;
         self.trusted = true;
         self.seen = None;
+        (self.unanswered, self.gap) = (None, false);
     }
 
     /// Whether something is still wrong with it.
     pub(super) fn ails(&self) -> bool {
-        self.error != 0 || self.refusing || self.drives.iter().any(|error| *error != 0)
+        self.error != 0 || self.alarm.1 != 0 || self.refusing || self.drives.iter().any(|error| *error != 0)
     }
 
     /// What was latched is over, unless it goes on.
@@ -262,7 +318,7 @@ impl Member {
         self.refusing = false;
         self.tripped = self.pressed;
         if !self.ails() {
-            self.ailed = None;
+            (self.ailed, self.falls) = (None, [None; 2]);
         }
     }
 
@@ -304,9 +360,14 @@ impl Member {
         self.unheard = 0;
     }
 
-    /// Whether its packet counter has to be read, though all is well.
-    pub(super) fn wants_baseline(&self) -> bool {
-        self.look_again || self.baseline.map_or(self.trusted, |baseline| baseline.is_stale(self.traffic))
+    /// Whether its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a
+    /// show: that it is not home any more is the only sign of a reset.
+    pub(super) fn wants_baseline(&self, now: MonoTime) -> bool {
+        self.look_again
+            || self.baseline.map_or(self.trusted, |baseline| {
+                let since = now.since(self.read);
+                baseline.is_stale(self.traffic) || (!baseline.is_counted() && since >= LOOK_AGAIN)
+            })
     }
 
     /// Whether it is time for a read; if so, the next one is due a while later.

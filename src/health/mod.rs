@@ -107,7 +107,7 @@ impl Health {
         self.members[controller].on_ack(frame, at);
     }
 
-    /// A refusal, x = 3 or 5, of an SMC controller.
+    /// A frame was refused: x = 3 or 5, of an MBOX controller also 4.
     pub fn on_refused(&mut self, controller: usize) {
         self.members[controller].on_refused();
     }
@@ -125,6 +125,7 @@ impl Health {
             observe::What::EmergencyStopOver => member.on_emergency_stop(false),
             observe::What::Error(error) => member.on_error(error),
             observe::What::ServoError { axis, error } => member.on_drive(axis, error),
+            observe::What::Alarm { register, value } => member.on_alarm(register, value),
             observe::What::Report { .. } => {}
         }
     }
@@ -142,6 +143,16 @@ impl Health {
     /// A beat went out: any answer of the controller is a sign of life ([`Health::on_status`]), and it is lost without one.
     pub fn on_beat_sent(&mut self, controller: usize, at: MonoTime) {
         self.members[controller].on_beat_sent(at);
+    }
+
+    /// It has answered something that this thread or another one asked.
+    pub fn on_answer(&mut self, controller: usize, at: MonoTime) {
+        self.members[controller].on_answer(at);
+    }
+
+    /// It has answered with registers of 32 bits, as the IMAX manual has them (2.3) and no program that is known.
+    pub fn on_wide_registers(&mut self, controller: usize) {
+        self.members[controller].on_wide_registers();
     }
 
     /// What was read; of no account where no read was sent since the group was lost.

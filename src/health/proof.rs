@@ -4,6 +4,9 @@
 //! by at least the frames that were acked and at most by all that was sent; whether reads count is left open. A
 //! controller that rebooted began at 0 and hardly ever meets that; where it counts more than it could since, somebody else
 //! sent to it.
+//!
+//! An MBOX controller has no DP34. That one did not reboot is proved by its answers: it needs a second to start, and then
+//! homes, so whoever has answered all the while has not.
 
 /// What was read of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,6 +15,8 @@ pub struct Sighting {
     pub identity: Identity,
     /// Its error number; 0 for none.
     pub error: u16,
+    /// What kind of alarm its drives have (DPFE of an MBOX controller); 0 for none.
+    pub alarm: u16,
     /// DP34, the datagrams it received; none where it has no such register.
     pub packets: Option<u16>,
     /// Whether DPF0 says that it knows its zero.
@@ -23,7 +28,7 @@ pub struct Sighting {
 pub struct Identity {
     /// DPFF.
     pub version: u16,
-    /// DPFE.
+    /// DPFE; 0 for an MBOX controller, whose DPFE is something else.
     pub minor_version: u16,
     /// PA00.
     pub work_mode: u16,
@@ -64,6 +69,7 @@ pub(super) enum Verdict {
     NotHome,
     Rebooted,
     Crowded,
+    Gap,
     Unproved,
 }
 
@@ -72,7 +78,8 @@ impl Baseline {
         Self { identity: sighting.identity, packets: sighting.packets, homed: sighting.homed, traffic }
     }
 
-    pub(super) fn judge(&self, sighting: &Sighting, traffic: Traffic) -> Verdict {
+    /// `gap` says whether it has left unanswered, since it was believed last, what it would not have.
+    pub(super) fn judge(&self, sighting: &Sighting, traffic: Traffic, gap: bool) -> Verdict {
         if sighting.identity != self.identity {
             return Verdict::Other;
         }
@@ -80,7 +87,12 @@ impl Baseline {
         if self.homed && !sighting.homed {
             return Verdict::NotHome;
         }
-        let (Some(then), Some(now)) = (self.packets, sighting.packets) else { return Verdict::Unproved };
+        let (then, now) = match (self.packets, sighting.packets) {
+            (Some(then), Some(now)) => (then, now),
+            (None, None) if gap => return Verdict::Gap,
+            (None, None) => return Verdict::Same,
+            _ => return Verdict::Unproved,
+        };
         let doubt = self.doubt(traffic) + 2 * UNDER_WAY;
         if doubt > PROVES {
             return Verdict::Unproved;
@@ -101,6 +113,11 @@ impl Baseline {
         self.packets.is_some_and(|packets| self.doubt(traffic) > counted(packets))
     }
 
+    /// Whether it has a counter.
+    pub(super) const fn is_counted(&self) -> bool {
+        self.packets.is_some()
+    }
+
     /// Datagrams that it may have received or not.
     const fn doubt(&self, traffic: Traffic) -> u64 {
         (traffic.sent - self.traffic.sent).saturating_sub(traffic.acked - self.traffic.acked)
@@ -115,13 +132,13 @@ mod tests {
 
     const fn sighting(packets: u16) -> Sighting {
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
-        Sighting { identity, error: 0, packets: Some(packets), homed: true }
+        Sighting { identity, error: 0, alarm: 0, packets: Some(packets), homed: true }
     }
 
     fn after(packets: u16, sent: u64, acked: u64, now: u16) -> Verdict {
         let before = Traffic { sent: 1_000, acked: 900 };
         let baseline = Baseline::of(&sighting(packets), before);
-        baseline.judge(&sighting(now), Traffic { sent: 1_000 + sent, acked: 900 + acked })
+        baseline.judge(&sighting(now), Traffic { sent: 1_000 + sent, acked: 900 + acked }, true)
     }
 
     #[test]
@@ -151,17 +168,22 @@ mod tests {
     #[test]
     fn a_counter_without_news_of_so_much_that_was_sent_proves_nothing() {
         assert_eq!(after(0, 40_000, 100, 5_000), Verdict::Unproved);
+    }
+
+    #[test]
+    fn a_controller_that_counts_nothing_is_believed_as_long_as_it_has_answered_all_the_while() {
         let blind = Sighting { packets: None, ..sighting(0) };
-        assert_eq!(
-            Baseline::of(&blind, Traffic::default()).judge(&blind, Traffic::default()),
-            Verdict::Unproved
-        );
+        let none = Traffic::default();
+        let after = |gap| Baseline::of(&blind, none).judge(&blind, none, gap);
+        assert_eq!((after(false), after(true)), (Verdict::Same, Verdict::Gap));
+        assert_eq!(Baseline::of(&sighting(0), none).judge(&blind, none, false), Verdict::Unproved);
     }
 
     #[test]
     fn a_controller_that_was_never_home_is_no_less_so_now() {
         let away = Sighting { homed: false, ..sighting(7) };
-        let judge = |before, now| Baseline::of(before, Traffic::default()).judge(now, Traffic::default());
+        let judge =
+            |before, now| Baseline::of(before, Traffic::default()).judge(now, Traffic::default(), false);
         assert_eq!(judge(&away, &away), Verdict::Same);
         assert_eq!(judge(&sighting(7), &away), Verdict::NotHome);
     }
@@ -171,7 +193,7 @@ mod tests {
         let mut other = sighting(7);
         other.identity.work_mode = 1;
         assert_eq!(
-            Baseline::of(&sighting(7), Traffic::default()).judge(&other, Traffic::default()),
+            Baseline::of(&sighting(7), Traffic::default()).judge(&other, Traffic::default(), false),
             Verdict::Other
         );
     }

@@ -58,6 +58,8 @@ pub enum Why {
     Moved(usize),
     /// It is not known where the frames to this controller have led its seat.
     Unsure(usize),
+    /// That was so three times within a minute.
+    Unsteady(usize),
     /// Not all axes of this controller tell where they are.
     Unread(usize),
     /// An axis of this controller, from 0, says that it is outside of its stroke.
@@ -87,8 +89,19 @@ pub enum Why {
         /// The number.
         error: u16,
     },
-    /// This controller refuses frames (x = 3, 5) and gives no error number.
+    /// This controller reports an alarm (MBOX): of its drives where the register is DPFE.
+    Alarm {
+        /// Which.
+        controller: usize,
+        /// The monitor register that it reports.
+        register: u16,
+        /// What stands there.
+        value: u16,
+    },
+    /// This controller refuses frames (x = 3, 5, MBOX also 4) and gives no error number.
     Refuses(usize),
+    /// This controller answers with registers of 32 bits.
+    Wide(usize),
     /// This controller has rebooted: its packet counter began anew.
     Rebooted(usize),
     /// This controller got more datagrams than were sent from here, and more than it can have got since a reboot.
@@ -97,6 +110,8 @@ pub enum Why {
     NotHome(usize),
     /// Another controller, or another mode, is where this one was.
     Other(usize),
+    /// This controller, which counts no packets, was silent for so long that it may have rebooted.
+    Gap(usize),
     /// Whether this controller has rebooted cannot be told.
     Unproved(usize),
 }
@@ -110,16 +125,20 @@ impl Why {
             | Self::Silent(controller)
             | Self::Moved(controller)
             | Self::Unsure(controller)
+            | Self::Unsteady(controller)
             | Self::Unread(controller)
             | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)
             | Self::Error { controller, .. }
             | Self::Drive { controller, .. }
+            | Self::Alarm { controller, .. }
             | Self::Refuses(controller)
+            | Self::Wide(controller)
             | Self::Rebooted(controller)
             | Self::Crowded(controller)
             | Self::NotHome(controller)
             | Self::Other(controller)
+            | Self::Gap(controller)
             | Self::Unproved(controller) => Some(controller),
             Self::Acked | Self::AcksOff | Self::NotSeenYet | Self::SeenAgain => None,
         }

@@ -1,10 +1,12 @@
 mod back;
 mod chance;
 mod latched;
+mod mbox;
 
 use super::*;
 use crate::observe::What;
 use crate::state::{Event, Trouble};
+use crate::wire::DPFE;
 
 const TICK: Duration = Duration::from_millis(10);
 const IDENTITY: Identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
@@ -22,6 +24,9 @@ struct Hall {
     notices: Vec<(MonoTime, Notice)>,
     answers_reads: bool,
     homed: bool,
+    /// Whether they tell how many datagrams they received, as MBOX controllers do not.
+    counts: bool,
+    alarm: u16,
 }
 
 impl Hall {
@@ -44,6 +49,8 @@ impl Hall {
             notices: Vec::new(),
             answers_reads: true,
             homed: true,
+            counts: true,
+            alarm: 0,
         };
         if ack_every > 0 {
             hall.look();
@@ -76,7 +83,13 @@ impl Hall {
     }
 
     fn sighting(&self, controller: usize) -> Sighting {
-        Sighting { identity: IDENTITY, error: 0, packets: Some(self.packets[controller]), homed: self.homed }
+        Sighting {
+            identity: IDENTITY,
+            error: 0,
+            alarm: self.alarm,
+            packets: self.counts.then(|| self.packets[controller]),
+            homed: self.homed,
+        }
     }
 
     fn tick(&mut self) {

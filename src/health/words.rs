@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Change, Standing, Why};
+use crate::wire::DPFE;
 
 /// What has to be said, loudly, where acks are off.
 pub const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
@@ -51,6 +52,10 @@ impl Why {
             Self::Crowded(_) => {
                 Some("stop the other machine; then park, and home it with nobody on the seat")
             }
+            Self::Wide(_) => Some(
+                "this IMAX answers as its manual has it and no other that is known: take it out, and send a capture \
+                 (`kinocue decode --dialect imax`) to whoever looks after this program",
+            ),
             _ => None,
         }
     }
@@ -68,6 +73,9 @@ impl fmt::Display for Why {
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
+            Self::Unsteady(_) => {
+                "frames to it, or its acks, were missing for over 50 ms three times within a minute: look at the network"
+            }
             Self::Unread(_) => {
                 "not all of its axes tell where they are: those past the sixth have no register"
             }
@@ -82,13 +90,23 @@ impl fmt::Display for Why {
             Self::EmergencyStop(_) => "emergency stop",
             Self::Error { error, .. } => return write!(f, "{}", crate::wire::DeviceError(*error)),
             Self::Drive { axis, error, .. } => return write!(f, "drive of axis {axis}: error {error}"),
+            Self::Alarm { register: DPFE, value, .. } => {
+                return write!(f, "alarm of the servo drives, kind {value} (DPFE)");
+            }
+            Self::Alarm { register, value, .. } => {
+                return write!(f, "it reports that something is wrong (0x1001): DP{register:02x} is {value}");
+            }
             Self::Refuses(_) => "it refuses frames",
+            Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
             Self::Crowded(_) => {
                 "it got more datagrams (DP34) than were sent from here: another machine sends to it"
             }
             Self::NotHome(_) => "it was reset: it is not home (DPF0)",
             Self::Other(_) => "another controller or another work mode (PA00) than before",
+            Self::Gap(_) => {
+                "it was silent for so long that it may have rebooted, and it counts no packets (DP34) that would tell"
+            }
             Self::Unproved(_) => "whether it has rebooted cannot be told",
         })
     }

@@ -8,22 +8,48 @@ use jiff::civil::Date;
 use super::Limits;
 use crate::sys::folder::Folder;
 
-/// One file: its day, and which one of that day.
+/// What a file holds. Each kind has half of the room, so that no flood of asks washes shows out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    /// Shows, and starts of the program.
+    Shows,
+    /// What was asked.
+    Asked,
+}
+
+impl Kind {
+    /// All of them.
+    pub(super) const ALL: [Self; 2] = [Self::Shows, Self::Asked];
+
+    /// What the names of its files begin with.
+    const fn prefix(self) -> &'static str {
+        match self {
+            Self::Shows => "kinocue-",
+            Self::Asked => "kinocue-asked-",
+        }
+    }
+}
+
+/// One file: its day, which one of that day, and of what kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct FileId {
     pub(super) day: Date,
     pub(super) number: u32,
+    pub(super) kind: Kind,
 }
 
 impl FileId {
     pub(super) fn name(self) -> String {
-        format!("kinocue-{}-{:03}.jsonl", self.day, self.number)
+        format!("{}{}-{:03}.jsonl", self.kind.prefix(), self.day, self.number)
     }
 
     fn parse(name: &str) -> Option<Self> {
-        let (day, number) = name.strip_prefix("kinocue-")?.strip_suffix(".jsonl")?.rsplit_once('-')?;
-        let id = Self { day: day.parse().ok()?, number: number.parse().ok()? };
-        (id.name() == name).then_some(id)
+        let of = |kind: Kind| {
+            let (day, number) = name.strip_prefix(kind.prefix())?.strip_suffix(".jsonl")?.rsplit_once('-')?;
+            let id = Self { day: day.parse().ok()?, number: number.parse().ok()?, kind };
+            (id.name() == name).then_some(id)
+        };
+        Kind::ALL.into_iter().find_map(of)
     }
 }
 
@@ -34,15 +60,15 @@ pub(super) fn all(folder: &Folder) -> io::Result<Vec<FileId>> {
     Ok(files)
 }
 
-/// Removes the files that are too old on `current`'s day, and the oldest while all are too large together; never `current`
-/// or one of a later day.
+/// Removes the files of `current`'s kind that are too old on its day, and the oldest while they take more than half of the
+/// room; never `current` or one of a later day.
 pub(super) fn clear_out(folder: &Folder, limits: &Limits, current: FileId) -> io::Result<()> {
     let oldest = current.day.checked_sub(i64::from(limits.max_age_days).days()).unwrap_or(Date::MIN);
-    let files = all(folder)?;
+    let files: Vec<_> = all(folder)?.into_iter().filter(|file| file.kind == current.kind).collect();
     let size = |file: &FileId| Ok::<_, io::Error>(folder.stamp(&file.name())?.map_or(0, |stamp| stamp.size));
     let mut total = files.iter().map(size).sum::<io::Result<u64>>()?;
     // The current one may still grow to its full size.
-    let most = limits.max_total.saturating_sub(limits.max_size);
+    let most = (limits.max_total / 2).saturating_sub(limits.max_size);
     for file in files.iter().filter(|file| **file < current) {
         if file.day < oldest || total > most {
             total = total.saturating_sub(size(file)?);

@@ -1,8 +1,10 @@
 //! The journal: what was asked of the hall, by whom and what came of it, and what was played. Records in, lines of JSON out,
 //! and from them the report of a day. Written by a thread of its own, so that no disk, full or slow, holds up anybody.
 //!
-//! - **Files** are `kinocue-DATE-NNN.jsonl`, one or more for each day, the day being that of the records' own times. A new one
-//!   begins with a day and where one would grow over its limit; the oldest go by age and by the size of all together.
+//! - **Files** are `kinocue-DATE-NNN.jsonl` for shows and `kinocue-asked-DATE-NNN.jsonl` for what was asked, one or more for
+//!   each day, the day being that of the records' own times. A new one begins with a day and where one would grow over its
+//!   limit; the oldest go by age and by the size of all of their kind, each of which has half of the room.
+//! - **What is asked** is bounded in its length, and repeats are folded: nobody washes out what others did.
 //! - **A line** is written by one write(2) with `O_APPEND`. Where a crash or a full disk has cut one, the next begins on a
 //!   line of its own, and whoever reads passes the cut one over with a note.
 //! - **On the disk**: the begin and the end of a show are synced before the next line is written; what was asked is left to
@@ -13,6 +15,7 @@
 //! One folder belongs to one hall.
 
 mod files;
+mod fold;
 mod read;
 mod record;
 mod report;
@@ -20,8 +23,9 @@ mod report;
 mod tests;
 mod writer;
 
+pub use fold::Folds;
 pub use record::{Action, Ending, Outcome, Percentiles, PlaylistPlace, ShowRecord, stamp};
-pub use report::{JournalError, Report, ShowResult, Shown, Totals, report};
+pub use report::{JournalError, Most, Report, ShowResult, Shown, Totals, report};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -131,14 +135,15 @@ impl Journal {
     }
 
     fn put(&self, line: &Line, sync: bool) {
-        let Ok(mut text) = serde_json::to_vec(line) else { return self.standing.lose("it has no words") };
+        let lose = |why| self.standing.lose(why);
+        let Ok(mut text) = serde_json::to_vec(line) else { return lose("it has no words") };
         text.push(b'\n');
-        let entry =
-            Entry { day: day_of(line.at()).unwrap_or(self.day), at: line.at().to_owned(), text, sync };
+        let day = day_of(line.at()).unwrap_or(self.day);
+        let entry = Entry { day, at: line.at().to_owned(), text, kind: line.kind(), sync };
         match self.to.as_ref().map(|to| to.try_send(entry)) {
             Some(Ok(())) => {}
-            Some(Err(TrySendError::Full(_))) => self.standing.lose("the disk is too slow"),
-            Some(Err(TrySendError::Disconnected(_))) | None => self.standing.lose("its thread is gone"),
+            Some(Err(TrySendError::Full(_))) => lose("the disk is too slow"),
+            Some(Err(TrySendError::Disconnected(_))) | None => lose("its thread is gone"),
         }
     }
 }

@@ -5,9 +5,13 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::files::Kind;
+
 /// Events of a show that are kept, and characters of each.
 const MOST_EVENTS: usize = 100;
 const MOST_CHARACTERS: usize = 500;
+/// Characters of what was asked, and of what came of it.
+const MOST_ASKED: usize = 300;
 
 /// One thing that somebody asked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -22,6 +26,42 @@ pub struct Action {
     pub result: String,
     /// The state of the hall that it led to.
     pub state: String,
+    /// How often it was asked in a row; where that is not once, all else is of the last time.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub times: u32,
+}
+
+const fn once() -> u32 {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde wants it so")]
+const fn is_once(times: &u32) -> bool {
+    *times == 1
+}
+
+impl Action {
+    /// Whether it was done.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.result == "done"
+    }
+
+    /// The same with texts no longer than are kept.
+    #[must_use]
+    pub fn shortened(self) -> Self {
+        let Self { at, who, what, result, state, times } = self;
+        let [who, what, result] = [who, what, result].map(|text| shortened(text, MOST_ASKED));
+        Self { at, who, what, result, state, times }
+    }
+}
+
+/// A text of at most so many characters, of which the last says that there were more.
+fn shortened(text: String, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        None => text,
+        Some(_) => text.chars().take(most - 1).chain(['…']).collect(),
+    }
 }
 
 /// One show: what was played, how, and what came of it.
@@ -143,6 +183,14 @@ pub(super) enum Line {
 }
 
 impl Line {
+    /// In which files it belongs.
+    pub(super) const fn kind(&self) -> Kind {
+        match self {
+            Self::Action(_) => Kind::Asked,
+            _ => Kind::Shows,
+        }
+    }
+
     /// When it happened.
     pub(super) fn at(&self) -> &str {
         match self {
@@ -163,7 +211,7 @@ impl ShowRecord {
             let more = events.len().saturating_sub(MOST_EVENTS);
             events.truncate(MOST_EVENTS);
             for event in events.iter_mut() {
-                *event = event.chars().take(MOST_CHARACTERS).collect();
+                *event = shortened(std::mem::take(event), MOST_CHARACTERS);
             }
             if more > 0 {
                 events.push(format!("and {more} more"));

@@ -1,5 +1,6 @@
 //! The report of some days: every show that began on them, and what came of it.
 
+use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +17,20 @@ use crate::sys::folder::Folder;
 const LONGEST_SHOW: i32 = 2;
 /// Notes that are told; of a file that is no journal there would be one for each line.
 const MOST_NOTES: usize = 20;
+
+/// How much of some days is taken into a report; of more the newest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Most {
+    /// Shows.
+    pub shows: usize,
+    /// What was asked.
+    pub actions: usize,
+}
+
+impl Most {
+    /// All that there is.
+    pub const ALL: Self = Self { shows: usize::MAX, actions: usize::MAX };
+}
 
 /// The journal cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -113,13 +128,13 @@ impl ShowResult {
     }
 }
 
-/// Reads the journal in `dir` for the days `from` to `to`, both included. A show belongs to the day on which it began, by
+/// Reads the journal in `dir` for the days `from` to `to`, both included, and keeps no more of them than `most`. A show belongs to the day on which it began, by
 /// the clock and the zone of the hall. One without an end was interrupted, unless it is the last and the program still runs.
 ///
 /// # Errors
 /// [`JournalError`] where the folder or a file of it cannot be read. No records are no error.
-pub fn report(dir: &Path, from: Date, to: Date) -> Result<Report, JournalError> {
-    let mut days = Days { from, to, shows: Vec::new(), actions: Vec::new(), notes: Vec::new() };
+pub fn report(dir: &Path, from: Date, to: Date, most: Most) -> Result<Report, JournalError> {
+    let mut days = Days::new(from, to, most);
     let mut gather = || -> io::Result<bool> {
         let folder = Folder::open(dir)?;
         // The clock may have been set back over midnight during a show.
@@ -140,8 +155,11 @@ pub fn report(dir: &Path, from: Date, to: Date) -> Result<Report, JournalError> 
 struct Days {
     from: Date,
     to: Date,
-    shows: Vec<Open>,
-    actions: Vec<Action>,
+    most: Most,
+    shows: VecDeque<Open>,
+    actions: VecDeque<Action>,
+    /// What was left out: shows, and what was asked.
+    more: (usize, usize),
     notes: Vec<String>,
 }
 
@@ -152,12 +170,21 @@ struct Open {
 }
 
 impl Days {
+    fn new(from: Date, to: Date, most: Most) -> Self {
+        let (shows, actions) = (VecDeque::new(), VecDeque::new());
+        Self { from, to, most, shows, actions, more: (0, 0), notes: Vec::new() }
+    }
+
     fn take(&mut self, line: Line) {
         let (from, to) = (self.from, self.to);
         let within = |at: &str| day_of(at).is_some_and(|day| (from..=to).contains(&day));
         match line {
             Line::Start { .. } => self.shows.iter_mut().for_each(|open| open.outlived = true),
-            Line::Action(action) if within(&action.at) => self.actions.push(action),
+            Line::Action(action) if within(&action.at) => {
+                // What older versions wrote has no bound of its own.
+                self.actions.push_back(action.shortened());
+                self.more.1 += keep(&mut self.actions, self.most.actions);
+            }
             Line::Begin(record) | Line::Show(record) if within(&record.start) => self.show(*record),
             Line::Lost { at, lines } if within(&at) => {
                 self.notes.push(format!("at {at}: {lines} lines had been lost since the program started"));
@@ -168,15 +195,19 @@ impl Days {
 
     /// The end of a show that has begun, or another show.
     fn show(&mut self, record: ShowRecord) {
+        let record = record.shortened();
         let same = |open: &&mut Open| open.record.start == record.start && open.record.hall == record.hall;
         match self.shows.iter_mut().rev().find(same) {
             Some(open) => open.record = record,
-            None => self.shows.push(Open { record, outlived: false }),
+            None => {
+                self.shows.push_back(Open { record, outlived: false });
+                self.more.0 += keep(&mut self.shows, self.most.shows);
+            }
         }
     }
 
     fn report(self, runs: bool) -> Report {
-        let Self { from, to, shows, actions, mut notes } = self;
+        let Self { from, to, shows, actions, more: left_out, mut notes, .. } = self;
         let last = shows.len();
         let shows: Vec<_> = shows
             .into_iter()
@@ -186,9 +217,18 @@ impl Days {
         let more = notes.len().saturating_sub(MOST_NOTES);
         notes.truncate(MOST_NOTES);
         notes.extend((more > 0).then(|| format!("and {more} more")));
-        let totals = Totals::of(&shows);
+        for (more, what) in [(left_out.0, "shows"), (left_out.1, "things that were asked")] {
+            let words = format!("{more} {what} before these are left out; `kinocue report` has them");
+            notes.extend((more > 0).then_some(words));
+        }
+        let (totals, actions) = (Totals::of(&shows), actions.into());
         Report { from: from.to_string(), to: to.to_string(), shows, totals, actions, notes }
     }
+}
+
+/// Leaves the newest of them; says how many went.
+fn keep<T>(all: &mut VecDeque<T>, most: usize) -> usize {
+    all.drain(..all.len().saturating_sub(most)).count()
 }
 
 impl Open {

@@ -28,6 +28,7 @@ fn action(at: &str, what: &str) -> Action {
         what,
         result: "done".to_owned(),
         state: "armed".to_owned(),
+        times: 1,
     }
 }
 
@@ -88,7 +89,7 @@ fn starts(file: &Path) -> usize {
 }
 
 fn of_day(dir: &Path, text: &str) -> Report {
-    report(dir, day(text), day(text)).unwrap()
+    report(dir, day(text), day(text), Most::ALL).unwrap()
 }
 
 const START: &str = "2026-11-21T19:00:03.250+01:00";
@@ -168,7 +169,7 @@ fn a_line_that_a_crash_cut_is_passed_over_and_the_next_is_whole() {
         journal.note(&action("2026-11-21T09:00:00.000+00:00", what));
     };
     write("arm");
-    let file = files(dir.path()).remove(0);
+    let file = files(dir.path()).remove(1);
     let length = fs::metadata(&file).unwrap().len();
     OpenOptions::new().write(true).open(&file).unwrap().set_len(length - 7).unwrap();
     write("go");
@@ -176,8 +177,7 @@ fn a_line_that_a_crash_cut_is_passed_over_and_the_next_is_whole() {
     let asked: Vec<_> = report.actions.iter().map(|action| action.what.as_str()).collect();
     assert_eq!(asked, ["go"]);
     let [note] = &report.notes[..] else { panic!("one note: {:?}", report.notes) };
-    assert!(note.starts_with("kinocue-2026-11-21-000.jsonl:2: "), "{note}");
-    assert_eq!(starts(&file), 2);
+    assert!(note.starts_with("kinocue-asked-2026-11-21-000.jsonl:1: "), "{note}");
 }
 
 #[test]
@@ -204,7 +204,7 @@ fn files_end_at_their_size_and_the_oldest_go() {
     let sizes: Vec<_> = files(dir.path()).iter().map(|file| fs::metadata(file).unwrap().len()).collect();
     assert!(sizes.iter().all(|size| *size <= 1_000) && sizes.iter().sum::<u64>() <= 4_100, "{sizes:?}");
     assert!(dir.path().join("notes.txt").exists());
-    let report = report(dir.path(), day("2026-11-18"), day("2026-11-21")).unwrap();
+    let report = report(dir.path(), day("2026-11-18"), day("2026-11-21"), Most::ALL).unwrap();
     assert_eq!(report.actions.last().unwrap().what, "trim 39");
     assert!(report.actions.iter().all(|action| action.at.starts_with("2026-11-21")), "the oldest are gone");
 }
@@ -260,18 +260,68 @@ fn a_full_disk_cuts_no_later_line() {
 }
 
 #[test]
+fn what_is_asked_washes_no_show_out_and_a_disk_is_shared() {
+    let dir = tempfile::tempdir().unwrap();
+    let limits = Limits { max_size: 10_000, max_total: 100_000, max_age_days: 400 };
+    let mut journal = Journal::open(dir.path(), limits, &zoned("2026-11-21T08:00:00Z"));
+    for minute in 0..7 {
+        let (start, end) =
+            [":03.000+01:00", ":33.000+01:00"].map(|at| format!("2026-11-21T19:0{minute}{at}")).into();
+        journal.begin(&record(&start));
+        journal.show(&ended(&start, &end, Ending::Completed));
+    }
+    for _ in 0..600 {
+        journal.note(&action("2026-11-21T20:00:00.000+01:00", &"x".repeat(300)));
+    }
+    drop(journal);
+    let report = of_day(dir.path(), "2026-11-21");
+    assert_eq!((report.totals.shows, report.totals.completed), (7, 7));
+    let size: u64 = files(dir.path()).iter().map(|file| fs::metadata(file).unwrap().len()).sum();
+    assert!(report.actions.len() > 50 && size < limits.max_total, "{} {size}", report.actions.len());
+}
+
+#[test]
+fn of_a_great_day_the_newest_is_taken_and_the_rest_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut journal = Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T08:00:00Z"));
+    for minute in 0..5 {
+        let start = format!("2026-11-21T19:0{minute}:03.000+01:00");
+        journal.begin(&record(&start));
+        journal.show(&ended(&start, &start, Ending::Completed));
+        journal.note(&action(&start, &format!("trim {minute}")));
+    }
+    drop(journal);
+    let day = day("2026-11-21");
+    let report = report(dir.path(), day, day, Most { shows: 2, actions: 3 }).unwrap();
+    assert_eq!((report.shows.len(), report.actions.len()), (2, 3));
+    assert_eq!((report.actions[0].what.as_str(), &report.shows[1].record.start[14..16]), ("trim 2", "04"));
+    assert!(report.notes[0].starts_with("3 shows before these") && report.notes[1].starts_with("2 things"));
+}
+
+#[test]
+fn a_long_ask_is_shortened() {
+    let long = action(START, &"ä".repeat(65_000)).shortened();
+    assert_eq!(
+        (long.what.chars().count(), long.what.ends_with('…'), long.result.as_str()),
+        (300, true, "done")
+    );
+    assert_eq!(action(START, "arm").shortened(), action(START, "arm"));
+}
+
+#[test]
 fn a_long_tale_is_shortened() {
     let mut show = ended(START, END, Ending::Completed);
     show.outcome.as_mut().unwrap().events = vec!["x".repeat(10_000); 1_000];
     let events = show.shortened().outcome.unwrap().events;
-    assert_eq!((events.len(), events[0].len(), events[100].as_str()), (101, 500, "and 900 more"));
+    assert_eq!((events.len(), events[0].len(), events[100].as_str()), (101, 502, "and 900 more"));
 }
 
 #[test]
 fn no_journal_is_told_from_an_empty_one() {
     let dir = tempfile::tempdir().unwrap();
     assert!(of_day(dir.path(), "2026-11-21").shows.is_empty());
-    let missing = report(&dir.path().join("none"), day("2026-11-21"), day("2026-11-21")).unwrap_err();
+    let missing =
+        report(&dir.path().join("none"), day("2026-11-21"), day("2026-11-21"), Most::ALL).unwrap_err();
     assert_eq!(missing.source.kind(), std::io::ErrorKind::NotFound);
 }
 
@@ -297,7 +347,7 @@ proptest! {
             }
         };
         write("before", before);
-        let file = files(dir.path()).remove(0);
+        let file = files(dir.path()).remove(1);
         let text = fs::read_to_string(&file).unwrap();
         let left = text.len().saturating_sub(usize::try_from(cut).unwrap());
         fs::write(&file, &text[..left]).unwrap();
@@ -310,8 +360,7 @@ proptest! {
         let wanted: Vec<_> = wanted.chain((0..after).map(|serial| format!("after {serial}"))).collect();
         prop_assert_eq!(asked, wanted);
         prop_assert!(report.notes.len() <= 1, "{:?}", report.notes);
-        let first = text[..left].lines().next().is_some_and(|line| line.ends_with('}'));
-        prop_assert_eq!(starts(&file), usize::from(first) + 1);
+        prop_assert_eq!(starts(&files(dir.path())[0]), 2);
     }
 
     /// Whatever a file holds, a report is made of what can be read.

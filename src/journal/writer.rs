@@ -1,4 +1,4 @@
-//! Puts lines at the end of the present file, and begins new files. Journal thread.
+//! Puts lines at the end of the present file of their kind, and begins new files. Journal thread.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use jiff::civil::Date;
 
 use super::Limits;
-use super::files::{self, FileId};
+use super::files::{self, FileId, Kind};
 use crate::sys::folder::{Folder, Stamp};
 
 /// A line on its way to the disk.
@@ -20,6 +20,8 @@ pub(super) struct Entry {
     pub(super) at: String,
     /// The line with its end.
     pub(super) text: Vec<u8>,
+    /// In which files it belongs.
+    pub(super) kind: Kind,
     /// Whether it is to be on the disk before the next one is written.
     pub(super) sync: bool,
 }
@@ -31,7 +33,8 @@ pub(super) struct Writer {
     limits: Limits,
     /// Kept open, so that others see that somebody writes here.
     folder: Option<Folder>,
-    current: Option<Current>,
+    /// For each kind.
+    current: [Option<Current>; 2],
 }
 
 /// The file that lines are added to.
@@ -46,12 +49,12 @@ struct Current {
 
 impl Writer {
     pub(super) fn new(dir: &Path, limits: Limits) -> Self {
-        Self { dir: dir.to_owned(), limits, folder: None, current: None }
+        Self { dir: dir.to_owned(), limits, folder: None, current: [None, None] }
     }
 
     /// Writes a line. After an error everything is opened anew the next time.
     pub(super) fn append(&mut self, entry: &Entry) -> io::Result<()> {
-        self.try_append(entry).inspect_err(|_| self.current = None)
+        self.try_append(entry).inspect_err(|_| self.current[entry.kind as usize] = None)
     }
 
     fn try_append(&mut self, entry: &Entry) -> io::Result<()> {
@@ -68,7 +71,8 @@ impl Writer {
             let grown = current.size + entry.text.len() as u64;
             current.id.day == entry.day && (grown <= self.limits.max_size || current.size == 0)
         };
-        let current = match self.current.take().filter(fits) {
+        let place = &mut self.current[entry.kind as usize];
+        let current = match place.take().filter(fits) {
             Some(current) => current,
             None => {
                 let current = Current::open(folder, entry, &self.limits)?;
@@ -77,15 +81,16 @@ impl Writer {
                 current
             }
         };
-        self.current.insert(current).append(entry)
+        place.insert(current).append(entry)
     }
 }
 
 impl Current {
     /// The last file of the day, or the next one where that is full.
     fn open(folder: &Folder, entry: &Entry, limits: &Limits) -> io::Result<Self> {
-        let of_day = files::all(folder)?.into_iter().rfind(|id| id.day == entry.day);
-        let mut id = of_day.unwrap_or(FileId { day: entry.day, number: 0 });
+        let fits = |id: &FileId| id.day == entry.day && id.kind == entry.kind;
+        let of_day = files::all(folder)?.into_iter().rfind(fits);
+        let mut id = of_day.unwrap_or(FileId { day: entry.day, number: 0, kind: entry.kind });
         loop {
             let file = folder.append(&id.name())?;
             let size = Stamp::of(&file)?.size;

@@ -10,21 +10,32 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use serde::de::DeserializeOwned;
 
-use super::{Bounds, Hall, Verdict};
+use super::{Bounds, Drawing, Hall, Verdict};
 use crate::hall::{Code, Problem};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
-/// The most that is taken of what it prints, octets.
-const MAX_OUTPUT: u64 = 1 << 20;
+/// The most that is taken of what it prints, octets: the curves of twelve axes in as many stretches as may be asked.
+const MAX_OUTPUT: u64 = 4 << 20;
 /// How it ends where the configuration has faults (sysexits).
 const BAD_CONFIGURATION: i32 = 78;
 
 /// Has a cue file checked for a hall. Blocks until it is.
 pub(super) fn examine(hall: &Hall, cue: &Path) -> Result<Verdict, Problem> {
+    run(hall, cue, &[])
+}
+
+/// Has the curves of a cue file drawn in so many stretches of time. Blocks until they are.
+pub(super) fn draw(hall: &Hall, cue: &Path, points: usize) -> Result<Drawing, Problem> {
+    run(hall, cue, &["--curve", &points.to_string()])
+}
+
+/// What the process says of a cue.
+fn run<T: DeserializeOwned>(hall: &Hall, cue: &Path, more: &[&str]) -> Result<T, Problem> {
     let bounds = &hall.bounds;
-    let mut child = spawn(hall, cue).map_err(|error| {
+    let mut child = spawn(hall, cue, more).map_err(|error| {
         let detail = format!("cannot start the check of the cue: {error}");
         Problem::new(Code::File, detail, "look at the service's limits on processes and memory")
     })?;
@@ -42,10 +53,11 @@ pub(super) fn examine(hall: &Hall, cue: &Path) -> Result<Verdict, Problem> {
 }
 
 /// Not a copy of this process, which would slow its real-time thread down: the child lowers itself.
-fn spawn(hall: &Hall, cue: &Path) -> io::Result<Child> {
+fn spawn(hall: &Hall, cue: &Path, more: &[&str]) -> io::Result<Child> {
     Command::new(&hall.program)
         .arg0("kinocue")
         .args(["prove", "--json"])
+        .args(more)
         .arg("--config")
         .arg(&hall.config)
         .args(["--memory-mib", &hall.bounds.memory_mib.to_string()])
@@ -119,5 +131,6 @@ fn no_verdict(status: ExitStatus, bounds: &Bounds) -> Problem {
     let detail = format!(
         "the check of the cue ended with {how}; it may take {memory} MiB of memory and {time} s of processor time"
     );
-    Problem::new(Code::Check, detail, "make the cue smaller, or try kinocue check on another machine")
+    let remedy = "give the cue fewer rows, or raise max_memory_mib in [library] and MemoryMax of the service";
+    Problem::new(Code::Check, detail, remedy)
 }

@@ -1,6 +1,6 @@
 //! The curves of a cue as a page draws them: for each stretch of time the least and the greatest, exact also between rows.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::config::Config;
@@ -11,8 +11,18 @@ use crate::timeline::{Cubic, Timeline};
 /// The most stretches that a curve is asked in.
 pub const MAX_POINTS: usize = 4000;
 
+/// What comes of drawing a cue; a line of JSON from the process that draws.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Drawing {
+    /// Its curves.
+    Curve(CurveData),
+    /// Why it has none: every fault, a line each.
+    Faults(Vec<String>),
+}
+
 /// The curves of a cue.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CurveData {
     /// How long the cue is, s.
     pub length_s: f64,
@@ -23,7 +33,7 @@ pub struct CurveData {
 }
 
 /// The curve of one axis, as parts of the stroke, 0 to 1.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AxisCurve {
     /// `a1` to `a12`.
     pub name: String,
@@ -35,10 +45,11 @@ pub struct AxisCurve {
 
 /// Draws a cue in so many stretches, 1 to [`MAX_POINTS`]. In a cue that is not in fractions, an axis is measured against the
 /// stroke of the first seat of `hall` that takes it, else of the bench seat.
-pub(super) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
+#[must_use]
+pub fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
     let bench = SeatType::bench3(timeline.axes());
     let to_stroke = |axis: usize| {
-        let taker = hall.and_then(|hall| hall.controllers.iter().find(|one| one.takes(axis)));
+        let taker = hall.and_then(|hall| hall.named().find(|one| one.takes(axis)));
         timeline.unit().to_stroke(taker.map_or(&bench, |one| &one.seat))
     };
     let length_s = timeline.duration().as_secs_f64();
@@ -51,7 +62,8 @@ pub(super) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) ->
 }
 
 /// Whether the hall has to be known to draw a cue in that unit.
-pub(super) fn needs_hall(unit: Unit) -> bool {
+#[must_use]
+pub fn needs_hall(unit: Unit) -> bool {
     unit != Unit::Fraction
 }
 

@@ -7,12 +7,14 @@
 
 mod child;
 mod curve;
+mod hashed;
 mod id;
 mod index;
 mod info;
 mod upload;
 
-pub use curve::{AxisCurve, CurveData, MAX_POINTS};
+pub use curve::{AxisCurve, CurveData, Drawing, MAX_POINTS, draw, needs_hall};
+pub use hashed::Hashed;
 pub use id::{CueId, Id, IdError};
 pub use info::{CueInfo, Proved, Verdict};
 pub use upload::Upload;
@@ -27,13 +29,15 @@ use std::time::Duration;
 
 use sha2::{Digest as _, Sha256};
 
-use crate::config::{self, Store};
+use crate::config::Store;
 use crate::cue::{self, Source, limits};
 use crate::hall::{Code, Problem};
 use crate::sys::folder::{Folder, Stamp};
 use crate::timeline::Timeline;
 use index::Index;
 
+/// A CSV file of so many octets is read by whoever wants to play it, known or not; MCAP may unpack to more.
+const SMALL: u64 = 16 << 20;
 /// Curves that are kept; a page asks for the same one again and again.
 const CURVES: usize = 4;
 
@@ -63,16 +67,17 @@ pub struct Hall {
 pub struct Bounds {
     /// The longest file that is taken in, octets.
     pub max_octets: u64,
-    /// Memory of the checking process, MiB.
+    /// Memory of the checking process, MiB: what a cue may take once it is read.
     pub memory_mib: u64,
     /// Processor time of the checking process, and how long it is waited for.
     pub time: Duration,
 }
 
 impl Default for Bounds {
-    /// Room for a cue of two hours and twelve axes at 1 kHz; a proof of it takes seconds where nothing else runs.
+    /// Room for a cue of two hours and one axis at 1 kHz, or of twelve at 100 Hz; a proof of it takes seconds where nothing
+    /// else runs. The service takes as much once it plays it, beside one that is loaded, and its unit has 2 GiB.
     fn default() -> Self {
-        Self { max_octets: 256 << 20, memory_mib: 4096, time: Duration::from_secs(300) }
+        Self { max_octets: 256 << 20, memory_mib: 768, time: Duration::from_secs(300) }
     }
 }
 
@@ -81,7 +86,11 @@ impl Hall {
     /// a newer one has taken its place on the disk since it was started.
     #[must_use]
     pub fn new(config: &Path, store: &Store) -> Self {
-        let bounds = Bounds { max_octets: u64::from(store.max_cue_mib) << 20, ..Bounds::default() };
+        let bounds = Bounds {
+            max_octets: u64::from(store.max_cue_mib) << 20,
+            memory_mib: u64::from(store.max_memory_mib),
+            ..Bounds::default()
+        };
         Self { config: config.to_owned(), program: PathBuf::from("/proc/self/exe"), bounds }
     }
 
@@ -219,29 +228,35 @@ impl Library {
     /// [`Problem`] where there is no such cue, it cannot be read, or it has faults, each with its place.
     pub fn read(&self, id: &CueId) -> Result<(Timeline, String), Problem> {
         let cue = self.cue(id)?;
-        self.timeline(id, &cue)
-    }
-
-    fn timeline(&self, id: &CueId, cue: &Cue) -> Result<(Timeline, String), Problem> {
+        self.keep_budget(id, &cue)?;
         let path = cue.folder.path(&cue.name);
-        let mut octets = Vec::new();
-        let read = (&cue.file).take(limits::MAX_FILE + 1).read_to_end(&mut octets);
-        read.map_err(|error| file_problem("read the cue", &error))?;
-        let sha256 = hex(&Sha256::digest(&octets));
-        let cue = cue::read(&path, octets.as_slice(), &Source::Native).map_err(|faults| {
+        let mut input = Hashed::new((&cue.file).take(limits::MAX_FILE + 1));
+        let read = cue::read(&path, &mut input, &Source::Native).map_err(|faults| {
             let lines = faults.to_string().lines().map(str::to_owned).collect();
-            let detail = format!("the cue {id} cannot be played as it is");
-            Problem::new(Code::Check, detail, "mend what is named, and upload it again").with(lines)
+            unplayable(id, lines)
         })?;
-        Ok((Timeline::new(cue), sha256))
+        let sha256 = input.finish().map_err(|error| file_problem("read the cue", &error))?;
+        // What was read is what the name stands for: it was not written to meanwhile.
+        if cue.folder.stamp(&cue.name).ok().flatten() != Some(cue.stamp) {
+            let detail = format!("the cue {id} changed while it was being read");
+            return Err(Problem::new(Code::File, detail, "try again when it is all there"));
+        }
+        Ok((Timeline::new(read), sha256))
     }
 
-    /// The curves of a cue in so many stretches of time, 1 to [`MAX_POINTS`]. Reads the cue, unless it was asked the same
-    /// before; one at a time.
+    /// What nobody has looked at yet, and may be large, is read by the child first, which ends where it takes too much.
+    fn keep_budget(&self, id: &CueId, cue: &Cue) -> Result<(), Problem> {
+        let small = if cue.name.ends_with(".mcap") { SMALL / 16 } else { SMALL };
+        let known = lock(&self.inner.index).get(&cue.name, cue.stamp, "").is_some();
+        if known || cue.stamp.size <= small { Ok(()) } else { self.examine(id).map(drop) }
+    }
+
+    /// The curves of a cue in so many stretches of time, 1 to [`MAX_POINTS`]. They are drawn by a process of the lowest
+    /// priority, unless the same was asked before; one at a time.
     ///
     /// # Errors
     /// As for [`Library::read`]; [`Code::Value`] where `points` is out of range, [`Code::Check`] where the cue is in mm or
-    /// pulses and the configuration cannot be read.
+    /// pulses and the configuration cannot be read, or where drawing it takes too much.
     pub fn curve(&self, id: &CueId, points: usize) -> Result<Arc<CurveData>, Problem> {
         if !(1..=MAX_POINTS).contains(&points) {
             let detail = format!("{points} points are outside 1..={MAX_POINTS}");
@@ -254,14 +269,10 @@ impl Library {
         if let Some(drawn) = curves.iter().find(same) {
             return Ok(Arc::clone(&drawn.curve));
         }
-        let (timeline, _) = self.timeline(id, &cue)?;
-        let hall = curve::needs_hall(timeline.unit()).then(|| config::load(&self.inner.hall.config));
-        let hall = hall.transpose().map_err(|faults| {
-            let remedy =
-                "mend the configuration; the strokes of the seats are needed for a cue in mm or pulses";
-            Problem::new(Code::Check, faults.to_string(), remedy)
-        })?;
-        let curve = Arc::new(curve::draw(&timeline, hall.as_ref(), points));
+        let curve = match child::draw(&self.inner.hall, &cue.folder.path(&cue.name), points)? {
+            Drawing::Curve(curve) => Arc::new(curve),
+            Drawing::Faults(lines) => return Err(unplayable(id, lines)),
+        };
         curves.truncate(CURVES - 1);
         let drawn = Drawn { name: cue.name, stamp: cue.stamp, points, curve: Arc::clone(&curve) };
         curves.insert(0, drawn);
@@ -311,6 +322,11 @@ fn id_of(name: &str) -> Option<CueId> {
 
 fn unknown(id: &CueId) -> Problem {
     Problem::new(Code::Unknown, format!("there is no cue {id} in the library"), "upload it, or name another")
+}
+
+fn unplayable(id: &CueId, faults: Vec<String>) -> Problem {
+    let detail = format!("the cue {id} cannot be played as it is");
+    Problem::new(Code::Check, detail, "mend what is named, and upload it again").with(faults)
 }
 
 fn file_problem(what: &str, error: &io::Error) -> Problem {

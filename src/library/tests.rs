@@ -107,17 +107,22 @@ fn a_check_that_cannot_be_started_is_a_problem_and_keeps_nothing() {
 }
 
 #[test]
-fn curves_are_drawn_once_until_the_file_changes() {
+fn no_curve_is_drawn_in_this_process() {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("ride.csv"), CUE).unwrap();
     let library = library(dir.path());
-    let first = library.curve(&id("ride"), 10).unwrap();
-    assert!(Arc::ptr_eq(&first, &library.curve(&id("ride"), 10).unwrap()));
-    assert_eq!(library.curve(&id("ride"), 20).unwrap().t_s.len(), 20);
-    fs::write(dir.path().join("new"), "time_ms,a1\n0,0.1\n100,0.1\n").unwrap();
-    fs::rename(dir.path().join("new"), dir.path().join("ride.csv")).unwrap();
-    assert_eq!(library.curve(&id("ride"), 10).unwrap().axes[0].max[0], 0.1);
     for points in [0, MAX_POINTS + 1] {
         assert_eq!(library.curve(&id("ride"), points).unwrap_err().code, Code::Value);
     }
+    let problem = library.curve(&id("ride"), 10).unwrap_err();
+    assert!(problem.detail.starts_with("cannot start the check"), "{problem}");
+}
+
+#[test]
+fn what_is_large_and_unknown_is_not_read_in_this_process() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = fs::File::create(dir.path().join("vast.csv")).unwrap();
+    file.set_len(SMALL + 1).unwrap();
+    let problem = library(dir.path()).read(&id("vast")).unwrap_err();
+    assert!(problem.detail.starts_with("cannot start the check"), "{problem}");
 }

@@ -7,7 +7,7 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 
 use super::Line;
-use super::text::escaped;
+use crate::plain::escaped;
 
 const SOCKET: &str = "/run/systemd/journal/socket";
 /// The longest message, octets; a datagram has room for many times that.

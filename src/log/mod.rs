@@ -15,11 +15,10 @@ use crate::time::Clock as _;
 
 mod journal;
 mod limit;
-mod text;
 
+pub use crate::plain::escaped;
 use journal::Journal;
 use limit::Limiter;
-pub use text::escaped;
 
 /// Lines that wait to be written at the most.
 const QUEUE: usize = 256;

@@ -48,11 +48,11 @@ fn frames(all: &[ControllerStatus]) -> Vec<Family> {
     ]
 }
 
-/// Whether it answers; none where nobody listens for its answers.
+/// Whether it answers; none where nobody listens for its answers, or asks.
 fn answers(standing: &str) -> Option<f64> {
     match standing {
         "lost" | "unknown" => Some(0.0),
-        "unwatched" => None,
+        "unwatched" | "out" => None,
         _ => Some(1.0),
     }
 }

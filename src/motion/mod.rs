@@ -10,7 +10,7 @@ mod window;
 pub use brake::{AxisState, Brake};
 pub use measure::{Measure, Reading, Readings, Spacing};
 pub use scan::{Peak, Peaks, scan};
-pub use seat::{FACTORY_INTERVAL_MS, Pulses, SeatType};
+pub use seat::{FACTORY_INTERVAL_MS, Pulses, SeatType, in_stroke};
 pub use window::{Limits, Slot, Window};
 
 /// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).

@@ -86,6 +86,18 @@ impl SeatType {
     }
 }
 
+/// How far outside its stroke a motor may be found that stands at its end, in strokes: 0.15 mm of 150. Drives hold a
+/// place to some pulses.
+const ROUNDING: f64 = 0.001;
+
+/// Whether a motor can stand at `pulses`, of a stroke of so many: inside it, or outside by no more than rounding. What is
+/// farther out is no position, but a wrong word order, another seat type, or a zero that was lost.
+#[must_use]
+pub fn in_stroke(pulses: Pulses, stroke_pulses: f64) -> bool {
+    let slack = (ROUNDING * stroke_pulses).max(1.0);
+    (-slack..=stroke_pulses + slack).contains(&f64::from(pulses.0))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,5 +115,12 @@ mod tests {
         let seat = SeatType { stroke_mm: 1.0, lead_mm: 1.0, pulses_per_rev: 1.0, ..SeatType::bench3(1) };
         assert_eq!(seat.pulses(0.5), Pulses(1));
         assert_eq!(seat.pulses(-0.5), Pulses(-1));
+    }
+    #[test]
+    fn a_motor_is_found_outside_its_stroke_by_rounding_alone() {
+        for (pulses, inside) in [(-301, false), (-300, true), (0, true), (300_300, true), (300_301, false)] {
+            assert_eq!(in_stroke(Pulses(pulses), 300_000.0), inside, "{pulses}");
+        }
+        assert!(in_stroke(Pulses(-1), 100.0) && !in_stroke(Pulses(-2), 100.0));
     }
 }

@@ -44,7 +44,14 @@ pub enum What {
         /// The number; 0 is none.
         error: u16,
     },
-    /// It reported registers unasked (0x1001).
+    /// An MBOX controller reported unasked that something is wrong (0x1001); with 0 it is over.
+    Alarm {
+        /// The monitor register: DPFE, the alarm of the drives, where that is among what it reported, else the first.
+        register: u16,
+        /// What stands in it.
+        value: u16,
+    },
+    /// Another reported registers unasked.
     Report {
         /// The first of them.
         start: u16,
@@ -64,6 +71,8 @@ impl fmt::Display for What {
             Self::Error(error) => write!(f, "{}", DeviceError(error)),
             Self::ServoError { axis, error: 0 } => write!(f, "drive of axis {axis}: error gone"),
             Self::ServoError { axis, error } => write!(f, "drive of axis {axis}: error {error}"),
+            Self::Alarm { register, value: 0 } => write!(f, "alarm over (DP{register:02x} is 0)"),
+            Self::Alarm { register, value } => write!(f, "alarm: DP{register:02x} is {value} (0x1001)"),
             Self::Report { start, first } => write!(f, "report of register {start:02x}: {first:#06x}"),
         }
     }

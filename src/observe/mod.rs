@@ -16,7 +16,9 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use crate::config::Controller;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
-use crate::wire::{Code, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status};
+use crate::wire::{
+    Code, DPFE, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status, VibrationPort, WireError,
+};
 
 /// Events that are kept; of more the oldest go.
 const EVENTS_KEPT: usize = 1_000;
@@ -28,6 +30,8 @@ pub struct Watched {
     pub address: SocketAddrV4,
     /// Its message set.
     pub dialect: Dialect,
+    /// How its answers to vibration frames have the inputs.
+    pub vibration_port: VibrationPort,
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where none does.
     pub estop_inputs: u16,
 }
@@ -39,6 +43,7 @@ impl Watched {
         Self {
             address: controller.address,
             dialect: controller.dialect,
+            vibration_port: controller.vibration_port,
             estop_inputs: controller.estop_inputs,
         }
     }
@@ -68,6 +73,14 @@ impl Observer {
             forgotten: 0,
             watched,
         }
+    }
+
+    /// A reply to a motion frame, as that controller writes them.
+    ///
+    /// # Errors
+    /// As [`MotionReply::parse`].
+    pub fn read_reply(&self, controller: usize, octets: &[u8]) -> Result<MotionReply, WireError> {
+        MotionReply::parse_as(self.watched[controller].vibration_port, octets)
     }
 
     /// The last known states.
@@ -141,8 +154,13 @@ impl Observer {
         let state = &mut self.states[controller];
         state.reports += 1;
         state.heard_at = Some(at);
-        let first = report.data.get(0).unwrap_or(0);
-        self.happened(controller, at, What::Report { start: report.start, first });
+        let first = (report.start, report.data.get(0).unwrap_or(0));
+        if self.watched[controller].dialect != Dialect::Mbox {
+            return self.happened(controller, at, What::Report { start: first.0, first: first.1 });
+        }
+        let of_drives = DPFE.checked_sub(report.start).and_then(|index| report.data.get(usize::from(index)));
+        let (register, value) = of_drives.map_or(first, |alarm| (DPFE, alarm));
+        self.happened(controller, at, What::Alarm { register, value });
     }
 
     /// Hears positions that were measured: position registers, or a status report.
@@ -150,6 +168,11 @@ impl Observer {
         let state = &mut self.states[controller];
         state.measured = Some(Heard { value: positions, at });
         state.heard_at = Some(at);
+    }
+
+    /// Hears inputs that were read from the monitor registers.
+    pub fn on_inputs(&mut self, controller: usize, inputs: u16, at: MonoTime) {
+        self.note_inputs(controller, inputs, at);
     }
 
     /// Which controller sent a report from a port that is none of the frame ports: the one at that address, where there

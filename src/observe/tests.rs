@@ -1,5 +1,5 @@
 use super::*;
-use crate::wire::{FrameNo, Timing, Words};
+use crate::wire::{FrameNo, Timing, VibrationPort, Words};
 
 const X01: u16 = 0b0001;
 const STATION: Code = Code(0x0fc9);
@@ -12,6 +12,7 @@ fn observer(dialect: Dialect) -> Observer {
     Observer::new(vec![Watched {
         address: "192.168.15.201:7408".parse().unwrap(),
         dialect,
+        vibration_port: VibrationPort::Two,
         estop_inputs: X01,
     }])
 }
@@ -127,18 +128,19 @@ fn errors_come_and_go_as_events_in_words() {
 }
 
 #[test]
-fn a_report_of_registers_is_an_event() {
-    let mut observer = observer(Dialect::Mbox);
-    let data = [0x0011];
-    let report = Report {
-        channel: 0,
-        accept: Code::NONE,
-        reply: Code::NONE,
-        start: 0xfe,
-        data: Words::from(&data[..]),
+fn a_report_of_registers_is_an_alarm_of_an_mbox_controller_and_else_an_event() {
+    let say = |dialect, start, data: &[u16]| {
+        let mut observer = observer(dialect);
+        let data = Words::from(data);
+        let report = Report { channel: 0, accept: Code::NONE, reply: Code::NONE, start, data };
+        observer.on_report(0, &report, at(5));
+        happened(&observer).remove(0).1
     };
-    observer.on_report(0, &report, at(5));
-    assert_eq!(happened(&observer), [(5, "report of register fe: 0x0011".to_owned())]);
+    assert_eq!(say(Dialect::Smc, 0xfe, &[17]), "report of register fe: 0x0011");
+    assert_eq!(say(Dialect::Mbox, 0xfe, &[17]), "alarm: DPfe is 17 (0x1001)");
+    assert_eq!(say(Dialect::Mbox, 0xfe, &[0]), "alarm over (DPfe is 0)");
+    assert_eq!(say(Dialect::Mbox, 0xf5, &[3, 0, 0, 0, 0, 0, 0, 0, 0, 12]), "alarm: DPfe is 12 (0x1001)");
+    assert_eq!(say(Dialect::Mbox, 0x5e, &[1]), "alarm: DP5e is 1 (0x1001)");
 }
 
 #[test]
@@ -156,6 +158,7 @@ fn a_report_from_another_port_is_its_senders_unless_two_could_have_sent_it() {
     let watched = |host: u8, port: u16| Watched {
         address: SocketAddrV4::new(Ipv4Addr::new(192, 168, 15, host), port),
         dialect: Dialect::Smc,
+        vibration_port: VibrationPort::Two,
         estop_inputs: 0,
     };
     let observer =

@@ -2,7 +2,7 @@
 
 use rosc::{OscMessage, OscType};
 
-use crate::config::OscWord;
+use crate::config::GearWord;
 use crate::hall::{Ask, LevelsChange};
 use crate::time::ShowTime;
 
@@ -42,19 +42,19 @@ pub(super) enum Fault {
 }
 
 /// What `message` asks, of what is allowed.
-pub(super) fn order(message: &OscMessage, allow: &[OscWord]) -> Result<Order, Fault> {
+pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, Fault> {
     let unknown = || Fault::Unknown(message.addr.clone());
     let path = message.addr.strip_prefix("/kinocue/").ok_or_else(unknown)?;
     let parts: Vec<&str> = path.split('/').collect();
     let taken = Taken { message, allow };
     match parts[..] {
-        ["stop"] => taken.button(Ask::Stop),
-        ["go"] => taken.allowed(OscWord::Go)?.button(Ask::Go),
-        ["pause"] => taken.allowed(OscWord::Pause)?.button(Ask::Pause),
-        ["resume"] => taken.allowed(OscWord::Resume)?.button(Ask::Resume),
-        ["park"] => taken.allowed(OscWord::Park)?.button(Ask::Park),
-        ["seek"] => taken.allowed(OscWord::Seek)?.seek(),
-        ["trim"] => taken.allowed(OscWord::Trim)?.trim(),
+        ["stop"] => Ok(taken.stop()),
+        ["go"] => taken.allowed(GearWord::Go)?.button(Ask::Go),
+        ["pause"] => taken.allowed(GearWord::Pause)?.button(Ask::Pause),
+        ["resume"] => taken.allowed(GearWord::Resume)?.button(Ask::Resume),
+        ["park"] => taken.allowed(GearWord::Park)?.button(Ask::Park),
+        ["seek"] => taken.allowed(GearWord::Seek)?.seek(),
+        ["trim"] => taken.allowed(GearWord::Trim)?.trim(),
         ["subscribe"] => taken.subscribe(),
         ["level", "motion"] => taken.levels(|motion| LevelsChange { motion: Some(motion), ..<_>::default() }),
         ["level", "vibration"] => {
@@ -64,14 +64,14 @@ pub(super) fn order(message: &OscMessage, allow: &[OscWord]) -> Result<Order, Fa
             taken.levels(|level| LevelsChange { rows: [(row.to_owned(), level)].into(), ..<_>::default() })
         }
         ["effect", name] if !name.is_empty() => {
-            let on = taken.allowed(OscWord::Levels)?.switch()?;
+            let on = taken.allowed(GearWord::Levels)?.switch()?;
             let effects = [(name.to_owned(), on)].into();
             Ok(Order::Ask(Ask::Levels(LevelsChange { effects, ..<_>::default() })))
         }
         ["seat", name, "enable"] if !name.is_empty() => {
-            let on = taken.allowed(OscWord::Seats)?.switch()?;
+            let on = taken.allowed(GearWord::Seats)?.switch()?;
             let name = name.to_owned();
-            Ok(Order::Ask(if on { Ask::Enable(name) } else { Ask::Disable(name) }))
+            Ok(Order::Ask(if on { Ask::Enable(name) } else { Ask::Disable { name, why: None } }))
         }
         ["arm", ..] => Err(Fault::Forbidden("arm")),
         ["disarm", ..] => Err(Fault::Forbidden("disarm")),
@@ -86,11 +86,11 @@ pub(super) fn order(message: &OscMessage, allow: &[OscWord]) -> Result<Order, Fa
 #[derive(Clone, Copy)]
 struct Taken<'m> {
     message: &'m OscMessage,
-    allow: &'m [OscWord],
+    allow: &'m [GearWord],
 }
 
 impl Taken<'_> {
-    fn allowed(self, word: OscWord) -> Result<Self, Fault> {
+    fn allowed(self, word: GearWord) -> Result<Self, Fault> {
         if self.allow.contains(&word) { Ok(self) } else { Err(Fault::NotAllowed(self.message.addr.clone())) }
     }
 
@@ -104,6 +104,14 @@ impl Taken<'_> {
             _ => return Err(self.wants("nothing, or 1 for a button that goes down")),
         };
         Ok(if pressed { Order::Ask(ask) } else { Order::Released })
+    }
+
+    /// Whatever comes with it, unless that says that a button came up.
+    fn stop(self) -> Order {
+        match self.message.args.as_slice() {
+            [value] if switch(value) == Some(false) => Order::Released,
+            _ => Order::Ask(Ask::Stop),
+        }
     }
 
     fn seek(self) -> Result<Order, Fault> {
@@ -120,7 +128,7 @@ impl Taken<'_> {
     }
 
     fn levels(self, change: impl FnOnce(f64) -> LevelsChange) -> Result<Order, Fault> {
-        let taken = self.allowed(OscWord::Levels)?;
+        let taken = self.allowed(GearWord::Levels)?;
         let level = taken.number().filter(|level| (0.0..=1.0).contains(level));
         let level = level.ok_or_else(|| taken.wants("a level, 0 to 1"))?;
         Ok(Order::Ask(Ask::Levels(change(level))))
@@ -185,8 +193,8 @@ mod tests {
 
     use super::*;
 
-    fn all() -> Vec<OscWord> {
-        OscWord::ALL.map(|(_, word)| word).to_vec()
+    fn all() -> Vec<GearWord> {
+        GearWord::ALL.map(|(_, word)| word).to_vec()
     }
 
     fn ordered(addr: &str, args: Vec<OscType>) -> Result<Order, Fault> {
@@ -229,7 +237,11 @@ mod tests {
                 levels(LevelsChange { rows: [("A".to_owned(), 0.0)].into(), ..LevelsChange::default() }),
             ),
             ("/kinocue/seat/F4/enable", vec![OscType::Int(1)], Ask::Enable("F4".to_owned())),
-            ("/kinocue/seat/F4/enable", vec![OscType::Bool(false)], Ask::Disable("F4".to_owned())),
+            (
+                "/kinocue/seat/F4/enable",
+                vec![OscType::Bool(false)],
+                Ask::Disable { name: "F4".to_owned(), why: None },
+            ),
         ] {
             assert_eq!(ordered(addr, args), Ok(Order::Ask(ask)), "{addr}");
         }
@@ -239,6 +251,16 @@ mod tests {
     fn a_button_that_is_let_go_asks_nothing() {
         assert_eq!(ordered("/kinocue/go", vec![OscType::Float(0.0)]), Ok(Order::Released));
         assert!(matches!(ordered("/kinocue/go", vec![OscType::Float(0.5)]), Err(Fault::Argument { .. })));
+    }
+
+    #[test]
+    fn a_stop_is_a_stop_whatever_comes_with_it() {
+        let odd =
+            [vec![OscType::Float(0.5)], vec![OscType::String("now".to_owned())], vec![OscType::Int(0); 2]];
+        for args in odd {
+            assert_eq!(ordered("/kinocue/stop", args), Ok(Order::Ask(Ask::Stop)));
+        }
+        assert_eq!(ordered("/kinocue/stop", vec![OscType::Int(0)]), Ok(Order::Released));
     }
 
     #[test]
@@ -283,7 +305,7 @@ mod tests {
     fn what_is_not_listed_is_not_allowed_but_stop_is() {
         let message = |addr: &str| OscMessage { addr: addr.to_owned(), args: Vec::new() };
         assert_eq!(order(&message("/kinocue/stop"), &[]), Ok(Order::Ask(Ask::Stop)));
-        assert!(matches!(order(&message("/kinocue/go"), &[OscWord::Pause]), Err(Fault::NotAllowed(_))));
+        assert!(matches!(order(&message("/kinocue/go"), &[GearWord::Pause]), Err(Fault::NotAllowed(_))));
     }
 
     #[test]

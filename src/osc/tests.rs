@@ -8,7 +8,7 @@ use rosc::{OscBundle, OscMessage, OscPacket, OscTime, OscType, decoder, encoder}
 use tokio::runtime::Builder;
 
 use super::{Counts, open};
-use crate::config::{OscPort, OscWord};
+use crate::config::{GearWord, OscPort};
 use crate::hall::{
     Ask, Code, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status, StatusSource, Surface,
     Warning, handle,
@@ -40,7 +40,7 @@ impl Stage {
         let config = OscPort {
             listen: SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0),
             sources: sources.to_vec(),
-            allow: OscWord::ALL.map(|(_, word)| word).to_vec(),
+            allow: GearWord::ALL.map(|(_, word)| word).to_vec(),
         };
         let osc = open(&config, hall).unwrap();
         let (port, counts) = (osc.address().unwrap(), osc.counts());
@@ -110,6 +110,7 @@ fn playing_at(position_s: f64) -> Status {
         length_s: 60.0,
         position_s,
         join_s: 2.0,
+        resume_s: None,
         axes: 3,
         effects: Vec::new(),
     };

@@ -76,7 +76,7 @@ fn silence(fault: &Fault) -> String {
 
 /// What was asked and not told makes everything that hangs on it unknown.
 fn judge_unread(subject: &Subject<'_>, faults: &[Fault], notes: &mut Notes) {
-    let missing: Vec<Address> = wanted(subject.controller.dialect)
+    let missing: Vec<Address> = wanted(subject.controller)
         .into_iter()
         .filter(|address| subject.register(*address).is_none())
         .collect();

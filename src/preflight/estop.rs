@@ -19,8 +19,10 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         );
         notes.add(Check::EstopDisabled, found, format!("set PA90 = {}", functions | ESTOP));
     }
-    judge_inputs(subject, notes);
-    judge_action(subject, notes);
+    if !judge_belts(subject, notes) {
+        judge_inputs(subject, notes);
+        judge_action(subject, notes);
+    }
     judge_filter_and_release(subject, notes);
     if subject.pa(0x04) == Some(1) {
         let found =
@@ -32,6 +34,28 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         );
     }
     judge_other_functions(subject, notes);
+}
+
+/// The second example of the manual's section 5.6: the one function of inputs is the belts'. Says whether it is.
+fn judge_belts(subject: &Subject<'_>, notes: &mut Notes) -> bool {
+    let belts = subject.controller.belt_inputs;
+    let Some(mask) = subject.pa(0x92).filter(|mask| mask & belts != 0) else { return false };
+    let then = match subject.pa(0x91) {
+        Some(0) => "the seat holds once all of them are open, and moves on by itself when one is closed",
+        Some(1) => {
+            "the seat moves to zero once all of them are open, and moves on by itself when one is closed"
+        }
+        Some(2) => "the seat holds once all of them are open, until a reset",
+        _ => "no manual says what the seat does once all of them are open",
+    };
+    let found = format!(
+        "PA92 = {mask}: {} are belts (belt_inputs), so none is an emergency stop; {then}",
+        inputs(mask)
+    );
+    let remedy =
+        "accept it where the emergency stop is hard-wired; else give belts inputs that PA92 does not name";
+    notes.add(Check::EstopIsBelts, found, remedy);
+    true
 }
 
 fn judge_inputs(subject: &Subject<'_>, notes: &mut Notes) {
@@ -48,11 +72,12 @@ fn judge_inputs(subject: &Subject<'_>, notes: &mut Notes) {
                 "PA92 = {mask}: all of {} must be active at once, so pressing one button does nothing",
                 inputs(mask)
             );
-            notes.add(
-                Check::EstopAnd,
-                found,
-                "wire the buttons in series to one input and name only that in PA92",
+            let remedy = format!(
+                "wire the buttons in series to one input and name only that in PA92; where these are belts, write \
+                 belt_inputs = [{}]",
+                numbers(mask)
             );
+            notes.add(Check::EstopAnd, found, remedy);
         }
     }
     let watched = subject.controller.estop_inputs;

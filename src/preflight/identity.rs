@@ -12,13 +12,19 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     judge_company(subject, notes);
     judge_axes(subject, notes);
     judge_mode(subject, notes);
+    if let Some(axis) = subject.pa(0x03).filter(|axis| *axis != 0) {
+        let found =
+            format!("PA03 = {axis}: axis {axis} is a rotary one, which takes for zero wherever it stands");
+        notes.add(Check::RotaryAxis, found, "set PA03 = 0; kinocue plays to no rotary axis");
+    }
     judge_offset(subject, notes);
     if let Some(version) = version(subject) {
         notes.add(Check::Version, format!("software {version}"), "");
     }
     if subject.controller.dialect == Dialect::Mbox {
         let found = "not in the IMAX manual, so not asked: auto reset (PA0d), status reports (PA1e, PA1f), amplitude \
-                     (PA55), speed of single axes (PA80 to PA85), emergency reset (PA98), outputs (PA9d), packets (DP34)";
+                     (PA55), encoder (PA54), bus period (PA59), analogue positions (PA60), speed of single axes (PA80 to PA85), \
+                     emergency reset (PA98), outputs (PA9d), packets (DP34)";
         notes.add(Check::NotAsked, found, "");
     }
 }
@@ -83,7 +89,11 @@ fn judge_mode(subject: &Subject<'_>, notes: &mut Notes) {
     let dialect = subject.controller.dialect;
     let what = match (mode, dialect) {
         (10, _) | (0, Dialect::Mbox) => return,
-        (0, Dialect::Smc) => "the SMC manual's table has no such mode, and its work mode is 10",
+        (0, Dialect::Smc) => {
+            let found = "PA00 = 0: the work mode of RS-485 units; that of CAN units is 10";
+            let remedy = "accept it where this is an RS-485 unit; else have the integrator set PA00 = 10";
+            return notes.add(Check::WorkModeOpen, found, remedy);
+        }
         (1, _) => "manual test",
         (2 | 12, _) => "test",
         (11, Dialect::Smc) => "effects",

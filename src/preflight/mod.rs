@@ -7,14 +7,17 @@
 //!  configuration ---+                                      `checks`: the one table of what there is to find
 //! ```
 //!
-//! One file for each family of checks. A finding has a name that never changes, so that a configuration can accept it for
+//! One file for each family of checks; of motion four. A finding has a name that never changes, so that a configuration can accept it for
 //! good, with its reason.
 
 mod answers;
 mod estop;
+mod geometry;
 mod identity;
 mod motion;
 mod network;
+mod outputs;
+mod place;
 mod speed;
 mod status;
 mod subject;
@@ -72,6 +75,7 @@ impl Notes {
 pub fn judge(subjects: &[Subject<'_>], terms: &Terms, accepted: &[Acceptance]) -> Vec<Vec<Finding>> {
     let mut all: Vec<Notes> = subjects.iter().map(|subject| one(subject, terms)).collect();
     identity::judge_together(subjects, &mut all);
+    geometry::judge_together(subjects, &mut all);
     let accept = |(Notes(mut findings), subject): (Notes, &Subject<'_>)| {
         for finding in &mut findings {
             let own = subject.controller.accept_findings.iter();
@@ -92,6 +96,9 @@ fn one(subject: &Subject<'_>, terms: &Terms) -> Notes {
         identity::judge(subject, &mut notes);
         network::judge_replies(subject, terms, &mut notes);
         motion::judge(subject, terms, &mut notes);
+        geometry::judge(subject, &mut notes);
+        place::judge(subject, &mut notes);
+        outputs::judge(subject, &mut notes);
         speed::judge(subject, &mut notes);
         estop::judge(subject, &mut notes);
         status::judge(subject, terms, &mut notes);

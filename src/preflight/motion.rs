@@ -28,10 +28,73 @@ pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
         _ => {}
     }
     judge_amplitude(subject, notes);
-    if subject.pa(0x9d) == Some(1) {
-        let found = "PA9d = 1: ignores the outputs of frames, so effects never switch";
-        notes.add(Check::OutputsIgnored, found, "set PA9d = 0, or take its effects out of the configuration");
+    judge_source(subject, notes);
+    judge_bus(subject, terms, notes);
+    judge_delay(subject, terms, notes);
+    if let Some(value) = subject.pa(0x0e).filter(|value| *value != 0) {
+        let found = format!("PA0e = {value}: a reset goes to zero without a search, wherever that was lost");
+        notes.add(Check::HomesUnsearched, found, "set PA0e = 0");
     }
+}
+
+/// Whatever else than the Time and the positions of frames it goes by.
+fn judge_source(subject: &Subject<'_>, notes: &mut Notes) {
+    // SMC has another meaning for it: a time for commands that have none. Ours always have one.
+    let imax = subject.controller.dialect == Dialect::Mbox;
+    if let Some(value) = subject.pa(0x0a).filter(|value| imax && *value != 0) {
+        let found = format!("PA0a = {value}: ignores the Time of frames and goes by when they come");
+        notes.add(Check::TimeIgnored, found, "set PA0a = 0");
+    }
+    if let Some(value) = subject.pa(0x60).filter(|value| *value != 0) {
+        let factor = subject.pa(0x61).zip(subject.pa(0x62));
+        let factor = factor.map_or_else(String::new, |(over, under)| format!(", times {over}/{under}"));
+        let found = format!("PA60 = {value}: positions come from the analogue inputs{factor}");
+        notes.add(Check::AnaloguePosition, found, "set PA60 = 0");
+    }
+}
+
+/// Frames that come faster than the drives are told wait in the controller.
+fn judge_bus(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+    let Some(ms) = subject.pa(0x59) else { return };
+    let period = 1e3 / terms.rate_hz;
+    if f64::from(ms) > period {
+        let found = format!(
+            "PA59 = {ms}: tells the drives every {ms} ms at most, but frames come every {period:.1} ms"
+        );
+        let remedy =
+            format!("set PA59 = 0, or play at {:.0} Hz or less", (1e3 / f64::from(ms)).floor().max(1.0));
+        notes.add(Check::BusPeriod, found, remedy);
+    }
+}
+
+/// By how much the seat is behind its frames. No manual gives the formula of the filter, nor the unit of the delays: the
+/// least and the most that they may mean.
+fn judge_delay(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
+    let value = |number| subject.pa(number).unwrap_or(0);
+    let (what, least, most) = match subject.controller.dialect {
+        Dialect::Mbox => {
+            // 0 is no filter and 1 smooths nothing (IMAX manual 5.8).
+            let depth = value(0x51).min(16);
+            let frames = [depth.saturating_sub(1), (1_u16 << depth.saturating_sub(1)).saturating_sub(1)];
+            let [least, most] = frames.map(|frames| f64::from(frames) * 1e3 / terms.rate_hz);
+            (format!("PA51 = {} (and PA50 = {}): by that filter", value(0x51), value(0x50)), least, most)
+        }
+        Dialect::Smc => {
+            let (delay, smooth) = (f64::from(value(0x4c)), f64::from(value(0x4d)));
+            let what = format!("PA4c = {delay} and PA4d = {smooth}: if these are ms,");
+            (what, delay + smooth / 2.0, delay + smooth)
+        }
+    };
+    if most <= 0.0 {
+        return;
+    }
+    let span = if least < most { format!("{least:.0} to {most:.0} ms") } else { format!("{most:.0} ms") };
+    let remedy = match subject.controller.dialect {
+        Dialect::Mbox => "set PA51 = 0",
+        Dialect::Smc => "set PA4c = 0 and PA4d = 0",
+    };
+    let remedy = format!("{remedy}; or measure it, and set trim to as much less than 0");
+    notes.add(Check::MotionLate, format!("{what} motion comes {span} later than the film"), remedy);
 }
 
 /// Every Time that is sent has to be executed as it is.

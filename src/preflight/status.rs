@@ -24,6 +24,10 @@ fn judge_state(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(survey) = subject.survey else { return };
     let reported = survey.reported.error.map_or(0, |heard| heard.value);
     match survey.state {
+        Some((ReplyCode::EmergencyStop, _)) if are_belts(subject) => {
+            let found = "no belt is closed (x = 4), so the controller takes no motion";
+            notes.add(Check::BeltsOpen, found, "close a belt before arming, or take the seat out");
+        }
         Some((ReplyCode::EmergencyStop, _)) => {
             let found = "an emergency stop is in effect (x = 4)";
             notes.add(
@@ -47,6 +51,12 @@ fn judge_state(subject: &Subject<'_>, notes: &mut Notes) {
     for (axis, error) in drives {
         add_error(&format!("the drive of axis {} reports its error {error}", axis + 1), notes);
     }
+}
+
+/// Whether what PA92 names are belts and nothing else.
+fn are_belts(subject: &Subject<'_>) -> bool {
+    let belts = subject.controller.belt_inputs;
+    belts != 0 && subject.pa(0x92).is_some_and(|mask| mask & !belts == 0)
 }
 
 fn add_error(found: &str, notes: &mut Notes) {

@@ -1,10 +1,11 @@
 //! What is judged, and by what.
 
 use std::net::Ipv4Addr;
+use std::ops::RangeInclusive;
 
 use crate::config::{Controller, FanOut};
 use crate::device::survey::Survey;
-use crate::device::{Address, table};
+use crate::device::{Address, home, places, table};
 use crate::motion::MAX_AXES;
 use crate::net::Route;
 use crate::time::Rate;
@@ -41,15 +42,33 @@ pub struct Terms {
     pub cue: Option<(usize, bool)>,
 }
 
-/// The registers that are judged of a controller of `dialect`, as far as its manual has them.
+/// Parameters that are judged.
+const PARAMETERS: [RangeInclusive<u8>; 15] = [
+    0x00..=0x0e,
+    0x10..=0x1b,
+    0x1e..=0x29,
+    0x40..=0x42,
+    0x4c..=0x4d,
+    0x50..=0x51,
+    0x54..=0x55,
+    0x59..=0x59,
+    0x60..=0x62,
+    0x80..=0x85,
+    0x90..=0x98,
+    0x9d..=0x9d,
+    0x9f..=0x9f,
+    0xa0..=0xa5,
+    0xb0..=0xb5,
+];
+
+/// The registers that are judged of a controller, as far as its manual has them.
 #[must_use]
-pub fn wanted(dialect: Dialect) -> Vec<Address> {
-    let parameters =
-        [0x00..=0x0d, 0x10..=0x1b, 0x1e..=0x29, 0x55..=0x55, 0x80..=0x85, 0x90..=0x98, 0x9d..=0x9d];
-    let parameters = parameters.into_iter().chain([0xa0..=0xa5, 0xb0..=0xb5]).flatten().map(Address::Pa);
-    let versions = [Address::Dp(0xfe), Address::Dp(0xff)];
-    let known = |it: &Address| table().get(*it).is_some_and(|register| register.dialect.has(dialect));
-    parameters.chain(versions).filter(known).collect()
+pub fn wanted(controller: &Controller) -> Vec<Address> {
+    let parameters = PARAMETERS.into_iter().flatten().map(Address::Pa);
+    let monitors = [home::DPF0, Address::Dp(0xfe), Address::Dp(0xff)];
+    let known =
+        |it: &Address| table().get(*it).is_some_and(|register| register.dialect.has(controller.dialect));
+    parameters.chain(places(controller.seat.axes)).chain(monitors).filter(known).collect()
 }
 
 impl Subject<'_> {
@@ -102,7 +121,7 @@ impl Terms {
         let vibrates = self.cue.is_none_or(|(_, vibrates)| vibrates)
             && controller.dialect == Dialect::Smc
             && slots <= MAX_VIBRATING_AXES;
-        let frame = motion_len(slots, vibrates);
+        let frame = motion_len(slots, vibrates.then_some(controller.vibration_port));
         frame.max(REGISTER_LEN) + HEADERS_LEN
     }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::{Finding, Subject, Terms, judge, wanted};
 use crate::config::{Controller, from_to_args};
+use crate::device::home::DPF0;
 use crate::device::survey::{ROUNDS, Survey};
 use crate::device::{Address, table};
 use crate::motion::SeatType;
@@ -21,6 +22,9 @@ const SAFE: [(u8, u16); 8] =
     [(0x04, 0), (0x06, 0), (0x90, 1), (0x91, 2), (0x92, 1), (0x93, 20), (0x94, 300), (0x07, 2_880)];
 /// The same, of SMC controllers alone.
 const SAFE_SMC: [(u8, u16); 3] = [(0x00, 10), (0x1e, 100), (0x1f, 1)];
+
+/// And of MBOX controllers.
+const SAFE_MBOX: [(u8, u16); 1] = [(0x51, 0)];
 
 /// One controller with all that preflight knows of it.
 pub(super) struct Case {
@@ -42,16 +46,17 @@ impl Case {
             (address, table().get(address).and_then(|it| it.default(dialect)).unwrap_or(0))
         };
         let mut survey = Survey {
-            values: wanted(dialect).into_iter().map(factory).collect(),
+            values: wanted(&controller).into_iter().map(factory).collect(),
             round_trips: vec![Duration::from_micros(300); ROUNDS],
             rounds: ROUNDS,
             foreign_packets: (dialect == Dialect::Smc).then_some(0),
             ..Survey::default()
         };
         survey.reported.reports = u64::from(dialect == Dialect::Smc);
-        let of_smc: &[_] = if dialect == Dialect::Smc { &SAFE_SMC } else { &[] };
+        let of_dialect: &[_] = if dialect == Dialect::Smc { &SAFE_SMC } else { &SAFE_MBOX };
+        survey.values.insert(DPF0, 2);
         let of_axes = (0x80..=0x85).map(|number| (number, 2_880)).filter(|_| dialect == Dialect::Smc);
-        for (number, value) in SAFE.into_iter().chain(of_smc.iter().copied()).chain(of_axes) {
+        for (number, value) in SAFE.into_iter().chain(of_dialect.iter().copied()).chain(of_axes) {
             survey.values.insert(Address::Pa(number), value);
         }
         Self {

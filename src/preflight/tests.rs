@@ -29,7 +29,6 @@ macro_rules! refused {
 }
 
 refused! {
-    a_work_mode_of_the_factory_is_refused: [0x00 = 0] => WorkMode, "PA00 = 0: the SMC manual's table has no such mode";
     a_test_mode_is_refused: [0x00 = 12] => WorkMode, "PA00 = 12: test";
     the_effects_mode_is_refused: [0x00 = 11] => WorkMode, "effects";
     too_few_axes_are_refused: [0x02 = 2] => AxisCount, "PA02 = 2: works with 2 axes, but seat bench3 has 3";
@@ -37,6 +36,15 @@ refused! {
     an_unknown_fast_forward_is_refused: [0x06 = 2] => FastForwardUnknown, "PA06 = 2";
     no_speed_limit_is_refused: [0x07 = 0] => SpeedUnlimited, "PA07 = 0: no limit on speed";
     a_speed_limit_below_the_seats_is_refused: [0x07 = 2000] => SpeedTooLow, "2000 rpm (PA07), 166.7 mm/s";
+    a_rotary_axis_is_refused: [0x03 = 3] => RotaryAxis, "PA03 = 3: axis 3 is a rotary one";
+    inverted_outputs_are_refused: [0x05 = 1] => OutputsInverted, "every effect is on while it should be off";
+    a_reset_without_a_search_is_refused: [0x0e = 1] => HomesUnsearched, "goes to zero without a search";
+    another_encoder_is_refused: [0x54 = 2] => Encoder, "PA54 = 2: no manual says which encoder";
+    another_lead_is_refused: [0x41 = 100] => Lead, "PA41 = 100: a lead of 10 mm, but seat bench3 has 5 mm";
+    no_lead_is_refused: [0x41 = 0] => Lead, "a lead of 0 mm";
+    a_shorter_stroke_is_refused: [0x42 = 1400] => Stroke, "PA42 = 1400: a stroke of 140 mm, but seat bench3 has 150 mm";
+    a_bus_slower_than_the_show_is_refused: [0x59 = 11] => BusPeriod, "every 11 ms at most, but frames come every 10.0 ms";
+    positions_of_analogue_inputs_are_refused: [0x60 = 1, 0x61 = 2, 0x62 = 3] => AnaloguePosition, "analogue inputs, times 2/3";
     a_cut_of_long_times_is_refused: [0x0b = 2999] => IntervalLimit, "PA0b = 2999: the frame that brings the seat to its park pose, of 3000 ms, is cut to 2999 ms";
     a_cut_of_the_shows_frames_is_refused: [0x0b = 5] => IntervalLimit, "made faster";
     a_reset_by_itself_is_refused: [0x0d = 500] => AutoReset, "PA0d = 500: resets by itself";
@@ -88,8 +96,18 @@ fn safe_settings_pass_in_both_dialects() {
 
 #[test]
 fn what_a_manual_allows_passes() {
-    for parameters in [[(0x0b, 0)], [(0x0b, 3_000)], [(0x93, 50)], [(0x93, 0)], [(0x92, 0x0800)], [(0x85, 0)]]
-    {
+    for parameters in [
+        [(0x0a, 1)],
+        [(0x0b, 0)],
+        [(0x0b, 3_000)],
+        [(0x42, 1_500)],
+        [(0x59, 10)],
+        [(0x61, 2)],
+        [(0x93, 50)],
+        [(0x93, 0)],
+        [(0x92, 0x0800)],
+        [(0x85, 0)],
+    ] {
         assert_eq!(Case::smc().with(&parameters).told(), [], "{parameters:x?}");
     }
     assert_eq!(check(&Case::new(Dialect::Mbox).with(&[(0x00, 10)])), None);
@@ -101,6 +119,10 @@ fn what_a_manual_allows_passes() {
 #[test]
 fn what_should_be_looked_at_is_a_warning_and_does_not_fail() {
     let warned = [
+        (vec![(0x00, 0)], Check::WorkModeOpen),
+        (vec![(0x54, 1)], Check::EncoderUnsure),
+        (vec![(0x4c, 20)], Check::MotionLate),
+        (vec![(0x9f, 5)], Check::PowerOnOutputs),
         (vec![(0x06, 1)], Check::FastForward),
         (vec![(0x04, 1)], Check::EstopWire),
         (vec![(0x94, 2_880)], Check::EstopReleaseFast),
@@ -127,7 +149,6 @@ fn settings_of_the_factory_are_refused() {
     let failed: Vec<_> =
         case.findings().into_iter().filter(Finding::fails).map(|finding| finding.check).collect();
     let expected = [
-        Check::WorkMode,
         Check::AxisSpeedUnlimited,
         Check::EstopDisabled,
         Check::EstopNoInput,
@@ -138,6 +159,134 @@ fn settings_of_the_factory_are_refused() {
         Check::StatusSlow,
     ];
     assert_eq!(failed, expected);
+}
+
+#[test]
+fn what_a_site_will_be_surprised_by_of_an_imax_is_told() {
+    let mbox = |parameters: &[(u8, u16)]| only(&Case::new(Dialect::Mbox).with(parameters)).unwrap();
+    let time = mbox(&[(0x0a, 1)]);
+    assert_eq!((time.check, time.fails()), (Check::TimeIgnored, true));
+    assert_eq!(mbox(&[(0x0e, 1)]).check, Check::HomesUnsearched);
+    let late = mbox(&[(0x51, 4)]);
+    assert_eq!((late.check, late.fails()), (Check::MotionLate, false));
+    let words = "PA51 = 4 (and PA50 = 100): by that filter motion comes 30 to 70 ms later than the film";
+    assert_eq!(late.found, words);
+    assert_eq!(check(&Case::new(Dialect::Mbox).with(&[(0x51, 1)])), None, "1 smooths nothing");
+    assert!(Case::new(Dialect::Mbox).with(&[(0x51, 65_535)]).told().len() == 1, "whatever it holds");
+}
+
+#[test]
+fn delays_of_the_controller_are_told_in_ms() {
+    let found = only(&Case::smc().with(&[(0x4c, 20), (0x4d, 40)])).unwrap().found;
+    let words = "PA4c = 20 and PA4d = 40: if these are ms, motion comes 40 to 60 ms later than the film";
+    assert_eq!(found, words);
+}
+
+#[test]
+fn the_stroke_register_is_a_rise_where_the_smc_manual_says_so() {
+    let case = Case::smc().with(&[(0x42, 100), (0x40, 0)]);
+    assert_eq!(check(&case), None);
+    assert_eq!(check(&case.with(&[(0x40, 1)])), Some(Check::Stroke));
+}
+
+#[test]
+fn pulses_that_no_count_of_the_encoder_makes_are_refused() {
+    let mut case = Case::smc();
+    case.controller.seat = std::sync::Arc::new(crate::motion::SeatType {
+        pulses_per_rev: 7_500.0,
+        ..crate::motion::SeatType::bench3(3)
+    });
+    let found = only(&case).unwrap();
+    assert_eq!(found.check, Check::Encoder);
+    assert!(
+        found.found.ends_with("7500 pulses a turn, so neither two nor four for each line"),
+        "{}",
+        found.found
+    );
+}
+
+#[test]
+fn seats_of_one_type_with_different_encoders_are_told() {
+    let mut cases = [Case::smc(), Case::smc(), Case::smc().with(&[(0x54, 1)])];
+    for (case, host) in cases.iter_mut().zip(201..) {
+        case.controller.address.set_ip(std::net::Ipv4Addr::new(192, 168, 15, host));
+        case.survey.values.insert(Address::Pa(0x13), u16::from(host));
+    }
+    let subjects: Vec<_> = cases.iter().map(Case::subject).collect();
+    let all = judge(&subjects, &cases[0].terms, &[]);
+    let differs = |findings: &Vec<Finding>| findings.iter().any(|one| one.check == Check::EncoderDiffers);
+    assert_eq!(all.iter().map(differs).collect::<Vec<_>>(), [false, false, true]);
+}
+
+/// Axes 1 to 3 stand there, by the words of `dialect`, both times they are asked; and so a report says, where there is one.
+fn standing(places: [i32; 3], dialect: Dialect, reported: Option<[i32; 3]>) -> Case {
+    let mut case = Case::smc();
+    for (place, first) in places.into_iter().zip([0x06, 0x08, 0x0a]) {
+        let words = crate::wire::position_words(Pulses(place), dialect);
+        for (word, step) in words.into_iter().zip(0..) {
+            case.survey.values.insert(Address::Dp(first + step), word);
+        }
+    }
+    case.survey.again = case.survey.values.clone();
+    let reported = reported.map(|places| PerAxis::from_fn(3, |axis| Pulses(places[axis])));
+    case.survey.reported.measured = reported.map(|value| Heard { value, at: MonoTime::default() });
+    case
+}
+
+#[test]
+fn a_word_order_that_the_stroke_or_a_report_refutes_is_refused() {
+    let finding = only(&standing([20_000, 0, 0], Dialect::Mbox, None)).unwrap();
+    assert_eq!((finding.check, finding.fails()), (Check::WordOrder, true));
+    let words = "axis 1 stands at 1310720000 pulses by the word order of smc, at 20000 by that of mbox; its stroke is \
+                 0..=300000";
+    assert_eq!(finding.found, words);
+    let reported = standing([1, 0, 0], Dialect::Mbox, Some([1, 0, 0]));
+    assert_eq!(check(&reported), Some(Check::WordOrder), "65536 is inside the stroke, but the report says 1");
+    assert_eq!(check(&standing([20_000, 0, 0], Dialect::Smc, Some([20_000, 0, 0]))), None);
+}
+
+#[test]
+fn a_word_order_that_nothing_tells_is_a_warning() {
+    let case = standing([1, 0, 0], Dialect::Smc, None);
+    assert_eq!(check(&case), Some(Check::WordOrderOpen));
+    assert_eq!(check(&standing([1, 0, 0], Dialect::Smc, Some([1, 0, 0]))), None);
+    assert_eq!(check(&standing([0, 0, 0], Dialect::Smc, None)), None, "zero is zero in both");
+}
+
+#[test]
+fn a_position_outside_the_stroke_is_no_position() {
+    let finding = only(&standing([0, -20_000, 0], Dialect::Smc, None)).unwrap();
+    assert_eq!((finding.check, finding.fails()), (Check::Position, true));
+    assert_eq!(finding.found, "axis 2 stands at -20000 pulses, outside its stroke of 0..=300000");
+    assert!(!Check::Position.can_be_accepted());
+    assert_eq!(check(&standing([-30, 300_030, 0], Dialect::Smc, None)), None, "rounding");
+    let mut case = standing([0, -20_000, 0], Dialect::Smc, None);
+    case.survey.values.insert(crate::device::home::DPF0, 0);
+    assert_eq!(check(&case), None, "before it is homed it tells of no place");
+}
+
+#[test]
+fn a_report_of_the_same_rest_contradicts_and_one_of_a_seat_that_moves_does_not() {
+    let mut case = standing([150_000, 0, 0], Dialect::Smc, Some([60_000, 0, 0]));
+    let found = only(&case).unwrap().found;
+    assert_eq!(found, "axis 1 stands at 150000 pulses by its registers, at 60000 by its reports");
+    case.survey.again.insert(Address::Dp(0x06), 7);
+    assert_eq!(check(&case), None);
+}
+
+#[test]
+fn belts_in_place_of_an_emergency_stop_are_named_as_such() {
+    let belts = [(0x04, 0), (0x91, 1), (0x92, 3)];
+    let mut case = Case::smc().with(&belts);
+    let undeclared: Vec<_> = case.told().into_iter().map(|finding| finding.check).collect();
+    assert_eq!(undeclared, [Check::EstopAnd, Check::EstopReturns]);
+    case.controller.belt_inputs = 0b11;
+    let finding = only(&case).unwrap();
+    assert_eq!((finding.check, finding.fails()), (Check::EstopIsBelts, true));
+    assert!(finding.found.contains("X01 and X02 are belts") && finding.found.contains("moves to zero"));
+    case.survey.state = Some((ReplyCode::EmergencyStop, DeviceError(0)));
+    assert!(case.told().iter().any(|finding| finding.check == Check::BeltsOpen));
+    assert!(case.told().iter().all(|finding| finding.check != Check::EmergencyStopActive));
 }
 
 #[test]

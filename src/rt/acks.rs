@@ -13,7 +13,7 @@ use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply, PerAxis, ReplyCode};
+use crate::wire::{FrameNo, PerAxis, ReplyCode};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
@@ -176,7 +176,7 @@ impl AckLoop {
                     return;
                 }
             };
-            match MotionReply::parse(octets) {
+            match observer.read_reply(controller, octets) {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
                     let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
@@ -191,6 +191,9 @@ impl AckLoop {
             }
         });
         books.settle(began, &mut Records { sent, last_sent, watch, live });
+        if let Some(live) = live {
+            live.on_told(began);
+        }
         for controller in 0..receiver.lanes() {
             let closed = receiver.port_closed(controller);
             books.tracker_mut().on_port_closed(controller, closed);
@@ -231,7 +234,11 @@ fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &
     if let Some(positions) = beat {
         observer.on_positions(controller, positions, at);
     }
-    watch.hear(controller, octets, at) || beat.is_some()
+    let inputs = watch.hear_inputs(controller, octets, at);
+    if let Some(inputs) = inputs {
+        observer.on_inputs(controller, inputs, at);
+    }
+    watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some()
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.

@@ -9,11 +9,14 @@ use crate::motion::Pulses;
 use crate::net::{Delivery, Sender};
 use crate::time::MonoTime;
 use crate::wire::{
-    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, RegisterReply, position_reads, positions,
+    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, ReadRequest, RegisterReply, position_reads,
+    positions,
 };
 
 /// From one beat to the next.
 const EVERY: Duration = Duration::from_millis(250);
+/// DP5e: the inputs that are active.
+const INPUTS: u16 = 0x5e;
 
 /// Who beats, and when next.
 #[derive(Debug)]
@@ -30,6 +33,8 @@ struct Heart {
     code: Code,
     dialect: Dialect,
     axes: usize,
+    /// Whether its inputs are asked for as well: somebody waits for a belt.
+    inputs: bool,
 }
 
 impl Beats {
@@ -38,6 +43,7 @@ impl Beats {
             code: lane.code,
             dialect: one.dialect,
             axes: one.seat.axes.min(DP_POSITIONS.len()),
+            inputs: one.belt_inputs != 0,
         };
         Self {
             next: MonoTime::default(),
@@ -58,9 +64,11 @@ impl Beats {
 
     /// Asks a controller; says whether the kernel took it.
     pub(super) fn send(&self, controller: usize, sender: &Sender) -> bool {
-        let Heart { code, axes, .. } = self.hearts[controller];
-        let reads = position_reads(axes, code, code).count().max(1);
-        let read = position_reads(axes, code, code).nth(self.turn % reads);
+        let Heart { code, axes, inputs, .. } = self.hearts[controller];
+        let inputs =
+            inputs.then_some(ReadRequest { channel: 0, accept: code, reply: code, start: INPUTS, num: 1 });
+        let reads = || position_reads(axes, code, code).chain(inputs);
+        let read = reads().nth(self.turn % reads().count().max(1));
         read.is_some_and(|read| {
             !matches!(sender.send(controller, read.emit(&mut [0; MAX_LEN])), Delivery::Failed(_))
         })
@@ -68,14 +76,22 @@ impl Beats {
 
     /// Which axes an answer to a beat tells of, the first of them counted from 0, and where they are; none where it is none.
     pub(super) fn hear(&mut self, controller: usize, octets: &[u8]) -> Option<(usize, PerAxis<Pulses>)> {
-        let Heart { axes, code, dialect } = self.hearts[controller];
+        let Heart { axes, code, dialect, .. } = self.hearts[controller];
         let reply = RegisterReply::parse(octets).ok()?;
         let mut reads = position_reads(axes, code, code);
         let is_ours = reply.access == Access::Read
             && reply.channel == 0
             && reads.any(|read| (read.start, read.num) == (reply.start, reply.num));
         let first = DP_POSITIONS.iter().position(|register| is_ours && *register == reply.start)?;
-        Some((first, positions(reply.data, dialect)))
+        Some((first, positions(reply.values(dialect), dialect)))
+    }
+
+    /// The inputs that are active, where this is the answer to a beat that asked for them.
+    pub(super) fn hear_inputs(&self, controller: usize, octets: &[u8]) -> Option<u16> {
+        let reply = RegisterReply::parse(octets).ok().filter(|_| self.hearts[controller].inputs)?;
+        let is_ours =
+            reply.access == Access::Read && (reply.channel, reply.start, reply.num) == (0, INPUTS, 1);
+        reply.data.get(0).filter(|_| is_ours)
     }
 }
 
@@ -86,7 +102,7 @@ mod tests {
 
     #[test]
     fn an_answer_to_a_beat_tells_of_three_axes_and_no_other_answer_is_one() {
-        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 6 };
+        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 6, inputs: false };
         let mut beats = Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] };
         let mut hear = |start, stand: [i32; 3]| {
             let words: Vec<u16> =
@@ -106,5 +122,25 @@ mod tests {
         assert_eq!(hear(DP_POSITIONS[3], [4, 5, 6]), Some((3, vec![4, 5, 6])));
         assert_eq!(hear(DP_POSITIONS[0], [1, 2, 3]), Some((0, vec![1, 2, 3])));
         assert_eq!(hear(DP_POSITIONS[1], [1, 2, 3]), None, "nobody asks so");
+    }
+
+    #[test]
+    fn inputs_are_heard_where_they_are_asked_for() {
+        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 3, inputs: true };
+        let mut beats = Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] };
+        let reply = |start| RegisterReply {
+            access: Access::Read,
+            code: ReplyCode::EmergencyStop,
+            channel: 0,
+            error: 0,
+            start,
+            num: 1,
+            data: Words::from(&[3][..]),
+        };
+        let octets = reply(INPUTS).emit(&mut [0; MAX_LEN]).to_vec();
+        assert_eq!(beats.hear_inputs(0, &octets), Some(3), "also while it says that no belt is closed");
+        assert_eq!(beats.hear_inputs(0, reply(0x66).emit(&mut [0; MAX_LEN])), None);
+        beats.hearts[0].inputs = false;
+        assert_eq!(beats.hear_inputs(0, &octets), None);
     }
 }

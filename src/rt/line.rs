@@ -17,6 +17,8 @@ const ANSWERS: usize = 1024;
 #[derive(Debug)]
 struct Shared {
     open: AtomicBool,
+    /// Nobody else is to ask the controllers anything.
+    hushed: AtomicBool,
     /// Datagrams sent by the line, and how often its port was found closed; by controller.
     sent: Box<[AtomicU64]>,
     closed: Box<[AtomicU64]>,
@@ -27,7 +29,7 @@ struct Shared {
 struct Answer {
     controller: u16,
     at: MonoTime,
-    length: u8,
+    length: u16,
     octets: [u8; MAX_LEN],
 }
 
@@ -52,7 +54,12 @@ pub struct LineEnd {
 #[must_use]
 pub fn line(sender: Sender, controllers: usize) -> (Line, LineEnd) {
     let zeros = || (0..controllers).map(|_| AtomicU64::new(0)).collect();
-    let shared = Arc::new(Shared { open: AtomicBool::new(false), sent: zeros(), closed: zeros() });
+    let shared = Arc::new(Shared {
+        open: AtomicBool::new(false),
+        hushed: AtomicBool::new(false),
+        sent: zeros(),
+        closed: zeros(),
+    });
     let (producer, answers) = RingBuffer::new(ANSWERS);
     let end =
         LineEnd { answers: producer, shared: Arc::clone(&shared), counted: vec![0; controllers].into() };
@@ -64,6 +71,11 @@ impl Line {
     pub fn open(&mut self, open: bool) {
         while self.answers.pop().is_ok() {}
         self.shared.open.store(open, Ordering::Release);
+    }
+
+    /// Has the ack thread ask nothing by itself while nothing moves, or lets it.
+    pub fn hush(&self, hushed: bool) {
+        self.shared.hushed.store(hushed, Ordering::Release);
     }
 
     /// Sends a datagram to a controller, counted from 0.
@@ -103,7 +115,7 @@ impl LineEnd {
         let mut answer = Answer {
             controller: u16::try_from(controller).expect("fewer controllers than ports"),
             at,
-            length: u8::try_from(octets.len()).unwrap_or(u8::MAX),
+            length: u16::try_from(octets.len()).expect("a message is shorter than 65,536 octets"),
             octets: [0; MAX_LEN],
         };
         answer.octets[..octets.len()].copy_from_slice(octets);
@@ -116,6 +128,11 @@ impl LineEnd {
         self.shared.open.load(Ordering::Acquire)
     }
 
+    /// Whether nobody else is to ask.
+    pub(super) fn is_hushed(&self) -> bool {
+        self.shared.hushed.load(Ordering::Acquire)
+    }
+
     /// Notes how often a controller's port was found closed so far.
     pub(super) fn on_closed(&self, controller: usize, times: u64) {
         self.shared.closed[controller].store(times, Ordering::Relaxed);
@@ -125,5 +142,24 @@ impl LineEnd {
     pub(super) fn take_sent(&mut self, controller: usize) -> u64 {
         let sent = self.shared.sent[controller].load(Ordering::Acquire);
         sent - std::mem::replace(&mut self.counted[controller], sent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::net::Ports;
+
+    #[test]
+    fn the_longest_answer_is_handed_over_whole() {
+        let to = "127.0.0.1:9".parse().unwrap();
+        let (sender, _) = Ports::open("127.0.0.1:0".parse().unwrap(), &[to]).unwrap().split();
+        let (mut line, mut end) = line(sender, 1);
+        line.open(true);
+        let octets: Vec<u8> = (0..=u8::MAX).cycle().take(MAX_LEN).collect();
+        assert!(end.hear(0, &octets, MonoTime::default()));
+        let mut heard = Vec::new();
+        line.drain(&mut |_, octets, _| heard.push(octets.to_vec()));
+        assert_eq!(heard, [octets]);
     }
 }

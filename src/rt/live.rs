@@ -9,7 +9,7 @@ use super::TickReport;
 use super::table::Row;
 use crate::belief::Evidence;
 use crate::state::{Ride, State};
-use crate::time::ShowTime;
+use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
 
 /// How far a play is, in the order of a show.
@@ -104,6 +104,8 @@ pub struct Live {
     clamps: Box<[AtomicU64]>,
     /// What the ack thread has seen of each lane.
     evidence: Box<[Evidence]>,
+    /// Up to when it has told all that arrived.
+    told_ns: AtomicU64,
     table: Mutex<Vec<Row>>,
 }
 
@@ -122,6 +124,18 @@ impl Live {
     #[must_use]
     pub fn evidence(&self, lane: usize) -> Option<&Evidence> {
         self.evidence.get(lane)
+    }
+
+    /// The instant up to which the ack thread has told all that arrived; the clock's zero before it did.
+    #[must_use]
+    pub fn told(&self) -> MonoTime {
+        // Acquire: whoever sees the instant sees the evidence from before it.
+        MonoTime::from_nanos(self.told_ns.load(Ordering::Acquire))
+    }
+
+    /// Notes that all that arrived before an instant was told.
+    pub fn on_told(&self, until: MonoTime) {
+        self.told_ns.store(until.as_nanos(), Ordering::Release);
     }
 
     /// How often the last gate held a lane back since the program started; 0 where that is not told.
@@ -244,7 +258,7 @@ impl Live {
     }
 
     /// Notes how the controllers stand. Ack thread.
-    pub(super) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
+    pub(crate) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
         note(&mut self.table.lock().unwrap_or_else(PoisonError::into_inner));
     }
 

@@ -267,6 +267,11 @@ impl Mail {
         self.live.evidence(lane)
     }
 
+    /// The instant up to which the ack thread has told all that arrived.
+    pub(super) fn told(&self) -> MonoTime {
+        self.live.told()
+    }
+
     /// Notes how often the last gate held a lane back.
     pub(super) fn clamps(&self, lane: usize, clamps: u64) {
         self.live.on_clamps(lane, clamps);

@@ -2,8 +2,6 @@
 //! which nobody knows which frames arrive go blind, and each frame is held against what is known before it leaves. Tick
 //! thread; allocates nothing.
 
-use std::time::Duration;
-
 use super::mail::{Mail, Sent};
 use crate::belief::{Belief, Taken, Tally};
 use crate::engine::{Beat, Engine};
@@ -16,9 +14,6 @@ use crate::wire::Timing;
 #[derive(Debug)]
 pub struct Places {
     lanes: Vec<Place>,
-    period: Duration,
-    /// The time of the ticks that were served.
-    awake: Duration,
 }
 
 #[derive(Debug)]
@@ -36,7 +31,7 @@ impl Places {
             belief: Belief::new(&lane.window, rate.period(), lane.ack_every > 0),
             longest_ms: lane.longest_ms,
         };
-        Self { lanes: lanes.iter().map(place).collect(), period: rate.period(), awake: Duration::ZERO }
+        Self { lanes: lanes.iter().map(place).collect() }
     }
 
     /// What is known of a lane's seat.
@@ -55,12 +50,11 @@ impl Places {
 
     /// Notes a frame that was sent before the ticks begin.
     pub fn taken(&mut self, lane: usize, taken: &Taken<'_>) {
-        self.lanes[lane].belief.taken(taken, self.awake);
+        self.lanes[lane].belief.taken(taken);
     }
 
     /// Takes up what the ack thread has seen, once a tick; `moving` says whether frames go out.
     pub fn look(&mut self, engine: &mut Engine, mail: &Mail, now: MonoTime, moving: bool) {
-        self.awake += self.period;
         for lane in 0..self.lanes.len() {
             if self.take_evidence(lane, mail, now) {
                 engine.go_blind(lane);
@@ -98,7 +92,7 @@ impl Places {
 
     fn take_evidence(&mut self, lane: usize, mail: &Mail, now: MonoTime) -> bool {
         let Some(evidence) = mail.evidence(lane) else { return false };
-        self.lanes[lane].belief.look(evidence, now, self.awake)
+        self.lanes[lane].belief.look(evidence, mail.told(), now)
     }
 
     /// Whether this tick's frame of a lane may leave, and what it says of time. Where it would be too fast from somewhere that
@@ -130,8 +124,8 @@ impl Places {
     pub fn sent(&mut self, lane: usize, taken: &Taken<'_>, delivery: Delivery) {
         let belief = &mut self.lanes[lane].belief;
         match delivery {
-            Delivery::Sent | Delivery::SentAfterRefusal => belief.taken(taken, self.awake),
-            Delivery::Failed(_) => belief.refused(self.awake),
+            Delivery::Sent | Delivery::SentAfterRefusal => belief.taken(taken),
+            Delivery::Failed(_) => belief.refused(taken.at),
         }
     }
 }

@@ -102,17 +102,23 @@ impl Looker {
         let Some(reply) = reply.filter(|reply| self.seen.asked && reply.access == Access::Read) else {
             return false;
         };
-        if reply.code != ReplyCode::Running {
-            self.seen.error = reply.error;
+        match self.dialect {
+            _ if reply.code == ReplyCode::Running => {}
+            Dialect::Smc => self.seen.error = reply.error,
+            // It tells of the request alone. What it has no versions for is known by the rest.
+            Dialect::Mbox if reply.start == VERSIONS.0 => self.seen.versions = Some((0, 0)),
+            Dialect::Mbox => return true,
         }
-        let word = |index| reply.data.get(index);
+        let word = |index| reply.values(self.dialect).get(index);
         // An answer with x over 2 does not say its channel; of what is asked here, start and count tell all the same.
         let of_parameters = reply.channel == PARAMETERS
             || (reply.code != ReplyCode::Running && (reply.start, reply.num) == MODE);
         let channel = if of_parameters { PARAMETERS } else { reply.channel };
         match (channel, reply.start) {
             (PARAMETERS, start) if start == MODE.0 => self.seen.mode = word(0).zip(word(2)),
-            (MONITORS, start) if start == VERSIONS.0 => self.seen.versions = word(0).zip(word(1)),
+            (MONITORS, start) if start == VERSIONS.0 => {
+                self.seen.versions = word(0).zip(word(1)).or(self.seen.versions);
+            }
             (MONITORS, PACKETS) => self.seen.packets = word(0),
             (MONITORS, RESET) => self.seen.homed = word(0).map(|state| state == RESET_DONE),
             (MONITORS, start) => return self.hear_positions(start, &reply),
@@ -123,7 +129,7 @@ impl Looker {
 
     fn hear_positions(&mut self, start: u16, reply: &RegisterReply<'_>) -> bool {
         let Some(first) = DP_POSITIONS.iter().position(|register| *register == start) else { return false };
-        let told = positions(reply.data, self.dialect);
+        let told = positions(reply.values(self.dialect), self.dialect);
         self.seen.axes |= ((1 << told.len()) - 1) << first;
         self.told = Some((first, told));
         true
@@ -144,8 +150,12 @@ impl Looker {
             return None;
         }
         self.seen.asked = false;
+        let (minor_version, alarm) = match self.dialect {
+            Dialect::Smc => (minor_version, 0),
+            Dialect::Mbox => (0, minor_version),
+        };
         let identity = Identity { version, minor_version, work_mode, axes: of_frame };
-        Some(Sighting { identity, error, packets, homed })
+        Some(Sighting { identity, error, alarm, packets, homed })
     }
 
     /// Whether a seat in that pose stands at park, to a pulse.
@@ -214,8 +224,20 @@ mod tests {
         let sighting = looker.take().unwrap();
         let (first, told) = looker.take_positions().unwrap();
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
-        assert_eq!(sighting, Sighting { identity, error: 0, packets: Some(77), homed: true });
+        assert_eq!(sighting, Sighting { identity, error: 0, alarm: 0, packets: Some(77), homed: true });
         assert_eq!((first, &told[..]), (0, &[Pulses(75_000)][..]));
+        assert!(looker.take().is_none());
+    }
+
+    #[test]
+    fn an_mbox_tells_the_alarm_of_its_drives_where_others_tell_a_version_and_a_refusal_tells_nothing() {
+        let mut looker = looker();
+        looker.dialect = Dialect::Mbox;
+        answer(&mut looker, ReplyCode::Running, 0);
+        let sighting = looker.take().unwrap();
+        assert_eq!((sighting.identity.minor_version, sighting.alarm), (0, 1));
+        looker.seen = Seen { asked: true, ..Seen::default() };
+        assert_eq!(answer(&mut looker, ReplyCode::Fault, 0), [true; 5]);
         assert!(looker.take().is_none());
     }
 

@@ -81,6 +81,11 @@ impl Standby {
         self.line.is_open()
     }
 
+    /// Whether that conversation wants nobody else to ask.
+    pub(super) fn is_hushed(&self) -> bool {
+        self.line.is_hushed()
+    }
+
     /// Takes orders, and counts what the line sent; `on_homed` hears of every controller that is home.
     pub(super) fn serve(&mut self, health: &mut Health, mut on_homed: impl FnMut(usize)) {
         while let Ok(Order::Homed(controller)) = self.orders.pop() {

@@ -22,7 +22,7 @@ use crate::observe::Observer;
 use crate::state::Event;
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
-use crate::wire::{Dialect, PerAxis, ReplyCode};
+use crate::wire::{Dialect, ImaxRegisters, PerAxis, ReplyCode};
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
@@ -153,7 +153,8 @@ impl Watch {
         let smc = self.lookers.get(reply.controller).is_some_and(|one| one.dialect() == Dialect::Smc);
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
-            Fate::Answered(ReplyCode::Fault | ReplyCode::Command) if smc => {
+            // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
+            Fate::Answered(code) if !(smc && code == ReplyCode::EmergencyStop) => {
                 self.health.on_refused(reply.controller);
             }
             _ => {}
@@ -167,6 +168,12 @@ impl Watch {
         let is_answer = looker.hear(octets);
         if let Some((first, positions)) = looker.take_positions() {
             self.on_positions(controller, first, &positions, at, Source::Registers);
+        }
+        if is_answer || awaited {
+            self.health.on_answer(controller, at);
+        }
+        if ImaxRegisters::parse(octets).is_ok_and(|reply| reply.is_wide()) {
+            self.health.on_wide_registers(controller);
         }
         self.take_sighting(controller, at);
         is_answer || awaited
@@ -222,6 +229,13 @@ impl Watch {
         self.health.on_status(controller, at);
         self.mind_rest(controller, at);
         self.positions[controller].told()
+    }
+
+    /// Hears an answer to a beat that asked for inputs: a sign of life, and which are active; none where it is none.
+    pub(super) fn hear_inputs(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> Option<u16> {
+        let inputs = self.beats.hear_inputs(controller, octets)?;
+        self.health.on_status(controller, at);
+        Some(inputs)
     }
 
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
@@ -297,7 +311,9 @@ impl Watch {
             // One that is out may be at work on: it stays away until it was homed, and holds up nobody.
             Notice::Hall(Event::Rebooted(controller)) if !self.takes_part(controller) => {}
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
-            // Preflight counts every datagram that a controller received: what can wait does not come between.
+            // Preflight counts every datagram that a controller received, and would take the answers for its own.
+            Notice::Read(_) if self.is_hushed() => {}
+            // A homing is watched by who ordered it; only those that are looked for are looked at beside.
             Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
             Notice::Read(controller) => {
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
@@ -317,6 +333,11 @@ impl Watch {
     /// Whether the control plane holds a conversation with the controllers.
     fn is_asked_otherwise(&self) -> bool {
         self.standby.as_ref().is_some_and(Standby::is_asked_otherwise)
+    }
+
+    /// Whether that conversation wants to be the only one.
+    fn is_hushed(&self) -> bool {
+        self.standby.as_ref().is_some_and(Standby::is_hushed) && !self.live.is_moving()
     }
 
     fn stands(&self, controller: usize) -> Standing {
@@ -361,7 +382,12 @@ impl Watch {
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
     fn beat(&mut self, now: MonoTime) {
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if self.silent || self.live.is_moving() || self.is_asked_otherwise() || !self.beats.take(now) {
+        if self.silent
+            || self.live.is_moving()
+            || self.is_hushed()
+            || self.is_asked_otherwise()
+            || !self.beats.take(now)
+        {
             return;
         }
         for controller in 0..self.lookers.len() {

@@ -141,7 +141,7 @@ impl Controller {
             self.counts.refused.source_port += 1;
             return ignored;
         }
-        match Message::parse(octets) {
+        match Message::parse_as(self.invented.vibration_port, octets) {
             Ok(message) => self.on_message(&message, at, buf),
             Err(_) => Handled { reply: self.on_malformed(octets, buf), motion: None },
         }
@@ -171,7 +171,7 @@ impl Controller {
             Message::Motion(request) => {
                 let answer = self.on_motion(request, at);
                 motion = Some(MotionSeen { request: *request, code: answer.code });
-                answer.emit(buf)
+                answer.emit_as(self.invented.vibration_port, buf)
             }
             Message::Read(read) => self.on_read(read, at, buf),
             Message::Write(write) => self.on_write(write, at, buf),

@@ -15,6 +15,7 @@ use super::log::Logs;
 use super::station::{Station, listen};
 use super::{Command, CommandError, Counts, Options, Setup};
 use crate::sys::clock::Monotonic;
+use crate::sys::realtime;
 use crate::time::{Clock as _, MonoTime};
 
 /// Why virtual controllers cannot start.
@@ -107,7 +108,11 @@ impl Farm {
             due: start,
         };
         let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let thread = thread.spawn(move || keeper.run()).map_err(system)?;
+        let run = move || {
+            realtime::below_the_tick_thread();
+            keeper.run()
+        };
+        let thread = thread.spawn(run).map_err(system)?;
         Ok(Self { addresses, remote: Remote { orders: sender, bell }, thread: Some(thread) })
     }
 

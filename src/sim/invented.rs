@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::wire::VibrationPort;
+
 /// Answers to what the manuals leave open. The defaults are guesses; each can be played the other way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invented {
@@ -32,6 +34,8 @@ pub struct Invented {
     pub servo_alarm: u16,
     /// Registers of a drive, from 0 on.
     pub servo_registers: u16,
+    /// How many octets Port Out takes in vibration frames, and the inputs in the answers.
+    pub vibration_port: VibrationPort,
     /// Major and minor version (DPFF, DPFE).
     pub version: [u16; 2],
 }
@@ -62,6 +66,7 @@ impl Default for Invented {
             jog_rpm: 60,
             servo_alarm: 1,
             servo_registers: 1_000,
+            vibration_port: VibrationPort::Two,
             version: [1, 0],
         }
     }

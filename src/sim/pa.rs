@@ -9,6 +9,8 @@ pub const AXES: u8 = 0x02;
 pub const ROTARY_AXIS: u8 = 0x03;
 /// 1: low inputs are active.
 pub const INPUT_POLARITY: u8 = 0x04;
+/// 1: outputs are inverted.
+pub const OUTPUT_POLARITY: u8 = 0x05;
 /// 1: speed up when more than two commands wait.
 pub const FAST_FORWARD: u8 = 0x06;
 /// Greatest speed, rpm.
@@ -17,6 +19,8 @@ pub const MAX_RPM: u8 = 0x07;
 pub const RESET: u8 = 0x08;
 /// Time of commands without one, ms.
 pub const INTERVAL: u8 = 0x09;
+/// IMAX: 1 goes by the time between packets, not by the one in them.
+pub const INTERVAL_SOURCE: u8 = 0x0a;
 /// Longest time of a command, ms; 0 for none.
 pub const MAX_TIME: u8 = 0x0b;
 /// How long after the last command it resets by itself, ms; 0 for never.
@@ -47,6 +51,8 @@ pub const HOST_PORT: u8 = 0x24;
 pub const SECOND_HOST: u8 = 0x25;
 /// Silence after a start, ms.
 pub const START_DELAY: u8 = 0x3d;
+/// IMAX: depth of the filter of positions.
+pub const FILTER_DEPTH: u8 = 0x51;
 /// Amplitude: 0 all of it, 1 to 9 tenths.
 pub const AMPLITUDE: u8 = 0x55;
 /// The first of six registers with the speed at which an axis jogs, rpm.

@@ -61,6 +61,8 @@ impl Setup {
             let smc = [(pa::MODE, 10), (pa::AUTO_RESET, 0), (pa::REPORT_INTERVAL, 100), (pa::REPORTS, 1)];
             parameters.extend(smc);
             parameters.extend((pa::AXIS_RPM..).zip([3_000; 6]));
+        } else {
+            parameters.push((pa::FILTER_DEPTH, 0));
         }
         parameters.append(&mut self.parameters);
         Self { parameters, host_port: host.port(), ..self }

@@ -1,9 +1,10 @@
 //! System calls that the standard library lacks; the only unsafe code of the project, each block with its reason.
-//! Linux only. Any thread; nothing here allocates except where a refusal is put into words, and in `folder`, which is of the
+//! Linux only. Any thread; nothing here allocates except where a refusal is put into words, and in `file` and `folder`, which are of the
 //! control plane.
 
 pub mod batch;
 pub mod clock;
+pub(crate) mod file;
 pub(crate) mod folder;
 pub mod humble;
 pub mod machine;

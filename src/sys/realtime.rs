@@ -73,6 +73,17 @@ pub fn normal_priority() -> io::Result<()> {
     set_scheduler(libc::SCHED_OTHER, 0)
 }
 
+/// Gives the calling thread real-time scheduling below that of a tick thread, where the system allows it: for the thread that
+/// sees what becomes of the frames, which a busy machine must not hold up, and for virtual controllers, which stand for
+/// machines of their own. Elsewhere it has ordinary scheduling.
+pub fn below_the_tick_thread() {
+    if set_scheduler(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, libc::c_int::from(PRIORITY - 10)).is_err()
+    {
+        // Giving up priority needs no right.
+        let _ = normal_priority();
+    }
+}
+
 /// Raises the limit of open files from the soft to the hard one and returns what it then is (`u64::MAX` if there is
 /// none); every controller takes a socket, and the usual soft limit is 1,024.
 ///

@@ -1,6 +1,6 @@
 //! A line of text into what it asks.
 
-use crate::config::parse_level;
+use crate::config::{GearWord, parse_level};
 use crate::hall::{Ask, Code, LevelsChange, Problem};
 use crate::time::{parse_time, parse_trim};
 
@@ -17,17 +17,32 @@ pub(super) enum Order {
     Status,
 }
 
+/// Why a line is not obeyed.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Fault {
+    /// It is an order with a value that is none, or one that may never come from here.
+    Refused(Problem),
+    /// It is no order: who sends such lines speaks something else, a browser perhaps that somebody else's page leads.
+    NoOrder(Problem),
+}
+
+impl From<Problem> for Fault {
+    fn from(problem: Problem) -> Self {
+        Self::Refused(problem)
+    }
+}
+
 /// What a line asks; it has no end of line any more.
-pub(super) fn order(line: &[u8]) -> Result<Order, Problem> {
+pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
     let text = str::from_utf8(line).ok().filter(|text| text.is_ascii());
-    let text = text.ok_or_else(|| value("the line is not ASCII".to_owned(), "send plain ASCII"))?;
-    let words: Vec<&str> = text.split_ascii_whitespace().collect();
-    Ok(Order::Ask(match words[..] {
+    let no_ascii = || Fault::NoOrder(value("the line is not ASCII".to_owned(), "send plain ASCII"));
+    let words: Vec<&str> = text.ok_or_else(no_ascii)?.split_ascii_whitespace().collect();
+    let order = Order::Ask(match words[..] {
         ["status"] => return Ok(Order::Status),
+        [stop] if stop.eq_ignore_ascii_case("stop") => Ask::Stop,
         ["go"] => Ask::Go,
         ["pause"] => Ask::Pause,
         ["resume"] => Ask::Resume,
-        ["stop"] => Ask::Stop,
         ["park"] => Ask::Park,
         ["seek", at] => Ask::Seek(parse_time(at).map_err(|why| argument(at, &why))?),
         ["trim", trim] => Ask::Trim(parse_trim(trim).map_err(|why| argument(trim, &why))?),
@@ -37,13 +52,27 @@ pub(super) fn order(line: &[u8]) -> Result<Order, Problem> {
         ["effect", name, "on"] => effect(name, true),
         ["effect", name, "off"] => effect(name, false),
         ["enable", name] => Ask::Enable(name.to_owned()),
-        ["disable", name] => Ask::Disable(name.to_owned()),
+        ["disable", name] => Ask::Disable { name: name.to_owned(), why: None },
         [word @ ("arm" | "disarm" | "home" | "clear" | "load"), ..] => {
             let detail = format!("lines of text may never {word}");
-            return Err(Problem::new(Code::Role, detail, "a person does that on the console"));
+            return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
         }
-        _ => return Err(value(format!("{text:?} is no line of kinocue"), &format!("there are {LINES}"))),
-    }))
+        _ => {
+            let detail = format!("{:?} is no line of kinocue", text.unwrap_or_default());
+            return Err(Fault::NoOrder(value(detail, &format!("there are {LINES}"))));
+        }
+    });
+    allowed(order, allow)
+}
+
+/// An order, where the configuration allows it.
+fn allowed(order: Order, allow: &[GearWord]) -> Result<Order, Fault> {
+    let Order::Ask(ask) = &order else { return Ok(order) };
+    if ask.gear_word().is_none_or(|word| allow.contains(&word)) {
+        return Ok(order);
+    }
+    let detail = format!("{} is not allowed here", ask.word());
+    Err(Problem::new(Code::Role, detail, "list it in `allow` of [text]").into())
 }
 
 fn level(text: &str, of: impl FnOnce(f64) -> (Option<f64>, Option<f64>)) -> Result<Ask, Problem> {
@@ -72,8 +101,12 @@ mod tests {
     use super::*;
     use crate::time::ShowTime;
 
+    fn ordered(line: &[u8]) -> Result<Order, Fault> {
+        order(line, &GearWord::ALL.map(|(_, word)| word))
+    }
+
     fn asked(line: &str) -> Ask {
-        match order(line.as_bytes()) {
+        match ordered(line.as_bytes()) {
             Ok(Order::Ask(ask)) => ask,
             other => panic!("{line}: {other:?}"),
         }
@@ -87,6 +120,7 @@ mod tests {
             ("  pause ", Ask::Pause),
             ("resume", Ask::Resume),
             ("stop", Ask::Stop),
+            (" STOP ", Ask::Stop),
             ("park", Ask::Park),
             ("seek 12:30", Ask::Seek(ShowTime::from_millis(750_000))),
             ("trim +80ms", Ask::Trim(80)),
@@ -97,18 +131,28 @@ mod tests {
             ("effect water off", effect("water", false)),
             ("effect water on", effect("water", true)),
             ("enable F4", Ask::Enable("F4".to_owned())),
-            ("disable F4", Ask::Disable("F4".to_owned())),
+            ("disable F4", Ask::Disable { name: "F4".to_owned(), why: None }),
         ] {
             assert_eq!(asked(line), ask, "{line}");
         }
-        assert_eq!(order(b"status"), Ok(Order::Status));
+        assert_eq!(ordered(b"status"), Ok(Order::Status));
     }
 
     #[test]
     fn nothing_arms_homes_clears_or_loads() {
         for line in ["arm", "disarm", "home", "home A1", "clear", "load coaster"] {
-            assert_eq!(order(line.as_bytes()).unwrap_err().code, Code::Role, "{line}");
+            let fault = ordered(line.as_bytes()).unwrap_err();
+            assert!(matches!(fault, Fault::Refused(Problem { code: Code::Role, .. })), "{line}: {fault:?}");
         }
+    }
+
+    #[test]
+    fn what_is_not_listed_is_not_allowed_but_stop_is() {
+        assert_eq!(order(b"stop", &[]), Ok(Order::Ask(Ask::Stop)));
+        assert_eq!(order(b"status", &[]), Ok(Order::Status));
+        assert_eq!(order(b"go", &[GearWord::Go]), Ok(Order::Ask(Ask::Go)));
+        let fault = order(b"park", &[GearWord::Go]).unwrap_err();
+        assert!(matches!(fault, Fault::Refused(Problem { code: Code::Role, .. })), "{fault:?}");
     }
 
     #[test]
@@ -118,17 +162,27 @@ mod tests {
             ("GO", "\"GO\" is no line"),
             ("go now", "no line"),
             ("seek", "no line"),
-            ("seek soon", "write SS[.mmm], MM:SS"),
-            ("trim 501", "\"501\": a trim is -500ms to 500ms"),
-            ("level 101%", "write 0% to 100%"),
             ("effect water maybe", "no line"),
+            ("POST / HTTP/1.1", "no line"),
+            ("gö", "not ASCII"),
         ] {
-            let problem = order(line.as_bytes()).unwrap_err();
+            let Fault::NoOrder(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };
             assert_eq!(problem.code, Code::Value, "{line}");
             assert!(problem.to_string().contains(says), "{line}: {problem}");
         }
-        assert!(order("gö".as_bytes()).unwrap_err().detail.contains("not ASCII"));
-        assert!(order(&[0xff, 0xfe]).unwrap_err().detail.contains("not ASCII"));
+        assert!(matches!(ordered(&[0xff, 0xfe]), Err(Fault::NoOrder(_))));
+    }
+
+    #[test]
+    fn a_value_that_is_none_is_refused_with_what_to_write() {
+        for (line, says) in [
+            ("seek soon", "write SS[.mmm], MM:SS"),
+            ("trim 501", "\"501\": a trim is -500ms to 500ms"),
+            ("level 101%", "write 0% to 100%"),
+        ] {
+            let Fault::Refused(problem) = ordered(line.as_bytes()).unwrap_err() else { panic!("{line}") };
+            assert!(problem.to_string().contains(says), "{line}: {problem}");
+        }
     }
 
     proptest! {
@@ -136,7 +190,7 @@ mod tests {
         fn no_octets_panic_and_none_arm(octets in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
             let line = [word.as_bytes(), b" ", &octets].concat();
             for line in [octets.as_slice(), line.as_slice()] {
-                if let Ok(Order::Ask(ask)) = order(line) {
+                if let Ok(Order::Ask(ask)) = ordered(line) {
                     prop_assert!(!["arm", "disarm", "home", "clear", "load"].contains(&ask.word()));
                 }
             }

@@ -8,8 +8,10 @@
 //!  effect water off   enable F4   disable F4
 //! ```
 //!
-//! As with OSC, who speaks is known by address alone, so nothing here arms, homes or clears. Off unless the configuration
-//! has `[text]`.
+//! As with OSC, who speaks is known by address alone, so nothing here arms, homes or clears. A listed machine may have a
+//! browser, which a page of anybody leads to send what it likes behind a head of HTTP: so the first line that is no order ends
+//! its connection, and where the configuration has a token the first line has to show it; a stop needs none. Off unless the
+//! configuration has `[text]`.
 
 mod line;
 mod talk;
@@ -21,20 +23,16 @@ use std::io;
 use std::net::{SocketAddr, SocketAddrV4, TcpListener};
 use std::time::Duration;
 
-use tokio::io::AsyncWriteExt as _;
-use tokio::net::TcpStream;
 use tokio::task::JoinSet;
 
 use crate::config::TextPort;
-use crate::hall::{Code, Handle, Problem, Role, Surface, Who};
-use talk::{Talk, reply};
+use crate::hall::{Handle, Places, Role, Surface, Who};
+use talk::Talk;
 
-/// Connections at the most.
+/// Connections at the most; of more the one that was silent longest goes, before all one that never asked anything.
 const CONNECTIONS: usize = 16;
 /// A connection without a line for so long is closed.
 const IDLE: Duration = Duration::from_secs(600);
-/// How long a refusal may take to be written.
-const PARTING: Duration = Duration::from_secs(1);
 /// How long to wait where the system has no room for a further connection.
 const BREATH: Duration = Duration::from_millis(100);
 
@@ -87,7 +85,7 @@ impl Text {
     pub async fn serve(self) -> io::Result<Infallible> {
         let Self { listener, config, hall, idle } = self;
         let listener = tokio::net::TcpListener::from_std(listener)?;
-        let mut talks = JoinSet::new();
+        let (mut talks, places) = (JoinSet::new(), Places::new(CONNECTIONS));
         loop {
             let Ok((stream, from)) = listener.accept().await else {
                 // Too many files are open, or the peer left at once.
@@ -98,20 +96,12 @@ impl Text {
             if !config.sources.contains(from.ip()) {
                 continue; // no word to strangers
             }
-            while talks.try_join_next().is_some() {} // those that are over make room
-            if talks.len() >= CONNECTIONS {
-                tokio::spawn(turn_away(stream));
-                continue;
-            }
+            while talks.try_join_next().is_some() {} // those that are over
+            let (place, _) = places.take(Some((*from.ip()).into()));
             let who = Who { role: Role::Operate, surface: Surface::Text, name: from.ip().to_string() };
-            let talk = Talk { hall: hall.clone(), who, idle };
+            let (allow, token) = (config.allow.clone(), config.token);
+            let talk = Talk { hall: hall.clone(), who, allow, token, idle, place };
             talks.spawn(async move { talk.run(stream).await });
         }
     }
-}
-
-async fn turn_away(mut stream: TcpStream) {
-    let detail = format!("{CONNECTIONS} connections are open already");
-    let line = reply(&Err(Problem::new(Code::Busy, detail, "close one")));
-    let _ = tokio::time::timeout(PARTING, stream.write_all(line.as_bytes())).await; // or it has left
 }

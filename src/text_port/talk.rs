@@ -3,20 +3,26 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use sha2::{Digest as _, Sha256};
+use subtle::ConstantTimeEq as _;
 use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::net::TcpStream;
 use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use super::line::{Order, order};
-use crate::hall::{Code, Handle, Posted, Problem, Status, Who};
+use super::line::{Fault, Order, order};
+use crate::config::GearWord;
+use crate::hall::{Ask, Code, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
 /// Octets of a line at the most, its end included.
 const LONGEST: u64 = 256;
-/// Lines that may wait for their answers; who sends more ahead is not listened to any further.
+/// Lines that may wait for their answers; of who sends more ahead nothing but a stop is heard any more.
 const AHEAD: usize = 16;
+/// Of what came behind the last line so much is read, octets, and waited for so long.
+const REST: u64 = 64 << 10;
+const PARTING: Duration = Duration::from_secs(1);
 /// How long a peer may take to read its answer.
 const WRITING: Duration = Duration::from_secs(5);
 
@@ -28,30 +34,53 @@ enum Read {
     Answered(Answer),
 }
 
-/// Who speaks on a connection, and with which hall.
+/// Who speaks on a connection, with which hall, and what they may ask.
 pub(super) struct Talk {
     pub(super) hall: Handle,
     pub(super) who: Who,
+    pub(super) allow: Vec<GearWord>,
+    /// SHA-256 of the token that the first line shows; none where none is wanted.
+    pub(super) token: Option<[u8; 32]>,
     /// A connection without a line for so long is closed.
     pub(super) idle: Duration,
+    /// Its place among the connections.
+    pub(super) place: Place,
+}
+
+/// What comes after a line.
+enum Then {
+    /// Further lines.
+    Listen,
+    /// Nothing: it was no order.
+    End,
 }
 
 impl Talk {
-    /// Talks until the peer leaves, falls silent, or sends what is no line.
-    pub(super) async fn run(&self, stream: TcpStream) {
-        let (incoming, outgoing) = stream.into_split();
+    /// Talks until the peer leaves, falls silent, or sends what is no order, or until another needs its place.
+    pub(super) async fn run(self, stream: TcpStream) {
+        let (mut incoming, outgoing) = stream.into_split();
         let (lines, read) = mpsc::channel(AHEAD);
         let answers = answer(outgoing, read);
         tokio::pin!(answers);
+        let talk = async {
+            tokio::select! {
+                // Who closes its own side still gets its answers.
+                () = self.listen(&mut incoming, lines) => answers.await,
+                () = &mut answers => {}
+            }
+            part(&mut incoming).await;
+        };
         tokio::select! {
-            // Who closes its own side still gets its answers.
-            () = self.listen(incoming, lines) => answers.await,
-            () = &mut answers => {}
+            () = talk => {}
+            () = self.place.leave() => {}
         }
     }
 
-    async fn listen(&self, incoming: OwnedReadHalf, lines: mpsc::Sender<Read>) {
+    async fn listen(&self, incoming: &mut OwnedReadHalf, lines: mpsc::Sender<Read>) {
         let mut incoming = BufReader::new(incoming);
+        // None once lines came faster than their answers: what is left to hear is a stop.
+        let mut lines = Some(lines);
+        let mut wanted = self.token;
         let mut line = Vec::new();
         loop {
             line.clear();
@@ -61,29 +90,74 @@ impl Talk {
                 _ => return, // it left, or fell silent
             }
             let Some(text) = line.strip_suffix(b"\n") else {
-                if line.len() as u64 == LONGEST {
+                if let Some(lines) = lines.filter(|_| line.len() as u64 == LONGEST) {
                     let _ = lines.try_send(Read::Answered(Err(too_long())));
                 }
                 return; // what is left of a line is none
             };
             let text = text.strip_suffix(b"\r").unwrap_or(text);
-            if lines.try_send(self.take(text)).is_err() {
-                return;
+            let Some(to) = &lines else {
+                self.hear_a_stop(text);
+                continue;
+            };
+            let (read, then) = if wanted.is_some() { self.first(text, &mut wanted) } else { self.take(text) };
+            let full = to.try_send(read).is_err();
+            match then {
+                Then::End => return,
+                Then::Listen if full => lines = None,
+                Then::Listen => {}
             }
         }
     }
 
-    fn take(&self, line: &[u8]) -> Read {
-        match order(line) {
-            Ok(Order::Status) => Read::Answered(Ok(self.hall.status())),
+    /// Does what a line asks.
+    fn take(&self, line: &[u8]) -> (Read, Then) {
+        let order = match order(line, &self.allow) {
+            Ok(order) => order,
+            Err(Fault::Refused(problem)) => return (Read::Answered(Err(problem)), Then::Listen),
+            Err(Fault::NoOrder(problem)) => return (Read::Answered(Err(problem)), Then::End),
+        };
+        self.place.show(&self.who.name);
+        let read = match order {
+            Order::Status => Read::Answered(Ok(self.hall.status())),
             // A stop is done with this; its answer is for the journal and the peer.
-            Ok(Order::Ask(ask)) => match self.hall.post(self.who.clone(), ask) {
+            Order::Ask(ask) => match self.hall.post(self.who.clone(), ask) {
                 Ok(posted) => Read::Posted(posted),
                 Err(problem) => Read::Answered(Err(problem)),
             },
-            Err(problem) => Read::Answered(Err(problem)),
+        };
+        (read, Then::Listen)
+    }
+
+    /// The first lines where a token is wanted: it, or a stop, which waits for none.
+    fn first(&self, line: &[u8], wanted: &mut Option<[u8; 32]>) -> (Read, Then) {
+        if matches!(order(line, &[]), Ok(Order::Ask(Ask::Stop))) {
+            return self.take(line);
+        }
+        let token = line.strip_prefix(b"token ").map(|token| Sha256::digest(token.trim_ascii()));
+        let same = |known: &[u8; 32]| token.is_some_and(|token| bool::from(known.ct_eq(token.as_slice())));
+        if wanted.as_ref().is_some_and(same) {
+            *wanted = None;
+            self.place.show(&self.who.name);
+            return (Read::Answered(Ok(self.hall.status())), Then::Listen);
+        }
+        let remedy = "send the line: token TOKEN, with the one whose SHA-256 is token_sha256 of [text]";
+        let problem = Problem::new(Code::Token, "the first line shows no token that is known here", remedy);
+        (Read::Answered(Err(problem)), Then::End)
+    }
+
+    fn hear_a_stop(&self, line: &[u8]) {
+        if matches!(order(line, &[]), Ok(Order::Ask(Ask::Stop))) {
+            self.hall.stop();
+            self.hall.note_stop(self.who.clone());
         }
     }
+}
+
+/// Reads what is left, for a moment: where it is unread at the end, the system takes back the answer that is on its way.
+async fn part(incoming: &mut OwnedReadHalf) {
+    let mut rest = incoming.take(REST);
+    let _ = timeout(PARTING, tokio::io::copy(&mut rest, &mut tokio::io::sink())).await; // it may have left long ago
 }
 
 /// Writes the answers in the order of the lines.
@@ -98,6 +172,7 @@ async fn answer(mut outgoing: OwnedWriteHalf, mut read: mpsc::Receiver<Read>) {
             return;
         }
     }
+    let _ = outgoing.shutdown().await; // so that the peer knows that this was all
 }
 
 /// `ok STATE POSITION` or `error CODE TEXT; REMEDY`, with the end of the line.

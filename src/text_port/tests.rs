@@ -5,10 +5,11 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
+use sha2::{Digest as _, Sha256};
 use tokio::runtime::Builder;
 
 use super::{CONNECTIONS, open};
-use crate::config::TextPort;
+use crate::config::{GearWord, TextPort};
 use crate::hall::{Ask, Code, Inbox, Problem, Role, ShowStatus, Status, Surface, handle};
 use crate::rt::Desk;
 
@@ -23,13 +24,18 @@ struct Stage {
 
 impl Stage {
     fn new() -> Self {
-        Self::with(Ipv4Addr::LOCALHOST, super::IDLE)
+        Self::with(Ipv4Addr::LOCALHOST, super::IDLE, None)
     }
 
-    fn with(source: Ipv4Addr, idle: Duration) -> Self {
+    fn with(source: Ipv4Addr, idle: Duration, token: Option<&str>) -> Self {
         let desk = Arc::new(Desk::new(std::iter::empty()));
         let (hall, inbox, _source) = handle(Arc::clone(&desk), playing());
-        let config = TextPort { listen: SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0), sources: vec![source] };
+        let config = TextPort {
+            listen: SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0),
+            sources: vec![source],
+            allow: GearWord::ALL.map(|(_, word)| word).to_vec(),
+            token: token.map(|token| Sha256::digest(token).into()),
+        };
         let mut text = open(&config, hall).unwrap();
         text.idle = idle;
         let port = text.address().unwrap();
@@ -75,6 +81,7 @@ fn playing() -> Status {
         length_s: 60.0,
         position_s: 12.34,
         join_s: 2.0,
+        resume_s: None,
         axes: 3,
         effects: Vec::new(),
     };
@@ -157,31 +164,87 @@ fn a_line_without_end_and_lines_without_number_end_the_connection() {
 
 #[test]
 fn strangers_are_shut_out_without_a_word() {
-    let stage = Stage::with(Ipv4Addr::new(10, 0, 0, 5), super::IDLE);
+    let stage = Stage::with(Ipv4Addr::new(10, 0, 0, 5), super::IDLE, None);
     let mut peer = stage.connect();
     assert_eq!(peer.line(), "");
 }
 
 #[test]
-fn one_connection_too_many_is_told_so() {
+fn a_page_of_anybody_cannot_have_a_browser_start_the_show() {
     let stage = Stage::new();
-    let mut peers: Vec<Peer> = (0..CONNECTIONS).map(|_| stage.connect()).collect();
-    peers[CONNECTIONS - 1].send(b"status\n");
-    assert!(peers[CONNECTIONS - 1].line().starts_with("ok "));
-    assert_eq!(stage.connect().line(), "error busy 16 connections are open already; close one\r\n");
-    drop(peers.pop());
-    // As soon as its end is noticed there is room.
-    let mut line = String::new();
-    while !line.starts_with("ok ") {
+    for body in ["go\n", "status\r\ngo\r\n"] {
         let mut peer = stage.connect();
-        let _ = peer.0.get_mut().write_all(b"status\n"); // it may have been turned away already
-        line.clear();
-        let _ = peer.0.read_line(&mut line);
+        let head = "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: text/plain;charset=UTF-8\r\n\r\n";
+        peer.send(format!("{head}{body}").as_bytes());
+        assert!(peer.line().starts_with("error value \"POST / HTTP/1.1\" is no line of kinocue"));
+        assert_eq!(peer.line(), "", "and that was all of it");
     }
+    let mut peer = stage.connect();
+    peer.send(b"status\nnonsense\ngo\n");
+    assert!(
+        peer.line().starts_with("ok ") && peer.line().starts_with("error value") && peer.line().is_empty()
+    );
+    assert!(stage.inbox.next(Duration::ZERO).is_none());
+}
+
+#[test]
+fn an_order_with_a_value_that_is_none_is_answered_and_the_next_is_heard() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"trim 501\nstop\n");
+    assert!(peer.line().starts_with("error value \"501\": a trim is"));
+    assert_eq!(stage.asked().desired.ask, Ask::Stop);
+}
+
+#[test]
+fn where_a_token_is_wanted_nothing_but_a_stop_is_taken_without_it() {
+    let stage = Stage::with(Ipv4Addr::LOCALHOST, super::IDLE, Some("hush"));
+    for first in ["go\ngo\n", "status\ngo\n", "token wrong\ngo\n", "token\ngo\n"] {
+        let mut peer = stage.connect();
+        peer.send(first.as_bytes());
+        assert!(peer.line().starts_with("error token "), "{first}");
+        assert_eq!(peer.line(), "", "{first}");
+    }
+    assert!(stage.inbox.next(Duration::ZERO).is_none());
+    let mut peer = stage.connect();
+    peer.send(b"stop\n");
+    assert_eq!(stage.asked().desired.ask, Ask::Stop);
+    assert!(stage.desk.take_stop());
+    let mut peer = stage.connect();
+    peer.send(b"token hush\r\ngo\r\n");
+    assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
+    assert_eq!(stage.asked().desired.ask, Ask::Go);
+}
+
+#[test]
+fn idle_connections_keep_no_stop_out() {
+    let stage = Stage::new();
+    let mut gear = stage.connect();
+    gear.send(b"status\n");
+    assert!(gear.line().starts_with("ok "));
+    let mut idle: Vec<Peer> = (0..2 * CONNECTIONS).map(|_| stage.connect()).collect();
+    let mut peer = stage.connect();
+    peer.send(b"stop\n");
+    assert_eq!(stage.asked().desired.ask, Ask::Stop);
+    assert!(stage.desk.take_stop());
+    assert_eq!(idle[0].line(), "", "the one that was silent longest has made room");
+    gear.send(b"stop\n");
+    assert_eq!(stage.asked().desired.ask, Ask::Stop, "who has asked something keeps a place");
+}
+
+#[test]
+fn a_stop_behind_too_many_lines_is_heard() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(&b"park\n".repeat(100));
+    peer.send(b"stop\n");
+    let stops =
+        std::iter::from_fn(|| stage.inbox.next(PATIENCE)).find(|asked| asked.desired.ask == Ask::Stop);
+    assert!(stops.is_some() && stage.desk.take_stop());
 }
 
 #[test]
 fn a_silent_connection_is_closed() {
-    let stage = Stage::with(Ipv4Addr::LOCALHOST, Duration::from_millis(1));
+    let stage = Stage::with(Ipv4Addr::LOCALHOST, Duration::from_millis(1), None);
     assert_eq!(stage.connect().line(), "");
 }

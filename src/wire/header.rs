@@ -90,8 +90,8 @@ impl ReplyCode {
     }
 }
 
-/// Which family of controllers is spoken to. It decides where errors stand, the word order of positions and what
-/// channel 0 of a register write means; motion is the same for both.
+/// Which family of controllers is spoken to; IMAX controllers are of that of MBOX. It decides where errors stand, the word
+/// order of positions and what channel 0 of a register write means; motion is the same for both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Dialect {
     /// SMC, by its manual.

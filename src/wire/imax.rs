@@ -133,6 +133,12 @@ impl<'a> ImaxRegisters<'a> {
         Ok(Self { access, code, channel: header.slot, start, num, data })
     }
 
+    /// Whether it tells registers, each of 32 bits: no reply with words of 16 has that length.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.code == ReplyCode::Running && self.num > 0
+    }
+
     /// The registers in order; with x = 3 the error number.
     pub fn values(&self) -> impl Iterator<Item = u32> + use<'a> {
         self.data.chunks_exact(4).map(|word| u32_at(word, 0))

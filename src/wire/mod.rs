@@ -17,6 +17,7 @@ mod report;
 mod servo;
 mod status;
 mod vibration;
+mod word_order;
 mod words;
 
 pub use error::{DeviceError, WireError};
@@ -27,10 +28,11 @@ pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_
 pub use per_axis::PerAxis;
 pub use position::{DP_POSITIONS, position, position_reads, position_words, positions};
 pub use register::{Access, ReadRequest, RegisterReply, Space, WriteRequest};
-pub use report::Report;
+pub use report::{DPFE, Report};
 pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
-pub use vibration::Vibration;
+pub use vibration::{Vibration, VibrationPort};
+pub use word_order::{WordOrder, word_order};
 pub use words::{MAX_WORDS, Words};
 
 /// Octets that hold any message we write; the longest carries a whole table of registers.
@@ -67,14 +69,26 @@ impl<'a> Message<'a> {
     /// # Errors
     /// At which octet, and why, these octets are none.
     pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
+        Self::parse_as(VibrationPort::Two, octets)
+    }
+
+    /// The same where Port Out is so in vibration frames.
+    ///
+    /// # Errors
+    /// As [`Message::parse`].
+    pub fn parse_as(port: VibrationPort, octets: &'a [u8]) -> Result<Self, WireError> {
         if octets.len() < header::SLOT {
             return Err(WireError::Short { len: octets.len(), need: header::LEN });
         }
         let found = header::function_at(octets)?;
         let [family, low] = found.to_be_bytes();
         match (family, low) {
-            (family, 1) if motion::is_motion(family) => MotionRequest::parse(octets).map(Self::Motion),
-            (family, _) if motion::is_motion(family) => MotionReply::parse(octets).map(Self::MotionReply),
+            (family, 1) if motion::is_motion(family) => {
+                MotionRequest::parse_as(port, octets).map(Self::Motion)
+            }
+            (family, _) if motion::is_motion(family) => {
+                MotionReply::parse_as(port, octets).map(Self::MotionReply)
+            }
             (register::READ, 1) => ReadRequest::parse(octets).map(Self::Read),
             (register::WRITE, 1) => WriteRequest::parse(octets).map(Self::Write),
             (register::READ | register::WRITE, _) => RegisterReply::parse(octets).map(Self::RegisterReply),

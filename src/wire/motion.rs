@@ -3,14 +3,14 @@
 
 use super::header::{self, Header, reply_function, request_function};
 use super::octets::{i32_at, put_i32, put_u16, put_u32, u16_at, u32_at};
-use super::{Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, WireError, vibration};
+use super::{Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, VibrationPort, WireError, vibration};
 use crate::motion::{MAX_AXES, Pulses};
 
 mod field {
     pub(super) const FRAME: usize = 12; // u32
     pub(super) const TIME: usize = 16; // u32, ms to reach the position
     pub(super) const POSITIONS: usize = 20; // n x i32; then Port u16, then Extend u32 or n x vibration
-    pub(super) const PORT_LEN: usize = 2;
+    pub(super) const PORT_LEN: usize = 2; // with vibration as VibrationPort says
     pub(super) const EXTEND_LEN: usize = 4;
 }
 
@@ -41,7 +41,7 @@ pub const fn motion_channel_and_slots(axes: usize) -> (u16, usize) {
 }
 
 /// A motion frame to send, host to controller: 38 octets for three axes, 50 for six, 66 for ten, 74 for twelve, with
-/// vibration 46 for three and 70 for six. Extend, which switches analogue outputs, is always 0.
+/// vibration 46 for three and 70 for six, or two more. Extend, which switches analogue outputs, is always 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Motion<'a> {
     /// What `time_ms` counts from.
@@ -67,6 +67,11 @@ pub struct Motion<'a> {
 impl Motion<'_> {
     /// Writes the message to the front of `buf` and returns it; nothing of what was there is kept.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        self.emit_as(VibrationPort::Two, buf)
+    }
+
+    /// The same for a controller that has Port Out so in vibration frames.
+    pub fn emit_as<'b>(&self, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(family(self.timing, self.vibration.is_some()));
         let header = Header { function, slot: self.channel, accept: self.accept, reply: self.reply };
         let body = Body {
@@ -77,7 +82,7 @@ impl Motion<'_> {
             extend: 0,
             vibration: self.vibration,
         };
-        body.emit(header, buf)
+        body.emit(header, port, buf)
     }
 }
 
@@ -113,8 +118,17 @@ impl MotionRequest {
     /// [`WireError::Axes`] for a channel that means no number of axes, [`WireError::Length`] where it is shorter
     /// than its axes need, and those of a broken header or another function.
     pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
+        Self::parse_as(VibrationPort::Two, octets)
+    }
+
+    /// The same, of a host that has Port Out so in vibration frames.
+    ///
+    /// # Errors
+    /// As [`MotionRequest::parse`].
+    pub fn parse_as(port: VibrationPort, octets: &[u8]) -> Result<Self, WireError> {
         let header = Header::parse(octets)?;
         let (timing, vibrating) = layout(header.family()).ok_or(header.foreign())?;
+        let vibrating = vibrating.then_some(port);
         if !header.is_request() {
             return Err(header.foreign());
         }
@@ -136,6 +150,11 @@ impl MotionRequest {
 
     /// Writes the frame to the front of `buf` and returns it, Extend as it is.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        self.emit_as(VibrationPort::Two, buf)
+    }
+
+    /// The same for a controller that has Port Out so in vibration frames.
+    pub fn emit_as<'b>(&self, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = self.function();
         let header = Header { function, slot: self.channel, accept: self.accept, reply: self.reply };
         let body = Body {
@@ -146,7 +165,7 @@ impl MotionRequest {
             extend: self.extend,
             vibration: self.vibration.as_deref(),
         };
-        body.emit(header, buf)
+        body.emit(header, port, buf)
     }
 
     /// Its function code.
@@ -157,8 +176,8 @@ impl MotionRequest {
 
     /// Octets of its layout; what a datagram has beyond them is surplus.
     #[must_use]
-    pub fn layout_len(&self) -> usize {
-        motion_len(self.positions.len(), self.vibration.is_some())
+    pub fn layout_len(&self, port: VibrationPort) -> usize {
+        motion_len(self.positions.len(), self.vibration.map(|_| port))
     }
 }
 
@@ -195,9 +214,18 @@ impl MotionReply {
     /// [`WireError::Function`] for requests and any other function, [`WireError::Axes`] or [`WireError::Length`]
     /// where not even one axis fits, and those of a broken header.
     pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
+        Self::parse_as(VibrationPort::Two, octets)
+    }
+
+    /// The same, of a controller that has the inputs so in its answers to vibration frames.
+    ///
+    /// # Errors
+    /// As [`MotionReply::parse`].
+    pub fn parse_as(port: VibrationPort, octets: &[u8]) -> Result<Self, WireError> {
         let header = Header::parse(octets)?;
         let (timing, vibrating) = layout(header.family()).ok_or(header.foreign())?;
         let code = header.reply_code().ok_or(header.foreign())?;
+        let vibrating = vibrating.then_some(port);
         let body = read(octets, axes_that_fit(octets.len(), vibrating), vibrating)?;
         let running = code == ReplyCode::Running;
         Ok(Self {
@@ -240,6 +268,11 @@ impl MotionReply {
 
     /// Writes the reply to the front of `buf` and returns it; nothing of what was there is kept.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        self.emit_as(VibrationPort::Two, buf)
+    }
+
+    /// The same of a controller that has the inputs so in its answers to vibration frames.
+    pub fn emit_as<'b>(&self, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = reply_function(family(self.timing, self.vibration.is_some()), self.code);
         let slot = if self.code == ReplyCode::Running { self.channel } else { self.error };
         let body = Body {
@@ -250,21 +283,29 @@ impl MotionReply {
             extend: self.extend,
             vibration: self.vibration.as_deref(),
         };
-        body.emit(Header { function, slot, accept: Code::NONE, reply: Code::NONE }, buf)
+        body.emit(Header { function, slot, accept: Code::NONE, reply: Code::NONE }, port, buf)
     }
 
     /// Octets of its layout; what a datagram has beyond them is surplus.
     #[must_use]
-    pub fn layout_len(&self) -> usize {
-        motion_len(self.positions.len(), self.vibration.is_some())
+    pub fn layout_len(&self, port: VibrationPort) -> usize {
+        motion_len(self.positions.len(), self.vibration.map(|_| port))
     }
 }
 
-/// Octets of a motion frame, or of its reply, with so many positions.
+/// Octets of a motion frame, or of its reply, with so many positions, and with vibration where `vibrating` says how wide its
+/// port is.
 #[must_use]
-pub const fn motion_len(axes: usize, vibrating: bool) -> usize {
-    let tail = if vibrating { vibration::LEN * axes } else { field::EXTEND_LEN };
-    field::POSITIONS + 4 * axes + field::PORT_LEN + tail
+pub const fn motion_len(axes: usize, vibrating: Option<VibrationPort>) -> usize {
+    let tail = if vibrating.is_some() { vibration::LEN * axes } else { field::EXTEND_LEN };
+    field::POSITIONS + 4 * axes + port_len(vibrating) + tail
+}
+
+const fn port_len(vibrating: Option<VibrationPort>) -> usize {
+    match vibrating {
+        Some(port) => port.len(),
+        None => field::PORT_LEN,
+    }
 }
 
 const fn family(timing: Timing, vibrating: bool) -> u8 {
@@ -293,14 +334,18 @@ pub(super) const fn is_motion(family: u8) -> bool {
 }
 
 /// The most axes that fit into `octets` octets.
-const fn axes_that_fit(octets: usize, vibrating: bool) -> usize {
-    let per_axis = if vibrating { 4 + vibration::LEN } else { 4 };
+const fn axes_that_fit(octets: usize, vibrating: Option<VibrationPort>) -> usize {
+    let per_axis = if vibrating.is_some() { 4 + vibration::LEN } else { 4 };
     let axes = octets.saturating_sub(motion_len(0, vibrating)) / per_axis;
     if axes > MAX_AXES { MAX_AXES } else { axes }
 }
 
 /// Manuals and programs disagree on channel 2 and above: 2 is taken from the length, 3 to 12 at their word.
-fn axes_of_request(channel: u16, octets: usize, vibrating: bool) -> Result<usize, WireError> {
+fn axes_of_request(
+    channel: u16,
+    octets: usize,
+    vibrating: Option<VibrationPort>,
+) -> Result<usize, WireError> {
     match channel {
         0 => Ok(3),
         1 => Ok(6),
@@ -321,7 +366,8 @@ struct Body<'a> {
 }
 
 impl Body<'_> {
-    fn emit<'b>(&self, header: Header, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    fn emit<'b>(&self, header: Header, port: VibrationPort, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+        let vibrating = self.vibration.map(|_| port);
         header.emit(buf);
         put_u32(buf, field::FRAME, self.frame.0);
         put_u32(buf, field::TIME, self.time_ms);
@@ -330,8 +376,9 @@ impl Body<'_> {
             put_i32(buf, field::POSITIONS + 4 * axis, position.0);
         }
         let port = field::POSITIONS + 4 * axes;
-        put_u16(buf, port, self.port);
-        let tail = port + field::PORT_LEN;
+        let tail = port + port_len(vibrating);
+        buf[port..tail].fill(0);
+        put_u16(buf, tail - 2, self.port);
         if let Some(vibration) = self.vibration {
             for axis in 0..axes {
                 let shake = vibration.get(axis).copied().unwrap_or(Vibration::NONE);
@@ -340,7 +387,7 @@ impl Body<'_> {
         } else {
             put_u32(buf, tail, self.extend);
         }
-        &buf[..motion_len(axes, self.vibration.is_some())]
+        &buf[..motion_len(axes, vibrating)]
     }
 }
 
@@ -354,20 +401,19 @@ struct ReadBody {
     vibration: Option<PerAxis<Vibration>>,
 }
 
-fn read(octets: &[u8], axes: usize, vibrating: bool) -> Result<ReadBody, WireError> {
+fn read(octets: &[u8], axes: usize, vibrating: Option<VibrationPort>) -> Result<ReadBody, WireError> {
     let need = motion_len(axes.max(1), vibrating);
     if octets.len() < need {
         return Err(WireError::Length { len: octets.len(), need });
     }
-    let port = field::POSITIONS + 4 * axes;
-    let tail = port + field::PORT_LEN;
+    let tail = field::POSITIONS + 4 * axes + port_len(vibrating);
     Ok(ReadBody {
         frame: FrameNo(u32_at(octets, field::FRAME)),
         time_ms: u32_at(octets, field::TIME),
         positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(octets, field::POSITIONS + 4 * axis))),
-        port: u16_at(octets, port),
-        extend: if vibrating { 0 } else { u32_at(octets, tail) },
+        port: u16_at(octets, tail - 2),
+        extend: if vibrating.is_some() { 0 } else { u32_at(octets, tail) },
         vibration: vibrating
-            .then(|| PerAxis::from_fn(axes, |axis| Vibration::at(octets, tail + vibration::LEN * axis))),
+            .map(|_| PerAxis::from_fn(axes, |axis| Vibration::at(octets, tail + vibration::LEN * axis))),
     })
 }

@@ -171,11 +171,22 @@ impl<'a> RegisterReply<'a> {
         words::emit_some(buf, self.start, self.num, self.data)
     }
 
-    /// Reads a reply, x = 2 to 5; octets after it are let pass.
+    /// The registers that it tells. A refusal of an MBOX controller tells none: what stands there is an error number (IMAX
+    /// manual 2.2.2.3). SMC controllers answer in every state, and x over 2 says which.
+    #[must_use]
+    pub fn values(&self, dialect: Dialect) -> Words<'a> {
+        match dialect {
+            Dialect::Mbox if self.code.refused() => Words::EMPTY,
+            _ => self.data,
+        }
+    }
+
+    /// Reads a reply, x = 2 to 5. Nothing may follow its words: a reply with registers of 32 bits, as the IMAX manual has
+    /// them (2.3), would else be read as values that nobody sent.
     ///
     /// # Errors
-    /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Count`] for more than 256,
-    /// and those of a broken header or another function.
+    /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Surplus`] where it goes on,
+    /// [`WireError::Count`] for more than 256 words, and those of a broken header or another function.
     pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
         let header = Header::parse(octets)?;
         let access = match header.family() {
@@ -186,6 +197,11 @@ impl<'a> RegisterReply<'a> {
         let code = header.reply_code().ok_or(header.foreign())?;
         let running = code == ReplyCode::Running;
         let (start, num, data) = if running { words::answer(octets)? } else { words::refusal(octets)? };
+        // A refusal may bring an error number in place of its words.
+        let need = words::HEAD_LEN + 2 * usize::from(if running { num } else { num.max(1) });
+        if octets.len() > need {
+            return Err(WireError::Surplus { len: octets.len(), need });
+        }
         Ok(Self {
             access,
             code,

@@ -7,6 +7,10 @@ use super::{Code, MAX_LEN, WireError};
 /// High octet of the function.
 pub(super) const FAMILY: u8 = 0x10;
 
+/// The monitor register DPFE: which alarm the drives of an IMAX or MBOX controller have, 0 for none. On SMC it is the minor
+/// version (2.3.3 of both manuals).
+pub const DPFE: u16 = 0xfe;
+
 /// Controller to host: what stands in these registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Report<'a> {

@@ -7,6 +7,37 @@ pub(super) const LEN: usize = 4;
 /// Steps of a period in one second: 0.125 ms each.
 const STEPS_PER_SECOND: f64 = 8_000.0;
 
+/// How many octets Port Out takes in a frame with vibration, and the inputs in the answer to it. The SMC manual prints 4
+/// (2.2.2.9), but so it does for other messages, in which everybody sends and answers 2. Nobody is known to have seen one with
+/// vibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum VibrationPort {
+    /// As in frames without vibration.
+    #[default]
+    Two,
+    /// As printed: bit 0 = Y01 in the last octet, the first two mean nothing.
+    Four,
+}
+
+impl VibrationPort {
+    /// The one of so many octets; none where that is neither 2 nor 4.
+    #[must_use]
+    pub const fn of_octets(octets: u8) -> Option<Self> {
+        match octets {
+            2 => Some(Self::Two),
+            4 => Some(Self::Four),
+            _ => None,
+        }
+    }
+
+    pub(super) const fn len(self) -> usize {
+        match self {
+            Self::Two => 2,
+            Self::Four => 4,
+        }
+    }
+}
+
 /// What shakes an axis about its position; none where either number is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Vibration {

@@ -96,3 +96,49 @@ fn playlists_and_reports_are_read_where_they_lie() {
     let report = hall.socket().get("/api/v1/reports/2026-01-31");
     assert!(report.status == 200 || report.problem() == problem(500, "file"), "{}", report.text());
 }
+
+#[test]
+fn reports_of_a_great_day_are_bounded_whole_and_made_in_turn() {
+    let hall = Hall::open();
+    let dir = hall.dir.path().join("journal");
+    fs::create_dir_all(&dir).unwrap();
+    let action = |n: usize| {
+        let what = "x".repeat(6_000);
+        let at = "2026-01-31T10:00:00.000+00:00";
+        format!(
+            "{{\"kind\":\"action\",\"at\":\"{at}\",\"who\":\"eve {n}\",\"what\":\"{what}\",\"result\":\"no\",\"state\":\"parked\"}}\n"
+        )
+    };
+    let text: String = (0..300).map(action).collect();
+    for file in 0..18 {
+        fs::write(dir.join(format!("kinocue-2026-01-31-{file:03}.jsonl")), &text).unwrap();
+    }
+    // One that is not read to its end keeps the others waiting for a while at the most.
+    let mut slow = hall.socket().connect();
+    slow.write_all(&Request::new("GET", "/api/v1/reports/2026-01-31").octets(&hall.socket())).unwrap();
+    drop(slow);
+    let report = hall.socket().get("/api/v1/reports/2026-01-31");
+    assert_eq!(report.status, 200, "{}", report.text());
+    assert_eq!(report.header("content-type"), Some("application/json"));
+    assert!(report.body.len() < 5_000 * 600, "{} octets", report.body.len());
+    let report: serde_json::Value = serde_json::from_slice(&unchunked(&report.body)).unwrap();
+    assert_eq!(report["actions"].as_array().unwrap().len(), 5_000);
+    assert_eq!(
+        report["notes"][0],
+        "400 things that were asked before these are left out; `kinocue report` has them"
+    );
+}
+
+/// What is in the chunks of a body.
+fn unchunked(mut body: &[u8]) -> Vec<u8> {
+    let mut octets = Vec::new();
+    loop {
+        let end = body.windows(2).position(|two| two == b"\r\n").unwrap();
+        let length = usize::from_str_radix(std::str::from_utf8(&body[..end]).unwrap(), 16).unwrap();
+        if length == 0 {
+            return octets;
+        }
+        octets.extend_from_slice(&body[end + 2..end + 2 + length]);
+        body = &body[end + 4 + length..];
+    }
+}

@@ -88,6 +88,27 @@ fn there_is_room_for_so_many_and_a_place_is_free_again_when_one_goes() {
 }
 
 #[test]
+fn viewers_who_watch_do_not_shut_the_booth_out() {
+    let hall = Hall::with(long_status(), |api| kinocue::config::Api {
+        open_role: Some(kinocue::hall::Role::View),
+        ..api
+    });
+    let watch = |token: Option<&str>| {
+        let request = Request::new("GET", "/api/v1/events");
+        let request = token.into_iter().fold(request, Request::token);
+        let mut connection = hall.port().connect();
+        connection.write_all(&request.octets(&hall.port())).unwrap();
+        Events(BufReader::new(connection))
+    };
+    let mut viewers: Vec<_> = (0..16).map(|_| watch(None)).collect();
+    viewers.extend((0..16).map(|_| watch(Some("guest-token"))));
+    viewers.iter_mut().for_each(|events| {
+        events.next();
+    });
+    watch(Some("booth-token")).next();
+}
+
+#[test]
 fn streams_end_with_the_server() {
     let mut hall = Hall::open();
     let mut events = Events::open(&hall.socket());

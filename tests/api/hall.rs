@@ -196,6 +196,7 @@ pub fn long_status() -> Status {
         who: "x".repeat(5000),
         what: String::new(),
         result: String::new(),
+        times: 1,
     };
     Status { journal: (0..20).map(line).collect(), ..with_controller() }
 }
@@ -226,6 +227,7 @@ pub fn with_controller() -> Status {
         emergency_stop: false,
         error: None,
         servo_errors: None,
+        belts_open: None,
         inputs: None,
         outputs: None,
         positions_mm: None,

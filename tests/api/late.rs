@@ -32,6 +32,17 @@ fn of_two_requests_with_one_key_the_second_does_nothing() {
 }
 
 #[test]
+fn a_stop_is_done_each_time_whatever_key_comes_with_it() {
+    let hall = Hall::open();
+    go().header("Idempotency-Key", "b").send(&hall.socket());
+    for key in ["a", "a", "b", "a b"] {
+        let stop = Request::new("POST", "/api/v1/show/stop").header("Idempotency-Key", key);
+        assert_eq!(stop.send(&hall.socket()).state(), "stopping", "{key}");
+        assert!(hall.desk.take_stop(), "{key}: not the reply of before alone");
+    }
+}
+
+#[test]
 fn a_key_is_its_owners_and_a_refusal_is_repeated_too() {
     let hall = Hall::open();
     let resume = |token: &str| {
@@ -73,7 +84,9 @@ fn a_go_that_is_old_or_from_the_future_does_nothing() {
 fn over_tcp_a_go_has_to_say_when_it_was_sent() {
     let hall = Hall::open();
     let go = go().token("tablet-token");
-    assert_eq!(go.clone().send(&hall.port()).problem(), problem(400, "value"));
+    for go in [go.clone(), go.clone().json(r#"{"from_s":1}"#)] {
+        assert_eq!(go.send(&hall.port()).problem(), problem(400, "value"));
+    }
     assert!(hall.asks().is_empty());
     assert_eq!(go.sent_ago(0).send(&hall.port()).state(), "joining");
 }

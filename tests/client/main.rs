@@ -43,6 +43,7 @@ fn each_command_is_one_request_in_the_words_of_the_api() {
         (vec!["arm", "--seats-empty"], "POST", "/api/v1/show/arm", json!({"seats_empty": true})),
         (vec!["disarm"], "POST", "/api/v1/show/disarm", json!({})),
         (vec!["go"], "POST", "/api/v1/show/go", json!({})),
+        (vec!["go", "--from", "12:30"], "POST", "/api/v1/show/go", json!({ "from_s": 750.0 })),
         (vec!["pause"], "POST", "/api/v1/show/pause", json!({})),
         (vec!["resume"], "POST", "/api/v1/show/resume", json!({})),
         (vec!["park"], "POST", "/api/v1/show/park", json!({})),
@@ -69,6 +70,12 @@ fn each_command_is_one_request_in_the_words_of_the_api() {
         (vec!["preset", "kids show"], "POST", "/api/v1/presets/kids%20show", json!({})),
         (vec!["enable", "A2"], "POST", "/api/v1/controllers/A2/enable", json!({})),
         (vec!["disable", "A2"], "POST", "/api/v1/controllers/A2/disable", json!({})),
+        (
+            vec!["disable", "A2", "--why", "broken leg"],
+            "POST",
+            "/api/v1/controllers/A2/disable",
+            json!({ "why": "broken leg" }),
+        ),
     ] {
         let daemon = Daemon::with(hall("armed"));
         let run = daemon.run(&args);

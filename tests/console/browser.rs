@@ -12,6 +12,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
+use crate::programs::is_installed;
+
 /// Nothing is waited for longer; where all is well a second does.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// The key of an element in replies, as the standard has it.
@@ -32,15 +34,10 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// A browser, or none where it is not installed, which it says.
+    /// A browser; none where it is not installed, and somebody asked for tests without it.
     pub(crate) fn start() -> Option<Self> {
-        for program in ["chromium", "chromedriver"] {
-            let paths = std::env::var_os("PATH").unwrap_or_default();
-            if !std::env::split_paths(&paths).any(|folder| folder.join(program).is_file()) {
-                let hint = "install chromium and chromium-driver to test the console in a browser";
-                let _ = writeln!(std::io::stderr(), "skipped: no {program} is installed; {hint}");
-                return None;
-            }
+        if !["chromium", "chromedriver"].into_iter().all(is_installed) {
+            return None;
         }
         let only = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let mut driver = Command::new("chromedriver")

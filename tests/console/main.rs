@@ -1,9 +1,11 @@
 //! The console as a technician uses it: in a real browser, against a real `kinocue serve` and virtual controllers. Pictures of
-//! what was seen are kept in `target/console-shots`. Where there is no chromium the tests say so and are skipped.
+//! what was seen are kept in `target/console-shots`.
 
 #[path = "../common/process.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod process;
+#[path = "../common/programs.rs"]
+mod programs;
 #[path = "../common/serving.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod serving;
@@ -109,6 +111,40 @@ fn a_show_is_armed_played_paused_turned_down_and_stopped_from_the_page() {
     browser.shot("08-stopped");
     browser.press("#clear");
     browser.reads("state", "recovering");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn a_seat_is_taken_out_with_a_reason_and_a_stopped_show_goes_on_where_it_was_left() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open();
+    enter(&browser, &hall);
+    arm(&browser);
+    go(&browser);
+    browser.press("[data-controller=A2]");
+    browser.press("#controller-why");
+    browser.type_text("broken leg");
+    browser.press("#controller-disable");
+    browser.reads("controller", "by booth: broken leg");
+    browser.wait("/^00:0[3-9]/.test(document.getElementById('position').textContent)");
+    browser.touch("#stop");
+    browser.reads("state", "stopped");
+    browser.press("#clear");
+    browser.reads("next", "park, or home");
+    browser.press("#park");
+    browser.reads("state", "parked");
+    browser.press("#arm");
+    browser.reads("show-reply", "a2: out since");
+    browser.wait("document.getElementById('resume').hidden");
+    browser.reads("go-from", "from 00:");
+    browser.shot("09-go-from");
+    browser.press("#go-from");
+    browser.reads("go-from", "sure?");
+    browser.wait("(window.fromPressed ??= performance.now()) + 400 < performance.now()");
+    browser.press("#go-from");
+    browser.reads("state", "playing");
+    browser.wait("document.getElementById('go-from').hidden && !document.getElementById('resume').hidden");
+    browser.wait("/^00:(0[3-9]|[1-5])/.test(document.getElementById('position').textContent)");
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 

@@ -56,6 +56,22 @@ fn after_a_crash_in_mid_show_nothing_moves_until_a_person_parks_the_seats() {
 }
 
 #[test]
+fn preflight_on_the_heels_of_the_start_finds_nobody_who_is_not_there() {
+    let mut hall = Hall::closed(&[], |config| config);
+    hall.launch();
+    // 69: there is no socket yet.
+    let asks = std::iter::repeat_with(|| hall.run(&["preflight"])).take(1_000);
+    let told = asks.into_iter().find(|run| run.code != Some(69)).expect("it comes up");
+    assert_eq!(told.code, Some(0), "{told:?}");
+    let preflight = &hall.status()["preflight"];
+    let findings = preflight["findings"].as_array().expect("a list");
+    let of_others = ["other-master", "foreign-replies", "two-answer", "contradiction"];
+    let strangers = findings.iter().filter(|one| of_others.iter().any(|id| one["id"] == *id));
+    assert_eq!(strangers.count(), 0, "{preflight}");
+    hall.comes_to("parked");
+}
+
+#[test]
 fn a_second_daemon_is_refused_by_the_port_and_by_the_socket_and_the_first_goes_on() {
     let port = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let hall = Hall::open_with(|config| config.replace("127.0.0.1:0", &port.to_string()));

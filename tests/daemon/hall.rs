@@ -61,9 +61,14 @@ impl Hall {
         hall
     }
 
+    /// Starts the daemon, and waits for nothing.
+    pub(crate) fn launch(&mut self) {
+        self.serving = Some(Serving::start(self.dir.path()));
+    }
+
     /// Starts the daemon.
     pub(crate) fn serve(&mut self) {
-        self.serving = Some(Serving::start(self.dir.path()));
+        self.launch();
         let begun = |line: &str| ["parked: ", "recovering: "].iter().any(|state| line.contains(state));
         self.serving().heard(|line| begun(line).then_some(()));
     }

@@ -18,7 +18,9 @@ mod serving;
 
 mod begin;
 mod hall;
+mod lasting;
 mod library;
+mod mbox;
 mod playlist;
 mod show;
 mod signals;

@@ -125,3 +125,23 @@ fn a_sweep_tries_each_axis_and_effect_of_two_seats_and_gives_a_table() {
     assert!(seen.farthest(0) > 50_000, "30 mm are 60,000 pulses");
     assert!(seen.rest_in_park(), "{:?}", seen.controllers);
 }
+
+#[test]
+fn go_waits_for_an_open_belt_and_the_status_says_whose() {
+    let hall = Hall::open_with(|config| {
+        let config = config.replace("[show]\n", "[show]\nbelts = \"all\"\n");
+        config.replace("seat = \"bench3\"\n", "seat = \"bench3\"\nbelt_inputs = [2]\n")
+    });
+    hall.arm("ride");
+    let belt = |status: &Value| status["controllers"][1]["belts_open"].clone();
+    hall.happens("2@X2=1");
+    let status = hall.wait(|status| belt(status) == serde_json::json!([2]));
+    assert_eq!(status["next"], "GO waits until these are buckled: A2 (X02)");
+    let refused = hall.run(&["go"]);
+    assert_eq!(refused.code, Some(75), "{refused:?}");
+    assert!(refused.stderr.contains("not buckled: A2 (X02)"), "{refused:?}");
+    hall.happens("2@X2=0");
+    hall.wait(|status| belt(status) == serde_json::json!([]));
+    hall.done(&["go"]);
+    hall.comes_to("parked");
+}

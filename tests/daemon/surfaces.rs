@@ -97,7 +97,8 @@ impl Gear {
 fn osc_lets_an_armed_show_go_and_stops_it_but_never_arms_homes_or_clears() {
     let port = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let hall = Hall::open_with(|config| {
-        config + &format!("[osc]\nlisten = \"{port}\"\nsources = [\"127.0.0.1\"]\n")
+        config
+            + &format!("[osc]\nlisten = \"{port}\"\nsources = [\"127.0.0.1\"]\nallow = [\"go\", \"park\"]\n")
     });
     let gear = Gear { socket: UdpSocket::bind("127.0.0.1:0").unwrap(), to: port };
     hall.done(&["load", "night"]);

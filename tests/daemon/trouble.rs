@@ -91,7 +91,7 @@ fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_a
     let lost = hall.wait(|status| standing(status, 1) == "lost");
     assert!(lost["state"] == "playing" && plays_on(&lost, 0), "{lost}");
     let told = warning(&lost, "A2").expect("it is told");
-    assert!(told["text"].as_str().unwrap().contains("no ack"), "{told}");
+    assert!(told["text"].as_str().unwrap().contains("missing for over 50 ms"), "{told}");
     assert!(told["remedy"].as_str().unwrap().contains("power and network"), "{told}");
     hall.serving().heard(|line| (line.contains("controller-lost") && line.contains("A2")).then_some(()));
     let acked = |status: &Value| status["controllers"][0]["acked"].as_u64();
@@ -209,4 +209,18 @@ fn another_machine_that_drives_a_seat_at_rest_is_a_fault_and_the_seat_is_homed_b
     hall.comes_to("playing");
     hall.comes_to("parked");
     assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn the_halls_homing_refuses_a_controller_that_would_not_search_its_zero() {
+    let mut hall = Hall::closed(&["--pa", "0e=1"], |config| config);
+    hall.serve();
+    hall.run(&["home", "--seats-empty"]);
+    let told = |status: &Value| {
+        let warnings = status["warnings"].as_array().expect("a list");
+        let texts = warnings.iter().filter_map(|warning| warning["text"].as_str());
+        texts.filter(|text| text.contains("without searching it (PA0e = 1)")).count() == 2
+    };
+    let status = hall.wait(|status| status["state"] == "fault" && told(status));
+    assert_eq!(status["cause"], "A1: a seat did not get home");
 }

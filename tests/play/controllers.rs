@@ -75,20 +75,27 @@ fn lost_and_repeated_answers_are_counted_and_leave_0() {
 }
 
 #[test]
-fn late_answers_are_acks_with_their_latency_up_to_a_second_and_stale_after() {
+fn late_answers_are_acks_with_their_latency_and_a_seat_whose_answers_are_a_second_late_is_not_moved() {
     let folder = Folder::new();
     let cue = folder.nod(&[0.1]);
-    let (slow, asleep) = (Sim::one(&["--delay", "80ms"]), Sim::one(&["--delay", "1.2s"]));
+    let (slow, asleep) = (Sim::one(&["--delay", "25ms"]), Sim::one(&["--delay", "1.2s"]));
     let late = Playing::start(&cue, &slow.to(), &["--json"]);
-    let stale = Playing::start(&cue, &asleep.to(), &["--json"]).finish().report_of(69);
+    let unsure = Playing::start(&cue, &asleep.to(), &["--json"]).finish();
     let late = late.finish().report_of(0);
     let one = first(&late);
     assert_eq!(one["acked"], one["sent"], "{one}");
-    assert!(one["ack_us"]["p50"].as_f64() > Some(80_000.0), "{one}");
-    let one = first(&stale);
-    assert_eq!((&one["lost"], &one["acked"]), (&one["asked"], &0.into()), "{one}");
-    assert!(one["stale"].as_u64() > Some(0), "{one}");
-    assert_eq!(one["homing"], 1, "its positions came too late as well: {one}");
+    assert!(one["ack_us"]["p50"].as_f64() > Some(25_000.0), "{one}");
+    // Its positions came too late as well, and so did the acks of the slow frame to park.
+    assert_eq!(unsure.code, Some(75), "{unsure:?}");
+    assert!(unsure.stderr.contains("cannot be brought to park for certain"), "{unsure:?}");
+}
+
+#[test]
+fn a_seat_whose_acks_come_later_than_a_gap_lasts_is_brought_to_rest_and_named() {
+    let folder = Folder::new();
+    let slow = Sim::one(&["--delay", "90ms"]);
+    let run = Playing::start(&folder.nod(&[0.1]), &slow.to(), &["--json"]).finish();
+    assert!(run.stdout.contains("were missing for over 50 ms"), "{run:?}");
 }
 
 #[test]
@@ -100,7 +107,7 @@ fn a_controller_that_goes_silent_mid_show_is_told_by_69() {
     drop(sim);
     let report = playing.finish().report_of(69);
     let one = first(&report);
-    assert!(one["acked"].as_u64() >= Some(20) && one["lost"].as_u64() > Some(20), "{one}");
+    assert!(one["acked"].as_u64() >= Some(20) && one["lost"].as_u64() > Some(3), "{one}");
     assert!(one["sent"].as_u64() < Some(100), "it gets nothing more once it is given up: {one}");
 }
 

@@ -93,6 +93,22 @@ fn absolute_time_goes_on_by_one_period_from_frame_to_frame() {
 }
 
 #[test]
+fn a_controller_whose_port_out_takes_four_octets_with_vibration_shakes_and_switches() {
+    let folder = Folder::new();
+    let row = |at_ms: u32| format!("{at_ms},0.1{}\n", if at_ms < 2_200 { ",0,0,0" } else { ",20,0.01,1" });
+    let rows: String = (0..=2_400).step_by(10).map(row).collect();
+    let cue = folder.write("shake.csv", format!("time_ms,a1,v1_hz,v1_amp,fx_air\n{rows}"));
+    let sim = Sim::one(&["--vibration-port-octets", "4"]);
+    let to = [format!("{},vibration_port_octets=4", sim.addresses[0])];
+    assert_all_acked(&play(&cue, &to, &["--json"]).report_of(0));
+    let seen = sim.end();
+    assert_eq!(functions(&seen), ["0x1901"]);
+    assert!(seen.rows.iter().any(|row| row.outputs == 1), "Y01 is air");
+    assert!(seen.rows.iter().all(|row| row.outputs <= 1), "and nothing else was on");
+    assert!(seen.rest_in_park());
+}
+
+#[test]
 fn vibration_goes_in_frames_of_its_own_kind_and_is_still_at_the_end() {
     let folder = Folder::new();
     // The seat stands at a tenth of its stroke, and in the last fifth of a second the first axis shakes.

@@ -62,11 +62,13 @@ fn when(events: &[(f64, &str)], what: &str) -> f64 {
 #[test]
 fn a_controller_that_falls_silent_is_given_up_and_joins_again_once_it_speaks_while_the_other_plays_on() {
     let hall = Hall::open();
-    let playing = hall.play(9);
+    let mut playing = hall.play(9);
     hall.frame(300);
     tell(&hall.control, "2@mute=1");
-    hall.frame(400);
+    playing.wait_for("c2: lost: no ack and no report for too long; next: look at its power and network");
     tell(&hall.control, "2@mute=0");
+    playing.wait_for("c2: back as it was; it joins again from where it stands");
+    playing.wait_for("c2: takes part again");
     let report = playing.finish().report_of(0);
     let [first, second] = [0, 1].map(|index: usize| &report["controllers"][index]);
     assert_eq!(first["sent"], report["ticks"], "the other plays on: {report}");
@@ -92,9 +94,10 @@ fn a_controller_that_restarts_is_not_trusted_with_a_position_any_more() {
 #[test]
 fn an_emergency_stop_at_one_seat_stops_the_hall_and_that_seat_gets_no_further_frame() {
     let hall = Hall::open();
-    let playing = hall.play(9);
+    let mut playing = hall.play(9);
     hall.frame(300);
     tell(&hall.control, "2@X1=1");
+    playing.wait_for("c2: stopped: emergency stop; next: release");
     let report = playing.finish().report_of(76);
     assert_eq!(report["result"], "stopped", "{report}");
     let told = events(&report, "c2");

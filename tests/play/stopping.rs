@@ -61,7 +61,7 @@ fn a_second_sigterm_changes_nothing() {
 }
 
 #[test]
-fn a_second_ctrl_c_ends_at_once_and_the_next_play_brings_the_seat_home_slowly() {
+fn a_second_ctrl_c_ends_at_once_and_the_next_play_joins_from_where_that_left_the_seat() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let relay = Relay::start(&sim.addresses[0]);
     // From the middle of the stroke the way to park takes a second and a half.
@@ -70,21 +70,21 @@ fn a_second_ctrl_c_ends_at_once_and_the_next_play_brings_the_seat_home_slowly() 
     playing.signal(Signal::INT);
     // Twice within an instant is one press that came by two ways.
     playing.signal(Signal::INT);
+    playing.wait_for("half a second from now on Ctrl-C again would end it at once");
     playing.wait_for("Ctrl-C again ends at once");
     playing.signal(Signal::INT);
     let run = playing.finish();
     assert_eq!((run.code, run.stdout.as_str()), (Some(130), ""), "{run:?}");
     let report = play(&folder.nod(&[0.1, 0.1]), &sim.to(), &["--json", "--time", "absolute"]).report_of(0);
     let one = &report["controllers"][0];
-    assert_eq!((&one["homing"], &one["acked"]), (&1.into(), &one["sent"]), "{one}");
+    assert_eq!((&one["homing"], &one["acked"]), (&0.into(), &one["sent"]), "{one}");
     let seen = sim.end();
     let home = seen.rows.iter().rposition(|row| row.frame == 1).expect("two plays");
-    let [slow, next] = &seen.rows[home..home + 2] else { panic!("frames came") };
-    assert!(slow.executed[0] > pulses(0.02), "it was left in the air: {slow:?}");
-    assert_eq!((slow.function.as_str(), slow.time_ms, slow.outputs), ("0x1401", 3000, 0));
-    assert!(next.at_s - slow.at_s >= 3.0, "tick 0 waits for it");
-    assert!(next.executed.iter().all(|pulses| *pulses == 0), "{next:?}");
-    assert_eq!((next.function.as_str(), next.time_ms, next.frame), ("0x1301", 10, 2));
+    let first = &seen.rows[home];
+    assert!(first.executed[0] > pulses(0.02), "it was left in the air: {first:?}");
+    let apart = first.commanded.iter().zip(&first.executed).map(|(to, at)| to.abs_diff(*at));
+    assert!(apart.max() < Some(100), "it goes on from there: {first:?}");
+    assert!(seen.rest_in_park());
 }
 
 #[test]

@@ -79,6 +79,15 @@ kinocue.prefs.dialect = Pref.enum(
   false
 )
 
+-- Nobody is known to have seen a frame with vibration; the SMC manual prints four octets (2.2.2.9).
+kinocue.prefs.vibration_port_octets = Pref.enum(
+  "Octets of Port Out with vibration",
+  2,
+  "Of the outputs in frames with vibration, and of the inputs in the answers",
+  { { 1, "2", 2 }, { 2, "4", 4 } },
+  false
+)
+
 local f = {
   confirm = ProtoField.uint16("kinocue.confirm", "Confirm code", base.HEX),
   pass = ProtoField.uint16("kinocue.pass", "Pass code", base.HEX),
@@ -187,8 +196,16 @@ local function ends(len, need)
   return fault(len, "ends after %d octets; this message takes %d", len, need)
 end
 
+local function goes_on(len, need)
+  return fault(need, "goes on to %d octets; this message takes %d", len, need)
+end
+
+local function port_len(vibrating)
+  return vibrating and kinocue.prefs.vibration_port_octets or 2
+end
+
 local function motion_len(axes, vibrating)
-  return BODY + 4 * axes + 2 + (vibrating and 4 * axes or 4)
+  return BODY + 4 * axes + port_len(vibrating) + (vibrating and 4 * axes or 4)
 end
 
 local function axes_that_fit(len, vibrating)
@@ -252,6 +269,11 @@ local function read_registers(tvb, message)
   if len < message.len then
     return ends(len, message.len)
   end
+  -- Nothing follows the words of a reply, or registers of 32 bits would be read as others. A refusal may bring an error.
+  local most = WORDS + 2 * (message.low > RUNNING and math.max(count, 1) or count)
+  if message.low ~= 1 and not message.is.servo and len > most then
+    return goes_on(len, most)
+  end
   return message
 end
 
@@ -265,7 +287,7 @@ local function read_status(tvb, message)
   if len < message.len then
     return ends(len, message.len)
   elseif len > message.len then
-    return fault(message.len, "goes on to %d octets; this message takes %d", len, message.len)
+    return goes_on(len, message.len)
   end
   return message
 end
@@ -402,14 +424,14 @@ local function add_motion(tree, tvb, message, note)
   table.insert(note, string.format("frame %d", tvb(12, 4):uint()))
   table.insert(note, string.format(message.is.absolute and "at %d ms" or "in %d ms", time))
   add_positions(tree, tvb, BODY, axes, note)
-  local port = BODY + 4 * axes
-  add_bits(tree, message.low == 1 and "output" or "input", tvb(port, 2), note)
+  local tail = BODY + 4 * axes + port_len(message.is.vibrating)
+  add_bits(tree, message.low == 1 and "output" or "input", tvb(tail - 2, 2), note)
   if not message.is.vibrating then
-    tree:add(f.extend, tvb(port + 2, 4))
+    tree:add(f.extend, tvb(tail, 4))
     return
   end
   for axis = 1, axes do
-    add_vibration(tree, tvb(port + 2 + 4 * (axis - 1), 4), axis, note)
+    add_vibration(tree, tvb(tail + 4 * (axis - 1), 4), axis, note)
   end
 end
 

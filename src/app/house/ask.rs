@@ -3,16 +3,21 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use crate::config::Controller;
-use crate::device::home::{HomeError, Progress, TIMEOUT, home};
+use crate::device::home::{HomeError, Progress, TIMEOUT, home, unsearched};
 use crate::device::survey::{Survey, survey};
 use crate::device::{Link, Talk, Watch, peers};
 use crate::net::{Origin, SendFault};
 use crate::preflight::wanted;
 use crate::rt::Line;
 use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
 use crate::wire::{Dialect, WriteRequest};
+
+/// How long what is under way when a survey begins may still be answered.
+const SETTLE: Duration = Duration::from_millis(100);
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -34,7 +39,8 @@ pub enum Inquiry {
 pub enum Finding {
     /// What each controller told.
     Surveyed(Vec<Survey>),
-    /// Whether each of these controllers is home.
+    /// Whether each of these controllers is home; where one would go there without a search, those alone that would, and
+    /// no seat was moved.
     Homed(Vec<(usize, Result<(), HomeError>)>),
 }
 
@@ -68,6 +74,11 @@ pub fn inquire(
     inquiry: Inquiry,
     tell: &mut dyn FnMut(&str),
 ) -> Finding {
+    if matches!(inquiry, Inquiry::Survey) {
+        // What the ack thread asks by itself is counted by the controllers too, and its answers are like those to preflight.
+        line.hush(true);
+        Monotonic.sleep_until(Monotonic.now() + SETTLE);
+    }
     line.open(true);
     let called_off = match &inquiry {
         Inquiry::Survey => Arc::default(),
@@ -76,23 +87,35 @@ pub fn inquire(
     let mut talk = Talk::over(OverLine { line, called_off }, Monotonic, &peers(controllers));
     let finding = match inquiry {
         Inquiry::Survey => {
-            let wanted: Vec<_> = controllers.iter().map(|one| wanted(one.dialect)).collect();
+            let wanted: Vec<_> = controllers.iter().map(wanted).collect();
             Finding::Surveyed(survey(&mut talk, controllers, &wanted, tell))
         }
-        Inquiry::Home { lanes, .. } => {
-            let seats: Vec<(usize, Dialect)> =
-                lanes.iter().map(|lane| (*lane, controllers[*lane].dialect)).collect();
-            let results = home(&mut talk, &seats, TIMEOUT, &mut |lane, step| {
-                if matches!(step, Progress::Home { .. }) {
-                    tell(&format!("{} is home", controllers[lane].name));
-                }
-            });
-            Finding::Homed(lanes.into_iter().zip(results.into_iter().map(|one| one.map(drop))).collect())
-        }
+        Inquiry::Home { lanes, .. } => Finding::Homed(home_all(&mut talk, controllers, &lanes, tell)),
     };
     drop(talk);
     line.open(false);
+    line.hush(false);
     finding
+}
+
+/// Homes these, unless one of them would go to zero without a search: a seat may have several controllers.
+fn home_all(
+    talk: &mut Talk<OverLine<'_>>,
+    controllers: &[Controller],
+    lanes: &[usize],
+    tell: &mut dyn FnMut(&str),
+) -> Vec<(usize, Result<(), HomeError>)> {
+    let seats: Vec<(usize, Dialect)> = lanes.iter().map(|lane| (*lane, controllers[*lane].dialect)).collect();
+    let would_not_search = unsearched(talk, &seats);
+    if !would_not_search.is_empty() {
+        return would_not_search.into_iter().map(|(lane, error)| (lane, Err(error))).collect();
+    }
+    let results = home(talk, &seats, TIMEOUT, &mut |lane, step| {
+        if matches!(step, Progress::Home { .. }) {
+            tell(&format!("{} is home", controllers[lane].name));
+        }
+    });
+    lanes.iter().copied().zip(results.into_iter().map(|one| one.map(drop))).collect()
 }
 
 #[cfg(test)]

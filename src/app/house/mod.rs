@@ -171,6 +171,12 @@ impl House {
         Arc::clone(&self.desk)
     }
 
+    /// Whose hall it is.
+    #[must_use]
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
     /// Runs it on the calling thread, which becomes the tick thread, until it is told to leave. Before the first tick `lead`
     /// gets the reins.
     ///

@@ -1,8 +1,9 @@
 //! What surfaces ask, and what is done for it.
 
 use super::{ANSWER, Keeper, LOOK_FOR_ANSWER};
-use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem, overtaken};
+use crate::hall::{Ask, Asked, Code, Desired, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command;
+use crate::settings::{LONGEST_WHY, Out};
 use crate::state::{Request, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime, TRIM_MS};
@@ -12,6 +13,10 @@ impl Keeper {
     pub(super) fn on_asked(&mut self, asked: Asked) {
         self.take_news();
         let Desired { ask, who } = asked.desired.clone();
+        if let Err(problem) = self.may_ask(&asked.desired) {
+            return self.answer(asked, Err(problem));
+        }
+        let before = self.before();
         self.heed(&ask);
         let result = match ask {
             Ask::Load { cue } => return self.load(&cue, asked),
@@ -20,12 +25,20 @@ impl Keeper {
             Ask::Test { rows } => return self.test(&rows, asked),
             Ask::Preflight => return self.preflight(asked),
             Ask::Home => self.request(Request::Home),
-            Ask::Arm { seats_empty: false } => self.request(Request::Arm),
-            Ask::Arm { seats_empty: true } => self.request(Request::HomeAndArm),
+            Ask::Arm { seats_empty } => {
+                let request = if seats_empty { Request::HomeAndArm } else { Request::Arm };
+                self.request(request).inspect(|()| self.say_what_lasts())
+            }
             Ask::Disarm => self.request(Request::Disarm),
             Ask::Go => {
+                let counted = self.count_before();
+                let go = self.are_buckled().and_then(|()| self.request(Request::Go));
+                go.inspect(|()| self.begin_show(&who.to_string(), who.surface, counted))
+            }
+            Ask::GoFrom(film) => {
                 let before = self.count_before();
-                self.request(Request::Go).inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
+                let go = self.are_buckled().and_then(|()| self.go_from(film));
+                go.inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
             }
             Ask::Pause => self.request(Request::Pause),
             Ask::Resume => self.request(Request::Resume),
@@ -41,12 +54,16 @@ impl Keeper {
             }
             Ask::Seek(film) => self.seek(film),
             Ask::Trim(ms) => self.trim(ms),
+            Ask::Levels(change) if who.surface.is_gear() => self.levels_of_gear(&change),
             Ask::Levels(change) => self.levels(&change),
-            Ask::Enable(name) => self.enable(&name, true),
-            Ask::Disable(name) => self.enable(&name, false),
+            Ask::Enable(name) => self.enable(&name, None),
+            Ask::Disable { name, why } => self.disable(&name, &who, why.as_deref()),
             Ask::Reload => self.reload(),
             Ask::Preset(name) => self.preset(&name),
         };
+        if result.is_ok() {
+            self.note_doer(&asked.desired, before);
+        }
         self.tell_readiness();
         self.answer(asked, result);
     }
@@ -91,14 +108,25 @@ impl Keeper {
         self.command(Command::Seek(film))
     }
 
+    /// Lets what is loaded go from there on, by a join onto the moving cue.
+    fn go_from(&mut self, film: ShowTime) -> Result<(), Problem> {
+        if self.known.state != State::Armed {
+            let detail = format!("cannot go from {film} while {}", self.known.state);
+            return Err(Problem::new(Code::State, detail, "arm first; while it plays or is paused, seek"));
+        }
+        self.seek(film)?;
+        self.request(Request::Go).inspect_err(|_| self.rewind())
+    }
+
     fn trim(&mut self, ms: i32) -> Result<(), Problem> {
         if ms.abs() > TRIM_MS {
             let detail = format!("a trim of {ms} ms is outside -{TRIM_MS}..={TRIM_MS}");
             return Err(Problem::new(Code::Value, detail, "give a smaller one"));
         }
-        self.board.trim_ms = ms;
-        self.reins.desk.set_trim_ms(ms);
-        Ok(())
+        self.set(|board| {
+            board.trim_ms = ms;
+            Ok(())
+        })
     }
 
     fn preset(&mut self, name: &str) -> Result<(), Problem> {
@@ -114,13 +142,37 @@ impl Keeper {
         self.set(|board| board.change(change))
     }
 
-    /// Takes the group of a controller in or out.
-    fn enable(&mut self, name: &str, on: bool) -> Result<(), Problem> {
-        let controller = self.reins.config.controllers.iter().find(|one| one.name == name);
-        let Some(controller) = controller else {
-            let detail = format!("there is no controller {name}");
-            return Err(Problem::new(Code::Unknown, detail, "GET /api/v1/controllers lists them"));
+    /// Takes the group of a controller out.
+    fn disable(&mut self, name: &str, who: &Who, why: Option<&str>) -> Result<(), Problem> {
+        let why = why.map_or(Ok(None), Out::reason).map_err(|fault| {
+            Problem::new(
+                Code::Value,
+                fault,
+                format!("say it in a line of {LONGEST_WHY} characters at the most"),
+            )
+        })?;
+        self.enable(name, Some(Out::now(who, why)))
+    }
+
+    /// Takes the group of a controller in, or out.
+    fn enable(&mut self, name: &str, out: Option<Out>) -> Result<(), Problem> {
+        let config = &self.reins.config;
+        let Some(controller) = config.controllers.iter().find(|one| one.name == name) else {
+            return match config.absent.iter().find(|one| one.controller.name == name) {
+                Some(_) if out.is_some() => Ok(()),
+                Some(_) => Err(Problem::new(
+                    Code::State,
+                    format!("{name} is out for good: the configuration says enabled = false"),
+                    "take that line out of its [[controller]], and reload",
+                )),
+                None => Err(Problem::new(
+                    Code::Unknown,
+                    format!("there is no controller {name}"),
+                    "GET /api/v1/controllers lists them",
+                )),
+            };
         };
+        let on = out.is_none();
         let group = controller.group.clone();
         // Between shows arming sees to that.
         if on && self.known.state.may_send_motion() && !self.is_preflighted(&group) {
@@ -129,7 +181,7 @@ impl Keeper {
             return Err(Problem::new(Code::State, detail, "park, enable it, and run preflight"));
         }
         self.set(|board| {
-            board.enable(&group, on);
+            board.enable(&group, out);
             Ok(())
         })
     }

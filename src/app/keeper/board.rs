@@ -6,14 +6,17 @@ use crate::config::Config;
 use crate::engine::Mix;
 use crate::hall::{Code, Levels, LevelsChange, Problem};
 use crate::rt::Desk;
+use crate::settings::{Out, Settings};
 
 /// What is set.
 #[derive(Debug, Clone)]
 pub(super) struct Board {
     pub(super) levels: Levels,
+    /// The same as people have set it: what gear may set at the most.
+    pub(super) ceiling: Levels,
     pub(super) trim_ms: i32,
-    /// Groups that are taken out.
-    pub(super) out: BTreeSet<String>,
+    /// Groups that are taken out, also such as this configuration does not know: one that comes back with the next is out still.
+    pub(super) out: BTreeMap<String, Out>,
     /// Rows that alone take part, while seats are tested; none where all do.
     pub(super) only: Option<BTreeSet<String>>,
     lanes: Vec<Strip>,
@@ -33,36 +36,39 @@ impl Board {
             |one: &crate::config::Controller| Strip { row: one.row.clone(), group: one.group.clone() };
         let lanes: Vec<Strip> = config.controllers.iter().map(strip).collect();
         let rows: BTreeMap<String, f64> =
-            lanes.iter().filter_map(|lane| Some((lane.row.clone()?, 1.0))).collect();
+            config.named().filter_map(|one| Some((one.row.clone()?, 1.0))).collect();
         let effects = config.effects.iter().map(|effect| (effect.name.clone(), true)).collect();
         let levels = Levels { motion: 1.0, vibration: 1.0, effects, rows };
-        Self { levels, trim_ms: 0, out: BTreeSet::new(), only: None, lanes }
+        Self { ceiling: levels.clone(), levels, trim_ms: 0, out: BTreeMap::new(), only: None, lanes }
     }
 
-    /// What is set goes over to the board of another configuration, as far as that knows it.
-    pub(super) fn carry_over(&mut self, before: &Self) {
-        self.levels.motion = before.levels.motion;
-        self.levels.vibration = before.levels.vibration;
-        for (name, on) in &mut self.levels.effects {
-            *on = before.levels.effects.get(name).copied().unwrap_or(*on);
-        }
-        for (row, level) in &mut self.levels.rows {
-            *level = before.levels.rows.get(row).copied().unwrap_or(*level);
-        }
-        self.trim_ms = before.trim_ms;
-        self.out = before
-            .out
-            .iter()
-            .filter(|group| self.lanes.iter().any(|lane| lane.group == **group))
-            .cloned()
-            .collect();
+    /// The same with what was set before, as far as this configuration knows it.
+    pub(super) fn with(config: &Config, before: &Settings) -> Self {
+        let mut board = Self::new(config);
+        let Settings { levels, trim_ms, out, .. } = before;
+        carry(&mut board.levels, levels);
+        // Gear may have set less than a person did; a person raises it again.
+        board.ceiling.clone_from(&board.levels);
+        board.trim_ms = *trim_ms;
+        board.out.clone_from(out);
+        board
     }
 
-    /// Changes levels and effects; nothing is changed where one of them is not known or not within 0 to 1.
+    /// Changes levels and effects, as a person does; nothing is changed where one of them is not known or not within 0 to 1.
     ///
     /// # Errors
     /// Every fault.
     pub(super) fn change(&mut self, change: &LevelsChange) -> Result<(), Problem> {
+        self.change_below(change)?;
+        apply(&mut self.ceiling, change);
+        Ok(())
+    }
+
+    /// The same for gear, of what a person has allowed for.
+    ///
+    /// # Errors
+    /// Every fault.
+    pub(super) fn change_below(&mut self, change: &LevelsChange) -> Result<(), Problem> {
         let mut faults = Vec::new();
         let levels = [("motion", change.motion), ("vibration", change.vibration)];
         let levels = levels.into_iter().filter_map(|(name, level)| Some((name.to_owned(), level?)));
@@ -80,20 +86,23 @@ impl Board {
             let remedy = "give levels from 0 to 1, and names of the configuration";
             return Err(Problem::new(Code::Value, "levels not changed", remedy).with(faults));
         }
-        self.levels.motion = change.motion.unwrap_or(self.levels.motion);
-        self.levels.vibration = change.vibration.unwrap_or(self.levels.vibration);
-        self.levels.rows.extend(change.rows.clone());
-        self.levels.effects.extend(change.effects.clone());
+        apply(&mut self.levels, change);
         Ok(())
     }
 
-    /// Takes the group of a controller in, or out.
-    pub(super) fn enable(&mut self, group: &str, on: bool) {
-        if on {
+    /// Takes a group in, or out. One that is out already stays so since then, and by whom it was, but for one that gear took out and
+    /// now a person; a reason that is given now counts.
+    pub(super) fn enable(&mut self, group: &str, out: Option<Out>) {
+        let Some(out) = out else {
             self.out.remove(group);
-        } else {
-            self.out.insert(group.to_owned());
+            return;
+        };
+        if self.out.get(group).is_some_and(|before| before.surface.is_gear() && !out.surface.is_gear()) {
+            self.out.remove(group);
         }
+        let why = out.why.clone();
+        let entry = self.out.entry(group.to_owned()).or_insert(out);
+        entry.why = why.or_else(|| entry.why.take());
     }
 
     /// Whether a lane is to take part.
@@ -104,7 +113,12 @@ impl Board {
             (Some(only), Some(row)) => only.contains(row),
             (Some(_), None) => false,
         };
-        !self.out.contains(group) && tested
+        !self.out.contains_key(group) && tested
+    }
+
+    /// The group of a lane.
+    pub(super) fn group(&self, lane: usize) -> &str {
+        &self.lanes[lane].group
     }
 
     /// What each lane makes of a cue that has these effects.
@@ -133,5 +147,24 @@ impl Board {
             desk.set(lane, mix);
         }
         desk.set_trim_ms(self.trim_ms);
+    }
+}
+
+fn apply(levels: &mut Levels, change: &LevelsChange) {
+    levels.motion = change.motion.unwrap_or(levels.motion);
+    levels.vibration = change.vibration.unwrap_or(levels.vibration);
+    levels.rows.extend(change.rows.clone());
+    levels.effects.extend(change.effects.clone());
+}
+
+/// Takes over what was set before, as far as it is known here.
+fn carry(levels: &mut Levels, before: &Levels) {
+    levels.motion = before.motion;
+    levels.vibration = before.vibration;
+    for (name, on) in &mut levels.effects {
+        *on = before.effects.get(name).copied().unwrap_or(*on);
+    }
+    for (row, level) in &mut levels.rows {
+        *level = before.rows.get(row).copied().unwrap_or(*level);
     }
 }

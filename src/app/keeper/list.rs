@@ -11,7 +11,7 @@ use super::show::{Cued, read};
 use crate::config::Config;
 use crate::hall::{Ask, Asked, Code, EntryStatus, PlaylistStatus, Problem, Surface};
 use crate::journal::{PlaylistPlace, stamp};
-use crate::library::Library;
+use crate::library::{IdError, Library};
 use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, Then, next_start};
 use crate::rt::Command;
 use crate::state::{Cause, Request, State};
@@ -63,6 +63,30 @@ impl List {
         };
         let cues = playlist.entries.iter().map(about).collect();
         Ok(Self { id: id.to_string(), playlist, cues, current: 0, schedule: Schedule::default() })
+    }
+
+    /// Reads the one that was loaded before, at the entry where it was.
+    pub(super) fn again(
+        shelf: &Shelf,
+        library: &Library,
+        config: &Config,
+        place: &PlaylistPlace,
+        cue: &str,
+    ) -> Result<Self, Problem> {
+        let id = place.id.parse().map_err(|error: IdError| {
+            Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them")
+        })?;
+        let mut list = Self::read(shelf, library, config, &id)?;
+        list.current = list.nearest(place.entry, cue);
+        Ok(list)
+    }
+
+    /// That entry where it is of the cue, else one that is: somebody may have changed the playlist meanwhile.
+    fn nearest(&self, entry: usize, cue: &str) -> usize {
+        let entries = &self.playlist.entries;
+        let is_of = |entry: &Entry| entry.cue.to_string() == cue;
+        let there = entries.get(entry).is_some_and(is_of).then_some(entry);
+        there.or_else(|| entries.iter().position(is_of)).unwrap_or_else(|| entry.min(entries.len() - 1))
     }
 
     /// Where it is, for the record of a show.
@@ -186,6 +210,7 @@ impl Keeper {
     /// there.
     fn start_entry(&mut self, start: Start) -> Result<(), Problem> {
         self.tell_readiness();
+        self.are_buckled()?;
         if start == Start::GoOn {
             self.command(Command::Request(Request::Arm))?;
         }
@@ -198,6 +223,7 @@ impl Keeper {
     /// A show has begun: who let it go, and that nobody has held the hall back since.
     pub(super) fn begin_show(&mut self, who: &str, surface: Surface, before: Before) {
         self.onward = Onward::default();
+        self.forget_before();
         self.begin_record(who, surface, before);
     }
 

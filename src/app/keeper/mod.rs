@@ -3,10 +3,13 @@
 //! (`errand`), so that a pause or a park never waits behind a preflight.
 
 mod asks;
+mod belts;
 mod board;
 mod errand;
+mod gear;
 mod homing;
 mod known;
+mod lasting;
 mod list;
 mod party;
 mod ready;
@@ -39,6 +42,7 @@ use crate::hall::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::{Ending, Journal};
 use crate::library::Library;
 use crate::rt::{Command, News};
+use crate::settings::SettingsFile;
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -78,8 +82,10 @@ pub struct Ends {
     pub signals: Signals,
     /// Whom to tell what happens.
     pub voice: Voice,
-    /// What was set in the hall before; for a first one, nothing.
+    /// What was set in the hall before, or before the program started.
     pub memory: Memory,
+    /// Where what is set is kept.
+    pub settings_file: SettingsFile,
 }
 
 /// What is left once the hall has closed.
@@ -123,6 +129,9 @@ pub struct Keeper {
     sweep: Option<sweep::Sweep>,
     record: Records,
     reload: Option<Arc<Config>>,
+    /// Since when the hall is paused by gear, and by no person; where that is not the pause of now, it is an old one.
+    gear_paused: Option<MonoTime>,
+    lasting: lasting::Lasting,
     /// A show has ended, and why.
     show_over: bool,
     ended: Cause,
@@ -140,10 +149,7 @@ impl Keeper {
     ) -> Self {
         let now = Monotonic.now();
         let memory = std::mem::take(&mut ends.memory);
-        let mut board = Board::new(&reins.config);
-        if let Some(before) = &memory.board {
-            board.carry_over(before);
-        }
+        let board = memory.board(&reins.config);
         ends.source.lead(Arc::clone(&reins.desk));
         let mut keeper = Self {
             ends,
@@ -167,12 +173,15 @@ impl Keeper {
             sweep: None,
             record: Records::new(journal),
             reload: None,
+            gear_paused: None,
+            lasting: memory.lasting,
             show_over: false,
             ended: Cause::Started,
         };
         memory.untold.into_iter().for_each(|note| keeper.note(note));
         keeper.examine_library();
-        keeper.begin(memory.cue, memory.latched);
+        let show = memory.settings.and_then(|settings| settings.show);
+        keeper.begin(show, memory.latched);
         keeper
     }
 
@@ -187,6 +196,7 @@ impl Keeper {
             if let Ok(closed) = closed.try_recv() {
                 self.end_record(self.ended);
                 self.close_record();
+                self.keep_settings();
                 self.ends.memory = self.remember();
                 let journal = self.record.into_journal();
                 let ended = record::ending(self.ended);
@@ -212,7 +222,9 @@ impl Keeper {
             let table = self.reins.live.table();
             self.rates.note(&table, now);
             self.strangers.note(&table, now);
+            self.settle_folds();
             self.say_journal();
+            self.keep_settings();
             self.publish();
         }
     }
@@ -236,6 +248,7 @@ impl Keeper {
     fn on_state(&mut self, from: State, to: State) {
         self.forget_start();
         self.call_off_homing();
+        self.note_place(from, to);
         if to == State::Homing {
             self.begin_homing();
         }
@@ -269,6 +282,7 @@ impl Keeper {
         if self.end_sweep(how) {
             self.rewind();
         } else {
+            self.keep_place();
             self.on_show_over(self.ended);
         }
     }
@@ -313,6 +327,7 @@ impl Keeper {
     /// Answers an ask with the state that it led to.
     fn answer(&mut self, asked: Asked, result: Result<(), Problem>) {
         self.write_down(&asked.desired, &result);
+        self.keep_settings();
         let status = self.publish();
         asked.answer(result.map(|()| status));
     }

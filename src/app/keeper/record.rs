@@ -7,7 +7,7 @@ use jiff::Zoned;
 
 use super::Keeper;
 use crate::hall::{Desired, JournalLine, Problem, Surface};
-use crate::journal::{Action, Ending, Journal, Outcome, Percentiles, ShowRecord, stamp};
+use crate::journal::{Action, Ending, Folds, Journal, Outcome, Percentiles, ShowRecord, stamp};
 use crate::rt::{Row, Times};
 use crate::state::Cause;
 use crate::sys::clock::Monotonic;
@@ -23,6 +23,7 @@ const NEWEST: usize = 20;
 #[derive(Debug)]
 pub(super) struct Records {
     journal: Journal,
+    folds: Folds,
     newest: VecDeque<JournalLine>,
     /// The show that is under way.
     open: Option<Box<Open>>,
@@ -59,8 +60,8 @@ struct Over {
 
 impl Records {
     /// Records that go to a journal.
-    pub(super) const fn new(journal: Journal) -> Self {
-        Self { journal, newest: VecDeque::new(), open: None }
+    pub(super) fn new(journal: Journal) -> Self {
+        Self { journal, folds: Folds::default(), newest: VecDeque::new(), open: None }
     }
 
     /// The newest lines, newest first.
@@ -79,13 +80,28 @@ impl Records {
     }
 
     /// The journal, for the next keeper.
-    pub(super) fn into_journal(self) -> Journal {
+    pub(super) fn into_journal(mut self) -> Journal {
+        self.folds.rest().iter().for_each(|action| self.journal.note(action));
         self.journal
     }
 
     /// Whether a show has begun, and is not over.
     pub(super) fn is_under_way(&self) -> bool {
         self.open.as_ref().is_some_and(|open| open.over.is_none())
+    }
+
+    /// Puts it before the newest lines; with the line before, where that was the same.
+    fn show(&mut self, action: &Action) {
+        let Action { at, who, what, result, .. } = action.clone();
+        let line = JournalLine { at, who, what, result, times: 1 };
+        let same = |before: &&mut JournalLine| {
+            (&before.who, &before.what, &before.result) == (&line.who, &line.what, &line.result)
+        };
+        match self.newest.front_mut().filter(same) {
+            Some(before) => *before = JournalLine { times: before.times.saturating_add(1), ..line },
+            None => self.newest.push_front(line),
+        }
+        self.newest.truncate(NEWEST);
     }
 
     /// Notes something that happens while a show is under way.
@@ -106,12 +122,21 @@ impl Keeper {
             Err(problem) => format!("{}; {}", problem.detail, problem.remedy),
         };
         let state = self.known.state.to_string();
-        self.say_ask(&who, &what, &result, desired.ask.word());
-        let line =
-            JournalLine { at: at.clone(), who: who.clone(), what: what.clone(), result: result.clone() };
-        self.record.newest.push_front(line);
-        self.record.newest.truncate(NEWEST);
-        self.record.journal.note(&Action { at, who, what, result, state });
+        let action = Action { at, who, what, result, state, times: 1 }.shortened();
+        self.record.show(&action);
+        let written = self.record.folds.take(action, desired.ask.word(), Monotonic.now());
+        written.iter().for_each(|action| self.note_action(action));
+    }
+
+    /// Writes down the repeats of what was asked, once their time is over.
+    pub(super) fn settle_folds(&mut self) {
+        let due = self.record.folds.due(Monotonic.now());
+        due.iter().for_each(|action| self.note_action(action));
+    }
+
+    fn note_action(&mut self, action: &Action) {
+        self.say_ask(action);
+        self.record.journal.note(action);
     }
 
     /// What is counted so far; to be taken before a show is let go.
@@ -143,7 +168,7 @@ impl Keeper {
             vibration: levels.vibration,
             trim_ms: self.board.trim_ms,
             effects_off: off.map(|(name, _)| name.clone()).collect(),
-            seats_total: config.controllers.len(),
+            seats_total: config.named().count(),
             seats_available: available.count(),
             operator: who.to_owned(),
             scheduled: surface == Surface::Schedule,

@@ -5,16 +5,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Keeper;
-use super::board::Board;
+use super::lasting::Lasting;
 use crate::config;
 use crate::hall::{Ask, Code, Desired, Problem, Role, Surface, Who};
+use crate::settings::{LoadedShow, Settings};
 use crate::state::State;
 
-/// What goes over from a hall to the one that is opened with another configuration.
+/// What goes over from a hall to the one that is opened with another configuration, or comes from before the start.
 #[derive(Debug, Default)]
 pub struct Memory {
-    pub(super) board: Option<Board>,
-    pub(super) cue: Option<String>,
+    /// What was set and loaded; none where nobody has set anything.
+    pub(super) settings: Option<Settings>,
+    pub(super) lasting: Lasting,
     /// What was latched: another configuration clears nothing.
     pub(super) latched: bool,
     /// What a person should know of the hall before.
@@ -48,15 +50,14 @@ impl Signals {
 }
 
 impl Keeper {
-    /// Takes up what goes over from the hall before. Ahead of the first tick: a seat that is out is not waited for, and what
-    /// was latched stays so.
-    pub(super) fn begin(&mut self, cue: Option<String>, latched: bool) {
+    /// Takes up what goes over from the hall before. Ahead of the first tick: what was latched stays so.
+    pub(super) fn begin(&mut self, show: Option<LoadedShow>, latched: bool) {
         self.set_desk();
         if latched {
             self.reins.desk.stop();
         }
-        if let Some(Ok(cue)) = cue.map(|cue| cue.parse()) {
-            self.fetch(cue, None);
+        if let Some(show) = show {
+            self.load_again(show);
         }
     }
 
@@ -67,13 +68,9 @@ impl Keeper {
             let (state, cause) = (self.known.state, self.cause());
             self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
         }
-        if let Some(list) = self.list.take() {
-            self.note(format!("the playlist {} is no longer loaded; load it again", list.place().id));
-        }
-        let cue = self.cued.take().map(|cued| cued.id);
         Memory {
-            board: Some(self.board.clone()),
-            cue,
+            settings: Some(self.settings()),
+            lasting: std::mem::take(&mut self.lasting),
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),

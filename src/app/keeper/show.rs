@@ -10,7 +10,7 @@ use crate::app::staged::headroom;
 use crate::config::Config;
 use crate::engine::{Headroom, Show};
 use crate::hall::{Asked, Code, Problem, ShowStatus};
-use crate::library::{CueId, Library};
+use crate::library::{CueId, IdError, Library};
 use crate::proof::{self, Digest, Terms};
 use crate::rt::Command;
 use crate::state::State;
@@ -27,6 +27,8 @@ pub(super) struct Cued {
     headroom: Headroom,
     /// Show time at which it begins.
     pub(super) start: ShowTime,
+    /// Where the film was when its last show ended before the cue did; none where there is nothing to go on from.
+    pub(super) left_at: Option<ShowTime>,
     /// How long the first move onto it takes, seconds.
     pub(super) join_s: f64,
 }
@@ -75,6 +77,7 @@ impl Cued {
             id,
             sha256,
             start: ShowTime::ZERO,
+            left_at: None,
             join_s: 0.0,
         })
     }
@@ -88,6 +91,7 @@ impl Cued {
             length_s: self.timeline.duration().as_secs_f64(),
             position_s: position.as_secs_f64(),
             join_s: self.join_s,
+            resume_s: self.left_at.map(ShowTime::as_secs_f64),
             axes: self.timeline.axes(),
             effects: self.timeline.effect_names().to_vec(),
         }
@@ -102,11 +106,7 @@ impl Keeper {
         }
         let id: CueId = match id.parse() {
             Ok(id) => id,
-            Err(error) => {
-                let problem =
-                    Problem::new(Code::Value, format!("{id:?}: {error}"), "GET /api/v1/cues lists them");
-                return self.answer(asked, Err(problem));
-            }
+            Err(error) => return self.answer(asked, Err(no_cue(id, &error))),
         };
         self.fetch(id, Some(asked));
     }
@@ -124,7 +124,7 @@ impl Keeper {
     }
 
     /// Has a cue read and proved.
-    pub(super) fn fetch(&mut self, id: CueId, asked: Option<Asked>) {
+    fn fetch(&mut self, id: CueId, asked: Option<Asked>) {
         let (library, config) = (self.library.clone(), self.reins.config.clone());
         self.send("loading", asked, move || Done::Cued(read(&library, &config, &id)));
     }
@@ -154,7 +154,7 @@ impl Keeper {
         let show = Show {
             rate: Rate::from_hz(config.show.rate_hz),
             timing: config.show.timing,
-            start: cued.start,
+            start: motion_at(cued.start, self.board.trim_ms),
             plays: 1,
         };
         let staged = Staged::mixed(config, &cued.timeline, cued.headroom.clone(), show, &mixes, false);
@@ -163,8 +163,10 @@ impl Keeper {
         })?;
         let course = &staged.course;
         cued.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
+        let mut loaded = staged.loaded();
+        loaded.engine.begin_trimmed(self.board.trim_ms);
         self.set_desk();
-        self.command(Command::Load(staged.loaded()))
+        self.command(Command::Load(loaded))
     }
 
     /// Sets something, and makes the show anew where its first frames hang on that; while the seats move the desk is enough.
@@ -204,6 +206,15 @@ impl Keeper {
             self.cued = None;
         }
     }
+}
+
+pub(super) fn no_cue(id: &str, error: &IdError) -> Problem {
+    Problem::new(Code::Value, format!("{id:?}: {error}"), "GET /api/v1/cues lists them")
+}
+
+/// Where in the cue the motion is at a time of the film, with that trim.
+const fn motion_at(film: ShowTime, trim_ms: i32) -> ShowTime {
+    ShowTime::from_nanos(film.as_nanos() - trim_ms as i64 * 1_000_000)
 }
 
 pub(super) fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<Cued>, Problem> {

@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::Keeper;
+use jiff::Zoned;
+
+use super::{Keeper, belts};
 use crate::config::Controller;
 use crate::engine::Unplanned;
 use crate::hall::{ControllerStatus, Histogram, Percentiles, RealTimeStatus, Status};
@@ -78,13 +80,13 @@ impl Keeper {
             uptime_s: now.since(self.ends.began).as_secs_f64(),
             state: self.known.state.word(),
             cause: self.cause(),
-            next: self.known.next.to_string(),
+            next: self.next_action(&table, now),
             arm_homes: self.known.next == Next::ArmAndHome,
             since_s: now.since(self.known.since).as_secs_f64(),
             lapses_s: self.known.lapses(now),
             moving,
             show: self.cued.as_ref().map(|cued| cued.status(position(cued))),
-            playlist: self.list.as_ref().map(|list| list.status(&jiff::Zoned::now())),
+            playlist: self.list.as_ref().map(|list| list.status(&Zoned::now())),
             trim_ms: self.board.trim_ms,
             levels: self.board.levels.clone(),
             presets: self.reins.config.presets.iter().map(|preset| preset.name.clone()).collect(),
@@ -104,6 +106,16 @@ impl Keeper {
             warnings: self.warnings(&table),
             test: self.sweep.as_ref().map(|sweep| sweep.status.clone()),
             journal: self.record.newest(),
+        }
+    }
+
+    /// What a person does next; where a show was left in its midst, also how it goes on from there.
+    pub(super) fn next(&self) -> String {
+        let next = self.known.next;
+        match self.cued.as_ref().and_then(|cued| cued.left_at) {
+            Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
+            Some(film) if next == Next::Arm => format!("{next}; it can go on from {film}, where it was left"),
+            _ => next.to_string(),
         }
     }
 
@@ -132,8 +144,14 @@ impl Keeper {
     }
 
     fn controllers(&self, table: &[Row], now: MonoTime) -> Vec<ControllerStatus> {
-        let controllers = self.reins.config.controllers.iter().enumerate();
-        controllers.map(|(index, one)| self.controller(index, one, table.get(index), now)).collect()
+        let config = &self.reins.config;
+        let present = config.controllers.iter().enumerate();
+        let mut all: Vec<_> =
+            present.map(|(index, one)| self.controller(index, one, table.get(index), now)).collect();
+        for (index, one) in config.absent.iter().enumerate() {
+            all.insert(one.after + index, absent(&one.controller));
+        }
+        all
     }
 
     fn controller(
@@ -148,6 +166,7 @@ impl Keeper {
         #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
         let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
         let ack = row.and_then(|row| row.ack_ns);
+        let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
         ControllerStatus {
             name: controller.name.clone(),
             row: controller.row.clone(),
@@ -156,7 +175,10 @@ impl Keeper {
             group: controller.group.clone(),
             enabled: self.board.is_on(index),
             standing: row.map_or("unknown", |row| super::warnings::word(row.standing)),
-            why: row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string()),
+            why: match self.board.out.get(self.board.group(index)) {
+                Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
+                None => why,
+            },
             heard_s: state.heard_at.map(|at| now.since(at).as_secs_f64()),
             ack_rate: self.rates.of(index),
             ack_p50_us: ack.map(|ack| us(ack.p50)),
@@ -173,6 +195,7 @@ impl Keeper {
             error: state.error.map(|heard| heard.value),
             servo_errors: state.servo_errors.map(|heard| heard.value.to_vec()),
             inputs: state.inputs.map(|heard| heard.value),
+            belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
             positions_mm: state.measured.or(state.echoed).map(|heard| {
                 let mm = |pulses: &crate::motion::Pulses| {
@@ -181,6 +204,20 @@ impl Keeper {
                 heard.value.iter().take(controller.seat.axes).map(mm).collect()
             }),
         }
+    }
+}
+
+/// A controller that is out for good: nothing is known of it.
+fn absent(controller: &Controller) -> ControllerStatus {
+    ControllerStatus {
+        name: controller.name.clone(),
+        row: controller.row.clone(),
+        seat: controller.seat.name.clone(),
+        address: controller.address.to_string(),
+        group: controller.group.clone(),
+        standing: "out",
+        why: "out for good: enabled = false in the configuration".to_owned(),
+        ..ControllerStatus::default()
     }
 }
 

@@ -39,6 +39,13 @@ pub(super) struct Sweep {
     before: Option<Box<Cued>>,
 }
 
+impl Sweep {
+    /// The cue that was loaded before.
+    pub(super) fn before(&self) -> Option<&Cued> {
+        self.before.as_deref()
+    }
+}
+
 /// One thing that is tested.
 #[derive(Debug, Clone, PartialEq)]
 struct Part {

@@ -23,6 +23,7 @@ use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
 use crate::rt::{Command, Desk, Live, News, line};
+use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, Readiness, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{Policy, RealTime};
@@ -160,7 +161,13 @@ impl Rig {
 
     /// One that has just started, after a hall of which it knows that.
     pub(super) fn starting(memory: Memory) -> Self {
+        Self::starting_in(|_| memory)
+    }
+
+    /// The same in a folder that is made ready for it.
+    pub(super) fn starting_in(ready: impl FnOnce(&Path) -> Memory) -> Self {
         let folder = tempfile::tempdir().unwrap();
+        let memory = ready(folder.path());
         let config = Arc::new(config(folder.path()));
         let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
         let (commands, commands_end) = RingBuffer::new(64);
@@ -182,6 +189,7 @@ impl Rig {
         let library = Library::open(&config.show.library, library).unwrap();
         let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
         let journal = Journal::open(&folder.path().join("log"), limits, &Zoned::now());
+        memory.set_desk(&config, &desk);
         let (handle, ends) = ends(&desk, folder.path(), memory);
         let keeper = Keeper::new(ends, reins, line, library, journal);
         let double = Double::start(desk, commands_end, news);
@@ -200,7 +208,12 @@ impl Rig {
 
     /// Asks the keeper something as a surface does, and waits for the answer.
     pub(super) fn ask(&mut self, ask: Ask) -> Result<Arc<Status>, Problem> {
-        let waits = self.post(ask);
+        self.ask_as(Surface::Socket, ask)
+    }
+
+    /// The same by another surface.
+    pub(super) fn ask_as(&mut self, surface: Surface, ask: Ask) -> Result<Arc<Status>, Problem> {
+        let waits = self.post_as(surface, ask);
         self.hear();
         self.wait_until(|_| waits.is_finished());
         waits.join().unwrap()
@@ -208,7 +221,11 @@ impl Rig {
 
     /// Has something asked that waits for its turn.
     pub(super) fn post(&self, ask: Ask) -> JoinHandle<Result<Arc<Status>, Problem>> {
-        let who = Who { role: Role::Engineer, surface: Surface::Socket, name: "anna".to_owned() };
+        self.post_as(Surface::Socket, ask)
+    }
+
+    fn post_as(&self, surface: Surface, ask: Ask) -> JoinHandle<Result<Arc<Status>, Problem>> {
+        let who = Who { role: Role::Engineer, surface, name: "anna".to_owned() };
         let posted = self.handle.post(who, ask).unwrap();
         let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
         thread::spawn(move || runtime.block_on(posted.answer()))
@@ -283,5 +300,6 @@ fn ends(desk: &Arc<Desk>, folder: &Path, memory: Memory) -> (Handle, Ends) {
     let voice = Voice::new(Log::start(|_| {}).unwrap());
     let config = folder.join("hall.toml");
     let (began, signals) = (Monotonic.now(), Signals::default());
-    (handle, Ends { inbox, source, config, began, signals, voice, memory })
+    let (settings_file, _) = SettingsFile::open(folder);
+    (handle, Ends { inbox, source, config, began, signals, voice, memory, settings_file })
 }

@@ -7,12 +7,21 @@ use super::errand::Done;
 use super::testing::Rig;
 use super::*;
 use crate::engine::Unplanned;
-use crate::hall::{Ask, Code};
-use crate::rt::News;
-use crate::state::{Event, Next, Trouble};
+use crate::hall::{Ask, Code, LevelsChange, Role, Surface, Who};
+use crate::rt::{News, TickReport};
+use crate::settings::Out;
+use crate::state::{Event, Next, Ride, Trouble};
 use crate::time::ShowTime;
 
 const ARM: Ask = Ask::Arm { seats_empty: false };
+
+fn anna() -> Who {
+    Who { role: Role::Engineer, surface: Surface::Socket, name: "anna".to_owned() }
+}
+
+fn out(name: &str) -> Ask {
+    Ask::Disable { name: name.to_owned(), why: None }
+}
 
 #[test]
 fn an_answer_that_came_too_late_is_not_taken_for_that_of_the_next_command() {
@@ -44,9 +53,165 @@ fn a_hall_that_was_latched_is_so_with_another_configuration_too() {
 #[test]
 fn a_seat_that_is_out_is_out_from_the_first_tick_of_the_next_hall_on() {
     let mut before = Rig::parked();
-    before.ask(Ask::Disable("B1".to_owned())).unwrap();
+    before.ask(out("B1")).unwrap();
     let rig = Rig::starting(before.keeper.remember());
     assert_eq!([0, 1].map(|lane| rig.keeper.reins.desk.mix(lane).on), [true, false]);
+}
+
+/// What a keeper that ends here leaves for one that starts after it, as its file does.
+fn after_a_restart(mut rig: Rig) -> Memory {
+    let folder = rig.folder.path().to_owned();
+    rig.keeper.keep_settings();
+    let Rig { keeper, folder: kept, .. } = rig;
+    drop(keeper);
+    let (_store, found) = SettingsFile::open(&folder);
+    drop(kept);
+    Memory::of(found)
+}
+
+#[test]
+fn a_seat_that_was_taken_out_is_out_after_a_restart_and_whoever_arms_first_is_told() {
+    let mut before = Rig::parked();
+    let why = Some("broken leg".to_owned());
+    before.ask(Ask::Disable { name: "B1".to_owned(), why }).unwrap();
+    before.ask(Ask::Levels(LevelsChange { motion: Some(0.6), ..LevelsChange::default() })).unwrap();
+    before.ask(Ask::Trim(-40)).unwrap();
+    let mut rig = Rig::starting(after_a_restart(before));
+    let desk = &rig.keeper.reins.desk;
+    assert_eq!(([0, 1].map(|lane| desk.mix(lane).on), desk.trim_ms()), ([true, false], -40));
+    assert!((desk.mix(0).motion - 0.6).abs() < 1e-6);
+    let status = rig.keeper.status();
+    let said = |id: &str| status.warnings.iter().find(|one| one.id == id).map(|one| one.text.clone());
+    let out = said("seat-out").unwrap();
+    assert!(out.starts_with("out since ") && out.ends_with(", by anna: broken leg"), "{out}");
+    assert_eq!(said("kept").unwrap(), "as it was before the start: motion 60 %, trim -40 ms, cue one");
+    assert!(status.controllers[1].why.contains("broken leg"), "{}", status.controllers[1].why);
+    rig.ask(Ask::Enable("B1".to_owned())).unwrap();
+    assert!(rig.keeper.settings().out.is_empty());
+}
+
+#[test]
+fn a_seat_that_is_taken_out_again_stays_out_since_then_and_a_reason_can_be_added() {
+    let mut rig = Rig::parked();
+    rig.ask(out("B1")).unwrap();
+    let first = rig.keeper.settings().out["B1"].clone();
+    rig.ask(Ask::Disable { name: "B1".to_owned(), why: Some("broken leg".to_owned()) }).unwrap();
+    rig.ask(out("B1")).unwrap();
+    let now = rig.keeper.settings().out["B1"].clone();
+    assert_eq!((&now.at, now.why.as_deref()), (&first.at, Some("broken leg")));
+    let long = Ask::Disable { name: "A1".to_owned(), why: Some("x".repeat(201)) };
+    assert_eq!(rig.ask(long).unwrap_err().code, Code::Value);
+    assert!(rig.keeper.board.is_on(0));
+}
+
+#[test]
+fn what_was_loaded_is_loaded_after_a_restart_and_nothing_starts() {
+    let mut before = Rig::parked();
+    before.ask(Ask::Load { cue: "two".to_owned() }).unwrap();
+    let folder = before.folder.path().to_owned();
+    let mut rig = Rig::starting_in(|folder_of_next| {
+        std::fs::create_dir(folder_of_next.join("cues")).unwrap();
+        let cue = "cues/two.csv";
+        std::fs::copy(folder.join(cue), folder_of_next.join(cue)).unwrap();
+        after_a_restart(before)
+    });
+    // Also where the program ends before it is loaded.
+    assert_eq!(rig.keeper.settings().show.unwrap().cue, "two");
+    rig.settle();
+    assert_eq!(rig.keeper.cued.as_ref().unwrap().id, "two");
+    assert_eq!(rig.state(), State::Boot);
+}
+
+#[test]
+fn a_cue_that_is_gone_after_a_restart_is_named_and_the_hall_goes_on_without() {
+    let memory = after_a_restart(Rig::parked());
+    let mut rig = Rig::starting(memory);
+    rig.settle();
+    assert!(rig.keeper.cued.is_none() && rig.keeper.settings().show.is_none());
+    assert!(rig.keeper.notes.iter().any(|note| note.contains("one")), "{:?}", rig.keeper.notes);
+}
+
+/// A show that was stopped where the film was at 2.5 s, with the seats parked since.
+fn stopped_in_its_midst() -> Rig {
+    let mut rig = Rig::playing();
+    let show = ShowTime::from_millis(2_500);
+    rig.keeper.reins.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.ask(Ask::Stop).unwrap();
+    rig.tell(Event::AtRest);
+    rig.ask(Ask::Clear).unwrap();
+    rig.tell(Event::PositionsRead);
+    rig.ask(Ask::Park).unwrap();
+    rig.tell(Event::Parked);
+    assert_eq!(rig.state(), State::Parked);
+    rig
+}
+
+#[test]
+fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before() {
+    let mut rig = stopped_in_its_midst();
+    let status = rig.keeper.status();
+    assert_eq!(status.show.as_ref().unwrap().resume_s, Some(2.5));
+    assert!(status.next.contains("it can go on from 00:02.500"), "{}", status.next);
+    let place = Ask::GoFrom(ShowTime::from_millis(2_500));
+    assert_eq!(rig.ask(place.clone()).unwrap_err().code, Code::State, "nobody has armed it");
+    rig.ask(ARM).unwrap();
+    assert!(rig.keeper.status().next.contains("or go on from 00:02.500"));
+    assert_eq!(rig.ask(Ask::GoFrom(ShowTime::from_millis(4_000))).unwrap_err().code, Code::Value);
+    rig.ask(place).unwrap();
+    assert_eq!(rig.state(), State::Playing(Ride::Joining));
+    let cued = rig.keeper.cued.as_ref().unwrap();
+    assert_eq!((cued.start, cued.left_at), (ShowTime::from_millis(2_500), None));
+    rig.tell(Event::Joined);
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    let cued = rig.keeper.cued.as_ref().unwrap();
+    assert_eq!((cued.start, cued.left_at), (ShowTime::ZERO, None), "the next one is whole");
+}
+
+#[test]
+fn a_show_that_is_stopped_on_its_way_to_park_after_its_end_is_over() {
+    let mut rig = Rig::playing();
+    let show = ShowTime::from_millis(3_900);
+    rig.keeper.reins.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.tell(Event::CueEnded);
+    rig.ask(Ask::Stop).unwrap();
+    rig.tell(Event::AtRest);
+    rig.wait_until(|keeper| keeper.known.state == State::Stopped);
+    assert_eq!(rig.keeper.cued.as_ref().unwrap().left_at, None);
+}
+
+#[test]
+fn a_plain_go_after_a_stop_begins_at_the_beginning() {
+    let mut rig = stopped_in_its_midst();
+    rig.ask(ARM).unwrap();
+    rig.ask(Ask::Go).unwrap();
+    assert_eq!(rig.keeper.cued.as_ref().unwrap().start, ShowTime::ZERO);
+    assert_eq!(rig.keeper.status().show.unwrap().resume_s, None);
+}
+
+#[test]
+fn where_a_show_was_left_lasts_over_a_restart_unless_the_cue_is_another_by_then() {
+    for (change, left_at) in [("", Some(ShowTime::from_millis(2_500))), ("5000,0.6\n", None)] {
+        let before = stopped_in_its_midst();
+        let ride = std::fs::read_to_string(before.folder.path().join("cues/one.csv")).unwrap();
+        let mut rig = Rig::starting_in(|folder| {
+            std::fs::create_dir(folder.join("cues")).unwrap();
+            std::fs::write(folder.join("cues/one.csv"), ride + change).unwrap();
+            after_a_restart(before)
+        });
+        rig.settle();
+        assert_eq!(rig.keeper.cued.as_ref().unwrap().left_at, left_at, "{change}");
+    }
+}
+
+#[test]
+fn where_a_crash_has_cut_a_show_is_known_to_five_seconds() {
+    let rig = Rig::playing();
+    for (film_ms, kept) in [(4_900, None), (12_340, Some(10_000))] {
+        let show = ShowTime::from_millis(film_ms);
+        rig.keeper.reins.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+        assert_eq!(rig.keeper.settings().show.unwrap().film_ms, kept);
+    }
 }
 
 #[test]
@@ -105,7 +270,7 @@ fn what_cannot_be_set_is_not_set_on_the_desk_either() {
     // As where the keeper has not heard yet that the seats move.
     rig.keeper.known.state = State::Parked;
     let problem = rig.keeper.set(|board| {
-        board.enable("B1", false);
+        board.enable("B1", Some(Out::now(&anna(), None)));
         Ok(())
     });
     assert_eq!(problem.unwrap_err().code, Code::State);
@@ -115,13 +280,13 @@ fn what_cannot_be_set_is_not_set_on_the_desk_either() {
 #[test]
 fn a_seat_whose_preflight_has_not_passed_does_not_join_a_show() {
     let mut rig = Rig::parked();
-    rig.ask(Ask::Disable("B1".to_owned())).unwrap();
+    rig.ask(out("B1")).unwrap();
     rig.keeper.preflighted = Some(ready::Preflighted::failing_at(1, 2));
     rig.ask(ARM).unwrap();
     rig.ask(Ask::Go).unwrap();
     assert_eq!(rig.ask(Ask::Enable("B1".to_owned())).unwrap_err().code, Code::State);
     assert!(!rig.keeper.reins.desk.mix(1).on);
-    rig.ask(Ask::Disable("A1".to_owned())).unwrap();
+    rig.ask(out("A1")).unwrap();
     rig.ask(Ask::Enable("A1".to_owned())).unwrap();
     assert!(rig.keeper.reins.desk.mix(0).on);
 }

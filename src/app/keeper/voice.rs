@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::Keeper;
 use super::warnings::NOTE;
 use crate::hall::{Severity, Status, Warning};
+use crate::journal::Action;
 use crate::log::{Line, Log, Priority};
 use crate::sd::Notifier;
 use crate::state::State;
@@ -86,11 +87,19 @@ impl Keeper {
         self.ends.voice.log.say(Line::new(Priority::Warning, NOTE, note));
     }
 
-    /// Says how the journal goes.
+    /// Says how the journal goes, and the keeping of what is set.
     pub(super) fn say_journal(&mut self) {
         for news in self.record.news() {
             self.ends.voice.log.say(Line::new(Priority::Warning, "journal", news));
         }
+        if self.ends.settings_file.take_mended() {
+            self.ends.voice.log.say(Line::new(Priority::Notice, "settings", "what people set is kept again"));
+        }
+    }
+
+    /// Says something that was set before the program started.
+    pub(super) fn say_kept(&self, text: &str) {
+        self.ends.voice.log.say(Line::new(Priority::Notice, "kept", text));
     }
 
     /// Says that the hall is in another state.
@@ -105,11 +114,12 @@ impl Keeper {
     }
 
     /// Says what somebody asked, and what came of it.
-    pub(super) fn say_ask(&self, who: &str, what: &str, result: &str, word: &str) {
-        let text = format!("{who}: {what}: {result}");
-        self.ends
-            .voice
-            .log
-            .say(Line::new(Priority::Notice, format!("ask-{word}"), text).with("operator", who));
+    pub(super) fn say_ask(&self, action: &Action) {
+        let Action { who, what, result, times, .. } = action;
+        let often = if *times > 1 { format!(" ({times} times)") } else { String::new() };
+        let word = what.split(' ').next().unwrap_or_default();
+        let line =
+            Line::new(Priority::Notice, format!("ask-{word}"), format!("{who}: {what}: {result}{often}"));
+        self.ends.voice.log.say(line.with("operator", who.clone()));
     }
 }

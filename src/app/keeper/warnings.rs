@@ -34,8 +34,11 @@ impl Keeper {
     pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
         warnings.extend(self.of_strangers());
+        warnings.extend(self.of_belts(table));
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
+        warnings.extend(self.of_what_lasts());
+        warnings.extend(self.of_the_settings_file());
         warnings.extend(self.record.trouble().map(|trouble| Warning {
             id: "journal".to_owned(),
             severity: Severity::Warning,
@@ -104,6 +107,18 @@ impl Keeper {
                 text: text.to_owned(),
                 remedy: remedy.to_owned(),
             }
+        })
+    }
+
+    fn of_the_settings_file(&self) -> Option<Warning> {
+        let trouble = self.ends.settings_file.trouble()?;
+        let (text, remedy) = trouble.split_once("; ").unwrap_or((&trouble, ""));
+        Some(Warning {
+            id: "settings".to_owned(),
+            severity: Severity::Warning,
+            controller: None,
+            text: text.to_owned(),
+            remedy: remedy.to_owned(),
         })
     }
 

@@ -16,6 +16,7 @@ use super::server::{ServerArgs, in_path};
 use super::table::table;
 use super::{http, reply, view};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::sys;
 
 /// How long an upload and its proof may take.
 const PATIENCE: Duration = Duration::from_secs(600);
@@ -110,7 +111,8 @@ fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
     let UploadArgs { file, id, server } = args;
     let id = id.clone().map_or_else(|| id_of(file), Ok)?;
     let body = FileBody::open(file).map_err(|error| {
-        let missing = matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::IsADirectory);
+        use io::ErrorKind::{InvalidInput, IsADirectory, NotFound};
+        let missing = matches!(error.kind(), NotFound | IsADirectory | InvalidInput);
         let exit = if missing { Exit::NoInput } else { Exit::Io };
         Failure { exit, error: anyhow::Error::new(error).context(file.display().to_string()) }
     })?;
@@ -144,12 +146,9 @@ struct FileBody {
 
 impl FileBody {
     fn open(path: &Path) -> io::Result<Self> {
-        let file = File::open(path)?;
-        let about = file.metadata()?;
-        if about.is_dir() {
-            return Err(io::ErrorKind::IsADirectory.into());
-        }
-        Ok(Self { file, left: about.len() })
+        let file = sys::file::open(path)?;
+        let left = file.metadata()?.len();
+        Ok(Self { file, left })
     }
 }
 

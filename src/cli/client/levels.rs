@@ -51,8 +51,14 @@ Examples:
     /// Takes the seat of a controller out.
     ///
     /// It parks, with all controllers that share it; the others play on.
-    #[command(after_help = "Example:\n  kinocue disable F4")]
-    Disable(NameArgs),
+    #[command(after_help = "\
+Examples:
+  kinocue disable F4
+  kinocue disable F4 --why \"broken leg\"
+
+It stays out over a restart of the service, until somebody takes it in; whoever arms is told. What is out for good says
+enabled = false in the configuration.")]
+    Disable(DisableArgs),
 }
 
 /// A trim.
@@ -104,6 +110,19 @@ pub(in crate::cli) struct NameArgs {
     server: ServerArgs,
 }
 
+/// A controller, and why it is taken out.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct DisableArgs {
+    /// Its name.
+    #[arg(value_name = "NAME")]
+    name: String,
+    /// Why, for whoever comes next.
+    #[arg(long, value_name = "REASON")]
+    why: Option<String>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
 pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
     match command {
         Command::Trim(TrimArgs { trim, server }) => {
@@ -127,8 +146,9 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
         Command::Enable(NameArgs { name, server }) => {
             server.act(&format!("/api/v1/controllers/{}/enable", in_path(name)), &json!({}))
         }
-        Command::Disable(NameArgs { name, server }) => {
-            server.act(&format!("/api/v1/controllers/{}/disable", in_path(name)), &json!({}))
+        Command::Disable(DisableArgs { name, why, server }) => {
+            let body = why.as_ref().map_or_else(|| json!({}), |why| json!({ "why": why }));
+            server.act(&format!("/api/v1/controllers/{}/disable", in_path(name)), &body)
         }
     }
 }

@@ -3,6 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::view::{Controller, Show, Status, Warning, percent, time, us};
+use crate::plain;
 
 /// Controllers and warnings that are shown one by one at the most.
 const FEW: usize = 6;
@@ -26,7 +27,7 @@ impl Panel {
 
     /// Shows the hall as it is.
     pub(super) fn show(&mut self, status: &Status) {
-        self.last = text(status);
+        self.last = plain::lines(&text(status)).into_owned();
         self.bar.set_message(self.last.clone());
         self.bar.tick();
     }
@@ -74,11 +75,11 @@ fn film(show: &Show) -> String {
 /// How many are well, and those that are not.
 fn controllers(all: &[Controller]) -> Vec<String> {
     let is_well = |one: &&Controller| one.standing == "ok" && one.enabled;
-    let mut lines = vec![format!("{} of {} controllers ok", all.iter().filter(is_well).count(), all.len())];
+    let part = all.iter().filter(|one| !one.is_out_for_good()).count();
+    let mut lines = vec![format!("{} of {part} controllers ok", all.iter().filter(is_well).count())];
     let ill = all.iter().filter(|one| !is_well(one)).map(|one| {
-        let off = if one.enabled { "" } else { ", off" };
         let acks = one.ack_rate.map_or_else(String::new, |rate| format!(", acks {}", percent(rate)));
-        format!("  {} {}{off}{acks}  {}", one.name, one.standing, one.why)
+        format!("  {} {}{acks}  {}", one.name, one.stands(), one.why)
     });
     lines.extend(few(ill.collect()));
     lines

@@ -101,7 +101,7 @@ impl ServerArgs {
 
     /// Prints a reply where its JSON is wanted.
     pub(super) fn show(&self, reply: &Reply) -> Result<(), Failure> {
-        if self.json { print::out(&format!("{}\n", reply.text.trim_end())) } else { Ok(()) }
+        if self.json { print::json_text(&reply.text) } else { Ok(()) }
     }
 }
 

@@ -38,11 +38,12 @@ Exit codes: 0 armed, or homing first, 75 not ready (what is missing is said), 77
 Examples:
   kinocue go
   kinocue arm && kinocue go
+  kinocue go --from 12:30       after a stop: status says where the show was left; the seats join the cue there
 
 A request that arrives more than two seconds late, or twice, starts nothing.
 
 Exit codes: 0 it plays, 75 not armed or too late, 77 not allowed, 69 no daemon")]
-    Go(ServerArgs),
+    Go(GoArgs),
     /// Holds the seats where they are; the film waits.
     #[command(after_help = "Example:\n  kinocue pause")]
     Pause(ServerArgs),
@@ -85,6 +86,16 @@ pub(in crate::cli) struct ArmArgs {
     server: ServerArgs,
 }
 
+/// From where on, and where the daemon is.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct GoArgs {
+    /// Begin there in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24 [default: its beginning, or where seek set it].
+    #[arg(long, value_name = "TIME", value_parser = parse_time)]
+    from: Option<ShowTime>,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
 /// The position, and where the daemon is.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SeekArgs {
@@ -99,10 +110,17 @@ pub(super) fn run(command: &Command) -> Result<Exit, Failure> {
     let (word, server) = match command {
         Command::Arm(ArmArgs { seats_empty, server }) => {
             let body = if *seats_empty { json!({ "seats_empty": true }) } else { json!({}) };
-            return server.act("/api/v1/show/arm", &body);
+            let status = server.post("/api/v1/show/arm", &body)?;
+            // Whoever arms hears who is out, and what is as it was before the service started.
+            let lasts = status.warnings.iter().filter(|one| ["seat-out", "kept"].contains(&one.id.as_str()));
+            lasts.for_each(|one| print::tell(&format!("kinocue: {}", one.said())));
+            return Ok(server.tell(&status));
         }
         Command::Disarm(server) => ("disarm", server),
-        Command::Go(server) => ("go", server),
+        Command::Go(GoArgs { from: Some(from), server }) => {
+            return server.act("/api/v1/show/go", &json!({ "from_s": from.as_secs_f64() }));
+        }
+        Command::Go(GoArgs { from: None, server }) => ("go", server),
         Command::Pause(server) => ("pause", server),
         Command::Resume(server) => ("resume", server),
         Command::Park(server) => ("park", server),
@@ -139,7 +157,7 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
     let verdict = if *passed { "passed" } else { "failed" };
     print::tell(&format!(
         "kinocue: preflight {verdict}: {answered} of {} controllers answered; next: {}",
-        status.controllers.len(),
+        status.controllers.iter().filter(|one| !one.is_out_for_good()).count(),
         status.hall.next
     ));
     Ok(if *passed { Exit::Done } else { Exit::CheckFailed })

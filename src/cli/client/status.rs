@@ -69,9 +69,11 @@ fn block(status: &Status) -> Vec<(&'static str, String)> {
 }
 
 fn show(show: &Show) -> String {
-    let Show { cue, title, length_s, position_s } = show;
+    let Show { cue, title, length_s, position_s, resume_s } = show;
     let title = title.as_ref().map_or_else(String::new, |title| format!(" \"{title}\""));
-    format!("{cue}{title}, at {} of {}", time(*position_s), time(*length_s))
+    let left =
+        resume_s.map(time).map(|at| format!("; left at {at}: kinocue go --from {at} goes on from there"));
+    format!("{cue}{title}, at {} of {}{}", time(*position_s), time(*length_s), left.unwrap_or_default())
 }
 
 fn playlist(list: &Playlist) -> String {
@@ -94,13 +96,11 @@ fn ticks(status: &Status) -> String {
 
 fn controllers(all: &[Controller]) -> String {
     let row = |one: &Controller| {
-        let Controller { name, row, enabled, standing, why, ack_rate, ack_p50_us, ack_p99_us, lost, .. } =
-            one;
-        let standing = if *enabled { standing.clone() } else { format!("{standing}, off") };
+        let Controller { name, row, why, ack_rate, ack_p50_us, ack_p99_us, lost, .. } = one;
         [
             name.clone(),
             row.clone().unwrap_or_else(|| "-".to_owned()),
-            standing,
+            one.stands(),
             ack_rate.map_or_else(|| "-".to_owned(), percent),
             us(*ack_p50_us),
             us(*ack_p99_us),

@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     quiet.tell(&begun);
     let result = follow(&quiet, begun)?;
     if server.json {
-        print::out(&format!("{}\n", result.json))?;
+        print::json_text(&result.json)?;
     } else {
         print::out(&text(&result.test))?;
     }

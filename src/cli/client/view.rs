@@ -52,6 +52,7 @@ pub(super) struct Show {
     pub(super) title: Option<String>,
     pub(super) length_s: f64,
     pub(super) position_s: f64,
+    pub(super) resume_s: Option<f64>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -199,13 +200,31 @@ impl Status {
     }
 }
 
+impl Controller {
+    /// How it stands, and whether it is out.
+    pub(super) fn stands(&self) -> String {
+        let off = if self.enabled || self.is_out_for_good() { "" } else { ", off" };
+        format!("{}{off}", self.standing)
+    }
+
+    /// Whether the configuration has it out, so that nobody counts it.
+    pub(super) fn is_out_for_good(&self) -> bool {
+        self.standing == "out"
+    }
+}
+
 impl Warning {
     /// What is the matter and what to do, in a line.
     pub(super) fn line(&self) -> String {
-        let about = self.controller.as_ref().map_or_else(String::new, |name| format!("{name}: "));
-        let Self { severity, id, text, remedy, .. } = self;
+        let Self { severity, id, remedy, .. } = self;
         let remedy = if remedy.is_empty() { String::new() } else { format!("; {remedy}") };
-        format!("{severity} {id}: {about}{text}{remedy}")
+        format!("{severity} {id}: {}{remedy}", self.said())
+    }
+
+    /// What is the matter, and whose it is.
+    pub(super) fn said(&self) -> String {
+        let about = self.controller.as_ref().map_or_else(String::new, |name| format!("{name}: "));
+        about + &self.text
     }
 }
 

@@ -12,6 +12,7 @@ use super::panel::Panel;
 use super::server::ServerArgs;
 use super::view::{Controller, Status};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::plain;
 
 /// How often a daemon that is gone is looked for.
 const AGAIN: Duration = Duration::from_millis(500);
@@ -99,7 +100,7 @@ impl Shown {
     /// Shows an event; false where nobody reads any more.
     fn show(&mut self, data: &str) -> Result<bool, Failure> {
         if matches!(self, Self::Json) {
-            return line(data);
+            return line(&plain::json(data));
         }
         // What is no status is for others.
         let Ok(status) = serde_json::from_str::<Status>(data) else { return Ok(true) };
@@ -138,7 +139,7 @@ impl Shown {
 
 /// Writes a line; false where nobody reads any more, which ends the watch.
 fn line(text: &str) -> Result<bool, Failure> {
-    let text = text.replace('\n', " ") + "\n";
+    let text = plain::lines(&text.replace('\n', " ")).into_owned() + "\n";
     match io::stdout().lock().write_all(text.as_bytes()) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
@@ -164,9 +165,8 @@ fn changes(before: Option<&Status>, now: &Status) -> Vec<String> {
         let known = was.controllers.iter().find(|one| one.name == controller.name);
         let Controller { name, enabled, standing, why, .. } = controller;
         if known.map(|one| (one.enabled, &one.standing)) != Some((*enabled, standing)) {
-            let off = if *enabled { "" } else { ", off" };
             let why = if why.is_empty() { String::new() } else { format!(": {why}") };
-            lines.push(format!("{name} {standing}{off}{why}"));
+            lines.push(format!("{name} {}{why}", controller.stands()));
         }
     }
     let same =

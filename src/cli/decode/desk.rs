@@ -10,6 +10,7 @@ use super::input::{MAX_OCTETS, octets};
 use super::message::{Reading, sheet};
 use super::tally::Tally;
 use crate::capture::{Capture, CaptureError, Content, Datagram, Fragment, Packet};
+use crate::wire::VibrationPort;
 
 /// The most octets of a malformed message that are shown.
 const SHOWN: usize = 64;
@@ -20,6 +21,8 @@ const MAX_LINE: usize = 16 * MAX_OCTETS;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Manner {
     pub(super) reading: Reading,
+    /// How vibration frames have Port Out.
+    pub(super) port: VibrationPort,
     pub(super) json: bool,
     /// All fields rather than one line.
     pub(super) full: bool,
@@ -184,7 +187,7 @@ impl<W: Write> Desk<W> {
     }
 
     fn message(&mut self, place: Place, octets: &[u8]) -> io::Result<()> {
-        match sheet(octets, self.manner.reading) {
+        match sheet(octets, self.manner.reading, self.manner.port) {
             Ok(sheet) => {
                 self.tally.message(&sheet);
                 match self.manner {
@@ -195,7 +198,8 @@ impl<W: Write> Desk<W> {
             }
             Err(error) => {
                 self.tally.malformed += 1;
-                let literal = self.manner.reading != Reading::Imax && sheet(octets, Reading::Imax).is_ok();
+                let literal = self.manner.reading != Reading::Imax
+                    && sheet(octets, Reading::Imax, self.manner.port).is_ok();
                 let hint = if literal { "; with --dialect imax it is one" } else { "" };
                 let why = format!("{error}{hint}");
                 let object = json!({ "octet": error.offset(), "why": why, "hex": hex(octets) });

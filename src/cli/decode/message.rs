@@ -4,7 +4,7 @@ use super::names::{motion_name, space_name};
 use super::sheet::Sheet;
 use crate::wire::{
     Access, Dialect, ImaxMotion, ImaxRegisters, MAX_SERVO_READ, Message, MotionReply, MotionRequest,
-    ReplyCode, Space, Status, WireError,
+    ReplyCode, Space, Status, VibrationPort, WireError,
 };
 
 /// How to read a message.
@@ -28,7 +28,7 @@ impl Reading {
 ///
 /// # Errors
 /// At which octet, and why, these octets are none.
-pub(super) fn sheet(octets: &[u8], reading: Reading) -> Result<Sheet, WireError> {
+pub(super) fn sheet(octets: &[u8], reading: Reading, port: VibrationPort) -> Result<Sheet, WireError> {
     let mut sheet = Sheet::default();
     if reading == Reading::Imax {
         if let Ok(motion) = ImaxMotion::parse(octets) {
@@ -40,8 +40,8 @@ pub(super) fn sheet(octets: &[u8], reading: Reading) -> Result<Sheet, WireError>
             return Ok(sheet);
         }
     }
-    let message = Message::parse(octets)?;
-    sheet.message(octets, &message, reading.dialect());
+    let message = Message::parse_as(port, octets)?;
+    sheet.message(octets, &message, reading.dialect(), port);
     Ok(sheet)
 }
 
@@ -49,10 +49,16 @@ pub(super) fn sheet(octets: &[u8], reading: Reading) -> Result<Sheet, WireError>
 const WORDS: usize = 16;
 
 impl Sheet {
-    fn message(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect) {
+    fn message(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect, port: VibrationPort) {
         match message {
-            Message::Motion(motion) => self.motion(octets, motion),
-            Message::MotionReply(reply) => self.motion_reply(octets, reply, dialect),
+            Message::Motion(motion) => {
+                self.motion(octets, motion);
+                self.surplus(octets, motion.layout_len(port));
+            }
+            Message::MotionReply(reply) => {
+                self.motion_reply(octets, reply, dialect);
+                self.surplus(octets, reply.layout_len(port));
+            }
             Message::Read(read) => {
                 self.head(octets, "read registers", true);
                 self.codes(read.accept, read.reply);
@@ -107,7 +113,6 @@ impl Sheet {
         self.positions(&motion.positions);
         self.bits("outputs", 'Y', u32::from(motion.outputs));
         self.tail(motion.extend, motion.vibration.as_deref());
-        self.surplus(octets, motion.layout_len());
     }
 
     fn motion_reply(&mut self, octets: &[u8], reply: &MotionReply, dialect: Dialect) {
@@ -121,7 +126,6 @@ impl Sheet {
         self.positions(&reply.positions);
         self.bits("inputs", 'X', u32::from(reply.inputs));
         self.tail(reply.extend, reply.vibration.as_deref());
-        self.surplus(octets, reply.layout_len());
     }
 
     fn servo(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect) {
@@ -223,7 +227,7 @@ mod tests {
     fn read(hex: &str, reading: Reading) -> Sheet {
         let octets: Vec<u8> =
             (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect();
-        sheet(&octets, reading).unwrap()
+        sheet(&octets, reading, VibrationPort::Two).unwrap()
     }
 
     #[test]

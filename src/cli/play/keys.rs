@@ -36,7 +36,8 @@ c        clear, after a stop or a fault
 p        park the seats, and end
 + -      motion and vibration of all seats 5 % up or down, never above the level at the start
 , .      motion 10 ms earlier or later than the film
-q        park as far as the seats may move, and leave; Ctrl-C does the same, a second one ends at once";
+q        park as far as the seats may move, and leave; Ctrl-C does the same, a second one
+         half a second later or more ends at once";
 
 /// Where in the octets of one key we are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -14,6 +14,7 @@ use rtrb::{Consumer, Producer};
 use super::keys;
 use super::leader::{self, Leader};
 use super::said::Said;
+use super::standings::Standings;
 use crate::app::Reins;
 use crate::cli::print;
 use crate::rt::{Command, News, Phase};
@@ -21,11 +22,12 @@ use crate::state::{Next, State};
 use crate::sys::terminal::Keyboard;
 use crate::time::ShowTime;
 
-/// How often is looked.
-/// Looks after which a second Ctrl-C is one of its own.
+/// Looks after which a second Ctrl-C is one of its own: half a second.
 const ARM_AFTER: u32 = 6;
 /// How often is looked.
 const LOOK: Duration = Duration::from_millis(100);
+/// What a first Ctrl-C does, and what a second one will.
+const LEAVING: &str = "the seats park as far as they may move, and the play ends; half a second from now on Ctrl-C again would end it at once";
 
 /// The threads; none where the system starts no further one, which is no reason to fail.
 pub(super) struct Progress {
@@ -57,6 +59,7 @@ impl Progress {
             pressed: 0,
             phase: Phase::Asking,
             now: None,
+            standings: Standings::default(),
         };
         let done = Arc::clone(&over);
         let teller = Builder::new()
@@ -95,6 +98,8 @@ struct Teller {
     phase: Phase,
     /// The state of the hall and the next action, once it plays.
     now: Option<(State, Next)>,
+    /// How the controllers stood when they were looked at last.
+    standings: Standings,
 }
 
 impl Teller {
@@ -102,9 +107,14 @@ impl Teller {
     fn lines(&mut self) -> Vec<String> {
         let mut lines: Vec<String> = self.notes.try_iter().map(str::to_owned).collect();
         self.pressed += u32::from(self.said.ctrl_c.is_pressed());
-        if self.pressed == ARM_AFTER {
-            self.said.ctrl_c.arm();
-            lines.push("Ctrl-C again ends at once, and leaves the seats where they are".to_owned());
+        match self.pressed {
+            // It stays so for as long as it is looked at.
+            1 => lines.push(LEAVING.to_owned()),
+            ARM_AFTER => {
+                self.said.ctrl_c.arm();
+                lines.push("Ctrl-C again ends at once, and leaves the seats where they are".to_owned());
+            }
+            _ => {}
         }
         if self.now.is_none()
             && self.said.control.live.phase() == Phase::Homing
@@ -120,6 +130,7 @@ impl Teller {
             }
             lines.extend(self.said.news(&news));
         }
+        lines.extend(self.standings.changes(&self.said.control.live.table(), &self.said.names));
         lines
     }
 

@@ -1,6 +1,7 @@
 //! A report as CSV (RFC 4180).
 
 use crate::journal::{Percentiles, Report, Shown};
+use crate::plain::escaped;
 
 const SHOWS: &str = "start,end,took_s,result,hall,cue,sha256,title,playlist,entry,level,vibration,trim_ms,effects_off,\
     seats_total,seats_available,operator,scheduled,out_of_hours,ticks,missed_ticks,sent,asked,acked,refused,lost,\
@@ -14,10 +15,12 @@ pub(super) fn shows(report: &Report) -> String {
 
 /// One record for each thing that was asked.
 pub(super) fn actions(report: &Report) -> String {
-    let head = ["at", "who", "what", "result", "state"].map(str::to_owned);
+    let head = ["at", "who", "what", "result", "state", "times"].map(str::to_owned);
     let rows = report.actions.iter();
-    let rows =
-        rows.map(|one| [&one.at, &one.who, &one.what, &one.result, &one.state].map(|text| plain(text)));
+    let rows = rows.map(|one| {
+        let times = one.times.to_string();
+        [&one.at, &one.who, &one.what, &one.result, &one.state, &times].map(|text| plain(text))
+    });
     [head].into_iter().chain(rows).map(|cells| record(&cells)).collect()
 }
 
@@ -62,9 +65,10 @@ fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-/// A text that no spreadsheet takes for a formula: titles come from whoever made the cue.
+/// A text that does nothing to a terminal, and that no spreadsheet takes for a formula: titles come from whoever made the cue.
 fn plain(text: &str) -> String {
-    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.to_owned() }
+    let text = escaped(text, usize::MAX);
+    if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.into_owned() }
 }
 
 /// One record with its end.
@@ -92,6 +96,7 @@ mod tests {
     #[test]
     fn a_title_is_no_formula() {
         assert_eq!(plain("=HYPERLINK(1)"), "'=HYPERLINK(1)");
+        assert_eq!(plain("\t=1\x1b"), "\\t=1\\u{1b}");
         assert_eq!(plain("Storm"), "Storm");
     }
 }

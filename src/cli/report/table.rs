@@ -41,7 +41,9 @@ pub(super) fn actions(report: &Report) -> String {
     table.load_style(STYLE);
     table.set_header(["at", "who", "what", "result", "state"]);
     for one in &report.actions {
-        table.add_row([short(&one.at), safe(&one.who), safe(&one.what), safe(&one.result), safe(&one.state)]);
+        let often = if one.times > 1 { format!(" ({} times)", one.times) } else { String::new() };
+        let result = safe(&one.result) + &often;
+        table.add_row([short(&one.at), safe(&one.who), safe(&one.what), result, safe(&one.state)]);
     }
     format!("{}\n", table.trim_fmt())
 }

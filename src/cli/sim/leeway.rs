@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use super::parse;
+use crate::cli::vibration_port;
 use crate::sim::{Commands, Invented};
 use crate::time::parse_duration;
+use crate::wire::VibrationPort;
 
 /// What the manuals leave open.
 #[derive(Debug, clap::Args)]
@@ -62,6 +64,10 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "N", default_value_t = 1_000)]
     servo_registers: u16,
 
+    /// Octets of Port Out in vibration frames, and of the inputs in the answers: 2 or 4.
+    #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
+    vibration_port_octets: VibrationPort,
+
     /// Software version (DPFF and DPFE).
     #[arg(long, value_name = "MAJOR.MINOR", default_value = "1.0", value_parser = parse::version)]
     software_version: [u16; 2],
@@ -109,6 +115,7 @@ impl Leeway {
             jog_rpm: self.jog_rpm,
             servo_alarm: self.servo_alarm,
             servo_registers: self.servo_registers,
+            vibration_port: self.vibration_port_octets,
             version: self.software_version,
         }
     }

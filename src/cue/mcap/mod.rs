@@ -3,6 +3,7 @@
 mod message;
 mod read;
 mod record;
+mod walk;
 mod write;
 
 pub(super) use read::read;

@@ -1,6 +1,6 @@
 //! From an MCAP file to a cue.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::Read;
 use std::path::Path;
 
@@ -11,16 +11,21 @@ use super::super::fault::{Collector, CueFaults, Place};
 use super::super::header::is_effect_name;
 use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME};
 use super::super::problem::Problem;
-use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, Vibration, value};
-use super::{METADATA, Topic, VERSION, message, record};
+use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, Vibration, title_of, value};
+use super::record::{self, Channel};
+use super::{METADATA, Topic, VERSION, message};
 use crate::motion::MAX_AXES;
+use crate::plain::escaped;
 use crate::time::ShowTime;
+
+/// How much is told of why a message is none, octets.
+const REASON_TOLD: usize = 200;
 
 /// Reads an MCAP cue; `path` names it in faults.
 pub(in crate::cue) fn read(path: &Path, input: impl Read) -> Result<Cue, CueFaults> {
     let mut reading = Reading::new(path);
-    if let Err(problem) = record::each(input, |opcode, body| reading.take(opcode, body)) {
-        reading.faults.add(Place::File, None, problem);
+    if let Err((place, problem)) = record::each(input, |opcode, body| reading.take(opcode, body)) {
+        reading.faults.add(place, None, problem);
     }
     reading.finish()
 }
@@ -34,9 +39,9 @@ pub fn recover(path: &Path, input: impl Read) -> Result<(Cue, Option<Problem>), 
     let mut reading = Reading::new(path);
     let lost = match record::each(input, |opcode, body| reading.take(opcode, body)) {
         Ok(()) => None,
-        Err(problem @ (Problem::CutShort | Problem::Damaged(_))) => Some(problem),
-        Err(problem) => {
-            reading.faults.add(Place::File, None, problem);
+        Err((_, problem @ (Problem::CutShort | Problem::Damaged(_)))) => Some(problem),
+        Err((place, problem)) => {
+            reading.faults.add(place, None, problem);
             None
         }
     };
@@ -67,6 +72,7 @@ impl At {
 /// A file while it is read. Units may be declared behind the messages, so values are checked at the end.
 struct Reading {
     faults: Collector,
+    schemas: HashSet<u16>,
     channels: HashMap<u16, Option<Topic>>,
     /// Messages so far and last log time, by topic.
     seen: HashMap<Topic, (u64, u64)>,
@@ -80,6 +86,7 @@ impl Reading {
     fn new(path: &Path) -> Self {
         Self {
             faults: Collector::default(),
+            schemas: HashSet::new(),
             channels: HashMap::new(),
             seen: HashMap::new(),
             unit: None,
@@ -93,9 +100,11 @@ impl Reading {
     fn take(&mut self, opcode: u8, body: &[u8]) -> Result<(), Problem> {
         let broken = |what: &str| Problem::Damaged(format!("a {what} record that is too short"));
         match opcode {
+            op::SCHEMA => {
+                self.schemas.insert(record::schema(body).ok_or_else(|| broken("schema"))?);
+            }
             op::CHANNEL => {
-                let (id, topic, encoding) = record::channel(body).ok_or_else(|| broken("channel"))?;
-                self.channel(id, topic, encoding);
+                self.channel(&Channel::parse(body).ok_or_else(|| broken("channel"))?)?;
             }
             op::METADATA => {
                 let (name, entries) = record::metadata(body).ok_or_else(|| broken("metadata"))?;
@@ -112,25 +121,37 @@ impl Reading {
                     return self.message(at, before, data);
                 }
             }
+            // Zeros would be read as one record after another.
+            0 => return Err(Problem::Damaged("a record of opcode 0, which no record has".to_owned())),
             _ => {}
         }
         Ok(())
     }
 
     /// Topics that are not below `/cue/` belong to someone else and are passed over.
-    fn channel(&mut self, id: u16, name: &str, encoding: &str) {
+    fn channel(&mut self, channel: &Channel<'_>) -> Result<(), Problem> {
+        let Channel { id, schema, topic: name, encoding } = *channel;
         if self.channels.contains_key(&id) {
-            return; // repeated in the summary
+            return Ok(()); // repeated in the summary
         }
         let topic = Topic::ALL.into_iter().find(|topic| topic.name() == name);
         if topic.is_none() && name.starts_with("/cue/") {
             self.faults.add(Place::File, None, Problem::UnknownTopic(value::shortened(name)));
         }
         if topic.is_some() && encoding != "json" {
-            let problem = Problem::Foreign(format!("{name} is encoded as {encoding:?}, not as json"));
+            let problem = Problem::Foreign(format!(
+                "{name} is encoded as {:?}, not as json",
+                value::shortened(encoding)
+            ));
             self.faults.add(Place::File, None, problem);
         }
+        if topic.is_some() && schema != 0 && !self.schemas.contains(&schema) {
+            return Err(Problem::Damaged(format!(
+                "{name} has schema {schema}, which does not stand before it"
+            )));
+        }
         self.channels.insert(id, topic);
+        Ok(())
     }
 
     fn declare(&mut self, entries: &std::collections::BTreeMap<&str, &str>) {
@@ -159,8 +180,7 @@ impl Reading {
             self.faults.add(Place::File, Some(METADATA), Problem::DeclaredTwice);
         }
         self.unit = Some(unit.unwrap_or_default());
-        self.cue.title =
-            entries.get("title").filter(|title| !title.is_empty()).map(|title| (*title).to_owned());
+        self.cue.title = entries.get("title").filter(|title| !title.is_empty()).map(|title| title_of(title));
     }
 
     fn message(&mut self, at: At, before: u64, data: &[u8]) -> Result<(), Problem> {
@@ -243,7 +263,7 @@ impl Reading {
         if marker.name.len() > MAX_MARKER_NAME {
             return Err(Problem::MarkerName(marker.name.len()));
         }
-        self.cue.markers.push(Marker { at: at.time(), name: marker.name });
+        self.cue.markers.push(Marker { at: at.time(), name: escaped(&marker.name, usize::MAX).into_owned() });
         Ok(())
     }
 
@@ -321,5 +341,7 @@ fn effect(names: &mut Vec<String>, name: String) -> Result<usize, Problem> {
 }
 
 fn parsed<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, Problem> {
-    serde_json::from_slice(data).map_err(|error| Problem::Message(error.to_string()))
+    // It names what it met in the file as it stands there.
+    serde_json::from_slice(data)
+        .map_err(|error| Problem::Message(escaped(&error.to_string(), REASON_TOLD).into_owned()))
 }

@@ -2,22 +2,41 @@
 //! records that matter are taken apart here, because the crate reserves as much memory as a length in the file claims.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::{BufReader, Read};
 
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
+use super::super::fault::Place;
 use super::super::limits::MAX_FILE;
 use super::super::problem::Problem;
+use super::walk::Walk;
+use crate::plain::escaped;
 
 /// The longest record that is taken into memory; indexes of foreign writers can be some MB.
 const MAX_RECORD: usize = 64 * 1024 * 1024;
 /// How much is read at a time, whatever a length in the file asks for.
 const READ: usize = 256 * 1024;
 
-/// Hands every record, its opcode and body, to `take`; stops at its first error or the file's.
+/// How much is told of what the reader met, octets.
+const REASON_TOLD: usize = 200;
+
+/// Hands every record, its opcode and body, to `take`; stops at its first error or the file's, with its place: that of the
+/// record, or of the chunk that holds it.
 pub(super) fn each(
-    mut input: impl Read,
+    input: impl Read,
+    take: impl FnMut(u8, &[u8]) -> Result<(), Problem>,
+) -> Result<(), (Place, Problem)> {
+    let mut walk = Walk::new();
+    each_of(input, &mut walk, take).map_err(|problem| match problem {
+        Problem::Damaged(_) => (Place::Octet(walk.record()), problem),
+        _ => (Place::File, problem),
+    })
+}
+
+fn each_of(
+    input: impl Read,
+    walk: &mut Walk,
     mut take: impl FnMut(u8, &[u8]) -> Result<(), Problem>,
 ) -> Result<(), Problem> {
     let options = LinearReaderOptions::default()
@@ -27,13 +46,15 @@ pub(super) fn each(
         .with_check_finishes_after_end_magic(true)
         .with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let (mut read, mut unpacked, mut begun) = (0_u64, 0_u64, false);
+    // No octet is read before it is asked for, so that the walk is where the reader is.
+    let mut input = BufReader::with_capacity(READ, input);
+    let (mut unpacked, mut begun) = (0_u64, false);
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 let space = reader.insert(wanted.clamp(1, READ));
                 let octets = input.read(space).map_err(|error| Problem::Unread(error.to_string()))?;
-                read += octets as u64;
+                walk.pass(&space[..octets]).map_err(Problem::Damaged)?;
                 reader.notify_read(octets);
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
@@ -41,9 +62,9 @@ pub(super) fn each(
                 unpacked += data.len() as u64 + 9; // opcode and length
                 take(opcode, data)?;
             }
-            Err(error) => return Err(problem(&error, read, begun)),
+            Err(error) => return Err(problem(&error, walk.octets(), begun)),
         }
-        if read > MAX_FILE || unpacked > MAX_FILE {
+        if walk.octets() > MAX_FILE || unpacked > MAX_FILE {
             return Err(Problem::FileTooLarge);
         }
     }
@@ -55,16 +76,29 @@ fn problem(error: &McapError, read: u64, begun: bool) -> Problem {
         McapError::UnexpectedEof if read == 0 => Problem::Empty,
         McapError::UnexpectedEof => Problem::CutShort,
         McapError::BadMagic if !begun => Problem::Foreign("it does not begin as MCAP files do".to_owned()),
-        other => Problem::Damaged(other.to_string()),
+        other => Problem::Damaged(escaped(&other.to_string(), REASON_TOLD).into_owned()),
     }
 }
 
-/// Channel record: id and topic and message encoding.
-pub(super) fn channel(body: &[u8]) -> Option<(u16, &str, &str)> {
-    let mut body = Body(body);
-    let id = body.u16()?;
-    body.u16()?; // schema
-    Some((id, body.text()?, body.text()?))
+/// Schema record: its id.
+pub(super) fn schema(body: &[u8]) -> Option<u16> {
+    Body(body).u16()
+}
+
+/// Channel record.
+pub(super) struct Channel<'a> {
+    pub(super) id: u16,
+    /// The schema of its messages; 0 is none.
+    pub(super) schema: u16,
+    pub(super) topic: &'a str,
+    pub(super) encoding: &'a str,
+}
+
+impl<'a> Channel<'a> {
+    pub(super) fn parse(body: &'a [u8]) -> Option<Self> {
+        let mut body = Body(body);
+        Some(Self { id: body.u16()?, schema: body.u16()?, topic: body.text()?, encoding: body.text()? })
+    }
 }
 
 /// Message record: channel, log time and data.

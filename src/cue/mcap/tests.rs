@@ -272,3 +272,128 @@ proptest! {
         prop_assert_eq!((first.times(), first.positions()), (third.times(), third.positions()));
     }
 }
+
+/// A record as it stands in a file.
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    [&[opcode], (body.len() as u64).to_le_bytes().as_slice(), body].concat()
+}
+
+/// A chunk that says that it unpacks to so many octets.
+fn chunk(compression: &str, unpacked: u64, packed: &[u8]) -> Vec<u8> {
+    let name = u32::try_from(compression.len()).unwrap().to_le_bytes();
+    let front =
+        [&[0; 16], unpacked.to_le_bytes().as_slice(), &[0; 4], &name, compression.as_bytes()].concat();
+    record(0x06, &[&front, (packed.len() as u64).to_le_bytes().as_slice(), packed].concat())
+}
+
+/// A file of these records; the footer is none of ours.
+fn file_of(records: &[&[u8]], summary: u64, offsets: u64) -> Vec<u8> {
+    let footer = [&summary.to_le_bytes()[..], &offsets.to_le_bytes(), &[0; 4]].concat();
+    let header = record(0x01, &[0; 8]);
+    let end = [record(0x0f, &[0; 4]), record(0x02, &footer)].concat();
+    [MAGIC, &header, &records.concat(), &end, MAGIC].concat()
+}
+
+#[test]
+fn a_chunk_that_unpacks_to_more_than_any_cue_is_refused_before_it_is_unpacked() {
+    struct Counting<'a>(&'a [u8], u64);
+    impl std::io::Read for Counting<'_> {
+        fn read(&mut self, space: &mut [u8]) -> std::io::Result<usize> {
+            let octets = self.0.read(space)?;
+            self.1 += octets as u64;
+            Ok(octets)
+        }
+    }
+    let packed = vec![0; 1 << 20];
+    for (compression, unpacked) in [("zstd", 2 << 30), ("lz4", 1 << 40), ("zstd", u64::MAX), ("", 1 << 40)] {
+        let octets = file_of(&[&chunk(compression, unpacked, &packed)], 0, 0);
+        let mut input = Counting(&octets, 0);
+        let told = cue::read(Path::new("t.mcap"), &mut input, &Source::Native).unwrap_err().to_string();
+        assert!(told.starts_with("t.mcap: octet 25: damaged: a chunk "), "{told}");
+        assert!(told.contains(&unpacked.to_string()), "{told}");
+        assert!(input.1 < 1 << 20, "{} octets were read of it", input.1);
+    }
+}
+
+#[test]
+fn records_that_are_none_are_refused_at_the_first() {
+    let octets = file_of(&[&[0; 90]], 0, 0);
+    assert!(faults(&octets).starts_with("octet 25: damaged: a record of opcode 0"), "{}", faults(&octets));
+    let zeros = chunk("", 90, &[0; 90]);
+    let told = faults(&file_of(&[&zeros], 0, 0));
+    assert!(told.starts_with("octet 25: damaged: a record of opcode 0"), "{told}");
+}
+
+#[test]
+fn a_footer_that_points_past_itself_is_refused_with_its_place() {
+    let whole = mcap_of(&csv(CUE));
+    let footer = whole.len() - MAGIC.len() - 29;
+    assert_eq!(whole[footer], 0x02);
+    for (field, what) in [(9, "summary"), (17, "summary offsets")] {
+        for at in [footer as u64 + 1, 1 << 40, u64::MAX, 3] {
+            let mut octets = whole.clone();
+            octets[footer + field..][..8].copy_from_slice(&at.to_le_bytes());
+            octets[footer + 25..][..4].fill(0); // its sum is not to be looked at
+            assert_eq!(
+                faults(&octets),
+                format!(
+                    "octet {footer}: damaged: a footer that looks for the {what} at octet {at}, and stands at {footer} \
+                     itself; `kinocue convert --recover` saves the complete messages before the damage"
+                )
+            );
+            let (saved, lost) = recover(Path::new("t"), octets.as_slice()).unwrap();
+            assert!(lost.is_some() && saved.rows() == 3, "all messages stand before it");
+        }
+    }
+}
+
+#[test]
+fn a_channel_whose_schema_is_missing_is_refused_with_its_place() {
+    let text = |text: &str| [&u32::try_from(text.len()).unwrap().to_le_bytes(), text.as_bytes()].concat();
+    let channel = |schema: u16, topic| {
+        let body = [&1_u16.to_le_bytes()[..], &schema.to_le_bytes(), &text(topic), &text("json"), &[0; 4]];
+        record(0x04, &body.concat())
+    };
+    let schema = record(
+        0x03,
+        &[&7_u16.to_le_bytes()[..], &text("cue.axes"), &text("jsonschema"), &text("{}")].concat(),
+    );
+    let missing = file_of(&[&schema, &channel(8, "/cue/axes")], 0, 0);
+    let at = 25 + schema.len();
+    let told = faults(&missing);
+    assert!(
+        told.starts_with(&format!("octet {at}: damaged: /cue/axes has schema 8, which does not")),
+        "{told}"
+    );
+    for good in [channel(7, "/cue/axes"), channel(0, "/cue/axes"), channel(8, "/somebody/else")] {
+        let told = faults(&file_of(&[&schema, &good], 0, 0));
+        assert_eq!(told, "not an MCAP cue: it has no metadata record \"kinocue\"");
+    }
+}
+
+#[test]
+fn rows_that_repeat_for_an_hour_are_no_bomb() {
+    let rows: String = (0..40_000).map(|k| format!("{},0.5,0.5,0.5,0.5,0.5,0.5\n", k * 10)).collect();
+    let cue = csv(&format!("time_ms,a1,a2,a3,a4,a5,a6\n{rows}"));
+    for chunk_size in [64 << 10, 1 << 20, 64 << 20] {
+        let mut out = Cursor::new(Vec::new());
+        let mut writer = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
+            .chunk_size(Some(chunk_size))
+            .create(&mut out)
+            .unwrap();
+        let metadata = FRACTION.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+        writer.write_metadata(&mcap::records::Metadata { name: METADATA.to_owned(), metadata }).unwrap();
+        let channel_id = writer.add_channel(0, "/cue/axes", "json", &Default::default()).unwrap();
+        for time in cue.times() {
+            let log_time = time.as_nanos().unsigned_abs();
+            let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
+            writer.write_to_known_channel(&header, br#"{"a":[0.5,0.5,0.5,0.5,0.5,0.5]}"#).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        let octets = out.into_inner();
+        assert_eq!(load(&octets).unwrap().rows(), cue.rows(), "{chunk_size} in {} octets", octets.len());
+    }
+}

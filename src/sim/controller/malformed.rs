@@ -29,7 +29,7 @@ impl Controller {
         }
         self.counts.replied += 1;
         match (motion, access) {
-            (Some(answer), _) => Some(answer.emit(buf)),
+            (Some(answer), _) => Some(answer.emit_as(self.invented.vibration_port, buf)),
             (None, Some(answer)) => Some(answer.emit(buf)),
             (None, None) => None,
         }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::Controller;
+use super::{Controller, OUTPUTS};
 use crate::sim::pa;
 use crate::sim::registers::{MS_PER_MINUTE, OWN_REGISTERS, TABLE};
 use crate::time::MonoTime;
@@ -61,6 +61,11 @@ impl Seen {
         self.last = Some(at);
     }
 
+    /// From the datagram before to this one.
+    pub(super) const fn interval(&self) -> Duration {
+        self.interval
+    }
+
     pub(super) const fn command(&mut self, motion: &MotionRequest, duration: Duration) {
         self.function = motion.function();
         self.time_ms = motion.time_ms;
@@ -75,7 +80,8 @@ impl Controller {
         self.monitor_axes(&mut table, at);
         [table[dp::QUEUE_WRITE], table[dp::QUEUE_READ]] = self.player.pointers();
         table[dp::INPUTS] = self.inputs.active();
-        table[dp::ACTIVE_OUTPUTS] = self.outputs;
+        let inverted = self.registers.get(pa::OUTPUT_POLARITY) == 1;
+        table[dp::ACTIVE_OUTPUTS] = if inverted { !self.outputs & OUTPUTS } else { self.outputs };
         table[dp::RESET] = if at < self.homing_until { RESETTING } else { RESET_DONE };
         table[dp::OUTPUTS] = self.outputs;
         table[dp::VERSION] = self.invented.version[0];

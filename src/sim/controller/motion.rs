@@ -85,17 +85,23 @@ impl Controller {
         }
     }
 
-    /// How long a frame's move takes: its Time, or what absolute time has gone on since the frame before; the fixed
+    /// How long a frame's move takes: on an IMAX with PA0a = 1, as long as it came after the datagram before; else its Time, or what absolute time has gone on since the frame before; the fixed
     /// interval where that is none; cut to the longest there may be.
     fn duration(&self, motion: &MotionRequest) -> Duration {
+        let longest = Duration::from_millis(u64::from(self.longest_ms()));
         let interval = self.registers.interval_ms();
+        if self.dialect == Dialect::Mbox && self.registers.get(pa::INTERVAL_SOURCE) == 1 {
+            let since = self.seen.interval();
+            let first = Duration::from_millis(u64::from(interval));
+            return if since.is_zero() { first } else { since }.min(longest);
+        }
         let asked = match (motion.timing, self.last_absolute) {
             (Timing::Relative, _) => motion.time_ms,
             (Timing::Absolute, Some(before)) => motion.time_ms.saturating_sub(before),
             (Timing::Absolute, None) => motion.time_ms.min(interval),
         };
         let ms = if asked == 0 { interval } else { asked };
-        Duration::from_millis(u64::from(ms.min(self.longest_ms())))
+        Duration::from_millis(u64::from(ms)).min(longest)
     }
 
     /// Where the axes go: each takes its own axis of the command, past the axis offset; those that the command does

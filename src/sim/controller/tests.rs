@@ -3,7 +3,8 @@ use std::time::Duration;
 use super::*;
 use crate::sim::Refused;
 use crate::wire::{
-    FrameNo, Motion, MotionReply, ReadRequest, RegisterReply, Timing, Vibration, Words, WriteRequest,
+    FrameNo, Motion, MotionReply, ReadRequest, RegisterReply, Timing, Vibration, VibrationPort, Words,
+    WriteRequest,
 };
 
 mod faults;

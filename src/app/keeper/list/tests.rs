@@ -175,3 +175,12 @@ fn a_show_that_a_person_lets_go_stays_the_one_that_is_loaded() {
     let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
     rig.ask(Ask::Levels(half)).unwrap();
 }
+
+#[test]
+fn a_playlist_that_was_loaded_before_is_at_the_entry_where_it_was_or_at_that_of_its_cue() {
+    let list = list();
+    assert_eq!(list.nearest(1, "two"), 1);
+    assert_eq!(list.nearest(0, "three"), 2, "somebody has changed it meanwhile");
+    assert_eq!(list.nearest(0, "beside"), 0, "a cue that was loaded beside it");
+    assert_eq!(list.nearest(7, "beside"), 2);
+}

@@ -36,7 +36,7 @@ export function headers(more = {}) {
 }
 
 /** A key that no other request has. Made of random octets, since `randomUUID` is there on secure origins alone. */
-export function key() {
+function key() {
   const octets = crypto.getRandomValues(new Uint8Array(16));
   return Array.from(octets, (octet) => octet.toString(16).padStart(2, '0')).join('');
 }
@@ -69,8 +69,8 @@ async function inTurn(request) {
   }
 }
 
-/** Sends a stop, which waits behind nothing. Repeats of one have the same key: the server does it once. */
-export const sendStop = (repeatOf, patience) => send('POST', 'show/stop', {}, repeatOf, patience);
+/** Sends a stop, which waits behind nothing and is done each time that it comes. */
+export const sendStop = (patience) => send('POST', 'show/stop', {}, key(), patience);
 
 function send(method, path, body, repeatOf, patience) {
   const more = {

@@ -23,6 +23,7 @@ const FIGURES = {
   'Emergency stop': ({ emergency_stop: stop }) => (stop ? 'IN EFFECT' : 'no'),
   'Error': ({ error }) => (error === null ? 'never told' : error === 0 ? 'none' : `number ${error}`),
   'Drive errors': ({ servo_errors: errors }) => drives(errors),
+  'Belts open': ({ belts_open: belts }) => (belts === null ? 'no belts known' : belts.length === 0 ? 'none' : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ')),
   'Inputs on': ({ inputs }) => bits(inputs, 'X'),
   'Outputs on': ({ outputs }) => bits(outputs, 'Y'),
   'Positions': ({ positions_mm: mm }) => (mm === null ? 'unknown' : `${mm.map((each) => each.toFixed(1)).join(', ')} mm`),
@@ -65,11 +66,13 @@ export function showController(status) {
     parts.shape = standing.mark;
     parts.picture.replaceChildren(mark(standing.mark));
   }
-  setText(parts.word, controller.enabled ? controller.standing : `taken out, ${controller.standing}`);
+  const forGood = controller.standing === 'out';
+  setText(parts.word, forGood ? 'out for good' : controller.enabled ? controller.standing : `taken out, ${controller.standing}`);
   setText(parts.why, sentence(controller.why));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);
-  setProperty(parts.in, 'hidden', controller.enabled);
+  setProperty(parts.reason, 'hidden', !controller.enabled);
+  setProperty(parts.in, 'hidden', controller.enabled || forGood);
 }
 
 function build({ name: which, row, seat, address, group }) {
@@ -86,9 +89,15 @@ function build({ name: which, row, seat, address, group }) {
   const companions = hall().controllers.filter((each) => each.group === group && each.name !== which).map((each) => each.name);
   const together = companions.length > 0 ? ` with ${companions.join(', ')}` : '';
   const out = make('button', { type: 'button', id: 'controller-disable', className: 'strong' }, `Take ${which} out${together}`);
+  const reason = make('input', { type: 'text', id: 'controller-why', maxLength: 200, placeholder: 'why, for whoever comes next', 'aria-label': `Why ${which} is taken out` });
   const back = make('button', { type: 'button', id: 'controller-enable', className: 'strong' }, `Take ${which} in${together}`);
   const close = make('button', { type: 'button' }, 'Close');
-  onPress(out, (button) => ask(button, `take ${which} out`, () => change('POST', `controllers/${encodeURIComponent(which)}/disable`)));
+  onPress(out, (button) => {
+    const why = reason.value.trim();
+    const path = `controllers/${encodeURIComponent(which)}/disable`;
+    ask(button, `take ${which} out`, () => change('POST', path, why ? { why } : {}));
+    reason.value = '';
+  });
   onTwoPresses(back, {
     asks: 'It may move: press again',
     label: () => back,
@@ -97,8 +106,8 @@ function build({ name: which, row, seat, address, group }) {
   onPress(close, () => select(null));
   const title = make('h3', {}, `${which}${row ? `, row ${row}` : ''}`);
   const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
-  const buttons = make('div', { className: 'row' }, out, back, close);
-  return { all: [title, where, standing, why, buttons, list], standing, picture, word, why, figures, out, in: back, shape: '' };
+  const buttons = make('div', { className: 'row' }, out, reason, back, close);
+  return { all: [title, where, standing, why, buttons, list], standing, picture, word, why, figures, out, reason, in: back, shape: '' };
 }
 
 function drives(errors) {

@@ -12,11 +12,12 @@ export const STANDINGS = {
   error: { look: 'bad', mark: 'peak', letters: 'ER', means: 'has an error' },
   stopped: { look: 'held', mark: 'block', letters: 'ST', means: 'emergency stop' },
   excluded: { look: 'away', mark: 'dash', letters: 'EX', means: 'taken out' },
+  out: { look: 'away', mark: 'dash', letters: 'XX', means: 'out for good' },
   unknown: { look: 'away', mark: 'what', letters: '??', means: 'never heard' },
 };
 
 /** How a controller stands; one that a person took out is shown as that, however well it answers. */
-export const standingOf = ({ enabled, standing }) => STANDINGS[enabled ? standing : 'excluded'] ?? STANDINGS.unknown;
+export const standingOf = ({ enabled, standing }) => STANDINGS[enabled || standing === 'out' ? standing : 'excluded'] ?? STANDINGS.unknown;
 
 /** The bands of a figure. */
 export const BANDS = {

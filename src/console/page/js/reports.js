@@ -29,9 +29,10 @@ function showPreflight({ preflight, controllers }) {
   }
   setProperty(verdict, 'className', `verdict ${preflight.passed ? 'look-good' : 'look-bad'}`);
   const outcome = preflight.passed ? 'PASSED' : 'NOT PASSED';
-  const answered = `${preflight.answered} of ${controllers.length} controllers answered`;
+  const all = controllers.filter(({ standing }) => standing !== 'out').length;
+  const answered = `${preflight.answered} of ${all} controllers answered`;
   setText(verdict, `${outcome}: ${answered}, ${lasting(preflight.age_s)} ago`);
-  showFindings({ findings: preflight.findings, all: controllers.length });
+  showFindings({ findings: preflight.findings, all });
 }
 
 const showFindings = onChange(({ findings, all }) => {
@@ -49,8 +50,8 @@ function whose(controllers, all) {
 }
 
 const showJournal = onChange((journal) => {
-  const lines = journal.map(({ at, who, what, result }) => {
-    const line = row([timeOfDay(at), who, what, result]);
+  const lines = journal.map(({ at, who, what, result, times }) => {
+    const line = row([timeOfDay(at), who, what, times > 1 ? `${result} (${times} times)` : result]);
     line.classList.toggle('refused', result !== 'done');
     return line;
   });

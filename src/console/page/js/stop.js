@@ -2,7 +2,7 @@
 // server. It is never asked twice whether it is meant. A script of its own, so that a fault elsewhere in the page leaves it be.
 
 import { byId, setProperty, setText } from './dom.js';
-import { key, sendStop } from './api.js';
+import { sendStop } from './api.js';
 import { hall, linkState, watch } from './state.js';
 
 const TRIES = 4;
@@ -27,17 +27,16 @@ function onKey(event) {
   if (!event.repeat) stop();
 }
 
-/** Tries a few times with the same key, so that the server does it once however often it hears of it. */
+/** Tries a few times: of a stop there is never one too many. */
 async function stop() {
   byId('stop').classList.add('pressed');
   if (sending) return;
   sending = true;
   tell('STOP is sent …', 'sent');
-  const repeatOf = key();
   let problem = null;
   for (let attempt = 0; attempt < TRIES; attempt += 1) {
     try {
-      await sendStop(repeatOf, PATIENCE_MS);
+      await sendStop(PATIENCE_MS);
       problem = null;
       tell('STOP was received: the seats come to rest.', 'received');
       break;

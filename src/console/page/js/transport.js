@@ -4,6 +4,7 @@ import { byId, setAttribute, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, onTwoPresses, say } from './press.js';
 import { hall } from './state.js';
+import { clock } from './words.js';
 
 const BETWEEN_GOS_MS = 1000;
 /** A button that has just changed its meaning is dead for so long: a double tap must not do the opposite. */
@@ -27,6 +28,7 @@ let lastGo = -Infinity;
 let armIs = 'arm';
 let armSince = -Infinity;
 let relaxGo = () => {};
+let relaxGoFrom = () => {};
 
 /** Makes the buttons work. */
 export function startTransport() {
@@ -36,7 +38,7 @@ export function startTransport() {
   onPress(byId('arm'), (button) => {
     if (performance.now() - armSince < SETTLE_MS) return;
     const what = armIs;
-    ask(button, what, () => post(what));
+    ask(button, what, () => post(what)).then((done) => done && what === 'arm' && sayOut(button));
   });
   onTwoPresses(byId('home'), {
     asks: 'SEATS EMPTY?',
@@ -48,17 +50,34 @@ export function startTransport() {
     label: () => byId('home-arm'),
     action: (button) => ask(button, 'arm', () => change('POST', 'show/arm', { seats_empty: true })),
   });
-  relaxGo = onTwoPresses(byId('go'), { asks: 'SURE?', label: () => byId('go-word'), action: go });
+  relaxGoFrom = onTwoPresses(byId('go-from'), {
+    asks: 'SURE?',
+    label: () => byId('go-from'),
+    action: (button) => {
+      const at = left(hall());
+      if (at !== null) letGo(button, `go from ${clock(at)}`, () => change('POST', 'show/go', { from_s: at }));
+    },
+  });
+  relaxGo = onTwoPresses(byId('go'), { asks: 'SURE?', label: () => byId('go-word'), action: (button) => letGo(button, 'go', () => post('go')) });
 }
 
-function go(button) {
+/** Where the show was left; null where there is nothing to go on from. */
+const left = (status) => status?.show?.resume_s ?? null;
+
+/** Whoever arms hears who is out, since when and why. */
+function sayOut(button) {
+  const out = (hall()?.warnings ?? []).filter(({ id }) => id === 'seat-out');
+  if (out.length > 0) say(button, `Arm: done. ${out.map(({ controller, text }) => `${controller}: ${text}`).join('; ')}`);
+}
+
+function letGo(button, what, request) {
   if (performance.now() - lastGo < BETWEEN_GOS_MS) {
     say(button, 'Go: not done. The last one was less than a second ago', true);
     return;
   }
   if (!may('go', hall()?.state)) return;
   lastGo = performance.now();
-  ask(button, 'go', () => post('go'));
+  ask(button, what, request);
 }
 
 /** Shows what may be pressed now. */
@@ -67,6 +86,7 @@ export function showTransport(status, link) {
   for (const what of ['pause', 'resume', 'park', 'go']) setProperty(byId(what), 'disabled', !may(what, state));
   showArm(state, status?.arm_homes ?? false);
   showGo(state, status);
+  showGoFrom(state, status);
   for (const what of ['clear', 'home']) {
     const button = byId(what);
     // What a press would need is in the next action; these two show only where they are one.
@@ -96,6 +116,21 @@ function showGo(state, status) {
   if (!live) relaxGo();
   const sure = byId('go').classList.contains('sure');
   setText(byId('go-note'), sure ? 'press again' : goNote(state, status));
+}
+
+/** After a stop the place of RESUME is that of a button that begins where the show was left. */
+function showGoFrom(state, status) {
+  const button = byId('go-from');
+  const at = left(status);
+  const offered = at !== null && may('go', state);
+  setProperty(button, 'hidden', !offered);
+  setProperty(byId('resume'), 'hidden', offered);
+  if (!offered) {
+    relaxGoFrom();
+    return;
+  }
+  button.dataset.word = `FROM ${clock(at, 0)}`;
+  if (!button.classList.contains('sure')) setText(button, button.dataset.word);
 }
 
 function goNote(state, status) {

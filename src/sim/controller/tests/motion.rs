@@ -108,6 +108,50 @@ fn vibration_is_for_smc_alone() {
 }
 
 #[test]
+
+fn an_imax_told_so_makes_of_lateness_speed() {
+    let parameters = vec![(pa::INTERVAL_SOURCE, 1)];
+    let mut late = Bench::new(&Setup { dialect: Dialect::Mbox, parameters, ..Setup::default() });
+    late.x(&FRAME);
+    late.wait(100).word(0, 0x5e);
+    late.wait(20).x(&Motion { positions: &[Pulses(2_000), Pulses(2_000), Pulses(-3_000)], ..FRAME });
+    assert_eq!(
+        late.wait(20).positions()[0],
+        2_000,
+        "in the 20 ms since the datagram before, not in its 100 ms"
+    );
+    let mut smc = Bench::with(&[(pa::INTERVAL_SOURCE, 1)]);
+    smc.x(&FRAME);
+    assert_eq!(smc.wait(50).positions(), [500, 1_000, -1_500], "there it is for commands without a Time");
+}
+
+#[test]
+fn inverted_outputs_are_on_where_a_frame_says_off() {
+    let mut bench = Bench::with(&[(pa::OUTPUT_POLARITY, 1)]);
+    bench.x(&Motion { outputs: 5, ..FRAME });
+    assert_eq!(bench.word(0, 0x66), 0x0ffa);
+}
+
+#[test]
+fn a_controller_whose_port_out_takes_four_octets_reads_outputs_and_vibration_there_and_refuses_two() {
+    let invented = Invented { vibration_port: VibrationPort::Four, ..Invented::default() };
+    let mut bench = Bench::new(&Setup { invented, ..Setup::default() });
+    bench.controller.set_switches(1, at(0));
+    bench.wait(1_000);
+    let shake = [Vibration { period: 400, amplitude: 10 }; 3];
+    let motion = Motion { vibration: Some(&shake), outputs: 0x0801, ..FRAME };
+    let octets = motion.emit_as(VibrationPort::Four, &mut [0; MAX_LEN]).to_vec();
+    let answer = MotionReply::parse_as(VibrationPort::Four, &bench.send(&octets).unwrap()).unwrap();
+    assert_eq!((answer.code, answer.vibration.as_deref()), (ReplyCode::Running, Some(&shake[..])));
+    assert_eq!((bench.controller.outputs(), answer.inputs), (0x0801, 1));
+    assert_eq!(bench.wait(100).positions(), [1_000, 2_000, -3_000]);
+
+    let octets = motion.emit(&mut [0; MAX_LEN]).to_vec();
+    let answer = MotionReply::parse_as(VibrationPort::Four, &bench.send(&octets).unwrap()).unwrap();
+    assert_eq!((answer.code, octets.len()), (ReplyCode::Command, 46), "it ends two octets too soon");
+}
+
+#[test]
 fn a_queue_that_runs_over_stops_the_play_with_err21_until_a_reset() {
     let mut bench = Bench::with(&[]);
     for _ in 0..201 {

@@ -1,6 +1,11 @@
-//! Text from anywhere as one honest line.
+//! Text from anywhere as what it is: whatever a file, a network or a person gives can be shown, and does nothing to the
+//! terminal, the log or the line that shows it.
 
 use std::borrow::Cow;
+use std::path::Path;
+
+/// The longest name of a file that is shown whole, octets: no path may be longer.
+const PATH_LEN: usize = 4_096;
 
 /// The text with its control characters, and those that change the direction of writing, escaped as Rust writes them, and
 /// cut after `limit` octets: whatever a file, a network or a person gives makes one line, and looks like what it is.
@@ -24,6 +29,36 @@ pub fn escaped(text: &str, limit: usize) -> Cow<'_, str> {
         }
     }
     Cow::Owned(line)
+}
+
+/// The name of a file as one line.
+#[must_use]
+pub fn path(path: &Path) -> String {
+    escaped(&path.to_string_lossy(), PATH_LEN).into_owned()
+}
+
+/// The text with the same characters escaped, but for line breaks and tabs: for lines of our own that hold what came from
+/// elsewhere.
+#[must_use]
+pub fn lines(text: &str) -> Cow<'_, str> {
+    with(text, |c, out| out.extend(c.escape_default()))
+}
+
+/// JSON with the same characters in its strings escaped, as JSON does; it says the same to whoever reads it.
+#[must_use]
+pub fn json(text: &str) -> Cow<'_, str> {
+    // None of them lies beyond the first plane, where JSON would want two escapes.
+    with(text, |c, out| out.push_str(&format!("\\u{:04x}", u32::from(c))))
+}
+
+fn with(text: &str, put: impl Fn(char, &mut String)) -> Cow<'_, str> {
+    let is_shown = |c: char| matches!(c, '\n' | '\t') || !misleads(c);
+    if text.chars().all(is_shown) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    text.chars().for_each(|c| if is_shown(c) { out.push(c) } else { put(c, &mut out) });
+    Cow::Owned(out)
 }
 
 /// Whether a character makes text look like something else: it ends the line, moves the cursor, or turns what follows around
@@ -52,6 +87,27 @@ mod tests {
         assert_eq!(escaped("\x1b[2Jgone", 80), "\\u{1b}[2Jgone");
         assert_eq!(escaped("a\u{202e}csv.exe", 80), "a\\u{202e}csv.exe");
         assert_eq!(escaped("nul\0tab\tcr\r", 80), "nul\\u{0}tab\\tcr\\r");
+    }
+
+    #[test]
+    fn lines_of_ours_stay_lines_whatever_they_hold() {
+        let ours = "a table\twith cells\nand a line more: ä, 座席\n";
+        assert!(matches!(lines(ours), Cow::Borrowed(same) if same == ours));
+        assert_eq!(lines("\x1b]0;x\x07\r\u{9b}2J\u{7f}\n"), "\\u{1b}]0;x\\u{7}\\r\\u{9b}2J\\u{7f}\n");
+    }
+
+    #[test]
+    fn json_says_the_same_when_it_is_escaped() {
+        let text = "\u{7f}\u{9b}\u{202e}\u{2028}ä\n\x1b";
+        let plain = serde_json::to_string(&text).unwrap();
+        let escaped = json(&plain);
+        assert!(!escaped.contains(misleads), "{escaped}");
+        assert_eq!(serde_json::from_str::<String>(&escaped).unwrap(), text);
+    }
+
+    #[test]
+    fn the_name_of_a_file_is_one_line() {
+        assert_eq!(path(Path::new("a\nkinocue: passed\x07.csv")), "a\\nkinocue: passed\\u{7}.csv");
     }
 
     #[test]

@@ -1,0 +1,162 @@
+//! The outline of an MCAP file while its octets go by: where each record begins, and whether what the file says of its own
+//! layout can be so (mcap.dev/spec, "Records"). The `mcap` crate believes some of that unseen.
+
+use mcap::records::op;
+
+use super::super::limits::MAX_FILE;
+use super::MAGIC;
+
+/// What a chunk may unpack to beside so many times its packed size: repeated rows pack well, up to some 50 times.
+const SLACK: u64 = 16 << 20;
+/// How many times its packed size a chunk may unpack to.
+const MAX_RATIO: u64 = 200;
+/// Octets of opcode and length.
+const HEAD: usize = 9;
+/// Octets of a chunk up to the name of its compression.
+const CHUNK: usize = 32;
+/// Octets of a footer.
+const FOOTER: usize = 20;
+/// The longest name of a compression that is looked at; those that are known are shorter.
+const MAX_NAME: usize = 32;
+
+/// How far into a file it is.
+#[derive(Debug)]
+pub(super) struct Walk {
+    /// Octets that went by.
+    at: u64,
+    /// Where the record begins in which the last octet lies.
+    record: u64,
+    /// What was kept of that record: what has to be looked at.
+    head: Vec<u8>,
+    /// Octets of the record that need no look.
+    left: u64,
+    /// Behind the footer there are no records.
+    over: bool,
+}
+
+impl Walk {
+    /// At the front of a file.
+    pub(super) fn new() -> Self {
+        let left = MAGIC.len() as u64;
+        Self { at: 0, record: 0, head: Vec::new(), left, over: false }
+    }
+
+    /// Where the record begins that was gone by last.
+    pub(super) const fn record(&self) -> u64 {
+        self.record
+    }
+
+    /// Octets that went by so far.
+    pub(super) const fn octets(&self) -> u64 {
+        self.at
+    }
+
+    /// Goes by the next octets.
+    ///
+    /// # Errors
+    /// What cannot be so, in words; [`Self::record`] is then where.
+    pub(super) fn pass(&mut self, mut octets: &[u8]) -> Result<(), String> {
+        while !octets.is_empty() {
+            let wanted = self.wanted();
+            let take = if self.over {
+                octets.len()
+            } else if self.left > 0 {
+                usize::try_from(self.left).unwrap_or(usize::MAX).min(octets.len())
+            } else {
+                (wanted - self.head.len()).min(octets.len())
+            };
+            let (taken, rest) = octets.split_at(take);
+            octets = rest;
+            if !self.over && self.left == 0 {
+                self.keep(taken)?;
+            } else {
+                self.left = self.left.saturating_sub(take as u64);
+            }
+            self.at += take as u64;
+        }
+        Ok(())
+    }
+
+    /// Keeps the next octets of a record's head, and looks at it once it is all there.
+    fn keep(&mut self, octets: &[u8]) -> Result<(), String> {
+        if self.head.is_empty() {
+            self.record = self.at;
+        }
+        self.head.extend_from_slice(octets);
+        if self.head.len() < self.wanted() {
+            return Ok(());
+        }
+        let looked = self.look();
+        self.left = self.body().saturating_sub((self.head.len() - HEAD) as u64);
+        self.head.clear();
+        looked
+    }
+
+    /// How much of the record has to be looked at, as far as that is known by now.
+    fn wanted(&self) -> usize {
+        let Some(opcode) = self.head.first().filter(|_| self.head.len() >= HEAD) else { return HEAD };
+        let inside = match *opcode {
+            op::CHUNK if self.head.len() < HEAD + CHUNK => CHUNK,
+            op::CHUNK => CHUNK + self.name_len() + 8,
+            op::FOOTER => FOOTER,
+            _ => 0,
+        };
+        HEAD + inside.min(usize::try_from(self.body()).unwrap_or(usize::MAX))
+    }
+
+    /// The length of the record's body, as it says.
+    fn body(&self) -> u64 {
+        self.u64(1)
+    }
+
+    fn name_len(&self) -> usize {
+        let len = self
+            .head
+            .get(HEAD + 28..HEAD + 32)
+            .map_or(0, |len| u32::from_le_bytes(len.try_into().unwrap_or_default()));
+        usize::try_from(len).unwrap_or(MAX_NAME).min(MAX_NAME)
+    }
+
+    fn u64(&self, at: usize) -> u64 {
+        self.head.get(at..at + 8).map_or(0, |value| u64::from_le_bytes(value.try_into().unwrap_or_default()))
+    }
+
+    /// What of a record cannot be so. One that is too short for what it should hold is left to the reader.
+    fn look(&mut self) -> Result<(), String> {
+        let body = usize::try_from(self.body()).unwrap_or(usize::MAX);
+        match self.head[0] {
+            op::CHUNK if body >= CHUNK + self.name_len() + 8 => self.look_at_chunk(),
+            op::FOOTER => {
+                self.over = true;
+                if body < FOOTER { Ok(()) } else { self.look_at_footer() }
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn look_at_chunk(&self) -> Result<(), String> {
+        let name = self.name_len();
+        let (unpacked, packed) = (self.u64(HEAD + 16), self.u64(HEAD + CHUNK + name));
+        let most = packed.saturating_mul(MAX_RATIO).saturating_add(SLACK).min(MAX_FILE);
+        if unpacked > most {
+            return Err(format!("a chunk of {packed} octets that unpacks to {unpacked}; the most is {most}"));
+        }
+        if name == 0 && packed != unpacked {
+            return Err(format!("a chunk that is not packed, of {packed} octets where it says {unpacked}"));
+        }
+        Ok(())
+    }
+
+    /// What the footer points to lies behind the messages and before itself.
+    fn look_at_footer(&self) -> Result<(), String> {
+        for (what, at) in [("summary", self.u64(HEAD)), ("summary offsets", self.u64(HEAD + 8))] {
+            if at != 0 && !(MAGIC.len() as u64..=self.record).contains(&at) {
+                let footer = self.record;
+                return Err(format!(
+                    "a footer that looks for the {what} at octet {at}, and stands at {footer} itself"
+                ));
+            }
+        }
+        Ok(())
+    }
+}

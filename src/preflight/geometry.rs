@@ -1,0 +1,97 @@
+//! What the controller knows of the seat's mechanics, against what its type says: encoder, lead, stroke.
+
+use std::collections::BTreeMap;
+
+use super::{Check, Notes, Subject};
+use crate::wire::Dialect;
+
+/// Lines of the encoder by PA54 (SMC manual 2.3.1).
+const LINES: [f64; 2] = [5_000.0, 2_500.0];
+/// Half of the unit of PA41 and PA42, mm.
+const HALF_A_UNIT_MM: f64 = 0.05;
+
+pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
+    judge_encoder(subject, notes);
+    judge_lead(subject, notes);
+    judge_stroke(subject, notes);
+}
+
+/// The manual has lines and no pulses. Public programs send 10,000 pulses for a turn of what the factory has set, 5,000
+/// lines, so two for each line; others count four.
+fn judge_encoder(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(value) = subject.pa(0x54) else { return };
+    let Some(lines) = LINES.get(usize::from(value)) else {
+        let found = format!("PA54 = {value}: no manual says which encoder that is");
+        return notes.add(Check::Encoder, found, "set PA54 = 0 for 5000 lines or 1 for 2500");
+    };
+    let seat = &subject.controller.seat;
+    let counts = seat.pulses_per_rev / lines;
+    let told = format!(
+        "PA54 = {value}: an encoder of {lines} lines, and seat {} has {} pulses a turn",
+        seat.name, seat.pulses_per_rev
+    );
+    let is = |wanted: f64| (counts - wanted).abs() < 1e-6;
+    if is(4.0) {
+        let remedy = "send the empty seat a known distance, measure it, and accept this if it was right";
+        notes.add(Check::EncoderUnsure, format!("{told}, so four for each line"), remedy);
+    } else if !is(2.0) {
+        let remedy = format!(
+            "set PA54 to the motors' encoder, or pulses_per_rev to {} or {}",
+            2.0 * lines,
+            4.0 * lines
+        );
+        notes.add(Check::Encoder, format!("{told}, so neither two nor four for each line"), remedy);
+    }
+}
+
+fn judge_lead(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(tenths) = subject.pa(0x41) else { return };
+    let seat = &subject.controller.seat;
+    let lead = f64::from(tenths) / 10.0;
+    if (lead - seat.lead_mm).abs() <= HALF_A_UNIT_MM {
+        return;
+    }
+    let found =
+        format!("PA41 = {tenths}: a lead of {lead} mm, but seat {} has {} mm", seat.name, seat.lead_mm);
+    let remedy = format!("set PA41 = {:.0}, or correct lead_mm of the seat type", seat.lead_mm * 10.0);
+    notes.add(Check::Lead, found, remedy);
+}
+
+/// 0 says nothing. In the SMC manual's table it is the rise of axis 1 where PA40 = 0, in its section 5.7 the stroke, as with
+/// IMAX.
+fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
+    let is_rise = subject.controller.dialect == Dialect::Smc && subject.pa(0x40) == Some(0);
+    let Some(tenths) = subject.pa(0x42).filter(|tenths| *tenths > 0 && !is_rise) else { return };
+    let seat = &subject.controller.seat;
+    let stroke = f64::from(tenths) / 10.0;
+    if stroke < seat.stroke_mm - HALF_A_UNIT_MM {
+        let found = format!(
+            "PA42 = {tenths}: a stroke of {stroke} mm, but seat {} has {} mm",
+            seat.name, seat.stroke_mm
+        );
+        let remedy = "correct stroke_mm of the seat type, or have PA42 set at the controller itself";
+        notes.add(Check::Stroke, found, remedy);
+    }
+}
+
+/// One seat type has one number of pulses a turn, so its controllers one encoder: tells those that differ from most.
+pub(super) fn judge_together(subjects: &[Subject<'_>], all: &mut [Notes]) {
+    let of = |subject: &Subject<'_>| Some((subject.controller.seat.name.clone(), subject.pa(0x54)?));
+    let mut counts: BTreeMap<(String, u16), usize> = BTreeMap::new();
+    for key in subjects.iter().filter_map(of) {
+        *counts.entry(key).or_default() += 1;
+    }
+    for (subject, notes) in subjects.iter().zip(all) {
+        let Some((seat, own)) = of(subject) else { continue };
+        let of_seat = counts.iter().filter(|((name, _), _)| *name == seat);
+        let Some(((_, most), _)) = of_seat.max_by_key(|(_, count)| **count) else { continue };
+        if own != *most {
+            let found = format!("PA54 = {own}, while most of seat {seat} have {most}");
+            notes.add(
+                Check::EncoderDiffers,
+                found,
+                format!("set PA54 = {most}, or give it a seat type of its own"),
+            );
+        }
+    }
+}

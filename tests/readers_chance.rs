@@ -1,0 +1,232 @@
+//! Files of all kinds, damaged by chance: whatever a reader is given it ends, says in plain lines what is wrong, and what it
+//! takes is what a seat can follow.
+
+#![allow(clippy::unwrap_used, reason = "whatever fails here fails the test")]
+
+use std::io::Cursor;
+use std::path::Path;
+
+use kinocue::config;
+use kinocue::cue::{self, Cue, CueFaults, Source};
+use kinocue::device::settings;
+use kinocue::motion::MAX_AXES;
+use kinocue::playlist::Playlist;
+use kinocue::time::ShowTime;
+use proptest::prelude::*;
+
+const CUE: &str = "# title: Störm\n# units: mm\ntime_ms,a1,a2,v1_hz,v1_amp,fx_air,fx_water\n\
+    0,0.1,150,0,0,1,0\n16.6,0.3,5e-3,20,1.5,1,1\n33.3,1,2,20,1.5,0,0\n50,,2,,,,\n";
+const HALL: &str = include_str!("data/config/hall.toml");
+const DAY: &str = "title = \"Saturday\"\ntimezone = \"UTC\"\n\n[[entry]]\ncue = \"seat-demo\"\npreset = \"kids\"\nthen = \"go\"\n\n\
+    [[entry]]\ncue = \"storm\"\nlevel = \"60%\"\ntrim_ms = -40\neffects = { water = false }\nat = \"19:00\"\n\
+    days = [\"fri\", \"sat\"]\n";
+const SETTINGS: &str = "kinocue_settings = 1\n[controller.A1]\naddress = \"10.0.0.1:7408\"\ndialect = \"smc\"\n\
+    [controller.A1.parameters]\nPA07 = 3000\nPA0b = 3000\n";
+
+/// What damages a text: what ends lines, cells and numbers, and what a terminal obeys.
+const NASTY: [&[u8]; 28] = [
+    b"\x1b]0;x\x07",
+    b"\x1b[2J",
+    b"\x7f",
+    "\u{9b}".as_bytes(),
+    "\u{202e}".as_bytes(),
+    "\u{2028}".as_bytes(),
+    b"\0",
+    b"\r",
+    b"\n",
+    b"\r\n",
+    b"\t",
+    b",",
+    b"\"",
+    b"\"\"\"",
+    b"'",
+    b"#",
+    b"[",
+    b"]]",
+    b"{",
+    b"=",
+    b".",
+    b"-",
+    b"1e999",
+    b"nan",
+    b"\\u001b",
+    b"\xff",
+    b"99999999999999999999",
+    b"\xef\xbb\xbf",
+];
+
+/// One damage, at a place in the file as a share of its length.
+#[derive(Debug, Clone)]
+enum Damage {
+    Put(usize),
+    Octet(u8),
+    Cut(usize),
+    Twice(usize),
+    End,
+}
+
+fn damages() -> impl Strategy<Value = Vec<(f64, Damage)>> {
+    let damage = prop_oneof![
+        6 => (0..NASTY.len()).prop_map(Damage::Put),
+        4 => any::<u8>().prop_map(Damage::Octet),
+        3 => (1_usize..40).prop_map(Damage::Cut),
+        3 => (1_usize..200).prop_map(Damage::Twice),
+        1 => Just(Damage::End),
+    ];
+    prop::collection::vec((0.0..1.0, damage), 1..6)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "a place"
+)]
+fn damaged(whole: &[u8], damages: &[(f64, Damage)]) -> Vec<u8> {
+    let mut octets = whole.to_vec();
+    for (share, damage) in damages {
+        let at = (octets.len() as f64 * share) as usize;
+        let end = |most: usize| (at + most).min(octets.len());
+        match damage {
+            Damage::Put(which) => drop(octets.splice(at..at, NASTY[*which].iter().copied())),
+            Damage::Octet(octet) => octets.iter_mut().skip(at).take(1).for_each(|there| *there = *octet),
+            Damage::Cut(most) => drop(octets.drain(at..end(*most))),
+            Damage::Twice(most) => {
+                let again = octets[at..end(*most)].to_vec();
+                octets.splice(at..at, again);
+            }
+            Damage::End => octets.truncate(at),
+        }
+    }
+    octets
+}
+
+/// Whether a text is one to show: short lines of characters that a terminal does not obey.
+fn is_plain(text: &str) -> bool {
+    let obeyed = |c: char| c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    !text.is_empty() && text.lines().all(|line| line.len() < 1_500 && !line.contains(obeyed))
+}
+
+/// What every cue promises to those behind it.
+fn assert_sound(cue: &Cue) {
+    assert!(cue.rows() >= 2 && (1..=MAX_AXES).contains(&cue.axes()));
+    assert_eq!((cue.times().len() * cue.axes(), cue.times()[0]), (cue.positions().len(), ShowTime::ZERO));
+    assert!(cue.times().is_sorted_by(|a, b| a < b));
+    assert!(cue.positions().iter().all(|position| position.is_finite() && *position >= 0.0));
+    let shakes = cue.vibration().iter().flat_map(|steps| steps.as_slice());
+    assert!(shakes.into_iter().all(|step| step.value.hz >= 0.0 && step.value.amplitude >= 0.0));
+    assert!(cue.title().is_none_or(is_plain), "{:?}", cue.title());
+    assert!(cue.markers().iter().all(|marker| marker.name.is_empty() || is_plain(&marker.name)));
+}
+
+#[test]
+fn what_is_damaged_here_is_whole_before() {
+    assert_read(cue::read(Path::new("t.csv"), CUE.as_bytes(), &Source::Native));
+    for octets in [mcap(), bare_mcap()] {
+        assert!(cue::read(Path::new("t.mcap"), octets.as_slice(), &Source::Native).is_ok());
+    }
+    assert!(Playlist::parse(Path::new("d.toml"), DAY).is_ok() && settings::parse(SETTINGS).is_ok());
+}
+
+/// A cue that can be had back as it is from the file that is made of it; or faults that can be told.
+fn assert_read(read: Result<Cue, CueFaults>) {
+    match read {
+        Ok(cue) => {
+            assert_sound(&cue);
+            let mut file = Cursor::new(Vec::new());
+            cue::write_mcap(&cue, &mut file).unwrap();
+            let again = cue::read(Path::new("t.mcap"), file.get_ref().as_slice(), &Source::Native).unwrap();
+            assert_eq!((again.times(), again.positions()), (cue.times(), cue.positions()));
+            assert_eq!((again.title(), again.vibration()), (cue.title(), cue.vibration()));
+            let mut text = Vec::new();
+            if cue::write_csv(&cue, &mut text).is_ok() {
+                let again = cue::read(Path::new("t.csv"), text.as_slice(), &Source::Native).unwrap();
+                assert_eq!((again.title(), again.positions()), (cue.title(), cue.positions()));
+            }
+        }
+        Err(faults) => assert!(is_plain(&faults.to_string()), "{:?}", faults.to_string()),
+    }
+}
+
+fn mcap() -> Vec<u8> {
+    let cue = cue::read(Path::new("t.csv"), CUE.as_bytes(), &Source::Native).unwrap();
+    let mut file = Cursor::new(Vec::new());
+    cue::write_mcap(&cue, &mut file).unwrap();
+    file.into_inner()
+}
+
+/// The same without packing and without sums, so that damage inside reaches the messages.
+fn bare_mcap() -> Vec<u8> {
+    let mut file = Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new()
+        .use_chunks(false)
+        .compression(None)
+        .calculate_chunk_crcs(false)
+        .calculate_data_section_crc(false)
+        .calculate_summary_section_crc(false)
+        .create(&mut file)
+        .unwrap();
+    let metadata = [("version", "1"), ("title", "Storm"), ("units", "fraction")];
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+    writer.write_metadata(&mcap::records::Metadata { name: "kinocue".to_owned(), metadata }).unwrap();
+    let messages = [
+        ("/cue/axes", 0, r#"{"a":[0,0.5]}"#),
+        ("/cue/vibration", 0, r#"{"axis":1,"hz":20.0,"amp":0.01}"#),
+        ("/cue/io", 5, r#"{"effects":{"wind":1,"air":0}}"#),
+        ("/cue/marker", 5, r#"{"name":"drop"}"#),
+        ("/cue/axes", 10, r#"{"a":[1,0.25]}"#),
+        ("/cue/axes", 20, r#"{"a":[1e-2,0]}"#),
+    ];
+    for (topic, log_time, json) in messages {
+        let channel_id = writer.add_channel(0, topic, "json", &Default::default()).unwrap();
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time, publish_time: 0 };
+        writer.write_to_known_channel(&header, json.as_bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    file.into_inner()
+}
+
+fn assert_faults_plain(faults: Result<(), String>) {
+    if let Err(faults) = faults {
+        assert!(is_plain(&faults), "{faults:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_damaged_csv_is_a_sound_cue_or_faults_in_plain_words(damages in damages()) {
+        let octets = damaged(CUE.as_bytes(), &damages);
+        assert_read(cue::read(Path::new("t.csv"), octets.as_slice(), &Source::Native));
+    }
+
+    #[test]
+    fn damaged_rows_of_an_editor_are_a_sound_cue_or_faults_in_plain_words(damages in damages()) {
+        let rows = b"line,time_ms,x,y,z\n1,1000,1,2,3\n2,500,7,8,9\n3,20,,8,9\n";
+        let source = Source::Rows { unit: "mm".parse().unwrap() };
+        assert_read(cue::read(Path::new("t.csv"), damaged(rows, &damages).as_slice(), &source));
+    }
+
+    #[test]
+    fn a_damaged_mcap_is_a_sound_cue_or_faults_in_plain_words(damages in damages(), packed in any::<bool>()) {
+        let octets = damaged(&if packed { mcap() } else { bare_mcap() }, &damages);
+        assert_read(cue::read(Path::new("t.mcap"), octets.as_slice(), &Source::Native));
+        assert_read(cue::recover(Path::new("t.mcap"), octets.as_slice()).map(|(cue, _)| cue));
+    }
+
+    #[test]
+    fn a_damaged_configuration_playlist_or_settings_file_has_faults_in_plain_words(damages in damages()) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hall.toml");
+        std::fs::write(&path, damaged(HALL.as_bytes(), &damages)).unwrap();
+        assert_faults_plain(config::load(&path).map(drop).map_err(|faults| faults.to_string()));
+        if let Ok(text) = String::from_utf8(damaged(DAY.as_bytes(), &damages)) {
+            assert_faults_plain(Playlist::parse(Path::new("d.toml"), &text).map(drop).map_err(|faults| faults.to_string()));
+        }
+        if let Ok(text) = String::from_utf8(damaged(SETTINGS.as_bytes(), &damages)) {
+            let _ = settings::parse(&text); // its one fault is shown by the commands, which escape it
+        }
+    }
+}
