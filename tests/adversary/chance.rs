@@ -38,6 +38,7 @@ fn live_through(seed: u64, deeds: u64, told: bool) -> Past {
     person.furnish(&ether);
     let (mut numbers, mut crashed) = (BTreeMap::new(), dice.one_in(3));
     let mut diary = Vec::new();
+    ether.world().frames = setting("KINOCUE_FRAMES").filter(|_| told).map(|_| Vec::new());
     if told {
         diary.push(format!("seed {seed}: {kind:?}"));
         let world = ether.world();
@@ -60,6 +61,7 @@ fn live_through(seed: u64, deeds: u64, told: bool) -> Past {
     }
     // What is on its way still arrives.
     ether.pass_to(ether.ns() + 1_000 * MS);
+    diary.extend(ether.world().frames.take().into_iter().flatten());
     let frames = ether.world().lines.iter().map(|line| line.frames).sum();
     Past { seed, breaches: breaches(&ether), frames, diary }
 }

@@ -9,7 +9,7 @@ use kinocue::time::{Clock, MonoTime};
 
 use super::dice::Dice;
 use super::seat::{Arrival, MS, Seat, Settings};
-use super::words;
+use super::words::{self, Heard};
 
 /// What befalls the datagrams of a seat for a while.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,10 +40,14 @@ pub(crate) enum Weather {
     Slow(u32),
 }
 
+/// So long after a frame, or after somebody asked for motion, nobody jogs a seat.
+const JUST: u64 = 300 * MS;
+
 #[derive(Debug, Clone)]
 struct Packet {
     at: u64,
     sent: u64,
+    lost_since: u64,
     asked: bool,
     octets: Vec<u8>,
 }
@@ -56,9 +60,18 @@ pub(crate) struct Line {
     back: VecDeque<Packet>,
     /// Frames of motion that the kernel took.
     pub(crate) frames: u64,
+    /// When the newest was to be sent; and the first of those since the last that will arrive.
+    newest: u64,
+    lost_since: Option<u64>,
 }
 
 impl Line {
+    /// Somebody jogs an axis: nobody does while frames come, or have just been asked for.
+    pub(crate) fn jog(&mut self, axis: usize, mm: f64, now: u64, asked_at: u64) -> bool {
+        let quiet = now > self.newest + JUST && now > asked_at + JUST;
+        quiet && self.there.is_empty() && self.seat.jog(axis, mm, now)
+    }
+
     fn is(&self, now: u64, weather: Weather) -> Option<u64> {
         self.weather.iter().find(|(until, what)| *until > now && *what == weather).map(|(until, _)| *until)
     }
@@ -73,8 +86,11 @@ impl Line {
 pub(crate) struct World {
     pub(crate) lines: Vec<Line>,
     dice: Dice,
-    /// Whether a person has asked for motion.
+    /// Whether a person has asked for motion, and when one did.
     pub(crate) asked: bool,
+    pub(crate) asked_at: u64,
+    /// Frames of motion in words, where somebody wants to read them.
+    pub(crate) frames: Option<Vec<String>>,
 }
 
 /// The network, with its clock.
@@ -92,9 +108,11 @@ impl Ether {
             there: VecDeque::new(),
             back: VecDeque::new(),
             frames: 0,
+            newest: 0,
+            lost_since: None,
         };
         let lines = seats.iter().enumerate().map(line).collect();
-        let world = World { lines, dice: Dice::new(!seed), asked: false };
+        let world = World { lines, dice: Dice::new(!seed), asked: false, asked_at: 0, frames: None };
         Self { now: Arc::new(AtomicU64::new(1_000 * MS)), world: Arc::new(Mutex::new(world)) }
     }
 
@@ -136,8 +154,10 @@ impl World {
         let Self { lines, dice, .. } = self;
         for (index, line) in lines.iter_mut().enumerate() {
             while line.there.front().is_some_and(|packet| packet.at <= now) {
-                let Some(Packet { at, sent, asked, octets }) = line.there.pop_front() else { break };
-                if let Some(reply) = line.seat.hear(&octets, Arrival { at, sent, asked }) {
+                let Some(Packet { at, sent, lost_since, asked, octets }) = line.there.pop_front() else {
+                    break;
+                };
+                if let Some(reply) = line.seat.hear(&octets, Arrival { at, sent, lost_since, asked }) {
                     line.answer(reply, at, dice);
                 }
             }
@@ -166,21 +186,32 @@ impl Line {
         if let Some((_, Weather::Echo(ms))) = self.until(at, |what| matches!(what, Weather::Echo(_))) {
             if dice.one_in(3) {
                 let later = arrives + dice.range(0, ms * MS);
-                insert(&mut self.back, Packet { at: later, sent: at, asked: false, octets: octets.clone() });
+                insert(
+                    &mut self.back,
+                    Packet { at: later, sent: at, lost_since: at, asked: false, octets: octets.clone() },
+                );
             }
             if dice.one_in(3) {
                 let later = arrives + dice.range(0, ms * MS);
-                return insert(&mut self.back, Packet { at: later, sent: at, asked: false, octets });
+                return insert(
+                    &mut self.back,
+                    Packet { at: later, sent: at, lost_since: at, asked: false, octets },
+                );
             }
         }
-        insert(&mut self.back, Packet { at: arrives, sent: at, asked: false, octets });
+        insert(&mut self.back, Packet { at: arrives, sent: at, lost_since: at, asked: false, octets });
     }
 
     fn take(&mut self, octets: &[u8], now: u64, asked: bool, dice: &mut Dice) -> Delivery {
+        let moves = matches!(octets.get(4), Some(0x13 | 0x14 | 0x18 | 0x19));
+        let lost_since = if moves { *self.lost_since.get_or_insert(now) } else { now };
+        if moves {
+            self.newest = now;
+        }
         if self.is(now, Weather::Refused).is_some() {
             return Delivery::Failed(SendFault::of(libc::ENOBUFS));
         }
-        self.frames += u64::from(matches!(octets.get(4), Some(0x13 | 0x14 | 0x18 | 0x19)));
+        self.frames += u64::from(moves);
         let thin = self.until(now, |what| matches!(what, Weather::Thin(_)));
         let lost = matches!(thin, Some((_, Weather::Thin(times))) if dice.one_in(times));
         let slow = self.until(now, |what| matches!(what, Weather::Slow(_)));
@@ -188,14 +219,17 @@ impl Line {
         if lost || self.is(now, Weather::Lost).is_some() || self.is(now, Weather::Cut).is_some() {
             return Delivery::Sent;
         }
+        if moves {
+            self.lost_since = None;
+        }
         let octets = octets.to_vec();
         let held = self.is(now, Weather::Held).map_or(0, |until| until - now);
         let mut at = now + flight(dice) + held;
         if let Some((_, Weather::Late(ms))) = self.until(now, |what| matches!(what, Weather::Late(_))) {
             at += dice.range(0, ms * MS);
         }
-        let packet = Packet { at, sent: now, asked, octets };
-        if self.is(now, Weather::Shuffled).is_some() {
+        let packet = Packet { at, sent: now, lost_since, asked, octets };
+        if held == 0 && self.is(now, Weather::Shuffled).is_some() {
             let later = now + dice.range(1, 40) * MS;
             if dice.one_in(6) {
                 insert(&mut self.there, Packet { at: later, ..packet.clone() });
@@ -225,8 +259,17 @@ impl Network for Ether {
 
     fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
         let now = self.ns();
-        let World { lines, dice, asked } = &mut *self.world();
-        lines[lane].take(datagram, now, *asked, dice)
+        let World { lines, dice, asked, frames, .. } = &mut *self.world();
+        let delivery = lines[lane].take(datagram, now, *asked, dice);
+        if let (Some(frames), Heard::Motion(frame)) = (frames, words::hear(datagram)) {
+            let places: Vec<i32> = frame.positions[..frame.axes].iter().map(|at| at / 200).collect();
+            let (at, number, ms) = (now as f64 * 1e-9, frame.number, frame.time_ms);
+            frames.push(format!(
+                "{at:8.4} s: seat {}: frame {number}, {ms} ms to {places:?} tenths of a mm, {delivery:?}",
+                lane + 1
+            ));
+        }
+        delivery
     }
 
     fn drain(&self, on: &mut dyn FnMut(Origin, &[u8], MonoTime)) -> MonoTime {

@@ -330,7 +330,8 @@ impl Hall<'_, '_> {
     pub(crate) fn ask(&mut self, request: Request) {
         self.note(|| format!("asks: {request:?}"));
         if matches!(request, Request::Go | Request::Resume | Request::Park) {
-            self.ether.world().asked = true;
+            let (now, world) = (self.ether.ns(), &mut *self.ether.world());
+            (world.asked, world.asked_at) = (true, now);
         }
         if request == Request::Stop {
             self.reins.desk.stop();

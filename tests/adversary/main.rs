@@ -4,7 +4,8 @@
 //!
 //! `KINOCUE_HISTORIES=N` plays so many histories instead of the default; `KINOCUE_SEED=S` begins at that seed, and with
 //! `KINOCUE_DEEDS=K` the person does no more than K things: `KINOCUE_HISTORIES=1 KINOCUE_SEED=S KINOCUE_DEEDS=K` is how a
-//! history that was found is made shorter. A single history prints what happened in it.
+//! history that was found is made shorter. A single history prints what happened in it, and with `KINOCUE_FRAMES=1` each
+//! frame.
 
 #![expect(
     clippy::cast_possible_truncation,

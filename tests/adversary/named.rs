@@ -59,7 +59,11 @@ impl Hall<'_, '_> {
         assert!(self.comes_to(|state| state == State::Parked, 5_000), "{:?}", self.state);
         self.pass(300);
         self.ask(Request::Arm);
-        assert!(self.comes_to(|state| state == State::Armed, 1_000), "{:?}", self.state);
+        if !self.comes_to(|state| state == State::Armed, 1_000) {
+            // It wants to know more of its zero.
+            self.ask(Request::HomeAndArm);
+        }
+        assert!(self.comes_to(|state| state == State::Armed, 10_000), "{:?}", self.state);
         self.ask(Request::Go);
         self.follows(8_000);
     }
@@ -260,8 +264,8 @@ fn a_controller_that_tells_positions_with_the_other_word_first_is_not_believed()
 
 #[test]
 fn nor_is_one_whose_words_the_wrong_way_round_read_as_parked() {
-    // 0x10000 pulses, with the words exchanged one pulse.
-    wrong_place(32.768, |seat| seat.high_first = true);
+    // 0x10000 pulses, with the words exchanged one pulse; its status reports tell the truth.
+    wrong_place(32.768, |seat| (seat.high_first, seat.report_ms) = (true, 100));
 }
 
 // D5: frames that are lost, or that the kernel refuses.
@@ -325,6 +329,39 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
         hall.pass(4_000);
     });
     assert_no_breach(&ether);
+}
+
+/// The greatest acceleration of the first axes of a seat over a span of 30 ms, mm/s², in so many milliseconds to come.
+fn sharpest(hall: &mut Hall<'_, '_>, ms: u64) -> f64 {
+    let mut places: Vec<[f64; 3]> = Vec::new();
+    for _ in 0..ms / 10 {
+        let place = hall.ether.world().lines[0].seat.place(hall.ether.ns());
+        places.push([0, 1, 2].map(|axis: usize| place[axis] / 2_000.0));
+        hall.pass(10);
+    }
+    let bent = |seven: &[[f64; 3]]| {
+        let bent =
+            |axis: usize| (seven[6][axis] - 2.0 * seven[3][axis] + seven[0][axis]).abs() / 0.03_f64.powi(2);
+        bent(0).max(bent(1)).max(bent(2))
+    };
+    places.windows(7).map(bent).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_seat_that_hears_all_frames_and_is_not_heard_itself_comes_to_rest_within_its_limits() {
+    for offset in [0, 200, 400, 600, 800] {
+        for ms in [60, 150, 400] {
+            let ether = ether(THREE, |_| {});
+            let sharpest = lead(THREE, &ether, false, |hall| {
+                hall.ride(0);
+                hall.pass(offset);
+                hall.ether.turns(0, Weather::Mute, ms);
+                sharpest(hall, 1_500)
+            });
+            assert_no_breach(&ether);
+            assert!(sharpest < 1.25 * 3_000.0, "{sharpest:.0} mm/s², silent for {ms} ms after {offset} ms");
+        }
+    }
 }
 
 // A machine that was asleep.

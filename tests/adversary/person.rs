@@ -127,7 +127,7 @@ impl Person {
                 hall.ether.world().lines[seat].seat.press(pressed, now);
             }
             1 => {
-                let dark = self.dice.pick(&[600, 1_000, 1_500]);
+                let dark = self.dice.pick(&[1_000, 1_500]);
                 hall.note(|| format!("seat {}: its power goes for {dark} ms", seat + 1));
                 hall.ether.world().lines[seat].seat.reboot(now, dark * MS);
             }
@@ -137,7 +137,8 @@ impl Person {
             _ => {
                 let axis = self.dice.range(0, hall.kind.axes[seat] as u64) as usize;
                 let mm = self.dice.range(0, 120) as f64 - 60.0;
-                let done = hall.ether.world().lines[seat].seat.jog(axis, mm, now);
+                let world = &mut *hall.ether.world();
+                let done = world.lines[seat].jog(axis, mm, now, world.asked_at);
                 hall.note(|| format!("seat {}, axis {}: jogged by {mm} mm: {done}", seat + 1, axis + 1));
             }
         }

@@ -29,7 +29,7 @@ fn frame(function: u16, number: u32, time_ms: u32, mm: f64) -> Vec<u8> {
 /// Has a seat hear a frame that was sent so many milliseconds after the first, and came without delay.
 fn hears(seat: &mut Seat, octets: &[u8], ms: u64) -> Option<Vec<u8>> {
     let at = BEGIN + ms * MS;
-    seat.hear(octets, Arrival { at, sent: at, asked: true })
+    seat.hear(octets, Arrival { at, sent: at, lost_since: at, asked: true })
 }
 
 fn mm(seat: &mut Seat, ms: u64) -> f64 {
@@ -90,7 +90,7 @@ fn what_was_lost_for_less_than_fifty_milliseconds_is_admitted_and_no_more() {
 #[test]
 fn a_move_that_nobody_asked_for_is_seen_however_slow_it_is() {
     let mut seat = seat(|_| {});
-    let arrival = Arrival { at: BEGIN, sent: BEGIN, asked: false };
+    let arrival = Arrival { at: BEGIN, sent: BEGIN, lost_since: BEGIN, asked: false };
     seat.hear(&frame(0x1401, 1, 1_000, 1.0), arrival);
     assert_eq!(seat.breaches.iter().map(|one| one.how).collect::<Vec<_>>(), [How::Unasked]);
 }

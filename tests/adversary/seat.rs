@@ -57,6 +57,7 @@ struct Command {
     axes: usize,
     time_ns: u64,
     sent_ns: u64,
+    lost_since: u64,
     asked: bool,
     number: u32,
 }
@@ -75,6 +76,8 @@ struct Move {
 pub(crate) struct Arrival {
     pub(crate) at: u64,
     pub(crate) sent: u64,
+    /// When the first of those was sent that were lost since the one that arrived before.
+    pub(crate) lost_since: u64,
     pub(crate) asked: bool,
 }
 
@@ -248,9 +251,7 @@ impl Seat {
             far: std::array::from_fn(|axis| to[axis] - self.rest[axis]),
             ms: takes as f64 / MS as f64,
             time_ms: command.time_ns as f64 / MS as f64,
-            apart_ms: self
-                .executed
-                .map_or(f64::INFINITY, |sent| sent.abs_diff(command.sent_ns) as f64 / MS as f64),
+            apart_ms: self.apart_ms(&command),
             period_ms: self.settings.period_ms,
             bunched: bunched || self.settings.jitter_ms > 0.0,
             jitter_ms: self.settings.jitter_ms,
@@ -259,6 +260,13 @@ impl Seat {
         self.judge(&executed, command.number, now);
         self.executed = Some(command.sent_ns);
         self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
+    }
+
+    /// How long ago the frame was sent after which this one comes: that which was executed before, or the first of a motion.
+    fn apart_ms(&self, command: &Command) -> f64 {
+        let of_executed = self.executed.map_or(u64::MAX, |sent| sent.abs_diff(command.sent_ns));
+        let of_lost = (command.sent_ns - command.lost_since) as f64 / MS as f64 + self.settings.period_ms;
+        (of_executed as f64 / MS as f64).min(of_lost)
     }
 
     fn judge(&mut self, executed: &Executed, frame: u32, at_ns: u64) {
@@ -305,7 +313,7 @@ impl Seat {
     }
 
     fn on_motion(&mut self, frame: &Frame, arrival: Arrival) {
-        let Arrival { at, sent, asked } = arrival;
+        let Arrival { at, sent, lost_since, asked } = arrival;
         if let Some((came, sent_before)) = self.came.replace((at, sent)) {
             let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
             if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
@@ -322,7 +330,15 @@ impl Seat {
         let time_ms = self.time_of(frame);
         let to = frame.positions.map(f64::from);
         let (axes, number) = (frame.axes, frame.number);
-        self.queue.push_back(Command { to, axes, time_ns: time_ms * MS, sent_ns: sent, asked, number });
+        self.queue.push_back(Command {
+            to,
+            axes,
+            time_ns: time_ms * MS,
+            sent_ns: sent,
+            lost_since,
+            asked,
+            number,
+        });
         if self.moving.is_none() {
             self.begin_next(at);
         } else if at >= self.bunched_until {
