@@ -253,6 +253,13 @@ impl Belief {
         is_known.then(|| KnownPose(*self.spans.last()))
     }
 
+    /// Whether the seat was read since then and is known to be at rest; where no acks are asked for, whether it is known at all.
+    #[must_use]
+    pub fn is_known_since(&self, since: MonoTime, now: MonoTime) -> bool {
+        let read = !self.asks || matches!(self.known, Known::Measured(at, _) if at >= since);
+        read && self.pose(now).is_some()
+    }
+
     /// Whether a reading told where some axes are, and of others nothing is known.
     #[must_use]
     pub const fn is_measured_in_part(&self) -> bool {

@@ -246,7 +246,7 @@ impl Engine {
     /// Whether frames lead a lane, be it to rest.
     #[must_use]
     pub fn is_led(&self, lane: usize) -> bool {
-        self.riders[lane].is_there() && !self.sends_nothing()
+        self.riders[lane].is_there() && !self.is_at_rest()
     }
 
     /// Leads a lane of which nobody knows which frames reach it so far ahead with this tick's frame that `is_enough` of the pose
@@ -265,17 +265,28 @@ impl Engine {
         self.riders.iter_mut().position(Rider::take_fall)
     }
 
+    /// Whether a lane is led, or would be if it were seen.
+    #[must_use]
+    pub fn takes_part(&self, lane: usize) -> bool {
+        self.riders[lane].part != Part::Away
+    }
+
     /// Whether a lane takes part that nobody has told of where it stands.
     #[must_use]
     pub fn is_unseen(&self, lane: usize) -> bool {
         self.riders[lane].part == Part::Unseen
     }
 
+    /// Whether no frame has led any lane since all rested.
+    fn is_at_rest(&self) -> bool {
+        self.sends_nothing() || self.frames == 0
+    }
+
     /// The pose that a lane was sent last, or in which it was found since; none where nothing goes to it.
     #[must_use]
     pub fn rests_at(&self, lane: usize) -> Option<&Pose> {
         let rider = &self.riders[lane];
-        (rider.is_there() && self.sends_nothing()).then(|| rider.pose())
+        (rider.is_there() && self.is_at_rest()).then(|| rider.pose())
     }
 
     /// The show time of the next tick: where in the cue the lanes are.
@@ -395,7 +406,7 @@ impl Engine {
         let cue = self.timeline.sample(self.reached, &mut self.hint);
         let there = self.riders.iter_mut().enumerate().filter(|(_, rider)| rider.is_there());
         for (lane, rider) in there {
-            if rider.take_ahead() {
+            if rider.skip() {
                 continue;
             }
             let pose = rider.next(lane, time, &mut self.course, self.reached, &cue);

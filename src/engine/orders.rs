@@ -138,7 +138,7 @@ impl Engine {
     /// others where they follow the cue; one that rests goes on from there; one that is under way goes on.
     pub fn found(&mut self, lane: usize, known: &KnownPose, near: &Pose) {
         let is_fresh = self.frames == 0 && self.phase != Phase::Resting(Rest::Stopped);
-        let rests = self.sends_nothing() && self.switch.is_none();
+        let rests = self.is_at_rest() && self.switch.is_none();
         let rider = &mut self.riders[lane];
         let at_park = is_at(&rider.window, known.pose(), &rider.window.park(), near);
         match rider.part {

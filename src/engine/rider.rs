@@ -48,8 +48,9 @@ pub(super) struct Rider {
     blind: bool,
     /// Whether it has just come to be away, and is to be looked at before it can come back.
     fallen: bool,
-    /// Ticks for which nothing goes to it, as its last frame leads that far ahead.
+    /// Ticks to come for which nothing goes to it, as its last frame leads that far ahead; and whether this is one of them.
     ahead: u32,
+    skips: bool,
     /// Whether it was away, and is not where the others are yet.
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
@@ -81,6 +82,7 @@ impl Rider {
             blind: false,
             fallen: false,
             ahead: 0,
+            skips: false,
             returning: false,
             refused: false,
             refusal_untold: false,
@@ -100,16 +102,16 @@ impl Rider {
         !matches!(self.part, Part::Unseen | Part::Away)
     }
 
-    /// Whether this tick is one of those that its last frame leads ahead.
-    pub(super) const fn take_ahead(&mut self) -> bool {
-        let is_ahead = self.ahead > 0;
+    /// Whether this tick is one of those that its last frame leads ahead: nothing goes to it then.
+    pub(super) const fn skip(&mut self) -> bool {
+        self.skips = self.ahead > 0;
         self.ahead = self.ahead.saturating_sub(1);
-        is_ahead
+        self.skips
     }
 
     /// Whether a frame goes to it in this tick.
     pub(super) const fn gets_a_frame(&self) -> bool {
-        self.is_there() && self.ahead == 0
+        self.is_there() && !self.skips
     }
 
     /// The pose sent last.
@@ -146,7 +148,8 @@ impl Rider {
 
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
-        (self.part, self.leaving, self.blind, self.ahead) = (Part::Away, None, false, 0);
+        (self.part, self.leaving, self.blind) = (Part::Away, None, false);
+        (self.ahead, self.skips) = (0, false);
     }
 
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
@@ -164,7 +167,8 @@ impl Rider {
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
         self.gate.restart(known);
-        (self.part, self.leaving, self.blind, self.ahead) = (Part::Still, None, false, 0);
+        (self.part, self.leaving, self.blind) = (Part::Still, None, false);
+        (self.ahead, self.skips) = (0, false);
         (self.refused, self.returning) = (false, true);
     }
 

@@ -59,6 +59,7 @@ impl Health {
             found.unsure = found.unsure.or(when(member.unsure, Why::Unsure(controller)));
             let outside = |(axis, pulses)| Why::Outside { controller, axis, pulses };
             found.outside = found.outside.or(member.outside.map(outside));
+            found.outside = found.outside.or(when(member.ambiguous, Why::Ambiguous(controller)));
             found.unseen |= !member.is_seen(now);
         }
         found
@@ -149,7 +150,7 @@ impl Place {
             (_, Findings { outcast: Some(why), .. }) => (Standing::Excluded, why),
             (Standing::Excluded, _) => (Standing::Lost, Why::NotSeenYet),
             (_, Findings { outside: Some(why), .. }) => (Standing::Lost, why),
-            (Standing::Lost, _) if matches!(self.why, Why::Outside { .. }) => {
+            (Standing::Lost, _) if matches!(self.why, Why::Outside { .. } | Why::Ambiguous(_)) => {
                 (Standing::Lost, Why::NotSeenYet)
             }
             (Standing::Lost, Findings { unseen: false, .. }) => (Standing::Rejoining, self.why.once_seen()),

@@ -79,6 +79,8 @@ pub(super) struct Member {
     falls: [Option<MonoTime>; 2],
     /// The axis, from 0, that told a position outside of its stroke, and which.
     pub(super) outside: Option<(usize, Pulses)>,
+    /// Its positions make two places each.
+    pub(super) ambiguous: bool,
     /// Another master was found, and nobody was told yet.
     crowd_untold: bool,
 }
@@ -117,6 +119,7 @@ impl Member {
             unsure: false,
             falls: [None; 2],
             outside: None,
+            ambiguous: false,
             crowd_untold: false,
         }
     }

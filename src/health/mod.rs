@@ -181,6 +181,11 @@ impl Health {
         self.members[controller].outside = outside;
     }
 
+    /// Whether the positions of a controller make two places of each, and nothing says in which order their words come.
+    pub fn on_ambiguous(&mut self, controller: usize, ambiguous: bool) {
+        self.members[controller].ambiguous = ambiguous;
+    }
+
     /// A controller is home; a person homes one only while the hall is paused or parked. Where that was all its group was
     /// out for, the group is looked at next.
     pub fn on_homed(&mut self, controller: usize) {

@@ -62,6 +62,8 @@ pub enum Why {
     Unsteady(usize),
     /// Not all axes of this controller tell where they are.
     Unread(usize),
+    /// The positions of this controller make two places each, and nothing says in which order their words come.
+    Ambiguous(usize),
     /// An axis of this controller, from 0, says that it is outside of its stroke.
     Outside {
         /// Which controller.
@@ -127,6 +129,7 @@ impl Why {
             | Self::Unsure(controller)
             | Self::Unsteady(controller)
             | Self::Unread(controller)
+            | Self::Ambiguous(controller)
             | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)
             | Self::Error { controller, .. }

@@ -76,6 +76,9 @@ impl fmt::Display for Why {
             Self::Unsteady(_) => {
                 "frames to it, or its acks, were missing for over 50 ms three times within a minute: look at the network"
             }
+            Self::Ambiguous(_) => {
+                "in either order of their words its positions are inside the stroke, and nothing says which is true: home it"
+            }
             Self::Unread(_) => {
                 "not all of its axes tell where they are: those past the sixth have no register"
             }

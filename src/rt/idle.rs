@@ -74,6 +74,15 @@ impl Beats {
         })
     }
 
+    /// Asks a controller where all of its axes are; says in how many datagrams.
+    pub(super) fn send_all(&self, controller: usize, sender: &Sender) -> u64 {
+        let Heart { code, axes, .. } = self.hearts[controller];
+        let taken = |read: &ReadRequest| {
+            !matches!(sender.send(controller, read.emit(&mut [0; MAX_LEN])), Delivery::Failed(_))
+        };
+        position_reads(axes, code, code).filter(taken).count() as u64
+    }
+
     /// Which axes an answer to a beat tells of, the first of them counted from 0, and where they are; none where it is none.
     pub(super) fn hear(&mut self, controller: usize, octets: &[u8]) -> Option<(usize, PerAxis<Pulses>)> {
         let Heart { axes, code, dialect, .. } = self.hearts[controller];

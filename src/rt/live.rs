@@ -106,6 +106,9 @@ pub struct Live {
     evidence: Box<[Evidence]>,
     /// Up to when it has told all that arrived.
     told_ns: AtomicU64,
+    /// Since when a reading of all seats is waited for, and whether anybody reads them.
+    wanted_ns: AtomicU64,
+    reads: AtomicBool,
     table: Mutex<Vec<Row>>,
 }
 
@@ -131,6 +134,27 @@ impl Live {
     pub fn told(&self) -> MonoTime {
         // Acquire: whoever sees the instant sees the evidence from before it.
         MonoTime::from_nanos(self.told_ns.load(Ordering::Acquire))
+    }
+
+    /// Since when a reading of all seats is waited for; the clock's zero before one was.
+    #[must_use]
+    pub fn wanted(&self) -> MonoTime {
+        MonoTime::from_nanos(self.wanted_ns.load(Ordering::Acquire))
+    }
+
+    /// Asks for a reading of all seats, later than `since`. Tick thread.
+    pub(super) fn want(&self, since: MonoTime) {
+        self.wanted_ns.store(since.as_nanos(), Ordering::Release);
+    }
+
+    /// Whether somebody reads seats when that is asked for.
+    pub(super) fn has_reader(&self) -> bool {
+        self.reads.load(Ordering::Acquire)
+    }
+
+    /// Notes that somebody does.
+    pub(super) fn on_reader(&self) {
+        self.reads.store(true, Ordering::Release);
     }
 
     /// Notes that all that arrived before an instant was told.

@@ -267,6 +267,11 @@ impl Mail {
         self.live.evidence(lane)
     }
 
+    /// What the ack thread sees, and is asked.
+    pub(super) fn live(&self) -> &Live {
+        &self.live
+    }
+
     /// The instant up to which the ack thread has told all that arrived.
     pub(super) fn told(&self) -> MonoTime {
         self.live.told()

@@ -125,7 +125,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.take_mail(now);
         let moving = self.conductor.machine().may_send_motion();
         self.places.look(&mut self.engine, &self.mail, now, moving);
-        let step = self.engine.tick(tick.missed);
+        let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving);
+        let step = if goes_on { self.engine.tick(tick.missed) } else { Step::Quiet };
         match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
             Step::Send(beat) if self.conductor.machine().may_send_motion() => {

@@ -2,6 +2,8 @@
 //! which nobody knows which frames arrive go blind, and each frame is held against what is known before it leaves. Tick
 //! thread; allocates nothing.
 
+use std::time::Duration;
+
 use super::mail::{Mail, Sent};
 use crate::belief::{Belief, Taken, Tally};
 use crate::engine::{Beat, Engine};
@@ -14,7 +16,15 @@ use crate::wire::Timing;
 #[derive(Debug)]
 pub struct Places {
     lanes: Vec<Place>,
+    /// Whether frames went out in the tick before.
+    moved: bool,
+    /// Since when a motion waits for all seats to be read once more, and when that was asked for last.
+    waits: Option<(MonoTime, MonoTime)>,
 }
+
+/// How often seats are read that a motion waits for, and for how long it waits.
+const READ_EVERY: Duration = Duration::from_millis(110);
+const WAITS_FOR: Duration = Duration::from_millis(400);
 
 #[derive(Debug)]
 struct Place {
@@ -31,7 +41,7 @@ impl Places {
             belief: Belief::new(&lane.window, rate.period(), lane.ack_every > 0),
             longest_ms: lane.longest_ms,
         };
-        Self { lanes: lanes.iter().map(place).collect() }
+        Self { lanes: lanes.iter().map(place).collect(), moved: false, waits: None }
     }
 
     /// What is known of a lane's seat.
@@ -70,6 +80,44 @@ impl Places {
                 engine.fall_out(lane);
             }
         }
+    }
+
+    /// Whether a motion may go on. One that begins waits until all seats were read since it was asked for, some milliseconds; a seat
+    /// that moves meanwhile, or does not answer, is left out.
+    pub(super) fn may_go_on(
+        &mut self,
+        engine: &mut Engine,
+        mail: &Mail,
+        now: MonoTime,
+        moving: bool,
+    ) -> bool {
+        let begins = moving && !std::mem::replace(&mut self.moved, moving) && mail.live().has_reader();
+        if begins {
+            self.waits = Some((now, now));
+            mail.live().want(now);
+        }
+        let Some((since, asked)) = self.waits.filter(|_| moving) else {
+            self.waits = None;
+            return true;
+        };
+        let is_open = |(_, place): &(usize, &Place)| !place.belief.is_known_since(since, now);
+        let is_over = now.since(since) >= WAITS_FOR;
+        let mut open =
+            self.lanes.iter().enumerate().filter(is_open).filter(|(lane, _)| engine.takes_part(*lane));
+        if !is_over && open.next().is_some() {
+            if now.since(asked) >= READ_EVERY {
+                self.waits = Some((since, now));
+                mail.live().want(now);
+            }
+            return false;
+        }
+        self.waits = None;
+        for lane in 0..self.lanes.len() {
+            if is_over && engine.takes_part(lane) && !self.lanes[lane].belief.is_known_since(since, now) {
+                engine.fall_out(lane);
+            }
+        }
+        true
     }
 
     /// A controller takes part again. Where its seat stands is known by what was read since the last frame went to it; else it

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::belief::{Reading, Source};
-use crate::motion::{MAX_AXES, Pulses, SeatType};
+use crate::motion::{MAX_AXES, Pulses, SeatType, in_stroke};
 use crate::time::MonoTime;
 use crate::wire::PerAxis;
 
@@ -36,6 +36,11 @@ pub(super) struct Positions {
     told: [Option<Told>; MAX_AXES],
     /// The axis, from 0, that told a position outside of its stroke, and which.
     outside: Option<(usize, Pulses)>,
+    /// Whether something has told in which order the two words of a position come: the manuals differ, and both may make a
+    /// place inside the stroke.
+    ordered: bool,
+    /// The axes whose last position would be another one inside the stroke in the other order, a bit each.
+    ambiguous: u16,
     /// Whether it was homed, and no frame went to it since: all its axes are at 0.
     home: bool,
     by: Source,
@@ -44,7 +49,16 @@ pub(super) struct Positions {
 impl Positions {
     pub(super) const fn new(seat: Arc<SeatType>, first_slot: usize) -> Self {
         let told = [None; MAX_AXES];
-        Self { seat, first_slot, told, outside: None, home: false, by: Source::Registers }
+        Self {
+            seat,
+            first_slot,
+            told,
+            outside: None,
+            ordered: false,
+            ambiguous: 0,
+            home: false,
+            by: Source::Registers,
+        }
     }
 
     /// Hears where axes are, from `first` on.
@@ -59,11 +73,29 @@ impl Positions {
                 continue;
             }
             self.outside = self.outside.filter(|(other, _)| *other != axis);
+            self.mind_order(axis, *pulses, by);
             let fraction = fraction.clamp(0.0, 1.0);
             let stays = |told: Told| at.since(told.at) <= APART && (told.since.0 - fraction).abs() <= STILL;
             let since = self.told[axis].filter(|told| stays(*told)).map_or((fraction, at), |told| told.since);
             self.told[axis] = Some(Told { fraction, at, since });
         }
+    }
+
+    /// A position that only its own order puts inside the stroke settles the order for the whole controller; so does a report,
+    /// which has no words, and a seat that is known to be at 0.
+    fn mind_order(&mut self, axis: usize, pulses: Pulses, by: Source) {
+        let other = Pulses(pulses.0.cast_unsigned().rotate_left(16).cast_signed());
+        let stroke = self.seat.stroke_pulses();
+        let is_open = by == Source::Registers && other != pulses && in_stroke(other, stroke);
+        let bit = 1 << axis;
+        self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
+        let near_zero = self.home && pulses.0.unsigned_abs() < 1 << 15;
+        self.ordered |= by == Source::Report || near_zero || (other != pulses && !is_open);
+    }
+
+    /// Whether it tells two places for some axis, and nothing says which of them is true.
+    pub(super) const fn is_ambiguous(&self) -> bool {
+        self.ambiguous != 0 && !self.ordered
     }
 
     /// It says that it is home, as it was asked to be: what it said before was of another zero.
@@ -92,6 +124,9 @@ impl Positions {
     /// The seat as it was told last; none while an axis that tells its position has not.
     pub(super) fn reading(&self, now: MonoTime) -> Option<Reading> {
         let mut reading = Reading { pose: [0.0; MAX_AXES], slots: 0, at: now, rests: true, by: self.by };
+        if self.is_ambiguous() {
+            return None;
+        }
         for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
             let slot = self.first_slot + axis;
             match self.told[axis] {
@@ -180,5 +215,31 @@ mod tests {
         assert_eq!((positions.reading(ms(1)), positions.outside()), (None, Some((0, Pulses(-20_000)))));
         positions.hear(0, &[Pulses(0)], ms(2), Source::Registers);
         assert_eq!(positions.outside(), None);
+    }
+
+    #[test]
+    fn a_position_that_either_order_of_words_puts_inside_the_stroke_is_none_before_something_tells_the_order()
+    {
+        // 1 pulse, or 32.8 mm.
+        let ambiguous = || {
+            let mut positions = seat(2);
+            positions.hear(0, &[Pulses(1), Pulses(0)], ms(0), Source::Registers);
+            assert!(positions.reading(ms(0)).is_none() && positions.is_ambiguous());
+            positions
+        };
+        let mut told = ambiguous();
+        told.hear(0, &[Pulses(1), Pulses(45_000)], ms(1), Source::Registers);
+        told.hear(0, &[Pulses(1), Pulses(0)], ms(2), Source::Registers);
+        assert!(told.reading(ms(2)).is_some(), "its other axis has told");
+        let mut reported = ambiguous();
+        reported.hear(0, &[Pulses(1), Pulses(0)], ms(1), Source::Report);
+        assert!(reported.reading(ms(1)).is_some());
+        let mut homed = ambiguous();
+        homed.on_homed();
+        homed.hear(0, &[Pulses(1), Pulses(0)], ms(1), Source::Registers);
+        assert!(homed.reading(ms(1)).is_some());
+        let mut at_zero = seat(2);
+        at_zero.hear(0, &[Pulses(0), Pulses(0)], ms(0), Source::Registers);
+        assert!(at_zero.reading(ms(0)).is_some(), "both orders say the same");
     }
 }

@@ -39,6 +39,8 @@ pub struct Watch {
     sender: Sender,
     alarms: Producer<Alarm>,
     live: Arc<Live>,
+    /// Since when a reading of all seats was asked for that was sent last.
+    wanted: MonoTime,
     /// When the last status report of each came that was taken up.
     reported: Vec<MonoTime>,
     /// Events of the observer that were heard.
@@ -71,12 +73,16 @@ impl Watch {
     ) -> Self {
         let groups = health.groups().len();
         let silent = (0..groups).all(|group| health.standing(group) == Standing::Unwatched);
+        if !silent {
+            live.on_reader();
+        }
         Self {
             lookers: controllers.iter().zip(lanes).map(|(one, lane)| Looker::new(one, lane)).collect(),
             positions: controllers.iter().map(positions).collect(),
             beats: Beats::new(controllers, lanes),
             notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
             changes: Vec::with_capacity(CHANGES_KEPT),
+            wanted: MonoTime::default(),
             reported: vec![MonoTime::default(); controllers.len()],
             heard: 0,
             anew: false,
@@ -184,6 +190,7 @@ impl Watch {
         let positions = &mut self.positions[controller];
         positions.hear(first, told, at, by);
         self.health.on_outside(controller, positions.outside());
+        self.health.on_ambiguous(controller, positions.is_ambiguous());
         if let (Some(reading), Some(evidence)) = (positions.reading(at), self.live.evidence(controller)) {
             evidence.on_reading(&reading);
         }
@@ -297,6 +304,7 @@ impl Watch {
         self.look_anew();
         self.stand_by();
         self.beat(now);
+        self.read_all();
         let notices = &mut self.notices;
         self.health.tick(now, &mut |notice| notices.push(notice));
         for index in 0..self.notices.len() {
@@ -377,6 +385,20 @@ impl Watch {
         }
         self.anew = true;
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
+    }
+
+    /// A motion that begins waits for readings of where the seats are by now.
+    fn read_all(&mut self) {
+        let wanted = self.live.wanted();
+        if self.silent || std::mem::replace(&mut self.wanted, wanted) == wanted {
+            return;
+        }
+        for controller in 0..self.lookers.len() {
+            if self.stands(controller).may_move() {
+                let sent = self.beats.send_all(controller, &self.sender);
+                self.health.on_other_sent(controller, sent);
+            }
+        }
     }
 
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
