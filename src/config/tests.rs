@@ -109,6 +109,21 @@ fn a_controller_switches_its_own_effects_alone() {
 }
 
 #[test]
+fn what_motion_and_vibration_may_reach_together_has_defaults_and_is_no_less_than_motion_alone_may() {
+    let seat = |more: &str| parse(&format!("{SEAT}{more}{CONTROLLER}")).map(|hall| hall.seats[0].clone());
+    let usual = seat("").unwrap();
+    assert_eq!((usual.shaken_velocity_mm_s(), usual.shaken_acceleration_mm_s2()), (250.0, 9_806.65));
+    let own = seat("max_shaken_velocity_mm_s = 245\nmax_shaken_acceleration_mm_s2 = 20000\n").unwrap();
+    assert_eq!((own.shaken_velocity_mm_s(), own.shaken_acceleration_mm_s2()), (245.0, 20_000.0));
+    let faults = seat("max_shaken_velocity_mm_s = 200\n").unwrap_err();
+    let [fault] = &faults[..] else { panic!("{faults:?}") };
+    assert!(
+        fault.starts_with("hall.toml:9:28: max_shaken_velocity_mm_s: 200 is below max_velocity_mm_s, 240"),
+        "{fault}"
+    );
+}
+
+#[test]
 fn every_fault_is_shown_with_its_place() {
     let Err(ConfigFaults::Bad(faults)) = load(&data("every_fault.toml")) else { panic!("faults") };
     let shown: Vec<_> = faults.iter().map(|f| format!("{}:{}: {}", f.line, f.column, f.message)).collect();

@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn what_only_one_phase_of_the_grid_shows_is_no_room() {
         // A bump between two frames of a grid that begins with the cue.
-        let text = "# interpolation: linear\ntime_ms,a1\n0,0.5\n1000,0.5\n1005,0.501\n1010,0.5\n2000,0.5\n";
+        let text = "# interpolation: linear\ntime_ms,a1\n0,0.5\n1000,0.5\n1005,0.502\n1010,0.5\n2000,0.5\n";
         let (timeline, rate, seat) = (timeline(text), Rate::from_hz(100.0), SeatType::bench3(1));
         let window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
         let room = Headroom::measure(&[window], &timeline, rate);
