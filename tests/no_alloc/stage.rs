@@ -226,10 +226,11 @@ fn answer(peer: &UdpSocket, pace: &Pace) {
     }
 }
 
-/// Two seconds away from park, so that each lap begins with a join; with vibration and effects.
+/// Three seconds away from park, so that each lap begins with a join, and is followed a while also where the trim leaves out half a
+/// second of it; with vibration and effects.
 fn ride() -> Timeline {
     let mut text = String::from("time_ms,a1,a2,a3,a4,a5,a6,v1_hz,v1_amp,fx_air\n");
-    for row in 0..=200 {
+    for row in 0..=300 {
         let swing = 0.4 + 0.1 * (f64::from(row) * 0.03).sin();
         let shaking = if row % 50 < 25 { "20,0.01,1" } else { "0,0,0" };
         text += &format!("{},{swing},{swing},{swing},0.5,0.5,{swing},{shaking}\n", row * 10);
