@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer};
 
+use super::company::Company;
 use super::prepare::Preparation;
 use super::report::Report;
 use super::stage::Stage;
@@ -64,9 +65,17 @@ pub enum PlayError {
     /// The frame port cannot be had.
     #[error(transparent)]
     Net(NetError),
+    /// Somebody else sends to these controllers, so many datagrams within about a second.
+    #[error("{}; end whatever else sends to them: another kinocue, player or tool", others(.0))]
+    OtherMaster(Vec<(String, u16)>),
     /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
     #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
     Unsure(Vec<String>),
+}
+
+fn others(found: &[(String, u16)]) -> String {
+    let one = |(name, more): &(String, u16)| format!("{name} got {more} datagrams (DP34) that were not sent from here");
+    found.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
@@ -195,6 +204,16 @@ impl Play {
         let Control { live, leave, .. } = &self.control;
         if self.holds {
             acks.tell(Arc::clone(live));
+        }
+        if !self.manner.silent {
+            let (controllers, lanes) = (&*self.config.controllers, &*self.staged.lanes);
+            let acks = &mut acks;
+            let found =
+                Company { clock: &Monotonic, sender: &sender, acks, controllers, lanes, stop: leave }.look();
+            if !found.is_empty() {
+                let name = |(lane, more): (usize, u16)| (controllers[lane].name.clone(), more);
+                return Err(PlayError::OtherMaster(found.into_iter().map(name).collect()));
+            }
         }
         let mut preparation = Preparation {
             clock: &Monotonic,

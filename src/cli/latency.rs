@@ -223,6 +223,7 @@ fn failed(error: PlayError) -> Failure {
     let exit = match &error {
         PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
         PlayError::Unsure(_) => Exit::TryAgain,
+        PlayError::OtherMaster(_) => Exit::OtherMaster,
         _ => Exit::Internal,
     };
     Failure { exit, error: error.into() }

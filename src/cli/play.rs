@@ -165,6 +165,7 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
     let exit = match error {
         PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
+        PlayError::OtherMaster(_) => Exit::OtherMaster,
         _ => Exit::BadCue,
     };
     let names_cue = !matches!(error, PlayError::Plan(_));

@@ -144,6 +144,7 @@ impl Ask {
                 | Self::Go
                 | Self::Resume
                 | Self::Seek(_)
+                | Self::Park
                 | Self::Clear
                 | Self::Enable(_)
                 | Self::Test { .. }

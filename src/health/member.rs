@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::Why;
+use super::counter::{Counter, Said};
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::window::Window;
 use crate::motion::MAX_AXES;
@@ -20,6 +21,8 @@ const SEEN_FOR: Duration = Duration::from_secs(1);
 const APART: Duration = Duration::from_secs(2);
 /// While nothing moves, what a controller is and whether it knows its zero is read this often: nobody sees it being reset.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
+/// Frames go to a controller to which one went so long ago.
+const FLOWS: Duration = Duration::from_millis(500);
 /// From one read to the next: 5 Hz.
 const READ_EVERY: Duration = Duration::from_millis(200);
 
@@ -47,6 +50,8 @@ pub(super) struct Member {
     read: MonoTime,
     look_again: bool,
     next_read: Option<MonoTime>,
+    /// Nobody wants it to take part.
+    pub(super) out: bool,
     /// It has to be homed, and why.
     pub(super) outcast: Option<Why>,
     /// An emergency stop is in effect.
@@ -62,6 +67,9 @@ pub(super) struct Member {
     pub(super) ailed: Option<Why>,
     /// Its seat was found elsewhere than frames left it.
     pub(super) moved: bool,
+    /// When a frame was last sent, and what the controller counts meanwhile.
+    framed: Option<MonoTime>,
+    counter: Counter,
     /// Another master was found, and nobody was told yet.
     crowd_untold: bool,
 }
@@ -85,6 +93,7 @@ impl Member {
             read: MonoTime::default(),
             look_again: false,
             next_read: None,
+            out: false,
             outcast: None,
             pressed: false,
             tripped: false,
@@ -94,12 +103,15 @@ impl Member {
             refusing: false,
             ailed: None,
             moved: false,
+            framed: None,
+            counter: Counter::default(),
             crowd_untold: false,
         }
     }
 
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         self.traffic.sent += 1;
+        self.framed = Some(at);
         if !asked {
             return;
         }
@@ -211,7 +223,15 @@ impl Member {
         self.ailed.get_or_insert(Why::Refuses(self.controller));
     }
 
-    pub(super) const fn on_emergency_stop(&mut self, pressed: bool) {
+    /// Nobody presses it any more, and only a reset ends it, which is a homing.
+    pub(super) const fn on_stop_held(&mut self) {
+        self.pressed = false;
+        self.outcast = Some(Why::HeldUntilReset(self.controller));
+    }
+
+    pub(super) fn on_emergency_stop(&mut self, pressed: bool) {
+        // It was reset at its place, or is pressed anew.
+        self.outcast.take_if(|why| matches!(why, Why::HeldUntilReset(_)));
         self.press_untold |= pressed && !self.pressed;
         self.tripped |= pressed;
         self.pressed = pressed;
@@ -222,17 +242,23 @@ impl Member {
         std::mem::replace(&mut self.press_untold, false)
     }
 
+    /// Whether an emergency stop is in effect that the hall waits for.
+    pub(super) const fn holds(&self) -> bool {
+        self.pressed && !self.out
+    }
+
     /// Whether another master was found since this was last asked.
     pub(super) const fn take_crowd(&mut self) -> bool {
         std::mem::replace(&mut self.crowd_untold, false)
     }
 
     /// It was homed: its position is known, and what it counts from here on is the new measure.
-    pub(super) const fn on_homed(&mut self) {
+    pub(super) fn on_homed(&mut self) {
         self.outcast = None;
         self.baseline = None;
         self.trusted = true;
         self.seen = None;
+        self.counter = Counter::default();
     }
 
     /// Whether something is still wrong with it.
@@ -250,8 +276,28 @@ impl Member {
         }
     }
 
+    pub(super) const fn on_count(&mut self, packets: u16) {
+        self.counter.hear(packets);
+    }
+
     pub(super) fn tick(&mut self, now: MonoTime) {
         self.window.tick(now);
+        match self.counter.judge(self.traffic, now) {
+            Some(Said::Crowded) => {
+                self.crowd_untold |= self.outcast.is_none();
+                self.outcast.get_or_insert(Why::Crowded(self.controller));
+            }
+            Some(Said::Rebooted) => drop(self.outcast.get_or_insert(Why::Rebooted(self.controller))),
+            None => {}
+        }
+    }
+
+    /// Whether frames go there, and it is time to read its packet counter; if so, it counts as sent.
+    pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
+        let flows = self.framed.is_some_and(|at| now.since(at) < FLOWS);
+        let due = flows && self.counter.take_turn(self.controller, now);
+        self.traffic.sent += u64::from(due);
+        due
     }
 
     pub(super) const fn is_poor(&self) -> bool {
@@ -278,6 +324,8 @@ impl Member {
         self.moved = false;
         self.reading = false;
         self.next_read = None;
+        // Who it is when it is back, and whether it rebooted, is for a sighting to prove.
+        self.counter = Counter::default();
         self.rest();
     }
 

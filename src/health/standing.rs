@@ -57,6 +57,8 @@ pub enum Why {
     Moved(usize),
     /// An emergency stop at this controller.
     EmergencyStop(usize),
+    /// An emergency stop at this controller was released, and it holds until it is reset.
+    HeldUntilReset(usize),
     /// This controller has an error.
     Error {
         /// Which.
@@ -96,6 +98,7 @@ impl Why {
             | Self::Silent(controller)
             | Self::Moved(controller)
             | Self::EmergencyStop(controller)
+            | Self::HeldUntilReset(controller)
             | Self::Error { controller, .. }
             | Self::Drive { controller, .. }
             | Self::Refuses(controller)
@@ -133,4 +136,6 @@ pub enum Notice {
     Hall(state::Event),
     /// Identity, mode, error, packet counter and DPF0 of this controller are to be read.
     Read(usize),
+    /// The packet counter of this controller, to which frames go, is to be read.
+    Count(usize),
 }

@@ -10,13 +10,15 @@ use super::{Live, Sent, TickReport, Watch};
 use crate::health::Change;
 use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
-use crate::observe::{Observer, Watched};
+use crate::observe::{Answer, Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply, PerAxis};
+use crate::wire::{FrameNo, MotionReply, PerAxis, RegisterReply};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
+/// A drain that is so much overdue says that this thread hangs: nobody hears of an emergency stop then.
+const HANGS_AFTER: Duration = Duration::from_millis(100);
 /// How often the times so far are told to whoever looks.
 const TELL: Duration = Duration::from_millis(100);
 
@@ -132,7 +134,11 @@ impl AckLoop {
                 break;
             }
             let next = drains.next_after(clock.now());
-            clock.sleep_until(if self.is_idle() { next.max(clock.now() + IDLE) } else { next });
+            let next = if self.is_idle() { next.max(clock.now() + IDLE) } else { next };
+            if let Some(watch) = &self.watch {
+                watch.on_drain(next + HANGS_AFTER);
+            }
+            clock.sleep_until(next);
         }
         self.tell_times();
         self.into_accounts()
@@ -173,8 +179,9 @@ impl AckLoop {
             match MotionReply::parse(octets) {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
-                    let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
-                    let mut records = Records { sent, last_sent, watch };
+                    let MotionReply { frame, code, error, inputs, .. } = reply;
+                    let reply = Reply { controller, frame, code, error, inputs, at };
+                    let mut records = Records { sent, last_sent, watch, observer };
                     books.on_reply(reply, &mut records);
                 }
                 Err(_) if observer.hear(controller, octets, at) => {}
@@ -184,7 +191,7 @@ impl AckLoop {
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
-        books.settle(began, &mut Records { sent, last_sent, watch });
+        books.settle(began, &mut Records { sent, last_sent, watch, observer });
         for controller in 0..receiver.lanes() {
             let closed = receiver.port_closed(controller);
             books.tracker_mut().on_port_closed(controller, closed);
@@ -225,7 +232,15 @@ fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &
     if let Some(positions) = beat {
         observer.on_positions(controller, positions, at);
     }
-    watch.hear(controller, octets, at) || beat.is_some()
+    let is_answer = watch.hear(controller, octets, at) || beat.is_some();
+    if let Some(reply) = RegisterReply::parse(octets).ok().filter(|_| is_answer) {
+        observer.on_code(controller, reply.code, at);
+        watch.mind_stop(controller, reply.code);
+    }
+    if let Some(look) = watch.take_look(controller) {
+        observer.on_look(controller, look, at);
+    }
+    is_answer
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.
@@ -233,6 +248,7 @@ struct Records<'a> {
     sent: &'a mut Consumer<Sent>,
     last_sent: &'a mut MonoTime,
     watch: &'a mut Option<Watch>,
+    observer: &'a mut Observer,
 }
 
 impl Ledger for Records<'_> {
@@ -246,6 +262,10 @@ impl Ledger for Records<'_> {
     }
 
     fn on_fate(&mut self, reply: &Reply, fate: Fate) {
+        if let Fate::Answered(code) = fate {
+            let Reply { controller, frame, error, inputs, at, .. } = *reply;
+            self.observer.on_answer(controller, &Answer { frame, code, error, inputs }, at);
+        }
         if let Some(watch) = self.watch {
             watch.on_fate(reply, fate);
         }

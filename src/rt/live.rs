@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::TickReport;
 use super::table::Row;
 use crate::state::{Ride, State};
-use crate::time::ShowTime;
+use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
 
 /// How far a play is, in the order of a show.
@@ -98,6 +98,9 @@ pub struct Live {
     missed: AtomicU64,
     beats: AtomicU64,
     closed: AtomicBool,
+    clears: AtomicU32,
+    drains: AtomicU64,
+    drain_due_ns: AtomicU64,
     moving: AtomicBool,
     /// How often the last gate held each lane back; empty where nobody wants to know.
     clamps: Box<[AtomicU64]>,
@@ -163,10 +166,23 @@ impl Live {
         self.beats.load(Ordering::Relaxed)
     }
 
-    /// [`Self::beats`] while the tick thread is to tick; none once its loop is over.
+    /// The ticks and the drains of the ack thread so far, while there are to be any; none once the tick loop is over.
     #[must_use]
-    pub fn pulse(&self) -> Option<u64> {
-        (!self.closed.load(Ordering::Relaxed)).then(|| self.beats())
+    pub fn pulse(&self) -> Option<[u64; 2]> {
+        let drains = self.drains.load(Ordering::Relaxed);
+        (!self.closed.load(Ordering::Relaxed)).then(|| [self.beats(), drains])
+    }
+
+    /// Notes a drain of the ack thread, and until when the next is to be over.
+    pub fn on_drain(&self, due: MonoTime) {
+        self.drains.fetch_add(1, Ordering::Relaxed);
+        self.drain_due_ns.store(due.as_nanos(), Ordering::Relaxed);
+    }
+
+    /// Until when the ack thread is to have drained again; none where it never did.
+    pub(super) fn drain_due(&self) -> Option<MonoTime> {
+        let due = self.drain_due_ns.load(Ordering::Relaxed);
+        (due > 0).then(|| MonoTime::from_nanos(due))
     }
 
     /// Notes that the tick loop is over.
@@ -218,6 +234,16 @@ impl Live {
         self.enter(Phase::of(state));
     }
 
+    /// Notes how often a person has cleared.
+    pub(super) fn on_clears(&self, clears: u32) {
+        self.clears.store(clears, Ordering::Release);
+    }
+
+    /// How often a person has cleared.
+    pub(super) fn clears(&self) -> u32 {
+        self.clears.load(Ordering::Acquire)
+    }
+
     /// Whether motion frames leave.
     #[must_use]
     pub fn is_moving(&self) -> bool {
@@ -260,9 +286,11 @@ mod tests {
     #[test]
     fn a_pulse_is_expected_from_the_start_until_the_loop_is_over() {
         let live = Live::default();
-        assert_eq!(live.pulse(), Some(0), "a tick thread that does not begin to tick hangs as well");
+        assert_eq!(live.pulse(), Some([0, 0]), "a tick thread that does not begin to tick hangs as well");
         live.beat();
-        assert_eq!(live.pulse(), Some(1));
+        assert_eq!(live.pulse(), Some([1, 0]));
+        live.on_drain(MonoTime::from_nanos(7));
+        assert_eq!((live.pulse(), live.drain_due()), (Some([1, 1]), Some(MonoTime::from_nanos(7))));
         live.close();
         assert_eq!(live.pulse(), None);
     }

@@ -10,7 +10,7 @@ use crate::engine::{Engine, Unplanned};
 use crate::fanout::Lane;
 use crate::motion::Pose;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
-use crate::state::{Cause, Event, Next, Refusal, Request, State};
+use crate::state::{Cause, Event, Machine, Next, Refusal, Request, State};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
 use crate::wire::FrameNo;
@@ -262,9 +262,15 @@ impl Mail {
         self.live.beat();
     }
 
+    /// Until when the ack thread is to have read replies again; none where it never did.
+    pub(super) fn drain_due(&self) -> Option<MonoTime> {
+        self.live.drain_due()
+    }
+
     /// Shows how far the play is.
-    pub(super) fn look(&self, state: State) {
-        self.live.on_state(state);
+    pub(super) fn look(&self, machine: &Machine) {
+        self.live.on_clears(machine.clears());
+        self.live.on_state(machine.state());
     }
 
     pub(super) fn command(&mut self) -> Option<Command> {

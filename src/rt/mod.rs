@@ -100,6 +100,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             self.clock.sleep_until(self.grid.next_deadline());
             let now = self.clock.now();
             let tick = self.grid.take(now);
+            self.conductor.mind_gap(tick.missed, &mut self.engine, now);
             self.take_mail(now);
             let step = self.engine.tick(tick.missed);
             match step {
@@ -115,7 +116,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             self.hand_on();
             self.mail.beat();
             // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
-            if step == Step::Over && (!self.conductor.stays() || self.leave.load(Ordering::Relaxed)) {
+            if step == Step::Over && (!self.conductor.stays() || self.conductor.is_left()) {
                 break;
             }
         }
@@ -131,6 +132,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             conductor.stop(engine, now);
         }
         conductor.tick(engine, now);
+        conductor.mind_acks(mail.drain_due(), engine, now);
         for lane in 0..desk.lanes() {
             engine.mix(lane, desk.mix(lane));
         }
@@ -154,7 +156,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             tell_state(conductor, mail);
             mail.tell(news);
         }
-        if self.leave.load(Ordering::Relaxed) {
+        if self.leave.load(Ordering::Relaxed) || conductor.is_ended(desk.is_ended(), now) {
             conductor.leave(engine, now);
         }
         while let Some(answer) = mail.answer() {
@@ -187,7 +189,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     }
 
     fn hand_on(&mut self) {
-        self.mail.look(self.conductor.machine().state());
+        self.mail.look(self.conductor.machine());
         tell_state(&mut self.conductor, &mut self.mail);
         while self.mail.has_room_for_news()
             && let Some(what) = self.engine.take_unplanned()

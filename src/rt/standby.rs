@@ -10,7 +10,7 @@ use super::idle::Beats;
 use super::line::LineEnd;
 use crate::config::Controller;
 use crate::fanout::Lane;
-use crate::health::Health;
+use crate::health::{Health, Standing};
 use crate::motion::Pulses;
 use crate::net::Sender;
 use crate::state::Finding;
@@ -138,9 +138,10 @@ impl Standby {
     pub(super) fn take_finding(&mut self, health: &Health) -> Option<Finding> {
         let crashed = self.boot?;
         let groups = health.groups();
+        // What is latched was seen as well; it waits for a person, who may clear it only once all have told.
         let known = |controller: usize| {
             let standing = health.standing(groups.group_of(controller));
-            self.seen[controller].filter(|_| !standing.is_looked_at())
+            self.seen[controller].filter(|_| standing != Standing::Lost)
         };
         let mut finding = Finding { homed: true, at_park: true, crashed };
         for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {

@@ -54,6 +54,8 @@ pub enum Event {
     SlowPlanner(u32),
     /// The planner finds no move for what it is asked next.
     Refuse,
+    /// From here on nobody reads replies, or somebody does again.
+    Deaf(bool),
 }
 
 /// A show to be played in virtual time.
@@ -116,7 +118,8 @@ impl Virtual {
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
-        let (mail, ends) = mailboxes(lanes.len(), rate, Arc::new(Live::default()));
+        let live = Arc::new(Live::default());
+        let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent: _sent, ticks: _ticks, tasks, answers, commands, alarms, news } = ends;
         let planning = Box::new(Planning { planner, timeline: Arc::clone(&timeline) });
         let plans = PlanLoop { planning, tasks, answers };
@@ -126,6 +129,8 @@ impl Virtual {
             leave: &leave,
             commands: RefCell::new(commands),
             alarms: RefCell::new(alarms),
+            live: &live,
+            deaf: Cell::new(false),
         };
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
@@ -157,11 +162,20 @@ struct Hands<'a> {
     leave: &'a AtomicBool,
     commands: RefCell<Producer<Command>>,
     alarms: RefCell<Producer<Alarm>>,
+    live: &'a Live,
+    deaf: Cell<bool>,
 }
 
 impl Hands<'_> {
     fn command(&self, command: Command) {
         self.commands.borrow_mut().push(command).expect("there is room");
+    }
+
+    /// Reads replies, as an ack thread does between ticks; the next time is to be soon.
+    fn hear(&self, now: MonoTime) {
+        if !self.deaf.get() {
+            self.live.on_drain(now + Duration::from_millis(105));
+        }
     }
 }
 
@@ -228,6 +242,7 @@ impl Clock for Stage<'_> {
         self.wake_ups.set(wake_up + 1);
         self.now.set(deadline.max(self.now.get()));
         self.serve_planner();
+        self.hands.hear(self.now.get());
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
@@ -241,6 +256,7 @@ impl Clock for Stage<'_> {
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+                Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
                 Event::Refuse => self.planner_refuses.set(true),
                 Event::SlowPlanner(ticks) => {
                     self.planner_delay.set(*ticks);

@@ -20,6 +20,7 @@ mod begin;
 mod hall;
 mod library;
 mod playlist;
+mod remedies;
 mod show;
 mod signals;
 mod surfaces;

@@ -107,16 +107,22 @@ pub struct Closed {
 }
 
 impl House {
-    /// Opens the frame port for a configuration; `crashed` says whether the mark of a crash was there.
+    /// Opens the frame port for a configuration; `crashed` says whether the mark of a crash was there. Where `signals` ask for
+    /// the end, the seats park and the hall closes, be it that whoever leads it does not hear them.
     ///
     /// # Errors
     /// Why not.
-    pub fn open(config: Arc<Config>, crashed: bool, numbers: &Numbers) -> Result<Self, HouseError> {
+    pub fn open(
+        config: Arc<Config>,
+        crashed: bool,
+        numbers: &Numbers,
+        signals: &Arc<AtomicBool>,
+    ) -> Result<Self, HouseError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let rate = Rate::from_hz(config.show.rate_hz);
         let opened = boot::open(&config, numbers)?;
-        let desk = Arc::new(opened.desk());
+        let desk = Arc::new(opened.desk().ended_by(Arc::clone(signals)));
         let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
         let controllers = &config.controllers;
         let live = Arc::new(Live::with_clamps(controllers.len()));
