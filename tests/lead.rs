@@ -473,10 +473,8 @@ fn a_tick_thread_that_was_held_itself_does_not_take_that_for_a_deaf_one() {
 
 #[test]
 fn after_a_sleep_of_seconds_the_seat_stays_where_it_was_until_a_person_resumes() {
-    let played = ride()
-        .with(500, Event::Late(Duration::from_secs(3)))
-        .with(900, Event::Ask(Request::Resume))
-        .play();
+    let played =
+        ride().with(500, Event::Late(Duration::from_secs(3))).with(900, Event::Ask(Request::Resume)).play();
     assert!(states(&played).contains(&State::Paused));
     assert_within(played.worst_from_rest(500, played.frames.len()));
     let woken = played.frames[499].at + Duration::from_secs(3);
@@ -488,7 +486,6 @@ fn after_a_sleep_of_seconds_the_seat_stays_where_it_was_until_a_person_resumes()
 
 #[test]
 fn after_a_sleep_of_minutes_no_frame_leaves_until_a_person_clears() {
-    let played =
-        ride().with(500, Event::Late(Duration::from_secs(400))).with(5_000, Event::Leave).play();
+    let played = ride().with(500, Event::Late(Duration::from_secs(400))).with(5_000, Event::Leave).play();
     assert_eq!((played.frames.len(), *states(&played).last().unwrap()), (500, State::Stopped));
 }

@@ -74,7 +74,9 @@ pub enum PlayError {
 }
 
 fn others(found: &[(String, u16)]) -> String {
-    let one = |(name, more): &(String, u16)| format!("{name} got {more} datagrams (DP34) that were not sent from here");
+    let one = |(name, more): &(String, u16)| {
+        format!("{name} got {more} datagrams (DP34) that were not sent from here")
+    };
     found.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 

@@ -72,7 +72,9 @@ pub enum ServeError {
         cause: io::Error,
     },
     /// The keeper does not end: what it had to write down may be lost.
-    #[error("the keeper hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost")]
+    #[error(
+        "the keeper hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost"
+    )]
     Keeper,
     /// The system gives no signals, or no thread.
     #[error("the system refused: {0}")]
@@ -304,11 +306,13 @@ mod tests {
         // An address of documentation, which no machine has (RFC 5737).
         let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
         let mut memory = Memory::default();
-        let (_house, config) = reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory, &Arc::default()).unwrap();
+        let (_house, config) =
+            reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory, &Arc::default()).unwrap();
         assert!(Arc::ptr_eq(&config, &before));
         assert!(format!("{memory:?}").contains("does not open with the new configuration"), "{memory:?}");
         let next = hall("127.0.0.1:0");
-        let (_house, config) = reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory, &Arc::default()).unwrap();
+        let (_house, config) =
+            reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory, &Arc::default()).unwrap();
         assert!(Arc::ptr_eq(&config, &next));
     }
 }

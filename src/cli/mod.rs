@@ -157,9 +157,8 @@ mod tests {
     use crate::state::Next;
 
     /// Words that mean a request where they stand in a next action.
-    const REQUESTS: [&str; 11] = [
-        "arm", "clear", "disable", "disarm", "go", "home", "load", "park", "pause", "preflight", "resume",
-    ];
+    const REQUESTS: [&str; 11] =
+        ["arm", "clear", "disable", "disarm", "go", "home", "load", "park", "pause", "preflight", "resume"];
 
     #[test]
     fn every_request_that_a_next_action_names_is_a_command_and_on_the_page() {
@@ -183,6 +182,9 @@ mod tests {
             };
             assert!(is_on_page, "{request} on the page");
         }
-        assert!(["arm", "clear", "disable", "home", "park"].iter().all(|word| named.contains(word)), "{named:?}");
+        assert!(
+            ["arm", "clear", "disable", "home", "park"].iter().all(|word| named.contains(word)),
+            "{named:?}"
+        );
     }
 }

@@ -1,6 +1,8 @@
 //! From what is known of the members to the standing of their group, and to what the hall has to hear of it.
 
-use super::{Change, Demand, Health, Latch, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well};
+use super::{
+    Change, Demand, Health, Latch, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well,
+};
 use crate::time::MonoTime;
 
 /// What the members of one group amount to: of each kind the first that there is.

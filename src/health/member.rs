@@ -168,6 +168,10 @@ impl Member {
         if !std::mem::take(&mut self.reading) {
             return;
         }
+        if let Some(packets) = sighting.packets {
+            // A look at a time, somebody else's frames are no more than may be under way: what they add up to tells.
+            self.counter.hear(packets);
+        }
         self.on_error(sighting.error);
         self.refusing &= sighting.error != 0;
         if let Some(why) = self.against(sighting) {

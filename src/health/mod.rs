@@ -70,7 +70,16 @@ impl Health {
         let (standing, why) = well(watched);
         let place = Place { standing, why, poor: MonoTime::default() };
         let places = vec![place; groups.len()];
-        Self { groups, members, places, policy, watched, stop_told: false, errors_told: false, latch_told: Latch::Free }
+        Self {
+            groups,
+            members,
+            places,
+            policy,
+            watched,
+            stop_told: false,
+            errors_told: false,
+            latch_told: Latch::Free,
+        }
     }
 
     /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.

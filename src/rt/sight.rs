@@ -156,8 +156,13 @@ impl Looker {
     pub(super) fn darken(&self, lane: usize, sender: &Sender) {
         let off = [0];
         let (channel, start) = (CONTROLS, OUTPUTS);
-        let write =
-            WriteRequest { channel, accept: self.code, reply: Code::NONE, start, data: Words::from(&off[..]) };
+        let write = WriteRequest {
+            channel,
+            accept: self.code,
+            reply: Code::NONE,
+            start,
+            data: Words::from(&off[..]),
+        };
         // It is sent three times.
         let _ = sender.send(lane, write.emit(&mut [0; MAX_LEN]));
     }
@@ -165,7 +170,8 @@ impl Looker {
     /// Hears a datagram; says whether it was an answer to what was asked.
     pub(super) fn hear(&mut self, octets: &[u8]) -> bool {
         let reply = RegisterReply::parse(octets).ok().filter(|reply| reply.access == Access::Read);
-        let is_count = |reply: &RegisterReply<'_>| (reply.channel, reply.start, reply.num) == (MONITORS, PACKETS, 1);
+        let is_count =
+            |reply: &RegisterReply<'_>| (reply.channel, reply.start, reply.num) == (MONITORS, PACKETS, 1);
         let counted = self.counting && reply.as_ref().is_some_and(is_count);
         if counted {
             self.counting = false;
@@ -381,8 +387,7 @@ mod tests {
             let channel = if code == ReplyCode::Running { channel } else { 0 };
             let words = [word];
             let data = Words::from(&words[..]);
-            let reply =
-                RegisterReply { access: Access::Read, code, channel, error: 0, start, num: 1, data };
+            let reply = RegisterReply { access: Access::Read, code, channel, error: 0, start, num: 1, data };
             assert!(looker.hear(reply.emit(&mut [0; MAX_LEN])));
         }
         looker.take_look().expect("it is whole").stop
@@ -396,7 +401,11 @@ mod tests {
         assert_eq!(look(&mut looker, EmergencyStop, 0), Unsure);
         assert_eq!([Running, Running].map(|code| look(&mut looker, code, 0)), [Unsure, Over]);
         assert_eq!(look(&mut looker, EmergencyStop, 0), Unsure);
-        assert_eq!([Fault, Running].map(|code| look(&mut looker, code, 0)), [Unsure, Over], "an error is none");
+        assert_eq!(
+            [Fault, Running].map(|code| look(&mut looker, code, 0)),
+            [Unsure, Over],
+            "an error is none"
+        );
         looker.spoil();
         look(&mut looker, Running, 0);
         looker.seen = Seen { asked: true, ..Seen::default() };
@@ -411,7 +420,8 @@ mod tests {
         use ReplyCode::EmergencyStop;
         use StopSign::{Asked, Held, Unsure};
         let mut looker = looker();
-        let looks = |looker: &mut Looker, inputs: [u16; 3]| inputs.map(|one| look(looker, EmergencyStop, one));
+        let looks =
+            |looker: &mut Looker, inputs: [u16; 3]| inputs.map(|one| look(looker, EmergencyStop, one));
         assert_eq!(looks(&mut looker, [0, 0, 0]), [Unsure; 3], "nobody knows what asks for it");
         assert_eq!(looks(&mut looker, [1, 0, 0]), [Asked, Unsure, Held]);
         assert_eq!(looks(&mut looker, [1, 0b10, 0b11]), [Asked, Unsure, Asked]);
@@ -425,8 +435,15 @@ mod tests {
         let words = [RESET_DONE];
         let data = Words::from(&words[..]);
         let code = ReplyCode::Running;
-        let late =
-            RegisterReply { access: Access::Read, code, channel: MONITORS, error: 0, start: RESET, num: 1, data };
+        let late = RegisterReply {
+            access: Access::Read,
+            code,
+            channel: MONITORS,
+            error: 0,
+            start: RESET,
+            num: 1,
+            data,
+        };
         for _ in 0..9 {
             assert!(looker.hear(late.emit(&mut [0; MAX_LEN])));
         }

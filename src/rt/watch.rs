@@ -433,7 +433,8 @@ impl Watch {
         let Some(since) = self.anew else { return };
         let is_open = |group| {
             let mut members = self.health.groups().members(group);
-            self.health.standing(group) == Standing::Lost && members.any(|controller| self.takes_part(controller))
+            self.health.standing(group) == Standing::Lost
+                && members.any(|controller| self.takes_part(controller))
         };
         let is_read = !(0..self.health.groups().len()).any(is_open);
         if is_read || now.since(since) >= SILENT_AFTER {

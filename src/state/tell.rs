@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use super::{
-    Cause, Demand, Event, Finding, Goal, Machine, Readiness, Ride, SLEPT, SLEPT_LONG, State,
-};
+use super::{Cause, Demand, Event, Finding, Goal, Machine, Readiness, Ride, SLEPT, SLEPT_LONG, State};
 use crate::time::MonoTime;
 
 impl Machine {

@@ -311,7 +311,8 @@ fn nothing_goes_on_by_itself_after_a_sleep() {
         assert_eq!(slept(State::Stopping, seconds).0, State::Stopped);
     }
     assert_eq!((slept(State::Armed, 3).0, slept(State::Armed, 301).0), (State::Armed, State::Parked));
-    for state in [State::Boot, State::Recovering, State::Parked, State::Homing, State::Stopped, State::Fault] {
+    for state in [State::Boot, State::Recovering, State::Parked, State::Homing, State::Stopped, State::Fault]
+    {
         assert_eq!(slept(state, 40_000).0, state);
     }
 }

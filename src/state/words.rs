@@ -72,7 +72,9 @@ impl fmt::Display for Next {
             Self::Watch => "nothing; pause, park or stop as needed",
             Self::AwaitJoin => "nothing; the seats join again by themselves",
             Self::Resume => "resume, or park",
-            Self::Release => "release the emergency stop, then clear; or disable a seat that cannot tell that it is",
+            Self::Release => {
+                "release the emergency stop, then clear; or disable a seat that cannot tell that it is"
+            }
 
             Self::PutRight => "put the error right at the controller, then clear; or disable its seat",
 
@@ -81,7 +83,9 @@ impl fmt::Display for Next {
             Self::LookAtSeat => "look at the seat, then clear and home again",
             Self::StopOtherMaster => "stop the other master, then clear",
             Self::Clear => "clear, then park or home",
-            Self::Restart => "clear, then park; where the positions are not read then, start the service anew",
+            Self::Restart => {
+                "clear, then park; where the positions are not read then, start the service anew"
+            }
         })
     }
 }
