@@ -428,6 +428,21 @@ mod tests {
     }
 
     #[test]
+    fn effects_are_switched_off_by_a_register_that_moves_nothing_and_nobody_answers() {
+        let controller = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = controller.local_addr().unwrap().to_string().parse().unwrap();
+        let (sender, _) =
+            crate::net::Ports::open("127.0.0.1:0".parse().unwrap(), &[address]).unwrap().split();
+        let looker = looker();
+        looker.darken(0, &sender);
+        let mut heard = [0; MAX_LEN];
+        let length = controller.recv(&mut heard).unwrap();
+        let write = WriteRequest::parse(&heard[..length]).unwrap();
+        assert_eq!((write.channel, write.start, write.data.get(0)), (2, 1, Some(0)), "DPF1");
+        assert_eq!((write.accept, write.reply), (looker.code, Code::NONE));
+    }
+
+    #[test]
     fn one_late_answer_of_before_is_no_whole_look() {
         let mut looker = looker();
         looker.spoil();
