@@ -19,6 +19,8 @@ use crate::wire::{FrameNo, MotionReply, PerAxis, RegisterReply};
 const IDLE: Duration = Duration::from_millis(5);
 /// A drain that is so much overdue says that this thread hangs: nobody hears of an emergency stop then.
 const HANGS_AFTER: Duration = Duration::from_millis(100);
+/// The same where every other program of the machine may hold it up.
+const SHARED_HANGS_AFTER: Duration = Duration::from_millis(500);
 /// How often the times so far are told to whoever looks.
 const TELL: Duration = Duration::from_millis(100);
 
@@ -76,6 +78,7 @@ pub struct AckLoop {
     watch: Option<Watch>,
     /// Whom to tell the times so far.
     live: Option<Arc<Live>>,
+    hangs_after: Duration,
 }
 
 impl AckLoop {
@@ -89,7 +92,8 @@ impl AckLoop {
         ticks: Consumer<TickReport>,
     ) -> Self {
         let accounts = Accounts::new(watched, ack_every);
-        Self { receiver, accounts, sent, ticks, watch: None, last_sent: MonoTime::default(), live: None }
+        let last_sent = MonoTime::default();
+        Self { receiver, accounts, sent, ticks, watch: None, last_sent, live: None, hangs_after: HANGS_AFTER }
     }
 
     /// The same where frames were sent before: `firsts` are the numbers of the next.
@@ -110,6 +114,11 @@ impl AckLoop {
     /// Tells `live` the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);
+    }
+
+    /// Its thread has no real-time service: a busy machine holds it up, as it does the tick thread.
+    pub fn shares_the_machine(&mut self) {
+        self.hangs_after = SHARED_HANGS_AFTER;
     }
 
     /// Has `watch` judge how the controllers stand.
@@ -136,7 +145,7 @@ impl AckLoop {
             let next = drains.next_after(clock.now());
             let next = if self.is_idle() { next.max(clock.now() + IDLE) } else { next };
             if let Some(watch) = &self.watch {
-                watch.on_drain(next + HANGS_AFTER);
+                watch.on_drain(next + self.hangs_after);
             }
             clock.sleep_until(next);
         }

@@ -201,12 +201,12 @@ impl Live {
         self.lock().clone()
     }
 
-    /// Notes the times so far.
+    /// Notes the times so far; where somebody is just looking at them, the next time will do: the ack thread waits for nobody.
     ///
     /// # Panics
     /// Where they are not made as [`histogram()`] makes them.
     pub fn on_times(&self, lateness: &Histogram, acks: &Histogram) {
-        let mut times = self.lock();
+        let Ok(mut times) = self.times.try_lock() else { return };
         let alike = "they have the same bounds";
         times.lateness.set_to(lateness).expect(alike);
         times.acks.set_to(acks).expect(alike);
@@ -256,9 +256,9 @@ impl Live {
         self.table.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Notes how the controllers stand. Ack thread.
-    pub(super) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
-        note(&mut self.table.lock().unwrap_or_else(PoisonError::into_inner));
+    /// Notes how the controllers stand; as [`Self::on_times`], it waits for nobody. Says whether it was noted.
+    pub(super) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) -> bool {
+        self.table.try_lock().map(|mut table| note(&mut table)).is_ok()
     }
 
     /// Notes a tick that sent.

@@ -251,7 +251,7 @@ impl Watch {
     /// Tells whoever looks how the controllers stand.
     pub(super) fn tell_table(&mut self, tracker: &Tracker, observer: &Observer) {
         let Self { health, standby, turns, looked, live, .. } = self;
-        live.on_table(|rows| {
+        let is_told = live.on_table(|rows| {
             let row = |controller: usize, before: Option<&Row>| {
                 let group = health.groups().group_of(controller);
                 Row {
@@ -272,6 +272,7 @@ impl Watch {
             }
             turns.look_up(rows, tracker);
         });
+        self.untold |= !is_told;
     }
 
     /// Judges all at `now`, an instant up to which all was told.

@@ -131,7 +131,7 @@ impl Trouble {
             Self::Gate => "the limits held motion back three times in a second",
             Self::Planner => "a move could not be planned",
             Self::Deaf => {
-                "replies were not read for 100 ms, so that nobody would have heard of an emergency stop"
+                "replies were not read for too long, and nobody would have heard of an emergency stop"
             }
             Self::Homing(_) => "a seat did not get home",
             Self::HomingTime => "homing took too long",

@@ -11,6 +11,9 @@ use rustix::thread::set_current_timer_slack;
 /// The priority asked for: above every ordinary program, with room for an operator to put something above it.
 pub const PRIORITY: u8 = 50;
 
+/// How far below the tick thread the thread is that watches over it.
+const BELOW: u8 = 10;
+
 /// How the kernel schedules a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Policy {
@@ -71,6 +74,18 @@ pub fn request() -> RealTime {
 /// Where the kernel refuses; giving up priority needs no right, so that is not to be expected.
 pub fn normal_priority() -> io::Result<()> {
     set_scheduler(libc::SCHED_OTHER, 0)
+}
+
+/// Gives the calling thread real-time service below a thread of that priority, so that what it watches over does not hang on how
+/// busy the machine is; says whether it has it. Where the kernel refuses, or that thread has none, it is an ordinary one.
+#[must_use]
+pub fn request_below(priority: u8) -> bool {
+    let below = libc::c_int::from(priority.saturating_sub(BELOW).max(1));
+    if priority > 1 && set_scheduler(libc::SCHED_FIFO, below).is_ok() {
+        return scheduler().0 == Policy::Fifo;
+    }
+    let _ = normal_priority();
+    false
 }
 
 /// Raises the limit of open files from the soft to the hard one and returns what it then is (`u64::MAX` if there is
@@ -210,6 +225,12 @@ mod tests {
             let mut refusals = Vec::new();
             request_priority(&mut refusals);
             assert_eq!(policy == Policy::Other, refusals.iter().any(|r| r.contains("LimitRTPRIO=50")));
+            if policy == Policy::Fifo {
+                assert!(request_below(priority));
+                assert_eq!(scheduler(), (Policy::Fifo, priority - BELOW));
+            }
+            assert!(!request_below(0));
+            assert_eq!(scheduler(), (Policy::Other, 0));
             normal_priority().unwrap();
             assert_eq!(scheduler(), (Policy::Other, 0));
         })

@@ -190,7 +190,8 @@ impl House {
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, rate.period());
-            let helpers = Helpers::start(scope, &over, acks, drains, plans).map_err(HouseError::Thread)?;
+            let helpers =
+                Helpers::start(scope, &over, &granted, acks, drains, plans).map_err(HouseError::Thread)?;
             mail.wakes(helpers.planner());
             let grid = TickGrid::new(origin, rate);
             let clock = Spinning::new(&Monotonic, spin, rate.period());
