@@ -81,7 +81,7 @@ impl Subject<'_> {
         let mut ends: Option<(At, At)> = None;
         // Of steps in a row that break a limit the first is told.
         let mut broken_before = [false; 2];
-        for index in 0..steps.len() {
+        for (index, step) in steps.iter().enumerate() {
             let Some(swing) = self.swing(&under, terms, index) else {
                 broken_before = [false; 2];
                 continue;
@@ -91,7 +91,7 @@ impl Subject<'_> {
                 if swing.low.value < low.value { swing.low } else { low },
                 if swing.high.value > high.value { swing.high } else { high },
             ));
-            let broken = [self.past_stroke(&swing), self.too_much(&swing, steps[index].at)];
+            let broken = [self.past_stroke(&swing), self.too_much(&swing, step.at)];
             let before = std::mem::replace(&mut broken_before, [broken[0].is_some(), broken[1].is_some()]);
             let told =
                 broken.into_iter().zip(before).filter_map(|(broken, before)| broken.filter(|_| !before));
