@@ -153,7 +153,8 @@ impl AckLoop {
         }
         let next = drains.next_after(clock.now());
         let next = if self.is_idle() { next.max(clock.now() + IDLE) } else { next };
-        if let Some(live) = &self.live {
+        // Without a watch nobody would hear of an emergency stop anyway.
+        if let (Some(live), true) = (&self.live, self.watch.is_some()) {
             live.expect_by(next + self.hangs_after);
         }
         next

@@ -130,8 +130,11 @@ impl Looker {
         sent
     }
 
-    /// Asks for its packet counter alone.
+    /// Asks for its packet counter alone, where it tells one.
     pub(super) fn ask_count(&mut self, lane: usize, sender: &Sender) {
+        if self.dialect != Dialect::Smc {
+            return;
+        }
         let read =
             ReadRequest { channel: MONITORS, accept: self.code, reply: self.code, start: PACKETS, num: 1 };
         self.counting = !matches!(sender.send(lane, read.emit(&mut [0; MAX_LEN])), Delivery::Failed(_));
@@ -228,7 +231,8 @@ impl Looker {
         let ((work_mode, of_frame), (minor_version, version), homed) = (mode?, versions?, homed?);
         let all = (1 << self.seat.axes.min(DP_POSITIONS.len())) - 1;
         let told = packets.is_some() || self.dialect != Dialect::Smc;
-        if !asked || !told || axes & all != all {
+        // Positions may have been asked for beside it: what comes before them is still to be heard then.
+        if !asked || !told || axes & all != all || !self.is_whole() {
             return None;
         }
         self.seen.asked = false;
@@ -244,6 +248,11 @@ impl Looker {
     fn stop_reads(&self) -> impl Iterator<Item = u16> + use<> {
         let inputs = self.asks_inputs().then_some(INPUTS);
         [MODE.0, RESET, VERSIONS.0].into_iter().chain(inputs)
+    }
+
+    /// Whether all was answered that tells of an emergency stop.
+    fn is_whole(&self) -> bool {
+        self.stop_reads().enumerate().all(|(read, _)| self.seen.answered & (1 << read) != 0)
     }
 
     /// Whether inputs tell something of an emergency stop.
@@ -262,8 +271,8 @@ impl Looker {
 
     /// What this look says of an emergency stop, once all has been answered that tells of one; said once.
     pub(super) fn take_look(&mut self) -> Option<Look> {
-        let Seen { inputs, answered, stopped, stop_taken, .. } = self.seen;
-        if stop_taken || self.stop_reads().enumerate().any(|(read, _)| answered & (1 << read) == 0) {
+        let Seen { inputs, stopped, stop_taken, .. } = self.seen;
+        if stop_taken || !self.is_whole() {
             return None;
         }
         self.seen.stop_taken = true;
@@ -355,6 +364,8 @@ mod tests {
     fn what_a_controller_tells_is_taken_whole_and_once() {
         let mut looker = looker();
         assert_eq!(answer(&mut looker, ReplyCode::Running, 0), [true; 5]);
+        assert!(looker.take().is_none(), "its inputs are to come");
+        look(&mut looker, ReplyCode::Running, 0);
         let sighting = looker.take().unwrap();
         let (first, told) = looker.take_positions().unwrap();
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
@@ -378,8 +389,17 @@ mod tests {
     #[test]
     fn one_with_an_error_is_heard_as_well_though_its_answers_name_no_channel() {
         let mut looker = looker();
+        looker.seen.answered = 0b1000; // its inputs
         assert_eq!(answer(&mut looker, ReplyCode::Fault, 21), [true; 5]);
         assert_eq!(looker.take().unwrap().error, 21);
+    }
+
+    /// What sends to a controller, and what that hears.
+    fn link() -> (Sender, std::net::UdpSocket) {
+        let controller = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = controller.local_addr().unwrap().to_string().parse().unwrap();
+        let ports = crate::net::Ports::open("127.0.0.1:0".parse().unwrap(), &[address]).unwrap();
+        (ports.split().0, controller)
     }
 
     /// A look that is answered so, with those inputs, of which the first is that of the emergency stop.
@@ -431,11 +451,22 @@ mod tests {
     }
 
     #[test]
+    fn an_mbox_is_not_asked_for_a_count_that_it_does_not_tell_and_a_request_that_is_too_short_stops_nobody() {
+        let (sender, controller) = link();
+        let mut looker = Looker { dialect: Dialect::Mbox, ..looker() };
+        looker.ask_count(0, &sender);
+        looker.darken(0, &sender);
+        let mut heard = [0; MAX_LEN];
+        let length = controller.recv(&mut heard).unwrap();
+        assert!(WriteRequest::parse(&heard[..length]).is_ok(), "the first that comes");
+        assert!(!looker.counting);
+        looker.mind_stop(ReplyCode::EmergencyStop);
+        assert!(!looker.seen.stopped);
+    }
+
+    #[test]
     fn effects_are_switched_off_by_a_register_that_moves_nothing_and_nobody_answers() {
-        let controller = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-        let address = controller.local_addr().unwrap().to_string().parse().unwrap();
-        let (sender, _) =
-            crate::net::Ports::open("127.0.0.1:0".parse().unwrap(), &[address]).unwrap().split();
+        let (sender, controller) = link();
         let looker = looker();
         looker.darken(0, &sender);
         let mut heard = [0; MAX_LEN];
