@@ -9,7 +9,7 @@ use common::{Event, Frame, Played, Virtual, Worst, swell};
 use kinocue::engine::{Ending, Mix, Unplanned};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
-use kinocue::state::{self, Refusal, Request, Why};
+use kinocue::state::{self, Cause, Refusal, Request, State, Trouble, Why};
 use kinocue::time::ShowTime;
 use kinocue::timeline::Hint;
 use kinocue::wire;
@@ -434,4 +434,64 @@ fn a_show_whose_seats_are_all_switched_off_parks_them_and_comes_to_its_end() {
         assert_within(played.worst_of_lane(lane, 0..played.lane(lane).count()));
         assert_eq!(pulses(played.lane(lane).nth(1_200).unwrap()), 0, "parked");
     }
+}
+
+/// The states that the hall came to, in order.
+fn states(played: &Played) -> Vec<State> {
+    let entered = |news: &News| match news {
+        News::Entered { state, .. } => Some(*state),
+        _ => None,
+    };
+    let mut states: Vec<State> = played.news.iter().filter_map(entered).collect();
+    states.dedup();
+    states
+}
+
+#[test]
+fn a_planner_that_gives_no_way_to_park_leaves_the_seat_at_rest_within_two_seconds_until_it_does() {
+    let played = ride()
+        .with(400, Event::SlowPlanner(1_000_000))
+        .with(500, Event::Ask(Request::Park))
+        .with(1_500, Event::SlowPlanner(0))
+        .play();
+    assert_within(played.worst());
+    let frames: Vec<i32> = played.lane(0).map(pulses).collect();
+    assert!(frames[700..1_450].iter().all(|pulses| *pulses == frames[700]), "at rest");
+    assert_eq!((frames.last(), played.ended.ending), (Some(&0), Ending::Stopped));
+}
+
+#[test]
+fn while_nobody_reads_replies_the_seat_is_brought_to_rest_within_a_second_and_the_hall_says_so() {
+    let played = ride().with(500, Event::Deaf(true)).with(900, Event::Leave).play();
+    assert_within(played.worst());
+    let deaf = |news: &News| matches!(news, News::Entered { cause: Cause::Trouble(Trouble::Deaf), .. });
+    assert!(played.news.iter().any(deaf));
+    assert_eq!(states(&played)[2..], [State::Stopping, State::Fault]);
+    assert!(played.lane(0).count() < 610, "{} frames", played.lane(0).count());
+}
+
+#[test]
+fn a_tick_thread_that_was_held_itself_does_not_take_that_for_a_deaf_one() {
+    let late = Event::Late(Duration::from_millis(600));
+    let played = ride().with(500, late).play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+}
+
+#[test]
+fn after_a_sleep_of_seconds_the_seat_stays_where_it_was_until_a_person_resumes() {
+    let played =
+        ride().with(500, Event::Late(Duration::from_secs(3))).with(900, Event::Ask(Request::Resume)).play();
+    assert!(states(&played).contains(&State::Paused));
+    assert_within(played.worst_from_rest(500, played.frames.len()));
+    let woken = played.frames[499].at + Duration::from_secs(3);
+    let still = |frame: &&Frame| frame.at > woken && frame.at < woken + Duration::from_millis(3_900);
+    let held = pulses(&played.frames[499]);
+    assert!(played.frames.iter().filter(still).all(|frame| pulses(frame) == held));
+    assert_eq!(played.ended.ending, Ending::Completed);
+}
+
+#[test]
+fn after_a_sleep_of_minutes_no_frame_leaves_until_a_person_clears() {
+    let played = ride().with(500, Event::Late(Duration::from_secs(400))).with(5_000, Event::Leave).play();
+    assert_eq!((played.frames.len(), *states(&played).last().unwrap()), (500, State::Stopped));
 }

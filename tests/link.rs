@@ -218,7 +218,7 @@ fn play(link: &Link) -> (Books, Ledger, Traffic) {
         let mut read = Vec::new();
         while let Some((at_us, frame, code)) = replies.next_if(|&(at_us, ..)| at_us < now_us) {
             read.push((at_us, frame, code));
-            let reply = Reply { controller: 0, frame, code, at: at(at_us) };
+            let reply = Reply { controller: 0, frame, code, error: 0, inputs: 0, at: at(at_us) };
             books.on_reply(reply, &mut |_: &mut Tracker| unreachable!("fewer than there is room for"));
         }
         // Frames are sent while the replies are read, too.

@@ -53,7 +53,8 @@ fn waves() -> impl Strategy<Value = Waves> {
 fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
         4 => (1..45_u64).prop_map(|ms| Event::Late(Duration::from_millis(ms))),
-        1 => (51..3_000_u64).prop_map(|ms| Event::Late(Duration::from_millis(ms))),
+        // After a longer one somebody has to resume.
+        1 => (51..1_900_u64).prop_map(|ms| Event::Late(Duration::from_millis(ms))),
         1 => (0..60_u32).prop_map(Event::SlowPlanner),
         1 => Just(Event::Leave),
     ]

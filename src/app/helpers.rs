@@ -32,20 +32,23 @@ pub(super) struct Helpers<'scope> {
 }
 
 impl<'scope> Helpers<'scope> {
-    /// Starts them, whatever the calling thread has been granted: the planner as an ordinary thread, the ack thread below the
-    /// tick thread.
+    /// Starts them: the ack thread below the calling one where that `granted` real-time service, the planner as an ordinary one.
     ///
     /// # Errors
     /// That of the system where it starts no further thread; none is left then.
     pub(super) fn start(
         scope: &'scope Scope<'scope, '_>,
         over: &'scope Over,
-        acks: AckLoop,
+        granted: &RealTime,
+        mut acks: AckLoop,
         drains: DrainGrid,
         mut plans: PlanLoop,
     ) -> io::Result<Self> {
+        let priority = granted.priority;
         let acks = Builder::new().name("acks".to_owned()).spawn_scoped(scope, move || {
-            realtime::below_the_tick_thread();
+            if !realtime::request_below(priority) {
+                acks.shares_the_machine();
+            }
             acks.run(&Monotonic, drains, || over.acks.load(Ordering::Acquire))
         })?;
         let planner = Builder::new().name("planner".to_owned()).spawn_scoped(scope, move || {

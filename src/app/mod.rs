@@ -1,5 +1,6 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
+mod company;
 mod helpers;
 pub mod house;
 pub mod keeper;

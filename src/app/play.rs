@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer};
 
+use super::company::Company;
 use super::prepare::{Preparation, Unready};
 use super::report::Report;
 use super::stage::Stage;
@@ -67,6 +68,9 @@ pub enum PlayError {
     /// The frame port cannot be had.
     #[error(transparent)]
     Net(NetError),
+    /// Somebody else sends to these controllers, so many datagrams within about a second.
+    #[error("{}; end whatever else sends to them: another kinocue, player or tool", others(.0))]
+    OtherMaster(Vec<(String, u16)>),
     /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
     #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
     Unsure(Vec<String>),
@@ -83,6 +87,13 @@ pub enum PlayError {
         .0.join(", ")
     )]
     Unplaced(Vec<String>),
+}
+
+fn others(found: &[(String, u16)]) -> String {
+    let one = |(name, more): &(String, u16)| {
+        format!("{name} got {more} datagrams (DP34) that were not sent from here")
+    };
+    found.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
@@ -211,6 +222,10 @@ impl Play {
         let watched = self.config.controllers.iter().map(Watched::of).collect();
         let mut acks = AckLoop::new(receiver, watched, self.manner.ack_every(&self.config), sent, ticks);
         let Control { live, leave, .. } = &self.control;
+        if !self.manner.silent {
+            look_for_others(&self.config, &self.staged.lanes, &sender, &mut acks, leave)?;
+        }
+        // Not sooner: what it reads would be counted.
         acks.tell(Arc::clone(live));
         acks.watched_by(watch(&self.config, self.manner, &self.staged, &sender, alarms, live));
         let mut places = Places::new(&self.staged.lanes, show.rate);
@@ -253,6 +268,23 @@ impl Play {
         }
         Ok(played)
     }
+}
+
+/// Refuses to play where somebody else sends to the same controllers.
+fn look_for_others(
+    config: &Config,
+    lanes: &[Lane],
+    sender: &Sender,
+    acks: &mut AckLoop,
+    stop: &AtomicBool,
+) -> Result<(), PlayError> {
+    let controllers = &*config.controllers;
+    let found = Company { clock: &Monotonic, sender, acks, controllers, lanes, stop }.look();
+    if found.is_empty() {
+        return Ok(());
+    }
+    let name = |(lane, more): (usize, u16)| (controllers[lane].name.clone(), more);
+    Err(PlayError::OtherMaster(found.into_iter().map(name).collect()))
 }
 
 /// The seats that told, after the last frame, that they are not at park.

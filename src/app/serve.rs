@@ -7,8 +7,10 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::channel;
 use std::thread::Builder;
+use std::time::Duration;
 
 use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -33,6 +35,9 @@ use crate::settings::SettingsFile;
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
+
+/// How long the keeper has to end once its hall has closed; all that it waits for is a disk.
+const KEEPER_ENDS: Duration = Duration::from_secs(10);
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]
@@ -67,6 +72,11 @@ pub enum ServeError {
         #[source]
         cause: io::Error,
     },
+    /// The keeper does not end: what it had to write down may be lost.
+    #[error(
+        "the keeper hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost"
+    )]
+    Keeper,
     /// The system gives no signals, or no thread.
     #[error("the system refused: {0}")]
     System(#[source] io::Error),
@@ -182,7 +192,7 @@ fn serve_halls(
     let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut numbers = Numbers::new();
-    let mut house = House::open(Arc::clone(&config), crashed, &numbers)?;
+    let mut house = House::open(Arc::clone(&config), crashed, &numbers, &signals.leave)?;
     let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
     let voice = Voice::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
@@ -203,7 +213,7 @@ fn serve_halls(
         };
         // Also of controllers that come back with a later configuration.
         numbers.extend(&left.closed.numbers);
-        (house, config) = reopen(next, config, &numbers, &mut ends.memory)?;
+        (house, config) = reopen(next, config, &numbers, &mut ends.memory, &ends.signals.leave)?;
     };
     surfaces.close();
     log.close();
@@ -216,15 +226,16 @@ fn reopen(
     before: Arc<Config>,
     numbers: &Numbers,
     memory: &mut Memory,
+    leave: &Arc<AtomicBool>,
 ) -> Result<(House, Arc<Config>), HouseError> {
     // The seats are parked or at rest, so nothing tells of a crash.
-    match House::open(Arc::clone(&next), false, numbers) {
+    match House::open(Arc::clone(&next), false, numbers, leave) {
         Ok(house) => Ok((house, next)),
         Err(error) => {
             memory.note(format!(
                 "the hall does not open with the new configuration, and has the old one: {error}"
             ));
-            Ok((House::open(Arc::clone(&before), false, numbers)?, before))
+            Ok((House::open(Arc::clone(&before), false, numbers, leave)?, before))
         }
     }
 }
@@ -238,9 +249,9 @@ fn keep(
     feeder: &mut Option<Feeder>,
 ) -> Result<Left, ServeError> {
     let (tell, closed) = channel();
-    let mut keeper = None;
     let mut failed = None;
     ends.memory.set_desk(house.config(), &house.desk());
+    let (leaves, left) = channel();
     let run = house.run(|reins, line| {
         let leave = Arc::clone(&reins.leave);
         // The one before it has fed until now, so that nobody takes the time between two halls for a hang.
@@ -248,22 +259,19 @@ fn keep(
         let kept = Keeper::new(ends, reins, line, library, journal);
         let thread = Builder::new().name("keeper".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
-            kept.run(&closed)
+            // Where nobody waits any more, it hung.
+            drop(leaves.send(kept.run(&closed)));
         });
-        match thread {
-            Ok(thread) => keeper = Some(thread),
-            Err(cause) => {
-                failed = Some(cause);
-                leave.store(true, std::sync::atomic::Ordering::Release);
-            }
+        if let Err(cause) = thread {
+            failed = Some(cause);
+            leave.store(true, std::sync::atomic::Ordering::Release);
         }
     })?;
     if let Some(cause) = failed {
         return Err(ServeError::System(cause));
     }
     drop(tell.send(Box::new(run)));
-    let keeper = keeper.expect("it was started before the first tick");
-    Ok(keeper.join().expect("the keeper does not panic"))
+    left.recv_timeout(KEEPER_ENDS).map_err(|_| ServeError::Keeper)
 }
 
 /// Feeds the watchdog of the service manager, where it has one, while the tick thread of this hall ticks.
@@ -302,11 +310,13 @@ mod tests {
         // An address of documentation, which no machine has (RFC 5737).
         let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
         let mut memory = Memory::default();
-        let (_house, config) = reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory).unwrap();
+        let (_house, config) =
+            reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory, &Arc::default()).unwrap();
         assert!(Arc::ptr_eq(&config, &before));
         assert!(format!("{memory:?}").contains("does not open with the new configuration"), "{memory:?}");
         let next = hall("127.0.0.1:0");
-        let (_house, config) = reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory).unwrap();
+        let (_house, config) =
+            reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory, &Arc::default()).unwrap();
         assert!(Arc::ptr_eq(&config, &next));
     }
 }

@@ -54,7 +54,7 @@ impl Stage {
             let period = rate.period();
             let drains =
                 if silent { DrainGrid::rare(origin, period) } else { DrainGrid::new(origin, period) };
-            let helpers = Helpers::start(scope, &over, acks, drains, plans)?;
+            let helpers = Helpers::start(scope, &over, &granted, acks, drains, plans)?;
             mail.wakes(helpers.planner());
             let grid = TickGrid::new(origin, rate);
             let clock = Spinning::new(&Monotonic, spin, period);

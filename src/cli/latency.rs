@@ -223,7 +223,7 @@ fn failed(error: PlayError) -> Failure {
     let exit = match &error {
         PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
         PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
-        PlayError::Moving(_) => Exit::OtherMaster,
+        PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         _ => Exit::Internal,
     };
     Failure { exit, error: error.into() }

@@ -168,3 +168,43 @@ fn vibration_port(text: &str) -> Result<VibrationPort, String> {
     let port = text.parse().ok().and_then(VibrationPort::of_octets);
     port.ok_or_else(|| "it is 2 or 4".to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+    use crate::state::Next;
+
+    /// Words that mean a request where they stand in a next action.
+    const REQUESTS: [&str; 11] =
+        ["arm", "clear", "disable", "disarm", "go", "home", "load", "park", "pause", "preflight", "resume"];
+
+    #[test]
+    fn every_request_that_a_next_action_names_is_a_command_and_on_the_page() {
+        let page = include_str!("../console/page/index.html");
+        let seat = include_str!("../console/page/js/controller.js");
+        let commands = Cli::command();
+        let mut named = std::collections::BTreeSet::new();
+        for next in Next::ALL {
+            let words = next.to_string();
+            let words = words.split(|letter: char| !letter.is_ascii_alphabetic());
+            named.extend(words.filter_map(|word| REQUESTS.into_iter().find(|request| *request == word)));
+        }
+        for request in &named {
+            assert!(commands.find_subcommand(request).is_some(), "kinocue {request}");
+            let is_on_page = match *request {
+                "disable" => seat.contains("disable"),
+                "disarm" => page.contains("id=\"arm\""),
+                "load" => page.contains("id=\"cues\""),
+                "preflight" => page.contains("id=\"preflight-run\""),
+                button => page.contains(&format!("id=\"{button}\"")),
+            };
+            assert!(is_on_page, "{request} on the page");
+        }
+        assert!(
+            ["arm", "clear", "disable", "home", "park"].iter().all(|word| named.contains(word)),
+            "{named:?}"
+        );
+    }
+}

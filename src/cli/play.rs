@@ -169,7 +169,7 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
     let exit = match error {
         PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
-        PlayError::Moving(_) => Exit::OtherMaster,
+        PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
         _ => Exit::BadCue,
     };
@@ -236,13 +236,22 @@ pub(super) fn tell(played: &Played, json: bool) -> Result<Exit, Failure> {
 
 /// How the program ends after a play.
 pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
-    let refused: Vec<&str> =
-        played.report.controllers.iter().filter(|one| one.refused > 0).map(|one| one.name.as_str()).collect();
+    let refused: Vec<&str> = played
+        .report
+        .controllers
+        .iter()
+        .filter(|one| one.refused > 0 || one.state.emergency_stop)
+        .map(|one| one.name.as_str())
+        .collect();
     if played.report.result == "fault" {
         return Err(anyhow!("the play ended in a fault; the seats were stopped")).or_exit(Exit::Internal);
     }
     if !refused.is_empty() {
-        return Err(anyhow!("{} refused frames (x = 3, 4 or 5)", refused.join(", "))).or_exit(Exit::Refused);
+        return Err(anyhow!(
+            "{} refused frames, or is in emergency stop (x = 3, 4 or 5)",
+            refused.join(", ")
+        ))
+        .or_exit(Exit::Refused);
     }
     if !played.silent.is_empty() {
         let who = played.silent.join(", ");

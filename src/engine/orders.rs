@@ -27,6 +27,13 @@ impl Engine {
         self.ending = Ending::Stopped;
     }
 
+    /// Brings lanes that are to park to rest without the planner, where it has not told the way: from there it is asked anew.
+    pub fn rest_to_park(&mut self) {
+        if self.homeward && self.phase == Phase::Riding {
+            self.come_down(Rest::Ended);
+        }
+    }
+
     /// Ends the play where the lanes are.
     pub fn end(&mut self) {
         self.phase = Phase::Done;

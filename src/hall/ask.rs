@@ -152,6 +152,7 @@ impl Ask {
                 | Self::GoFrom(_)
                 | Self::Resume
                 | Self::Seek(_)
+                | Self::Park
                 | Self::Clear
                 | Self::Enable(_)
                 | Self::Test { .. }

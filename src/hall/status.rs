@@ -27,6 +27,8 @@ pub struct Status {
     pub next: String,
     /// Whether arming homes the seats first, which is for empty seats alone.
     pub arm_homes: bool,
+    /// Whether there is something to clear: the hall, or controllers that wait for it.
+    pub may_clear: bool,
     /// Seconds since it is in that state.
     pub since_s: f64,
     /// Seconds until that state ends by itself; null where it does not.
@@ -79,6 +81,7 @@ impl Status {
             cause: Cause::Started.to_string(),
             next: Next::AwaitAnswers.to_string(),
             arm_homes: false,
+            may_clear: false,
             since_s: 0.0,
             lapses_s: None,
             moving: false,

@@ -1,6 +1,8 @@
 //! From what is known of the members to the standing of their group, and to what the hall has to hear of it.
 
-use super::{Change, Demand, Health, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well};
+use super::{
+    Change, Demand, Health, Latch, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well,
+};
 use crate::time::MonoTime;
 use crate::wire::DPFE;
 
@@ -71,8 +73,8 @@ impl Health {
         for controller in self.groups.members(group).filter(|_| !well) {
             let member = &mut self.members[controller];
             member.forget();
-            // One that was homed while it was out is known, though it was not read since.
-            if from != Standing::Excluded {
+            // One that was homed while it was out is known, and so is one that was never found well, though neither was read.
+            if from.may_move() {
                 member.distrust();
             }
         }
@@ -94,11 +96,12 @@ impl Health {
     pub(super) fn tell_of_stops(&mut self, on: &mut dyn FnMut(Notice)) {
         let mut pressed = false;
         for (controller, member) in self.members.iter_mut().enumerate() {
-            pressed |= member.pressed;
+            pressed |= member.holds();
             if member.take_crowd() {
                 on(Notice::Hall(state::Event::Trouble(state::Trouble::OtherMaster(controller))));
             }
-            if member.take_press() && !self.stop_told {
+            // Wherever it is pressed the hall stops; it waits for a release only where somebody is to sit.
+            if (member.take_press() || member.holds()) && !self.stop_told {
                 self.stop_told = true;
                 on(Notice::Hall(state::Event::EmergencyStop(controller)));
             }
@@ -107,11 +110,36 @@ impl Health {
             self.stop_told = false;
             on(Notice::Hall(state::Event::AllReleased));
         }
-        let ailing = self.members.iter().any(super::Member::ails);
+        let ailing = self.members.iter().any(|member| member.ails() && !member.out);
         if self.errors_told && !ailing {
             on(Notice::Hall(state::Event::ErrorsGone));
         }
         self.errors_told = ailing;
+    }
+
+    /// Tells the hall whether groups that take part wait to be cleared.
+    pub(super) fn tell_of_latches(&mut self, on: &mut dyn FnMut(Notice)) {
+        let latched = |group: &usize| {
+            matches!(self.places[*group].standing, Standing::Stopped | Standing::Error)
+                && self.groups.members(*group).any(|controller| !self.members[controller].out)
+        };
+        let mut latch = Latch::Free;
+        for group in (0..self.places.len()).filter(latched) {
+            let mut members = self.groups.members(group).map(|controller| &self.members[controller]);
+            let held = members.any(|member| member.pressed || member.ails());
+            latch = if held || latch == Latch::Held { Latch::Held } else { Latch::Over };
+        }
+        if std::mem::replace(&mut self.latch_told, latch) != latch {
+            on(Notice::Hall(state::Event::Latched(latch)));
+        }
+    }
+
+    pub(super) fn tell_of_counts(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {
+        for (controller, member) in self.members.iter_mut().enumerate().filter(|_| self.watched) {
+            if member.take_count(now) {
+                on(Notice::Count(controller));
+            }
+        }
     }
 
     pub(super) fn tell_of_reads(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {

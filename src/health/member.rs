@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::Why;
+use super::counter::{Counter, Said};
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::window::Window;
 use crate::motion::{MAX_AXES, Pulses};
@@ -25,6 +26,8 @@ const UNSTEADY: Duration = Duration::from_mins(1);
 /// A controller needs a second to start (PA3d), and may have begun to just before it was asked: where all that was asked of
 /// it found an answer sooner, it has not rebooted.
 const GAP: Duration = Duration::from_millis(600);
+/// Frames go to a controller to which one went so long ago.
+const FLOWS: Duration = Duration::from_millis(500);
 /// From one read to the next: 5 Hz.
 const READ_EVERY: Duration = Duration::from_millis(200);
 
@@ -56,6 +59,8 @@ pub(super) struct Member {
     read: MonoTime,
     look_again: bool,
     next_read: Option<MonoTime>,
+    /// Nobody wants it to take part.
+    pub(super) out: bool,
     /// It has to be homed, and why.
     pub(super) outcast: Option<Why>,
     /// An emergency stop is in effect.
@@ -81,6 +86,9 @@ pub(super) struct Member {
     pub(super) outside: Option<(usize, Pulses)>,
     /// Its positions make two places each.
     pub(super) ambiguous: bool,
+    /// When a frame was last sent, and what the controller counts meanwhile.
+    framed: Option<MonoTime>,
+    counter: Counter,
     /// Another master was found, and nobody was told yet.
     crowd_untold: bool,
 }
@@ -106,6 +114,7 @@ impl Member {
             read: MonoTime::default(),
             look_again: false,
             next_read: None,
+            out: false,
             outcast: None,
             pressed: false,
             tripped: false,
@@ -120,12 +129,15 @@ impl Member {
             falls: [None; 2],
             outside: None,
             ambiguous: false,
+            framed: None,
+            counter: Counter::default(),
             crowd_untold: false,
         }
     }
 
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         self.traffic.sent += 1;
+        self.framed = Some(at);
         if !asked {
             return;
         }
@@ -193,6 +205,10 @@ impl Member {
             return;
         }
         self.on_answer(at);
+        if let Some(packets) = sighting.packets {
+            // A look at a time, somebody else's frames are no more than may be under way: what they add up to tells.
+            self.counter.hear(packets);
+        }
         self.on_error(sighting.error);
         self.on_alarm(DPFE, sighting.alarm);
         let is_well = sighting.error == 0 && sighting.alarm == 0;
@@ -270,7 +286,15 @@ impl Member {
         self.ailed.get_or_insert(Why::Refuses(self.controller));
     }
 
-    pub(super) const fn on_emergency_stop(&mut self, pressed: bool) {
+    /// Nobody presses it any more, and only a reset ends it, which is a homing.
+    pub(super) const fn on_stop_held(&mut self) {
+        self.pressed = false;
+        self.outcast = Some(Why::HeldUntilReset(self.controller));
+    }
+
+    pub(super) fn on_emergency_stop(&mut self, pressed: bool) {
+        // It was reset at its place, or is pressed anew.
+        self.outcast.take_if(|why| matches!(why, Why::HeldUntilReset(_)));
         self.press_untold |= pressed && !self.pressed;
         self.tripped |= pressed;
         self.pressed = pressed;
@@ -279,6 +303,11 @@ impl Member {
     /// Whether an emergency stop began since this was last asked.
     pub(super) const fn take_press(&mut self) -> bool {
         std::mem::replace(&mut self.press_untold, false)
+    }
+
+    /// Whether an emergency stop is in effect that the hall waits for.
+    pub(super) const fn holds(&self) -> bool {
+        self.pressed && !self.out
     }
 
     /// Whether another master was found since this was last asked.
@@ -302,12 +331,13 @@ impl Member {
     }
 
     /// It was homed: its position is known, and what it counts from here on is the new measure.
-    pub(super) const fn on_homed(&mut self) {
+    pub(super) fn on_homed(&mut self) {
         self.outcast = None;
         self.baseline = None;
         self.trusted = true;
         self.seen = None;
         (self.unanswered, self.gap) = (None, false);
+        self.counter = Counter::default();
     }
 
     /// Whether something is still wrong with it.
@@ -325,8 +355,28 @@ impl Member {
         }
     }
 
+    pub(super) const fn on_count(&mut self, packets: u16) {
+        self.counter.hear(packets);
+    }
+
     pub(super) fn tick(&mut self, now: MonoTime) {
         self.window.tick(now);
+        match self.counter.judge(self.traffic, now) {
+            Some(Said::Crowded) => {
+                self.crowd_untold |= self.outcast.is_none();
+                self.outcast.get_or_insert(Why::Crowded(self.controller));
+            }
+            Some(Said::Rebooted) => drop(self.outcast.get_or_insert(Why::Rebooted(self.controller))),
+            None => {}
+        }
+    }
+
+    /// Whether frames go there, and it is time to read its packet counter; if so, it counts as sent.
+    pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
+        let flows = self.framed.is_some_and(|at| now.since(at) < FLOWS);
+        let due = flows && self.counter.take_turn(self.controller, now);
+        self.traffic.sent += u64::from(due);
+        due
     }
 
     pub(super) const fn is_poor(&self) -> bool {
@@ -353,6 +403,8 @@ impl Member {
         (self.moved, self.unsure) = (false, false);
         self.reading = false;
         self.next_read = None;
+        // Who it is when it is back, and whether it rebooted, is for a sighting to prove.
+        self.counter = Counter::default();
         self.rest();
     }
 

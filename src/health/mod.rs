@@ -6,6 +6,7 @@
 //! older and stray acks are none, nor is any ack once the group is lost: it comes back by registers that were asked for
 //! since, and by them alone.
 
+mod counter;
 mod groups;
 mod judge;
 mod member;
@@ -26,7 +27,7 @@ pub use words::ACKS_OFF;
 use crate::config::LossPolicy;
 use crate::motion::Pulses;
 use crate::observe;
-use crate::state::{self, Demand};
+use crate::state::{self, Demand, Latch};
 use crate::time::MonoTime;
 use crate::wire::FrameNo;
 use member::Member;
@@ -46,6 +47,8 @@ pub struct Health {
     stop_told: bool,
     /// The same for errors.
     errors_told: bool,
+    /// What the hall was told of controllers that are held.
+    latch_told: Latch,
 }
 
 /// Where one group stands.
@@ -68,7 +71,16 @@ impl Health {
         let (standing, why) = well(watched);
         let place = Place { standing, why, poor: MonoTime::default() };
         let places = vec![place; groups.len()];
-        Self { groups, members, places, policy, watched, stop_told: false, errors_told: false }
+        Self {
+            groups,
+            members,
+            places,
+            policy,
+            watched,
+            stop_told: false,
+            errors_told: false,
+            latch_told: Latch::Free,
+        }
     }
 
     /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.
@@ -76,6 +88,11 @@ impl Health {
     pub fn of_a_hall(mut self) -> Self {
         self.members.iter_mut().for_each(Member::demand_home);
         self
+    }
+
+    /// Whether somebody wants a controller to take part: clearing and parking wait for nobody else.
+    pub fn on_part(&mut self, controller: usize, takes_part: bool) {
+        self.members[controller].out = !takes_part;
     }
 
     /// The groups.
@@ -122,6 +139,7 @@ impl Health {
         let member = &mut self.members[event.controller];
         match event.what {
             observe::What::EmergencyStop { .. } => member.on_emergency_stop(true),
+            observe::What::EmergencyStopHeld => member.on_stop_held(),
             observe::What::EmergencyStopOver => member.on_emergency_stop(false),
             observe::What::Error(error) => member.on_error(error),
             observe::What::ServoError { axis, error } => member.on_drive(axis, error),
@@ -158,6 +176,12 @@ impl Health {
     /// What was read; of no account where no read was sent since the group was lost.
     pub fn on_sighting(&mut self, controller: usize, sighting: &Sighting, at: MonoTime) {
         self.members[controller].on_sighting(sighting, at);
+    }
+
+    /// The packet counter of a controller, which was read while frames go there. To be told before the sending of all that it
+    /// may have counted was.
+    pub fn on_count(&mut self, controller: usize, packets: u16) {
+        self.members[controller].on_count(packets);
     }
 
     /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
@@ -212,7 +236,7 @@ impl Health {
     }
 
     /// Judges all groups at `now`, an instant up to which all was told, and tells `on` what is new: for each group at most
-    /// one change and one demand, for each controller at most one read and one word of it.
+    /// one change and one demand, for each controller at most one read and one word of it, and for the hall four words of all.
     pub fn tick(&mut self, now: MonoTime, on: &mut dyn FnMut(Notice)) {
         for member in &mut self.members {
             member.tick(now);
@@ -221,7 +245,9 @@ impl Health {
         for group in 0..self.places.len() {
             self.judge(group, now, on);
         }
+        self.tell_of_latches(on);
         self.tell_of_reads(now, on);
+        self.tell_of_counts(now, on);
     }
 }
 

@@ -75,6 +75,8 @@ pub enum Why {
     },
     /// An emergency stop at this controller.
     EmergencyStop(usize),
+    /// An emergency stop at this controller was released, and it holds until it is reset.
+    HeldUntilReset(usize),
     /// This controller has an error.
     Error {
         /// Which.
@@ -132,6 +134,7 @@ impl Why {
             | Self::Ambiguous(controller)
             | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)
+            | Self::HeldUntilReset(controller)
             | Self::Error { controller, .. }
             | Self::Drive { controller, .. }
             | Self::Alarm { controller, .. }
@@ -172,4 +175,6 @@ pub enum Notice {
     Hall(state::Event),
     /// Identity, mode, error, packet counter and DPF0 of this controller are to be read.
     Read(usize),
+    /// The packet counter of this controller, to which frames go, is to be read.
+    Count(usize),
 }

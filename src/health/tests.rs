@@ -5,7 +5,7 @@ mod mbox;
 
 use super::*;
 use crate::observe::What;
-use crate::state::{Event, Trouble};
+use crate::state::{Event, Latch, Trouble};
 use crate::wire::DPFE;
 
 const TICK: Duration = Duration::from_millis(10);
@@ -65,10 +65,13 @@ impl Hall {
         let mut new = Vec::new();
         self.health.tick(now, &mut |notice| new.push(notice));
         for notice in &new {
-            if let (Notice::Read(controller), true) = (*notice, self.answers_reads) {
-                self.read(controller);
+            match *notice {
+                Notice::Read(controller) if self.answers_reads => self.read(controller),
+                Notice::Count(controller) => self.count(controller),
+                _ => {}
             }
         }
+        new.retain(|notice| !matches!(notice, Notice::Count(_)));
         self.notices.extend(new.into_iter().map(|notice| (now, notice)));
     }
 
@@ -79,6 +82,14 @@ impl Hall {
             self.packets[controller] = self.packets[controller].wrapping_add(1);
             let sighting = self.sighting(controller);
             self.health.on_sighting(controller, &sighting, self.now);
+        }
+    }
+
+    /// Reads the packet counter alone.
+    fn count(&mut self, controller: usize) {
+        if self.ack_after[controller].is_some() {
+            self.packets[controller] = self.packets[controller].wrapping_add(1);
+            self.health.on_count(controller, self.packets[controller]);
         }
     }
 
@@ -172,6 +183,19 @@ impl Hall {
     fn back(&mut self) {
         self.ack_after[2] = Some(Duration::from_millis(1));
     }
+}
+
+#[test]
+fn another_master_in_mid_show_is_told_within_two_seconds() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(300);
+    for _ in 0..200 {
+        hall.packets[3] += 1; // somebody else's frame, at the same rate
+        hall.tick();
+    }
+    assert_eq!(hall.told_hall()[0], Event::Trouble(Trouble::OtherMaster(3)));
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Excluded, Why::Crowded(3)));
+    assert_eq!(hall.standings()[..2], [Standing::Ok; 2]);
 }
 
 const ESTOP: What = What::EmergencyStop { cause: observe::Cause::Reply };

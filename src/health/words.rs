@@ -34,7 +34,7 @@ impl Standing {
             Self::Degraded => "look at the network",
             Self::Lost => "look at its power and network; it joins again by itself if it did not reboot",
             Self::Stopped => "release the emergency stop at its place, then clear",
-            Self::Error => "put the error right at the controller, then clear",
+            Self::Error => "put the error right at the controller; with the seats parked or stopped, clear",
             Self::Excluded => "park, then home it with nobody on the seat",
             Self::Unwatched => "watch the seat",
         }
@@ -91,6 +91,7 @@ impl fmt::Display for Why {
                 );
             }
             Self::EmergencyStop(_) => "emergency stop",
+            Self::HeldUntilReset(_) => "its emergency stop was released, and holds until a reset (PA91 = 2)",
             Self::Error { error, .. } => return write!(f, "{}", crate::wire::DeviceError(*error)),
             Self::Drive { axis, error, .. } => return write!(f, "drive of axis {axis}: error {error}"),
             Self::Alarm { register: DPFE, value, .. } => {

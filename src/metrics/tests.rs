@@ -66,6 +66,7 @@ fn playing() -> Status {
         cause: "somebody asked".to_owned(),
         next: "nothing".to_owned(),
         arm_homes: false,
+        may_clear: false,
         since_s: 5.0,
         lapses_s: None,
         moving: true,

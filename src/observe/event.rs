@@ -33,6 +33,8 @@ pub enum What {
         /// How it showed first.
         cause: Cause,
     },
+    /// The emergency stop was released, and the controller holds it until it is reset.
+    EmergencyStopHeld,
     /// No sign of an emergency stop is left.
     EmergencyStopOver,
     /// The controller's error number changed; 0 is none.
@@ -66,6 +68,7 @@ impl fmt::Display for What {
         match *self {
             Self::EmergencyStop { cause: Cause::Reply } => f.write_str("emergency stop in effect (x = 4)"),
             Self::EmergencyStop { cause: Cause::Inputs } => f.write_str("emergency stop in effect (inputs)"),
+            Self::EmergencyStopHeld => f.write_str("emergency stop released, and held until a reset"),
             Self::EmergencyStopOver => f.write_str("emergency stop over"),
             Self::Error(0) => f.write_str("error gone"),
             Self::Error(error) => write!(f, "{}", DeviceError(error)),

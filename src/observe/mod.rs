@@ -17,7 +17,7 @@ use crate::config::Controller;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{
-    Code, DPFE, Dialect, MotionReply, PerAxis, ReplyCode, Report, Status, VibrationPort, WireError,
+    Code, DPFE, Dialect, FrameNo, MotionReply, PerAxis, ReplyCode, Report, Status, VibrationPort, WireError,
 };
 
 /// Events that are kept; of more the oldest go.
@@ -51,6 +51,41 @@ impl Watched {
     fn station(&self) -> Code {
         Code::station(self.address.ip().octets())
     }
+}
+
+/// What the first reply to a frame says beside positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Answer {
+    /// The frame that it answers.
+    pub frame: FrameNo,
+    /// How the controller does.
+    pub code: ReplyCode,
+    /// Its error number; 0 for none.
+    pub error: u16,
+    /// Its inputs, bit 0 = X01.
+    pub inputs: u16,
+}
+
+/// What a look at the registers of a controller says of an emergency stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Look {
+    /// How it stands with it.
+    pub stop: StopSign,
+    /// The inputs, where they were told; bit 0 = X01.
+    pub inputs: Option<u16>,
+}
+
+/// How it stands with an emergency stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopSign {
+    /// This look alone does not tell.
+    Unsure,
+    /// Its inputs ask for it.
+    Asked,
+    /// Its inputs asked for it and do no more, and it is still in effect: the controller holds until a reset (PA91 = 2).
+    Held,
+    /// All answers of this look, and of the one before, were asked for since the last sign of it, and none had one.
+    Over,
 }
 
 /// The states of all controllers, counted from 0 in the order of their lanes, and the events that led to them.
@@ -107,23 +142,66 @@ impl Observer {
         self.forgotten
     }
 
-    /// Hears a reply to a motion frame.
+    /// Hears a reply to a motion frame, be it an old one or a repeated one: what it says of the controller counts only once
+    /// it is known for neither ([`Observer::on_answer`]).
     pub fn on_reply(&mut self, controller: usize, reply: &MotionReply, at: MonoTime) {
-        let watched = self.watched[controller];
         let state = &mut self.states[controller];
         state.reply = Some(Heard { value: reply.code, at });
         state.echoed = Some(Heard { value: reply.positions, at });
+        state.heard_at = Some(at);
+    }
+
+    /// Hears the first reply to a frame. One to a frame older than the newest that was answered says nothing new.
+    pub fn on_answer(&mut self, controller: usize, answer: &Answer, at: MonoTime) {
+        let smc = self.is_smc(controller);
+        let state = &mut self.states[controller];
+        if state.answered.is_some_and(|newest| answer.frame.since(newest) <= 0) {
+            return;
+        }
+        state.answered = Some(answer.frame);
         // An MBOX controller says with x = 4 that a frame was too short, and has no error numbers in motion replies.
-        let smc = watched.dialect == Dialect::Smc;
-        let stopped = smc && reply.code == ReplyCode::EmergencyStop;
-        self.note_stop(controller, Cause::Reply, stopped, at);
-        if smc && reply.code != ReplyCode::Running {
+        self.on_code(controller, answer.code, at);
+        if smc && answer.code != ReplyCode::Running {
             self.states[controller].error_by_reply = true;
-            self.note_error(controller, reply.error, at);
+            self.note_error(controller, answer.error, at);
         } else if std::mem::take(&mut self.states[controller].error_by_reply) {
             self.note_error(controller, 0, at);
         }
-        self.note_inputs(controller, reply.inputs, at);
+        self.note_inputs(controller, answer.inputs, at);
+    }
+
+    /// Hears the reply code of any answer, to a frame or to registers: an emergency stop begins with the first that says so.
+    /// It ends by [`Observer::on_look`] alone: an answer may be from before it was pressed.
+    pub fn on_code(&mut self, controller: usize, code: ReplyCode, at: MonoTime) {
+        if self.is_smc(controller) && code == ReplyCode::EmergencyStop {
+            self.note_stop(controller, Cause::Reply, true, at);
+        }
+    }
+
+    /// Hears what a whole look at a controller says of an emergency stop.
+    pub fn on_look(&mut self, controller: usize, look: Look, at: MonoTime) {
+        if let Some(inputs) = look.inputs {
+            self.note_inputs(controller, inputs, at);
+        }
+        let state = &mut self.states[controller];
+        match look.stop {
+            StopSign::Over => {
+                self.note_stop(controller, Cause::Reply, false, at);
+                self.note_stop(controller, Cause::Inputs, false, at);
+            }
+            StopSign::Held if state.emergency_stop() && !state.stop_is_held => {
+                state.stop_is_held = true;
+                self.happened(controller, at, What::EmergencyStopHeld);
+            }
+            StopSign::Asked if std::mem::take(&mut state.stop_is_held) => {
+                self.happened(controller, at, What::EmergencyStop { cause: Cause::Inputs });
+            }
+            StopSign::Unsure | StopSign::Asked | StopSign::Held => {}
+        }
+    }
+
+    fn is_smc(&self, controller: usize) -> bool {
+        self.watched[controller].dialect == Dialect::Smc
     }
 
     /// Hears a status report; one of another station is not taken. Says whether it was.
@@ -191,8 +269,9 @@ impl Observer {
         let state = &mut self.states[controller];
         state.heard_at = Some(at);
         state.inputs = Some(Heard { value: inputs, at });
-        let pressed = inputs & self.watched[controller].estop_inputs;
-        self.note_stop(controller, Cause::Inputs, pressed != 0, at);
+        if inputs & self.watched[controller].estop_inputs != 0 {
+            self.note_stop(controller, Cause::Inputs, true, at);
+        }
     }
 
     /// An emergency stop begins with the first of its signs and is over with the last.
@@ -205,7 +284,10 @@ impl Observer {
         }
         match (before, state.emergency_stop()) {
             (false, true) => self.happened(controller, at, What::EmergencyStop { cause }),
-            (true, false) => self.happened(controller, at, What::EmergencyStopOver),
+            (true, false) => {
+                self.states[controller].stop_is_held = false;
+                self.happened(controller, at, What::EmergencyStopOver);
+            }
             _ => {}
         }
     }

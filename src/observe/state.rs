@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::motion::Pulses;
 use crate::time::MonoTime;
-use crate::wire::{PerAxis, ReplyCode};
+use crate::wire::{FrameNo, PerAxis, ReplyCode};
 
 /// Something that a controller said, and when the kernel received it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,8 +48,12 @@ pub struct ControllerState {
     pub reports: u64,
     /// When its last status report (0x3101) came.
     pub reported_at: Option<MonoTime>,
+    /// The newest frame that it answered.
+    pub(super) answered: Option<FrameNo>,
     pub(super) stopped_by_reply: bool,
     pub(super) stopped_by_inputs: bool,
+    /// Nothing asks for the emergency stop any more, but it lasts until a reset.
+    pub(super) stop_is_held: bool,
     /// Whether the error number came with a reply, so that a reply without one ends it; else only a report does.
     pub(super) error_by_reply: bool,
 }

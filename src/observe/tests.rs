@@ -17,20 +17,27 @@ fn observer(dialect: Dialect) -> Observer {
     }])
 }
 
-fn reply(code: ReplyCode, error: u16, inputs: u16) -> MotionReply {
+fn reply() -> MotionReply {
     MotionReply {
         timing: Timing::Relative,
-        code,
+        code: ReplyCode::Running,
         channel: 0,
-        error,
+        error: 0,
         frame: FrameNo::FIRST,
         time_ms: 10,
         positions: PerAxis::new(&[Pulses(7); 3]),
-        inputs,
+        inputs: 0,
         extend: 0,
         vibration: None,
     }
 }
+
+/// The first reply to the frame of that number.
+fn answers(observer: &mut Observer, frame: u32, code: ReplyCode, error: u16, inputs: u16, at: MonoTime) {
+    observer.on_answer(0, &Answer { frame: FrameNo(frame), code, error, inputs }, at);
+}
+
+const CALM: Look = Look { stop: StopSign::Over, inputs: None };
 
 fn status(station: Code, error: u16, servo_errors: [u16; 3]) -> Status {
     Status {
@@ -49,28 +56,73 @@ fn happened(observer: &Observer) -> Vec<(u64, String)> {
 }
 
 #[test]
-fn an_emergency_stop_is_one_event_however_many_replies_say_so() {
+fn an_emergency_stop_is_one_event_however_many_replies_say_so_and_only_looks_end_it() {
     let mut observer = observer(Dialect::Smc);
-    for ms in 0..5 {
-        observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 0, 0), at(ms));
+    for frame in 1..5 {
+        answers(&mut observer, frame, ReplyCode::EmergencyStop, 0, 0, at(u64::from(frame)));
     }
     assert!(observer.states()[0].emergency_stop());
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(9));
+    answers(&mut observer, 9, ReplyCode::Running, 0, 0, at(9));
+    assert!(observer.states()[0].emergency_stop(), "it may have been asked before it was pressed");
+    observer.on_look(0, Look { stop: StopSign::Unsure, inputs: None }, at(10));
+    assert!(observer.states()[0].emergency_stop());
+    observer.on_look(0, CALM, at(11));
     assert!(!observer.states()[0].emergency_stop());
     let words = ["emergency stop in effect (x = 4)", "emergency stop over"].map(str::to_owned);
-    assert_eq!(happened(&observer), [(0, words[0].clone()), (9, words[1].clone())]);
+    assert_eq!(happened(&observer), [(1, words[0].clone()), (11, words[1].clone())]);
 }
 
 #[test]
-fn a_configured_input_means_an_emergency_stop_until_its_last_sign_is_gone() {
+fn a_register_answer_tells_of_an_emergency_stop_where_no_input_is_named_and_no_frame_is_sent() {
     let mut observer = observer(Dialect::Smc);
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, X01), at(1));
-    observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 0, X01), at(2));
-    observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 0, 0), at(3));
-    assert!(observer.states()[0].emergency_stop(), "the replies still say so");
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(4));
+    observer.on_code(0, ReplyCode::EmergencyStop, at(1));
+    assert!(observer.states()[0].emergency_stop());
+    observer.on_code(0, ReplyCode::Fault, at(2));
+    assert!(observer.states()[0].emergency_stop());
+}
+
+#[test]
+fn an_answer_to_a_frame_older_than_the_newest_that_was_answered_says_nothing() {
+    let mut observer = observer(Dialect::Smc);
+    answers(&mut observer, 7, ReplyCode::Running, 0, 0, at(1));
+    for frame in [6, 7] {
+        answers(&mut observer, frame, ReplyCode::EmergencyStop, 21, X01, at(2));
+    }
+    assert!(!observer.states()[0].emergency_stop() && happened(&observer).is_empty());
+}
+
+#[test]
+fn a_configured_input_means_an_emergency_stop_until_a_look_finds_no_sign_of_it() {
+    let mut observer = observer(Dialect::Smc);
+    answers(&mut observer, 1, ReplyCode::Running, 0, X01, at(1));
+    answers(&mut observer, 2, ReplyCode::EmergencyStop, 0, X01, at(2));
+    answers(&mut observer, 3, ReplyCode::Running, 0, 0, at(3));
+    observer.on_look(0, Look { stop: StopSign::Asked, inputs: Some(X01) }, at(4));
+    assert!(observer.states()[0].emergency_stop());
+    observer.on_look(0, Look { stop: StopSign::Over, inputs: Some(0) }, at(5));
     let words: Vec<u64> = happened(&observer).into_iter().map(|(ms, _)| ms).collect();
-    assert_eq!(words, [1, 4]);
+    assert_eq!(words, [1, 5]);
+}
+
+#[test]
+fn one_that_is_held_until_a_reset_is_told_once_and_pressed_anew_is_one_again() {
+    let mut observer = observer(Dialect::Smc);
+    let look = |observer: &mut Observer, stop, ms| observer.on_look(0, Look { stop, inputs: None }, at(ms));
+    look(&mut observer, StopSign::Held, 1);
+    observer.on_code(0, ReplyCode::EmergencyStop, at(2));
+    for ms in 3..6 {
+        look(&mut observer, StopSign::Held, ms);
+    }
+    assert!(observer.states()[0].emergency_stop());
+    look(&mut observer, StopSign::Asked, 7);
+    look(&mut observer, StopSign::Over, 8);
+    let expected = [
+        (2, "emergency stop in effect (x = 4)"),
+        (3, "emergency stop released, and held until a reset"),
+        (7, "emergency stop in effect (inputs)"),
+        (8, "emergency stop over"),
+    ];
+    assert_eq!(happened(&observer), expected.map(|(ms, words)| (ms, words.to_owned())));
 }
 
 #[test]
@@ -92,21 +144,22 @@ fn an_input_that_is_read_tells_of_an_emergency_stop_too_and_that_it_is_over() {
 #[test]
 fn other_inputs_mean_nothing() {
     let mut observer = observer(Dialect::Smc);
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, !X01), at(1));
+    answers(&mut observer, 1, ReplyCode::Running, 0, !X01, at(1));
     assert!(!observer.states()[0].emergency_stop() && happened(&observer).is_empty());
 }
 
 #[test]
 fn on_mbox_x_4_is_no_emergency_stop() {
     let mut observer = observer(Dialect::Mbox);
-    observer.on_reply(0, &reply(ReplyCode::EmergencyStop, 17, 0), at(1));
+    answers(&mut observer, 1, ReplyCode::EmergencyStop, 17, 0, at(1));
+    observer.on_code(0, ReplyCode::EmergencyStop, at(2));
     assert!(!observer.states()[0].emergency_stop() && happened(&observer).is_empty());
 }
 
 #[test]
 fn a_status_report_is_measured_and_a_reply_only_echoes() {
     let mut observer = observer(Dialect::Smc);
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(1));
+    observer.on_reply(0, &reply(), at(1));
     assert_eq!(observer.states()[0].measured, None);
     assert!(observer.on_status(0, &status(STATION, 0, [0; 3]), at(2)));
     let state = &observer.states()[0];
@@ -128,10 +181,10 @@ fn errors_come_and_go_as_events_in_words() {
     let mut observer = observer(Dialect::Smc);
     observer.on_status(0, &status(STATION, 12, [0, 33, 0]), at(1));
     observer.on_status(0, &status(STATION, 12, [0, 33, 0]), at(2));
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(3));
+    answers(&mut observer, 3, ReplyCode::Running, 0, 0, at(3));
     observer.on_status(0, &status(STATION, 0, [0; 3]), at(4));
-    observer.on_reply(0, &reply(ReplyCode::Fault, 21, 0), at(5));
-    observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(6));
+    answers(&mut observer, 5, ReplyCode::Fault, 21, 0, at(5));
+    answers(&mut observer, 6, ReplyCode::Running, 0, 0, at(6));
     let expected = [
         (1, "drive of axis 2: error 33"),
         (1, "Err12: alarm of the servo of axis 3"),
@@ -163,8 +216,8 @@ fn a_report_of_registers_is_an_alarm_of_an_mbox_controller_and_else_an_event() {
 fn of_too_many_events_the_oldest_go_and_are_counted() {
     let mut observer = observer(Dialect::Smc);
     for ms in 0..1_001 {
-        let code = if ms % 2 == 0 { ReplyCode::EmergencyStop } else { ReplyCode::Running };
-        observer.on_reply(0, &reply(code, 0, 0), at(ms));
+        let error = if ms % 2 == 0 { 12 } else { 0 };
+        observer.on_status(0, &status(STATION, error, [0; 3]), at(ms));
     }
     assert_eq!((observer.events().count(), observer.forgotten()), (1_000, 1));
 }

@@ -10,13 +10,17 @@ use super::{Live, Sent, TickReport, Watch};
 use crate::health::Change;
 use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
-use crate::observe::{Observer, Watched};
+use crate::observe::{Answer, Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, PerAxis, ReplyCode};
+use crate::wire::{FrameNo, MotionReply, PerAxis, RegisterReply, ReplyCode};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
+/// A drain that is so much overdue says that this thread hangs: nobody hears of an emergency stop then.
+const HANGS_AFTER: Duration = Duration::from_millis(100);
+/// The same where every other program of the machine may hold it up.
+const SHARED_HANGS_AFTER: Duration = Duration::from_millis(500);
 /// How often the times so far are told to whoever looks.
 const TELL: Duration = Duration::from_millis(100);
 
@@ -74,6 +78,7 @@ pub struct AckLoop {
     watch: Option<Watch>,
     /// Whom to tell which frames were acked, and the times so far.
     live: Option<Arc<Live>>,
+    hangs_after: Duration,
 }
 
 impl AckLoop {
@@ -87,7 +92,8 @@ impl AckLoop {
         ticks: Consumer<TickReport>,
     ) -> Self {
         let accounts = Accounts::new(watched, ack_every);
-        Self { receiver, accounts, sent, ticks, watch: None, last_sent: MonoTime::default(), live: None }
+        let last_sent = MonoTime::default();
+        Self { receiver, accounts, sent, ticks, watch: None, last_sent, live: None, hangs_after: HANGS_AFTER }
     }
 
     /// The same where frames were sent before: `firsts` are the numbers of the next.
@@ -108,6 +114,11 @@ impl AckLoop {
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);
+    }
+
+    /// Its thread has no real-time service: a busy machine holds it up, as it does the tick thread.
+    pub fn shares_the_machine(&mut self) {
+        self.hangs_after = SHARED_HANGS_AFTER;
     }
 
     /// Has `watch` judge how the controllers stand.
@@ -141,7 +152,12 @@ impl AckLoop {
             self.tell_table();
         }
         let next = drains.next_after(clock.now());
-        if self.is_idle() { next.max(clock.now() + IDLE) } else { next }
+        let next = if self.is_idle() { next.max(clock.now() + IDLE) } else { next };
+        // Without a watch nobody would hear of an emergency stop anyway.
+        if let (Some(live), true) = (&self.live, self.watch.is_some()) {
+            live.expect_by(next + self.hangs_after);
+        }
+        next
     }
 
     /// Whether a hall has nothing on its way: then there is no hurry.
@@ -166,7 +182,7 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, watch, live } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
@@ -179,8 +195,9 @@ impl AckLoop {
             match observer.read_reply(controller, octets) {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
-                    let reply = Reply { controller, frame: reply.frame, code: reply.code, at };
-                    let mut records = Records { sent, last_sent, watch, live };
+                    let MotionReply { frame, code, error, inputs, .. } = reply;
+                    let reply = Reply { controller, frame, code, error, inputs, at };
+                    let mut records = Records { sent, last_sent, watch, observer, live };
                     books.on_reply(reply, &mut records);
                 }
                 Err(_) if observer.hear(controller, octets, at) => {}
@@ -190,7 +207,7 @@ impl AckLoop {
                 Err(_) => books.tracker_mut().on_stray(controller),
             }
         });
-        books.settle(began, &mut Records { sent, last_sent, watch, live });
+        books.settle(began, &mut Records { sent, last_sent, watch, observer, live });
         if let Some(live) = live {
             live.on_told(began);
         }
@@ -238,7 +255,15 @@ fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &
     if let Some(inputs) = inputs {
         observer.on_inputs(controller, inputs, at);
     }
-    watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some()
+    let is_answer = watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some();
+    if let Some(reply) = RegisterReply::parse(octets).ok().filter(|_| is_answer) {
+        observer.on_code(controller, reply.code, at);
+        watch.mind_stop(controller, reply.code);
+    }
+    if let Some(look) = watch.take_look(controller) {
+        observer.on_look(controller, look, at);
+    }
+    is_answer
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.
@@ -247,6 +272,7 @@ struct Records<'a> {
     last_sent: &'a mut MonoTime,
     watch: &'a mut Option<Watch>,
     live: &'a Option<Arc<Live>>,
+    observer: &'a mut Observer,
 }
 
 impl Ledger for Records<'_> {
@@ -260,6 +286,10 @@ impl Ledger for Records<'_> {
     }
 
     fn on_fate(&mut self, reply: &Reply, fate: Fate) {
+        if let Fate::Answered(code) = fate {
+            let Reply { controller, frame, error, inputs, at, .. } = *reply;
+            self.observer.on_answer(controller, &Answer { frame, code, error, inputs }, at);
+        }
         // One that was refused leads nowhere.
         if let (Some(live), Fate::Answered(ReplyCode::Running)) = (self.live, fate)
             && let Some(evidence) = live.evidence(reply.controller)

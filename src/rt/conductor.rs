@@ -1,6 +1,8 @@
 //! Between the state machine of the hall and the engine of the play: what is asked and what happens goes to the machine,
 //! what the machine says is done by the engine, and what the engine then does is told to the machine. Tick thread.
 
+use std::time::Duration;
+
 use super::mail::{Alarm, News};
 use crate::engine::{Ending, Engine, Rest};
 use crate::state::{Cause, Event, Finding, Machine, Next, Readiness, Refusal, Request, Ride, State, Trouble};
@@ -18,19 +20,73 @@ pub struct Conductor {
     attended: bool,
     /// Whether the hall lives on when its show is over.
     stays: bool,
+    /// Whether somebody wants the program to end.
+    left: bool,
+    /// When the last tick was.
+    ticked: Option<MonoTime>,
+    /// Until then the ack thread may be late as well: this thread was.
+    excused: MonoTime,
+    /// Since when a signal wants the program to end.
+    ended: Option<MonoTime>,
 }
+
+/// A signal goes to whoever leads the hall as well, who knows more: this long it is left to them.
+const LEFT_TO_KEEPER: Duration = Duration::from_millis(500);
+/// The way to park is known within this time, or the seats come to rest first.
+const PLANNED_WITHIN: Duration = Duration::from_secs(1);
+/// After a gap the ack thread has this long to read what came in it.
+const EXCUSED_FOR: Duration = Duration::from_millis(100);
 
 impl Conductor {
     /// One of a hall in that state.
     #[must_use]
     pub const fn new(machine: Machine, attended: bool) -> Self {
-        Self { told: machine.state(), machine, known: None, attended, stays: false }
+        Self {
+            told: machine.state(),
+            machine,
+            known: None,
+            attended,
+            stays: false,
+            left: false,
+            ticked: None,
+            excused: MonoTime::from_nanos(0),
+            ended: None,
+        }
     }
 
     /// One of a hall that lives on when its show is over.
     #[must_use]
     pub const fn of_a_hall(now: MonoTime) -> Self {
         Self { stays: true, ..Self::new(Machine::new(now), true) }
+    }
+
+    /// Whether somebody wants the program to end.
+    pub(super) const fn is_left(&self) -> bool {
+        self.left
+    }
+
+    /// Whether a signal that asks for the end has found nobody to hear it; `asked` says whether there is one.
+    pub(super) fn is_ended(&mut self, asked: bool, now: MonoTime) -> bool {
+        asked && now.since(*self.ended.get_or_insert(now)) >= LEFT_TO_KEEPER
+    }
+
+    /// Minds how long no tick came; to be told every tick, before all else. Nothing goes on by itself after a sleep.
+    pub(super) fn mind_gap(&mut self, missed: u64, engine: &mut Engine, now: MonoTime) {
+        let before = self.ticked.replace(now).unwrap_or(now);
+        if missed > 0 {
+            self.excused = now + EXCUSED_FOR;
+            self.machine.event(Event::Slept(now.since(before)), now);
+            self.steer(engine);
+        }
+    }
+
+    /// Minds until when the ack thread is to have read replies again. While it hangs nobody hears of an emergency stop.
+    pub(super) fn mind_acks(&mut self, due: Option<MonoTime>, engine: &mut Engine, now: MonoTime) {
+        let hangs = due.is_some_and(|due| now > due.max(self.excused));
+        if hangs && self.machine.may_send_motion() && self.machine.fault().is_none() {
+            self.machine.event(Event::Trouble(Trouble::Deaf), now);
+            self.steer(engine);
+        }
     }
 
     /// Whether the hall lives on when its show is over.
@@ -101,6 +157,7 @@ impl Conductor {
 
     /// Somebody wants the program to end: the seats park, as far as the hall may move; where it may not, the play is over.
     pub fn leave(&mut self, engine: &mut Engine, now: MonoTime) {
+        self.left = true;
         match self.machine.state() {
             State::Playing(_) | State::Paused => {
                 let _ = self.machine.request(Request::Park, now);
@@ -120,6 +177,9 @@ impl Conductor {
     /// Ends what has lasted too long; to be told every tick, before the engine's.
     pub fn tick(&mut self, engine: &mut Engine, now: MonoTime) {
         self.machine.tick(now);
+        if self.machine.state() == State::Parking && now.since(self.machine.since()) >= PLANNED_WITHIN {
+            engine.rest_to_park();
+        }
         self.steer(engine);
     }
 
@@ -200,5 +260,19 @@ impl Conductor {
             Some(ending) if self.machine.fault().is_none() => ending,
             _ => Ending::Fault,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_to_end_is_left_to_the_keeper_for_half_a_second_and_then_heeded_without_one() {
+        let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
+        let mut conductor = Conductor::of_a_hall(ms(0));
+        let asked = [(100, false), (1_000, true), (1_499, true), (1_500, true)];
+        let ends = asked.map(|(at, asked)| conductor.is_ended(asked, ms(at)));
+        assert_eq!(ends, [false, false, false, true]);
     }
 }

@@ -1,6 +1,7 @@
 //! Where operators set what lasts: levels, effects, seats on or off, trim, and the stop that is read every tick. Last
 //! value wins, so that no flood of changes can hold up the tick thread, or a stop.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 
 use crate::engine::Mix;
@@ -11,6 +12,8 @@ pub struct Desk {
     stop: AtomicBool,
     trim_ms: AtomicI32,
     strips: Box<[Strip]>,
+    /// Set by a signal: the program is to end.
+    ended: Arc<AtomicBool>,
 }
 
 /// What is set for one seat.
@@ -37,9 +40,22 @@ impl Desk {
             stop: AtomicBool::new(false),
             trim_ms: AtomicI32::new(0),
             strips: mixes.iter().map(strip).collect(),
+            ended: Arc::default(),
         };
         mixes.into_iter().enumerate().for_each(|(lane, mix)| desk.set(lane, mix));
         desk
+    }
+
+    /// The same for a program that a signal ends by that flag.
+    #[must_use]
+    pub fn ended_by(self, signal: Arc<AtomicBool>) -> Self {
+        Self { ended: signal, ..self }
+    }
+
+    /// Whether a signal wants the program to end.
+    #[must_use]
+    pub fn is_ended(&self) -> bool {
+        self.ended.load(Ordering::Relaxed)
     }
 
     /// How many lanes it has.

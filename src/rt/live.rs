@@ -99,6 +99,7 @@ pub struct Live {
     missed: AtomicU64,
     beats: AtomicU64,
     closed: AtomicBool,
+    clears: AtomicU32,
     moving: AtomicBool,
     /// How often the last gate held each lane back.
     clamps: Box<[AtomicU64]>,
@@ -109,6 +110,8 @@ pub struct Live {
     /// Since when a reading of all seats is waited for, and whether anybody reads them.
     wanted_ns: AtomicU64,
     reads: AtomicBool,
+    /// By when it is to have told more.
+    due_ns: AtomicU64,
     table: Mutex<Vec<Row>>,
 }
 
@@ -214,10 +217,22 @@ impl Live {
         self.beats.load(Ordering::Relaxed)
     }
 
-    /// [`Self::beats`] while the tick thread is to tick; none once its loop is over.
+    /// The ticks so far, and up to when the ack thread has told all: both grow. None once the tick loop is over.
     #[must_use]
-    pub fn pulse(&self) -> Option<u64> {
-        (!self.closed.load(Ordering::Relaxed)).then(|| self.beats())
+    pub fn pulse(&self) -> Option<[u64; 2]> {
+        let told = self.told().as_nanos();
+        (!self.closed.load(Ordering::Relaxed)).then(|| [self.beats(), told])
+    }
+
+    /// Notes by when the ack thread is to have told more, or it hangs.
+    pub fn expect_by(&self, due: MonoTime) {
+        self.due_ns.store(due.as_nanos(), Ordering::Relaxed);
+    }
+
+    /// By when the ack thread is to have told more; none before it runs.
+    pub(super) fn told_by(&self) -> Option<MonoTime> {
+        let due = self.due_ns.load(Ordering::Relaxed);
+        (due > 0).then(|| MonoTime::from_nanos(due))
     }
 
     /// Notes that the tick loop is over.
@@ -236,12 +251,12 @@ impl Live {
         self.lock().clone()
     }
 
-    /// Notes the times so far.
+    /// Notes the times so far; where somebody is just looking at them, the next time will do: the ack thread waits for nobody.
     ///
     /// # Panics
     /// Where they are not made as [`histogram()`] makes them.
     pub fn on_times(&self, lateness: &Histogram, acks: &Histogram) {
-        let mut times = self.lock();
+        let Ok(mut times) = self.times.try_lock() else { return };
         let alike = "they have the same bounds";
         times.lateness.set_to(lateness).expect(alike);
         times.acks.set_to(acks).expect(alike);
@@ -269,6 +284,16 @@ impl Live {
         self.enter(Phase::of(state));
     }
 
+    /// Notes how often a person has cleared.
+    pub(super) fn on_clears(&self, clears: u32) {
+        self.clears.store(clears, Ordering::Release);
+    }
+
+    /// How often a person has cleared.
+    pub(super) fn clears(&self) -> u32 {
+        self.clears.load(Ordering::Acquire)
+    }
+
     /// Whether motion frames leave.
     #[must_use]
     pub fn is_moving(&self) -> bool {
@@ -281,9 +306,9 @@ impl Live {
         self.table.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Notes how the controllers stand. Ack thread.
-    pub(crate) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) {
-        note(&mut self.table.lock().unwrap_or_else(PoisonError::into_inner));
+    /// Notes how the controllers stand; as [`Self::on_times`], it waits for nobody. Says whether it was noted.
+    pub(crate) fn on_table(&self, note: impl FnOnce(&mut Vec<Row>)) -> bool {
+        self.table.try_lock().map(|mut table| note(&mut table)).is_ok()
     }
 
     /// Notes a tick that sent.
@@ -311,9 +336,11 @@ mod tests {
     #[test]
     fn a_pulse_is_expected_from_the_start_until_the_loop_is_over() {
         let live = Live::default();
-        assert_eq!(live.pulse(), Some(0), "a tick thread that does not begin to tick hangs as well");
+        assert_eq!(live.pulse(), Some([0, 0]), "a tick thread that does not begin to tick hangs as well");
         live.beat();
-        assert_eq!(live.pulse(), Some(1));
+        assert_eq!(live.pulse(), Some([1, 0]));
+        live.on_told(MonoTime::from_nanos(7));
+        assert_eq!(live.pulse(), Some([1, 7]));
         live.close();
         assert_eq!(live.pulse(), None);
     }

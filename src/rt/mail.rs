@@ -10,7 +10,7 @@ use crate::belief::Evidence;
 use crate::engine::{Engine, Unplanned};
 use crate::fanout::Lane;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
-use crate::state::{Cause, Event, Next, Refusal, Request, State};
+use crate::state::{Cause, Event, Machine, Next, Refusal, Request, State};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
 use crate::wire::FrameNo;
@@ -287,9 +287,15 @@ impl Mail {
         self.live.beat();
     }
 
+    /// By when the ack thread is to have told more; none before it runs.
+    pub(super) fn told_by(&self) -> Option<MonoTime> {
+        self.live.told_by()
+    }
+
     /// Shows how far the play is.
-    pub(super) fn look(&self, state: State) {
-        self.live.on_state(state);
+    pub(super) fn look(&self, machine: &Machine) {
+        self.live.on_clears(machine.clears());
+        self.live.on_state(machine.state());
     }
 
     pub(super) fn command(&mut self) -> Option<Command> {

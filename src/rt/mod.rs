@@ -122,6 +122,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.clock.sleep_until(self.grid.next_deadline());
         let now = self.clock.now();
         let tick = self.grid.take(now);
+        self.conductor.mind_gap(tick.missed, &mut self.engine, now);
         self.take_mail(now);
         let moving = self.conductor.machine().may_send_motion();
         self.places.look(&mut self.engine, &self.mail, now, moving);
@@ -140,7 +141,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         self.hand_on();
         self.mail.beat();
         // A hall goes on when its show is over; one that is told to leave has ended its engine once nothing moves.
-        step != Step::Over || (self.conductor.stays() && !self.leave.load(Ordering::Relaxed))
+        step != Step::Over || (self.conductor.stays() && !self.conductor.is_left())
     }
 
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
@@ -151,6 +152,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             conductor.stop(engine, now);
         }
         conductor.tick(engine, now);
+        conductor.mind_acks(mail.told_by(), engine, now);
         for lane in 0..desk.lanes() {
             engine.mix(lane, desk.mix(lane));
         }
@@ -177,7 +179,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             tell_state(conductor, mail);
             mail.tell(news);
         }
-        if self.leave.load(Ordering::Relaxed) {
+        if self.leave.load(Ordering::Relaxed) || conductor.is_ended(desk.is_ended(), now) {
             conductor.leave(engine, now);
         }
         while let Some(answer) = mail.answer() {
@@ -217,7 +219,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     }
 
     fn hand_on(&mut self) {
-        self.mail.look(self.conductor.machine().state());
+        self.mail.look(self.conductor.machine());
         tell_state(&mut self.conductor, &mut self.mail);
         while self.mail.has_room_for_news()
             && let Some(what) = self.engine.take_unplanned()

@@ -8,7 +8,7 @@ use rtrb::Consumer;
 use super::desk::Desk;
 use super::line::LineEnd;
 use crate::config::Controller;
-use crate::health::Health;
+use crate::health::{Health, Standing};
 use crate::state::Finding;
 use crate::time::MonoTime;
 
@@ -102,9 +102,10 @@ impl Standby {
     pub(super) fn take_finding(&mut self, health: &Health) -> Option<Finding> {
         let crashed = self.boot?;
         let groups = health.groups();
+        // What is latched was seen as well; it waits for a person, who may clear it only once all have told.
         let known = |controller: usize| {
             let standing = health.standing(groups.group_of(controller));
-            self.seen[controller].filter(|_| !standing.is_looked_at())
+            self.seen[controller].filter(|_| standing != Standing::Lost)
         };
         let mut finding = Finding { homed: true, at_park: true, crashed };
         for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {

@@ -1,9 +1,11 @@
 //! What the ack thread makes of all that it hears, beside the books: how each group stands, what the tick thread has to
 //! hear of that, and whose registers are read.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Duration;
 
-use rtrb::Producer;
+use rtrb::{Producer, PushError};
 
 use super::idle::Beats;
 use super::live::{Live, Phase};
@@ -18,7 +20,7 @@ use crate::fanout::Lane;
 use crate::health::{Change, Health, Notice, Standing};
 use crate::motion::Pulses;
 use crate::net::Sender;
-use crate::observe::Observer;
+use crate::observe::{Look, Observer};
 use crate::state::Event;
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
@@ -26,6 +28,11 @@ use crate::wire::{Dialect, ImaxRegisters, PerAxis, ReplyCode};
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
+
+/// So often effects are switched off at a controller in an emergency stop: a datagram may be lost, and nobody answers.
+const DARKENED: u8 = 3;
+/// A controller that was not seen for so long after the hall was cleared holds up nobody.
+const SILENT_AFTER: Duration = Duration::from_secs(3);
 
 /// The watch over the controllers of one play.
 #[derive(Debug)]
@@ -38,6 +45,8 @@ pub struct Watch {
     beats: Beats,
     sender: Sender,
     alarms: Producer<Alarm>,
+    /// Alarms for which there was no room yet, oldest first: none is ever dropped.
+    waiting: VecDeque<Alarm>,
     live: Arc<Live>,
     /// Since when a reading of all seats was asked for that was sent last.
     wanted: MonoTime,
@@ -47,8 +56,14 @@ pub struct Watch {
     heard: u64,
     notices: Vec<Notice>,
     changes: Vec<Change>,
-    /// Whether positions are read anew, because the hall was cleared.
-    anew: bool,
+    /// How often the effects of each controller are still to be switched off.
+    lit: Vec<u8>,
+    /// Since when positions are read anew, because the hall was cleared.
+    anew: Option<MonoTime>,
+    /// How often it was cleared so far.
+    clears: u32,
+    /// A controller that takes part does not know its position, and the hall was told so.
+    lost_zero: bool,
     phase: Phase,
     /// When it last judged.
     looked: MonoTime,
@@ -85,7 +100,11 @@ impl Watch {
             wanted: MonoTime::default(),
             reported: vec![MonoTime::default(); controllers.len()],
             heard: 0,
-            anew: false,
+            lit: vec![0; controllers.len()],
+            anew: None,
+            clears: 0,
+            lost_zero: false,
+            waiting: VecDeque::with_capacity(4 * (controllers.len() + groups) + 4),
             phase: Phase::default(),
             looked: MonoTime::default(),
             health,
@@ -157,6 +176,7 @@ impl Watch {
     /// What became of a reply.
     pub(super) fn on_fate(&mut self, reply: &Reply, fate: Fate) {
         let smc = self.lookers.get(reply.controller).is_some_and(|one| one.dialect() == Dialect::Smc);
+        self.mind_stop(reply.controller, reply.code);
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
             // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
@@ -172,6 +192,9 @@ impl Watch {
         let awaited = self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at));
         let looker = &mut self.lookers[controller];
         let is_answer = looker.hear(octets);
+        if let Some(packets) = looker.take_count() {
+            self.health.on_count(controller, packets);
+        }
         if let Some((first, positions)) = looker.take_positions() {
             self.on_positions(controller, first, &positions, at, Source::Registers);
         }
@@ -209,6 +232,18 @@ impl Watch {
                 standby.on_seen(controller, Seen { homed: sighting.homed, at_park });
             }
         }
+    }
+
+    /// Minds a sign of an emergency stop: what was asked before it says nothing of its end.
+    pub(super) fn mind_stop(&mut self, controller: usize, code: ReplyCode) {
+        if let Some(looker) = self.lookers.get_mut(controller) {
+            looker.mind_stop(code);
+        }
+    }
+
+    /// What the newest look at a controller says of an emergency stop, once it is whole.
+    pub(super) fn take_look(&mut self, controller: usize) -> Option<Look> {
+        self.lookers[controller].take_look()
     }
 
     /// Whether it is that of a hall that sends no frames.
@@ -264,7 +299,7 @@ impl Watch {
     /// Tells whoever looks how the controllers stand.
     pub(super) fn tell_table(&mut self, tracker: &Tracker, observer: &Observer) {
         let Self { health, standby, turns, looked, live, .. } = self;
-        live.on_table(|rows| {
+        let is_told = live.on_table(|rows| {
             let row = |controller: usize, before: Option<&Row>| {
                 let group = health.groups().group_of(controller);
                 Row {
@@ -285,6 +320,7 @@ impl Watch {
             }
             turns.look_up(rows, tracker);
         });
+        self.untold |= !is_told;
     }
 
     /// Judges all at `now`, an instant up to which all was told.
@@ -301,7 +337,7 @@ impl Watch {
                 self.on_positions(controller, 0, &told.value, at, Source::Report);
             }
         }
-        self.look_anew();
+        self.look_anew(now);
         self.stand_by();
         self.beat(now);
         self.read_all();
@@ -311,19 +347,23 @@ impl Watch {
             self.tell(self.notices[index]);
         }
         self.notices.clear();
-        self.end_look_anew();
+        self.tell_of_zeros();
+        self.end_look_anew(now);
+        self.send_alarms();
     }
 
     fn tell(&mut self, notice: Notice) {
         match notice {
-            // One that is out may be at work on: it stays away until it was homed, and holds up nobody.
-            Notice::Hall(Event::Rebooted(controller)) if !self.takes_part(controller) => {}
+            // Of a hall that is told as it stands.
+            Notice::Hall(Event::Rebooted(_)) if self.standby.is_some() => {}
             Notice::Hall(event) => self.alarm(Alarm::Event(event)),
             // Preflight counts every datagram that a controller received, and would take the answers for its own.
-            Notice::Read(_) if self.is_hushed() => {}
+            Notice::Read(_) | Notice::Count(_) if self.is_hushed() => {}
             // A homing is watched by who ordered it; only those that are looked for are looked at beside.
             Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
+            Notice::Count(controller) => self.lookers[controller].ask_count(controller, &self.sender),
             Notice::Read(controller) => {
+                self.darken(controller);
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
                 self.health.on_read_sent(controller, datagrams);
             }
@@ -360,22 +400,65 @@ impl Watch {
     fn tell_lane(&mut self, controller: usize, change: Change) {
         let lane = u16::try_from(controller).expect("fewer controllers than ports");
         match change.to {
-            Standing::Stopped => self.alarm(Alarm::Cut(lane)),
+            Standing::Stopped => {
+                // Frames have left effects on; between shows none of ours are.
+                self.lit[controller] = if self.live.is_moving() { DARKENED } else { 0 };
+                self.alarm(Alarm::Cut(lane));
+            }
             Standing::Rejoining => self.alarm(Alarm::Found(lane)),
             to if !to.may_move() => self.alarm(Alarm::Leave(lane)),
             _ => {}
         }
     }
 
-    /// Where it finds no room the tick thread has not looked for dozens of ticks, and what it does next is a hold.
+    /// Switches off the effects that the last frame left on at a controller in an emergency stop, with each of the next looks.
+    fn darken(&mut self, controller: usize) {
+        if self.lit[controller] > 0 {
+            self.lit[controller] -= 1;
+            self.lookers[controller].darken(controller, &self.sender);
+            self.health.on_other_sent(controller, 1);
+        }
+    }
+
+    /// What finds no room waits for the next look: the tick thread hears all of it, in this order.
     fn alarm(&mut self, alarm: Alarm) {
-        let _ = self.alarms.push(alarm);
+        self.waiting.push_back(alarm);
+    }
+
+    fn send_alarms(&mut self) {
+        while let Some(alarm) = self.waiting.pop_front() {
+            if let Err(PushError::Full(alarm)) = self.alarms.push(alarm) {
+                self.waiting.push_front(alarm);
+                return;
+            }
+        }
+    }
+
+    /// Tells the hall whether all that take part know their positions. One that is out may be at work on: it holds up nobody.
+    fn tell_of_zeros(&mut self) {
+        if self.standby.is_none() {
+            return;
+        }
+        let groups = self.health.groups();
+        let is_lost = |controller: &usize| {
+            self.health.standing(groups.group_of(*controller)) == Standing::Excluded
+                && self.takes_part(*controller)
+        };
+        let lost = (0..groups.controllers()).find(is_lost);
+        match (std::mem::replace(&mut self.lost_zero, lost.is_some()), lost) {
+            (false, Some(controller)) => self.alarm(Alarm::Event(Event::Rebooted(controller))),
+            (true, None) => self.alarm(Alarm::Event(Event::ZerosKnown)),
+            _ => {}
+        }
     }
 
     /// Whoever cleared the hall wants to know where its seats stand: nothing is taken on trust.
-    fn look_anew(&mut self) {
+    fn look_anew(&mut self, now: MonoTime) {
         let phase = self.live.phase();
-        if std::mem::replace(&mut self.phase, phase) == phase || phase != Phase::Recovering {
+        let has_entered = std::mem::replace(&mut self.phase, phase) != phase && phase == Phase::Recovering;
+        let clears = self.live.clears();
+        let is_cleared = std::mem::replace(&mut self.clears, clears) != clears;
+        if !has_entered && !is_cleared {
             return;
         }
         if self.silent {
@@ -383,7 +466,7 @@ impl Watch {
             self.alarm(Alarm::Event(Event::PositionsRead));
             return;
         }
-        self.anew = true;
+        self.anew = Some(now);
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
     }
 
@@ -422,6 +505,9 @@ impl Watch {
     fn stand_by(&mut self) {
         let Self { standby, health, positions, live, untold, .. } = self;
         let Some(standby) = standby else { return };
+        for controller in 0..health.groups().controllers() {
+            health.on_part(controller, standby.takes_part(controller));
+        }
         standby.serve(health, |homed| positions[homed].on_homed());
         if live.is_moving() {
             return;
@@ -440,11 +526,17 @@ impl Watch {
         }
     }
 
-    fn end_look_anew(&mut self) {
-        let health = &self.health;
-        let is_open = |group| health.standing(group).is_looked_at();
-        if self.anew && !(0..health.groups().len()).any(is_open) {
-            self.anew = false;
+    /// Those that take part are waited for, and not for ever: nothing goes to one that is silent, and the others may park.
+    fn end_look_anew(&mut self, now: MonoTime) {
+        let Some(since) = self.anew else { return };
+        let is_open = |group| {
+            let mut members = self.health.groups().members(group);
+            self.health.standing(group) == Standing::Lost
+                && members.any(|controller| self.takes_part(controller))
+        };
+        let is_read = !(0..self.health.groups().len()).any(is_open);
+        if is_read || now.since(since) >= SILENT_AFTER {
+            self.anew = None;
             self.alarm(Alarm::Event(Event::PositionsRead));
         }
     }
@@ -453,4 +545,41 @@ impl Watch {
 /// What the seat of a controller tells of where it is.
 fn positions(controller: &Controller) -> Positions {
     Positions::new(Arc::clone(&controller.seat), controller.first_slot())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use rtrb::RingBuffer;
+
+    use super::*;
+    use crate::config::{LossPolicy, from_to_args};
+    use crate::cue::{Source, read};
+    use crate::fanout::{Manner, lanes};
+    use crate::health::Groups;
+    use crate::net::Ports;
+    use crate::timeline::Timeline;
+
+    #[test]
+    fn no_alarm_is_dropped_where_the_tick_thread_has_no_room_and_all_come_in_their_order() {
+        let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
+        let config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
+        let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
+        let (sender, _) =
+            Ports::open("127.0.0.1:0".parse().unwrap(), &[config.controllers[0].address]).unwrap().split();
+        let (producer, mut alarms) = RingBuffer::new(2);
+        let health =
+            Health::new(Groups::of(&config.controllers), LossPolicy::Continue, 1, Duration::from_millis(10));
+        let mut watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
+        let all: Vec<Alarm> = (0..7).map(Alarm::Leave).collect();
+        all.iter().for_each(|alarm| watch.alarm(*alarm));
+        let mut heard = Vec::new();
+        while heard.len() < all.len() {
+            watch.send_alarms();
+            assert!(!alarms.is_empty(), "{heard:?}");
+            heard.extend(std::iter::from_fn(|| alarms.pop().ok()));
+        }
+        assert_eq!(heard, all);
+    }
 }

@@ -1,4 +1,5 @@
-//! The watchdog of the service manager: fed only while the tick thread ticks, in whatever state. A thread of its own looks,
+//! The watchdog of the service manager: fed only while the tick thread ticks, in whatever state, and the ack
+//! thread reads replies. A thread of its own looks,
 //! so that no surface that hangs starves it, and none that lives feeds it for a tick thread that hangs.
 
 use std::io;
@@ -17,32 +18,39 @@ const LOOKS: u32 = 4;
 /// How long a hall may take to close or to open, while nothing ticks.
 const BETWEEN: Duration = Duration::from_secs(10);
 
-/// Whether the watchdog is to be fed, by a counter of ticks; told the time.
+/// What counts the ticks, and the drains of the ack thread.
+pub type Pulse = [u64; 2];
+
+/// Whether the watchdog is to be fed, by counters of ticks and of drains; told the time.
 #[derive(Debug)]
 pub struct Hunger {
     patience: Duration,
-    seen: Option<u64>,
-    /// When the counter moved last, or was there, or went.
-    moved: MonoTime,
+    seen: Option<Pulse>,
+    /// When each counter moved last, or was there, or went.
+    moved: [MonoTime; 2],
 }
 
 impl Hunger {
-    /// One for a service manager that waits `interval` long, and ticks every `period`. The counter may stand still from one
+    /// One for a service manager that waits `interval` long, and ticks every `period`. No counter may stand still from one
     /// look to the next no longer than a quarter of the interval, or two periods where ticks are rare.
     #[must_use]
-    pub fn new(interval: Duration, period: Duration, beats: Option<u64>, now: MonoTime) -> Self {
-        Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: now }
+    pub fn new(interval: Duration, period: Duration, beats: Option<Pulse>, now: MonoTime) -> Self {
+        Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: [now; 2] }
     }
 
     /// Whether all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
     /// or opens, that is as good for ten seconds.
     #[must_use]
-    pub fn feed(&mut self, beats: Option<u64>, now: MonoTime) -> bool {
-        if beats != self.seen {
-            self.seen = beats;
-            self.moved = now;
+    pub fn feed(&mut self, beats: Option<Pulse>, now: MonoTime) -> bool {
+        for (counter, moved) in self.moved.iter_mut().enumerate() {
+            let count = |pulse: Option<Pulse>| pulse.map(|pulse| pulse[counter]);
+            if count(beats) != count(self.seen) {
+                *moved = now;
+            }
         }
-        now.since(self.moved) < if beats.is_some() { self.patience } else { BETWEEN }
+        self.seen = beats;
+        let patience = if beats.is_some() { self.patience } else { BETWEEN };
+        self.moved.iter().all(|moved| now.since(*moved) < patience)
     }
 }
 
@@ -63,7 +71,7 @@ impl Feeder {
     pub fn start(
         interval: Duration,
         period: Duration,
-        beats: impl Fn() -> Option<u64> + Send + 'static,
+        beats: impl Fn() -> Option<Pulse> + Send + 'static,
     ) -> io::Result<Self> {
         // A message that does not get through is missed by whom it is for, which is what a watchdog is there for.
         Self::feeding(interval, period, beats, || drop(notify(&[NotifyState::Watchdog])))
@@ -72,7 +80,7 @@ impl Feeder {
     fn feeding(
         interval: Duration,
         period: Duration,
-        beats: impl Fn() -> Option<u64> + Send + 'static,
+        beats: impl Fn() -> Option<Pulse> + Send + 'static,
         mut feed: impl FnMut() + Send + 'static,
     ) -> io::Result<Self> {
         let done = Arc::new(AtomicBool::new(false));
@@ -111,40 +119,55 @@ mod tests {
 
     const SECOND: Duration = Duration::from_secs(1);
 
+    /// Both counters stand there.
+    #[expect(clippy::unnecessary_wraps, reason = "as they are told")]
+    fn both(count: u64) -> Option<Pulse> {
+        Some([count; 2])
+    }
+
+    #[test]
+    fn it_is_not_fed_while_one_of_the_two_stands() {
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), Some([0, 0]), ms(0));
+        assert!(hunger.feed(Some([25, 40]), ms(200)));
+        assert!(!hunger.feed(Some([50, 40]), ms(450)), "nobody hears of an emergency stop");
+        assert!(hunger.feed(Some([75, 41]), ms(650)));
+        assert!(!hunger.feed(Some([75, 90]), ms(900)));
+    }
+
     fn ms(ms: u64) -> MonoTime {
         MonoTime::default() + Duration::from_millis(ms)
     }
 
     #[test]
     fn it_is_fed_while_the_counter_moves_and_not_once_it_stands() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), Some(0), ms(0));
-        assert!(hunger.feed(Some(25), ms(250)));
-        assert!(hunger.feed(Some(26), ms(500)), "one tick is enough");
-        assert!(!hunger.feed(Some(26), ms(750)), "it hangs");
-        assert!(!hunger.feed(Some(26), ms(1_000)));
-        assert!(hunger.feed(Some(27), ms(1_250)), "it was late, and goes on");
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), both(0), ms(0));
+        assert!(hunger.feed(both(25), ms(250)));
+        assert!(hunger.feed(both(26), ms(500)), "one tick is enough");
+        assert!(!hunger.feed(both(26), ms(750)), "it hangs");
+        assert!(!hunger.feed(both(26), ms(1_000)));
+        assert!(hunger.feed(both(27), ms(1_250)), "it was late, and goes on");
     }
 
     #[test]
     fn a_tick_thread_that_never_ticked_gets_nothing() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(1), Some(0), ms(0));
-        assert!((1..40).all(|look| !hunger.feed(Some(0), ms(250 * look))));
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(1), both(0), ms(0));
+        assert!((1..40).all(|look| !hunger.feed(both(0), ms(250 * look))));
     }
 
     #[test]
     fn ticks_once_a_second_are_no_hang() {
-        let mut hunger = Hunger::new(4 * SECOND, SECOND, Some(0), ms(0));
-        assert!((1..=10).all(|s| hunger.feed(Some(s), ms(1_000 * s))));
-        assert!(hunger.feed(Some(10), ms(11_000)), "the next tick may be due this very moment");
-        assert!(!hunger.feed(Some(10), ms(12_000)));
+        let mut hunger = Hunger::new(4 * SECOND, SECOND, both(0), ms(0));
+        assert!((1..=10).all(|s| hunger.feed(both(s), ms(1_000 * s))));
+        assert!(hunger.feed(both(10), ms(11_000)), "the next tick may be due this very moment");
+        assert!(!hunger.feed(both(10), ms(12_000)));
     }
 
     #[test]
     fn a_hall_that_is_opened_anew_has_ten_seconds_and_counts_from_where_it_likes() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), Some(7_000), ms(0));
+        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), both(7_000), ms(0));
         assert!((1..40).all(|look| hunger.feed(None, ms(250 * look))));
-        assert!(hunger.feed(Some(0), ms(10_000)));
-        assert!(!hunger.feed(Some(0), ms(10_250)), "open, it has to tick");
+        assert!(hunger.feed(both(0), ms(10_000)));
+        assert!(!hunger.feed(both(0), ms(10_250)), "open, it has to tick");
         assert!(hunger.feed(None, ms(10_500)));
         assert!(!hunger.feed(None, ms(20_500)), "it neither opens nor ends");
     }
@@ -153,7 +176,7 @@ mod tests {
     fn the_thread_feeds_while_ticks_come_and_ends_when_it_is_dropped() {
         let ticks = Arc::new(AtomicU64::new(0));
         let (fed, feeds) = mpsc::channel();
-        let beats = move || Some(ticks.fetch_add(1, Ordering::Relaxed));
+        let beats = move || both(ticks.fetch_add(1, Ordering::Relaxed));
         let interval = Duration::from_millis(4);
         let feeder = Feeder::feeding(interval, interval, beats, move || {
             let _ = fed.send(());

@@ -1,6 +1,6 @@
 //! Requests by persons.
 
-use super::{Cause, Goal, Machine, Readiness, Refusal, Request, Ride, State, Why};
+use super::{Cause, Goal, Latch, Machine, Readiness, Refusal, Request, Ride, State, Why};
 use crate::time::MonoTime;
 
 impl Machine {
@@ -165,17 +165,35 @@ impl Machine {
     fn clear(&mut self, now: MonoTime) -> Result<(), Why> {
         match self.state {
             State::Stopped | State::Fault if self.facts.pressed => Err(Why::StillPressed),
+            // Before every controller has told, one of them may be in an emergency stop.
+            State::Stopped | State::Fault if !self.facts.identified => Err(Why::NotIdentified),
             State::Stopped | State::Fault if self.facts.errors => Err(Why::StillWrong),
             State::Stopped | State::Fault => {
                 self.stop = None;
                 self.fault = None;
-                self.facts.measured = false;
-                self.enter(State::Recovering, Cause::Cleared, now);
+                self.cleared(now);
                 Ok(())
             }
             State::Stopping => Err(Why::StoppingNow),
+            State::Parked | State::Recovering => self.clear_controllers(now),
             _ => Err(Why::NothingToClear),
         }
+    }
+
+    /// Nothing is latched but single controllers, which went wrong while nothing moved.
+    fn clear_controllers(&mut self, now: MonoTime) -> Result<(), Why> {
+        match self.facts.latch {
+            Latch::Free => return Err(Why::NothingToClear),
+            Latch::Held => return Err(Why::StillWrong),
+            Latch::Over => self.cleared(now),
+        }
+        Ok(())
+    }
+
+    fn cleared(&mut self, now: MonoTime) {
+        self.facts.measured = false;
+        self.clears = self.clears.wrapping_add(1);
+        self.enter(State::Recovering, Cause::Cleared, now);
     }
 }
 

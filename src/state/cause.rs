@@ -46,6 +46,8 @@ pub enum Cause {
     Trouble(Trouble),
     /// A person cleared it.
     Cleared,
+    /// No tick came for more than two seconds: the machine or the program slept.
+    Slept,
 }
 
 /// Something that no play goes on with.
@@ -69,6 +71,8 @@ pub enum Trouble {
     Gate,
     /// A move could not be planned.
     Planner,
+    /// Replies are no longer read: nobody would hear of an emergency stop.
+    Deaf,
     /// A controller did not get home.
     Homing(usize),
     /// Homing took too long.
@@ -110,7 +114,7 @@ impl Trouble {
             | Self::Drive { controller, .. }
             | Self::Homing(controller)
             | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
-            Self::Gate | Self::Planner | Self::HomingTime | Self::ParkingTime => None,
+            Self::Gate | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
         }
     }
 

@@ -187,10 +187,28 @@ pub enum Event {
     EmergencyStop(usize),
     /// No controller reports an emergency stop any more.
     AllReleased,
+    /// No tick came for so long: the machine slept, or the program was held.
+    Slept(Duration),
     /// Something is wrong.
     Trouble(Trouble),
     /// No controller and no drive reports an error any more.
     ErrorsGone,
+    /// Whether controllers that take part stand stopped or in error, and wait for a person to clear them.
+    Latched(Latch),
+    /// Every controller that takes part knows its position again: the one that did not was homed, or is out.
+    ZerosKnown,
+}
+
+/// Whether controllers that take part are held by an emergency stop or an error, whatever the hall is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Latch {
+    /// None is.
+    #[default]
+    Free,
+    /// One is, and what holds it goes on.
+    Held,
+    /// What held them is over; they wait until it is cleared.
+    Over,
 }
 
 /// What was found when the controllers were first asked.

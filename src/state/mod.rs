@@ -24,7 +24,7 @@ mod words;
 use std::time::Duration;
 
 pub use cause::{Cause, Trouble, Whose};
-pub use kinds::{Demand, Event, Finding, Readiness, Request, Ride, State};
+pub use kinds::{Demand, Event, Finding, Latch, Readiness, Request, Ride, State};
 pub use next::Next;
 pub use refusal::{Refusal, Why};
 
@@ -41,6 +41,11 @@ pub const STOPPING_FOR: Duration = Duration::from_secs(5);
 /// How long parking may take: a stroke of 5 m at 50 mm/s, and then some.
 pub const PARKING_FOR: Duration = Duration::from_mins(2);
 
+/// After a sleep that was longer nothing goes on by itself.
+pub const SLEPT: Duration = Duration::from_secs(2);
+/// After a sleep that was longer whatever was under way is over.
+pub const SLEPT_LONG: Duration = Duration::from_mins(5);
+
 /// The state of one hall.
 #[derive(Debug, Clone)]
 pub struct Machine {
@@ -54,6 +59,8 @@ pub struct Machine {
     stop: Option<Cause>,
     /// What is wrong; kept until cleared.
     fault: Option<Trouble>,
+    /// How often a person has cleared.
+    clears: u32,
 }
 
 /// What is known beside the state.
@@ -71,6 +78,8 @@ struct Facts {
     pressed: bool,
     /// A controller or a drive has an error.
     errors: bool,
+    /// What holds controllers that take part.
+    latch: Latch,
     readiness: Readiness,
 }
 
@@ -95,11 +104,13 @@ impl Machine {
                 astray: false,
                 pressed: false,
                 errors: false,
+                latch: Latch::Free,
                 readiness: Readiness::NoCue,
             },
             goal: Goal::Parked,
             stop: None,
             fault: None,
+            clears: 0,
         }
     }
 
@@ -167,6 +178,12 @@ impl Machine {
     #[must_use]
     pub const fn has_errors(&self) -> bool {
         self.facts.errors
+    }
+
+    /// How often a person has cleared: whoever looks at the controllers looks anew each time.
+    #[must_use]
+    pub const fn clears(&self) -> u32 {
+        self.clears
     }
 
     /// When the state ends by itself; none where it does not. For a hall that is armed or paused, worth showing.

@@ -1,6 +1,6 @@
 //! What a person does next.
 
-use super::{Cause, Machine, Readiness, Ride, State, Trouble};
+use super::{Cause, Latch, Machine, Readiness, Ride, State, Trouble};
 
 /// What a person does next; worded by its `Display`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -51,6 +51,38 @@ pub enum Next {
     StopOtherMaster,
     /// Clear, then park or home.
     Clear,
+    /// Clear; where that does not help, start the service anew.
+    Restart,
+}
+
+impl Next {
+    /// All there are.
+    pub const ALL: [Self; 24] = [
+        Self::AwaitAnswers,
+        Self::AwaitPositions,
+        Self::AwaitHome,
+        Self::AwaitRest,
+        Self::ParkOrHome,
+        Self::ParkOrStart,
+        Self::Home,
+        Self::Load,
+        Self::Prove,
+        Self::Preflight,
+        Self::Arm,
+        Self::ArmAndHome,
+        Self::Go,
+        Self::Watch,
+        Self::AwaitJoin,
+        Self::Resume,
+        Self::Release,
+        Self::PutRight,
+        Self::AwaitStandstill,
+        Self::CheckCue,
+        Self::LookAtSeat,
+        Self::StopOtherMaster,
+        Self::Clear,
+        Self::Restart,
+    ];
 }
 
 impl Machine {
@@ -78,6 +110,8 @@ impl Machine {
             Next::Home
         } else if !self.facts.measured {
             Next::AwaitPositions
+        } else if matches!(self.facts.latch, Latch::Over) {
+            Next::Clear
         } else {
             Next::ParkOrHome
         }
@@ -85,6 +119,8 @@ impl Machine {
 
     const fn next_parked(&self) -> Next {
         match self.facts.readiness {
+            _ if matches!(self.facts.latch, Latch::Over) => Next::Clear,
+            _ if matches!(self.facts.latch, Latch::Held) => Next::PutRight,
             Readiness::Ready if !self.facts.homed => Next::ArmAndHome,
             _ if self.facts.astray => Next::ParkOrStart,
             Readiness::NoCue => Next::Load,
@@ -101,11 +137,15 @@ impl Machine {
         if self.facts.errors {
             return Next::PutRight;
         }
+        if !self.facts.identified {
+            return Next::AwaitAnswers;
+        }
         match self.cause {
             Cause::StoppedHoming => Next::AwaitStandstill,
             Cause::Trouble(Trouble::Gate) => Next::CheckCue,
             Cause::Trouble(Trouble::Homing(_) | Trouble::HomingTime) => Next::LookAtSeat,
             Cause::Trouble(Trouble::OtherMaster(_)) => Next::StopOtherMaster,
+            Cause::Trouble(Trouble::Deaf) => Next::Restart,
             _ => Next::Clear,
         }
     }

@@ -1,6 +1,8 @@
 //! Events from the engine and the observers.
 
-use super::{Cause, Demand, Event, Finding, Goal, Machine, Readiness, Ride, State};
+use std::time::Duration;
+
+use super::{Cause, Demand, Event, Finding, Goal, Machine, Readiness, Ride, SLEPT, SLEPT_LONG, State};
 use crate::time::MonoTime;
 
 impl Machine {
@@ -30,8 +32,12 @@ impl Machine {
             Event::Policy(demand, group) => self.policy(demand, group, now),
             Event::EmergencyStop(controller) => self.emergency_stop(controller, now),
             Event::AllReleased => self.facts.pressed = false,
+            Event::Slept(span) => self.slept(span, now),
             Event::Trouble(trouble) => self.trouble(trouble, now),
             Event::ErrorsGone => self.facts.errors = false,
+            Event::Latched(latch) => self.facts.latch = latch,
+            // Before, and while they home, others say so.
+            Event::ZerosKnown => self.facts.homed |= self.facts.identified && self.state != State::Homing,
             Event::JoinBegun
             | Event::Joined
             | Event::Late
@@ -89,6 +95,27 @@ impl Machine {
             Goal::Armed => State::Armed,
         };
         self.enter(state, Cause::Homed, now);
+    }
+
+    /// The seats stood where the last frame before the sleep had left them, and somebody may have got up, or on. Homing is the
+    /// controllers' own, and what is latched stays so.
+    fn slept(&mut self, span: Duration, now: MonoTime) {
+        if span <= SLEPT {
+            return;
+        }
+        match self.state {
+            State::Playing(_) | State::Paused if span <= SLEPT_LONG => {
+                self.enter(State::Paused, Cause::Slept, now);
+            }
+            State::Playing(_) | State::Paused | State::Parking => {
+                let cause = *self.stop.get_or_insert(Cause::Slept);
+                self.enter(State::Stopped, cause, now);
+            }
+            State::Stopping => self.end_stopping(now),
+            // Nothing moves, and whoever lets it go looks at the seats.
+            State::Armed if span > SLEPT_LONG => self.enter(State::Parked, Cause::Slept, now),
+            _ => {}
+        }
     }
 
     fn policy(&mut self, demand: Demand, group: usize, now: MonoTime) {

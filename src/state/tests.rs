@@ -1,4 +1,5 @@
 mod chance;
+mod remedies;
 mod table;
 
 use super::*;
@@ -292,6 +293,70 @@ fn after_clearing_the_positions_are_read_anew_before_the_seats_park() {
     hall.event(Event::PositionsRead, s(3));
     hall.request(Request::Park, s(4)).unwrap();
     assert_eq!(hall.state(), State::Parking);
+}
+
+#[test]
+fn nothing_goes_on_by_itself_after_a_sleep() {
+    let slept = |state, seconds| {
+        let hall = told(state, Event::Slept(Duration::from_secs(seconds)));
+        (hall.state(), hall.cause())
+    };
+    for state in riding().into_iter().chain([State::Paused]) {
+        assert_eq!(slept(state, 2).0, state);
+        assert_eq!(slept(state, 3), (State::Paused, Cause::Slept), "from {state}");
+        assert_eq!(slept(state, 301), (State::Stopped, Cause::Slept), "from {state}");
+    }
+    for seconds in [3, 301] {
+        assert_eq!(slept(State::Parking, seconds), (State::Stopped, Cause::Slept));
+        assert_eq!(slept(State::Stopping, seconds).0, State::Stopped);
+    }
+    assert_eq!((slept(State::Armed, 3).0, slept(State::Armed, 301).0), (State::Armed, State::Parked));
+    for state in [State::Boot, State::Recovering, State::Parked, State::Homing, State::Stopped, State::Fault]
+    {
+        assert_eq!(slept(state, 40_000).0, state);
+    }
+}
+
+#[test]
+fn a_pause_that_was_slept_through_begins_anew() {
+    let mut hall = hall(State::Paused);
+    hall.event(Event::Slept(Duration::from_secs(299)), s(299));
+    hall.tick(s(400));
+    assert_eq!((hall.state(), hall.next()), (State::Paused, Next::Resume));
+}
+
+#[test]
+fn controllers_that_were_held_while_nothing_moved_are_cleared_once_that_is_over() {
+    for state in [State::Parked, State::Recovering] {
+        assert_eq!(why(state, Request::Clear), Why::NothingToClear);
+        let mut hall = told(state, Event::Latched(Latch::Held));
+        assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::StillWrong);
+        hall.event(Event::Latched(Latch::Over), s(2));
+        assert_eq!(hall.next(), Next::Clear);
+        hall.request(Request::Clear, s(3)).unwrap();
+        assert_eq!((hall.state(), hall.cause()), (State::Recovering, Cause::Cleared));
+        assert!(!hall.is_measured() && hall.clears() > 0);
+    }
+}
+
+#[test]
+fn what_is_stopped_is_not_cleared_before_every_controller_has_told() {
+    let mut hall = asked(State::Boot, Request::Stop);
+    assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::NotIdentified);
+    hall.event(Event::Identified(PARKED), s(3));
+    hall.request(Request::Clear, s(4)).unwrap();
+}
+
+#[test]
+fn a_hall_whose_unknown_seat_is_taken_out_knows_its_positions_again() {
+    let mut hall = told(State::Recovering, Event::Rebooted(1));
+    assert_eq!(hall.next(), Next::Home);
+    hall.event(Event::ZerosKnown, s(2));
+    hall.request(Request::Park, s(3)).unwrap();
+    let mut unknown = told(State::Boot, Event::ZerosKnown);
+    assert!(!unknown.is_homed(), "nobody has told");
+    unknown.event(Event::Identified(Finding { homed: false, ..PARKED }), s(2));
+    assert!(!unknown.is_homed());
 }
 
 #[test]

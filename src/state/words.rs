@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Cause, Next, Readiness, Request, Ride, State, Trouble, Why};
+use super::{Cause, Next, Readiness, Refusal, Request, Ride, State, Trouble, Why};
 
 impl State {
     /// The state in one word, as every surface shows it.
@@ -61,7 +61,8 @@ impl fmt::Display for Next {
             Self::AwaitRest => "wait until the seats are at rest",
             Self::ParkOrHome => "park, or home",
             Self::ParkOrStart => "park, or start a show: it joins slowly",
-            Self::Home => "home, with nobody on the seats",
+            Self::Home => "home, with nobody on the seats; or disable the seat whose position is unknown",
+
             Self::Load => "load a cue, then arm",
             Self::Prove => "check the cue against the seats, then arm",
             Self::Preflight => "run preflight, then arm",
@@ -71,14 +72,54 @@ impl fmt::Display for Next {
             Self::Watch => "nothing; pause, park or stop as needed",
             Self::AwaitJoin => "nothing; the seats join again by themselves",
             Self::Resume => "resume, or park",
-            Self::Release => "release the emergency stop, then clear",
-            Self::PutRight => "put the error right at the controller, then clear",
+            Self::Release => {
+                "release the emergency stop, then clear; or disable a seat that cannot tell that it is"
+            }
+
+            Self::PutRight => "put the error right at the controller, then clear; or disable its seat",
+
             Self::AwaitStandstill => "wait until the seats stand still, then clear and home",
             Self::CheckCue => "check the cue against the seats, then clear",
             Self::LookAtSeat => "look at the seat, then clear and home again",
             Self::StopOtherMaster => "stop the other master, then clear",
             Self::Clear => "clear, then park or home",
+            Self::Restart => {
+                "clear, then park; where the positions are not read then, start the service anew"
+            }
         })
+    }
+}
+
+impl Next {
+    /// The same where a play in the foreground is led by keys, which neither home nor take out a seat.
+    #[must_use]
+    pub const fn by_keys(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Home | Self::ArmAndHome => "leave, then `kinocue home` with nobody on the seats",
+            Self::ParkOrHome => "park",
+            Self::Release => "release the emergency stop, then clear",
+            Self::PutRight => "put the error right at the controller, then clear",
+            Self::AwaitAnswers => "wait until every controller has answered, or leave",
+            Self::StopOtherMaster => "stop the other master, then leave and start the play anew",
+            Self::Clear => "clear, then park",
+            Self::Restart => "leave, then start the play anew",
+            _ => return None,
+        })
+    }
+}
+
+impl Refusal {
+    /// The same where a play in the foreground is led by keys, which neither home nor take out a seat.
+    #[must_use]
+    pub fn by_keys(&self) -> String {
+        let remedy = match self.why {
+            Why::PositionUnknown | Why::HomesFirst => "leave, then `kinocue home` with nobody on the seats",
+            Why::StillPressed => "release it at its place",
+            Why::StillWrong => "put it right there",
+            Why::NotIdentified => "wait until they answer, or leave",
+            why => why.remedy(),
+        };
+        format!("cannot {} while {}: {}; {remedy}", self.asked, self.state, self.why.words())
     }
 }
 
@@ -89,6 +130,9 @@ impl Trouble {
             Self::Drive { .. } => "a drive has an alarm",
             Self::Gate => "the limits held motion back three times in a second",
             Self::Planner => "a move could not be planned",
+            Self::Deaf => {
+                "replies were not read for too long, and nobody would have heard of an emergency stop"
+            }
             Self::Homing(_) => "a seat did not get home",
             Self::HomingTime => "homing took too long",
             Self::ParkingTime => "parking took too long",
@@ -136,6 +180,7 @@ impl Cause {
             Self::EmergencyStop(_) => "emergency stop",
             Self::Trouble(trouble) => trouble.words(),
             Self::Cleared => "cleared by the operator",
+            Self::Slept => "the machine slept, or the program was held, for more than 2 s",
         }
     }
 }
@@ -196,7 +241,7 @@ impl Why {
         match self {
             Self::NotIdentified => "wait until they answer, or disable the one that does not",
             Self::PositionsNotRead => "wait until the controllers have answered",
-            Self::PositionUnknown => "home first, with nobody on the seats",
+            Self::PositionUnknown => "home first, with nobody on the seats, or disable that seat",
             Self::HomesFirst => {
                 "see that the seats are empty, then arm with --seats-empty (seats_empty in the API)"
             }
@@ -214,8 +259,8 @@ impl Why {
             Self::Latched => "clear first",
             Self::SeatsAnywhere => "park or home first",
             Self::ArmedNow => "disarm first",
-            Self::StillPressed => "release it at its place",
-            Self::StillWrong => "put it right there",
+            Self::StillPressed => "release it at its place, or disable a seat that cannot tell that it is",
+            Self::StillWrong => "put it right there, or disable its seat",
             Self::NothingToClear => "go on",
         }
     }

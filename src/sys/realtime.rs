@@ -11,6 +11,9 @@ use rustix::thread::set_current_timer_slack;
 /// The priority asked for: above every ordinary program, with room for an operator to put something above it.
 pub const PRIORITY: u8 = 50;
 
+/// How far below the tick thread the thread is that watches over it.
+const BELOW: u8 = 10;
+
 /// How the kernel schedules a thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Policy {
@@ -73,15 +76,22 @@ pub fn normal_priority() -> io::Result<()> {
     set_scheduler(libc::SCHED_OTHER, 0)
 }
 
-/// Gives the calling thread real-time scheduling below that of a tick thread, where the system allows it: for the thread that
-/// sees what becomes of the frames, which a busy machine must not hold up, and for virtual controllers, which stand for
-/// machines of their own. Elsewhere it has ordinary scheduling.
+/// Gives the calling thread real-time service below that of a tick thread, where the system allows it: for virtual controllers,
+/// which stand for machines of their own. Elsewhere it has ordinary scheduling.
 pub fn below_the_tick_thread() {
-    if set_scheduler(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, libc::c_int::from(PRIORITY - 10)).is_err()
-    {
-        // Giving up priority needs no right.
-        let _ = normal_priority();
+    let _ = request_below(PRIORITY);
+}
+
+/// Gives the calling thread real-time service below a thread of that priority, so that what it watches over does not hang on how
+/// busy the machine is; says whether it has it. Where the kernel refuses, or that thread has none, it is an ordinary one.
+#[must_use]
+pub fn request_below(priority: u8) -> bool {
+    let below = libc::c_int::from(priority.saturating_sub(BELOW).max(1));
+    if priority > 1 && set_scheduler(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, below).is_ok() {
+        return scheduler().0 == Policy::Fifo;
     }
+    let _ = normal_priority();
+    false
 }
 
 /// Raises the limit of open files from the soft to the hard one and returns what it then is (`u64::MAX` if there is
@@ -221,6 +231,12 @@ mod tests {
             let mut refusals = Vec::new();
             request_priority(&mut refusals);
             assert_eq!(policy == Policy::Other, refusals.iter().any(|r| r.contains("LimitRTPRIO=50")));
+            if policy == Policy::Fifo {
+                assert!(request_below(priority));
+                assert_eq!(scheduler(), (Policy::Fifo, priority - BELOW));
+            }
+            assert!(!request_below(0));
+            assert_eq!(scheduler(), (Policy::Other, 0));
             normal_priority().unwrap();
             assert_eq!(scheduler(), (Policy::Other, 0));
         })

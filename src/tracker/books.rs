@@ -17,6 +17,10 @@ pub struct Reply {
     pub frame: FrameNo,
     /// What it says.
     pub code: ReplyCode,
+    /// The error number that came with it; 0 for none.
+    pub error: u16,
+    /// The inputs that came with it, bit 0 = X01.
+    pub inputs: u16,
     /// When the kernel received it.
     pub at: MonoTime,
 }
@@ -124,7 +128,7 @@ mod tests {
     }
 
     fn reply(frame: u32, at: MonoTime) -> Reply {
-        Reply { controller: 0, frame: FrameNo(frame), code: ReplyCode::Running, at }
+        Reply { controller: 0, frame: FrameNo(frame), code: ReplyCode::Running, error: 0, inputs: 0, at }
     }
 
     fn books() -> Books {

@@ -84,7 +84,8 @@ pub(crate) fn open<T>(
 ) -> (T, Numbers) {
     let book = kind.book();
     let halves = over(Arc::new(ether.clone()));
-    let house = House::over(Arc::clone(&book.config), crashed, numbers, halves).expect("the hall opens");
+    let house = House::over(Arc::clone(&book.config), crashed, numbers, &Arc::default(), halves)
+        .expect("the hall opens");
     let origin = MonoTime::from_nanos(ether.ns() + 20 * MS);
     let period = Rate::from_hz(kind.hz).period();
     house.stepped(ether, origin, |reins, line, loops| {

@@ -59,6 +59,8 @@ pub enum Event {
     SlowPlanner(u32),
     /// The planner finds no move for what it is asked next.
     Refuse,
+    /// From here on nobody reads replies, or somebody does again.
+    Deaf(bool),
 }
 
 /// A show to be played in virtual time.
@@ -136,6 +138,7 @@ impl Virtual {
             alarms: RefCell::new(alarms),
             live: &live,
             stands: &stands,
+            deaf: Cell::new(false),
         };
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
@@ -172,11 +175,19 @@ struct Hands<'a> {
     live: &'a Live,
     /// Where the last frame of each lane led it.
     stands: &'a RefCell<Vec<Pose>>,
+    deaf: Cell<bool>,
 }
 
 impl Hands<'_> {
     fn command(&self, command: Command) {
         self.commands.borrow_mut().push(command).expect("there is room");
+    }
+
+    /// Reads replies, as an ack thread does between ticks; the next time is to be soon.
+    fn hear(&self, now: MonoTime) {
+        if !self.deaf.get() {
+            self.live.expect_by(now + Duration::from_millis(105));
+        }
     }
 }
 
@@ -259,6 +270,7 @@ impl Clock for Stage<'_> {
         self.now.set(deadline.max(self.now.get()));
         self.serve_planner();
         self.beat();
+        self.hands.hear(self.now.get());
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
@@ -284,6 +296,7 @@ impl Clock for Stage<'_> {
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+                Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
                 Event::Refuse => self.planner_refuses.set(true),
                 Event::SlowPlanner(ticks) => {
                     self.planner_delay.set(*ticks);

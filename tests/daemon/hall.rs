@@ -131,13 +131,13 @@ impl Hall {
     }
 
     /// Another machine that drives the seats, past the relays, with the cue `ride`.
-    pub(crate) fn rival(&self) -> Child {
+    pub(crate) fn rival(&self, more: &[&str]) -> Child {
         let mut config = serving::hall(self.folder());
         serving::write_row(&mut config, "A", &self.sim.addresses);
         self.write("rival.toml", &config);
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
         command.arg("play").arg(self.path("cues/ride.csv")).arg("--config").arg(self.path("rival.toml"));
-        command.args(["--bind", "127.0.0.1:0"]).stdin(Stdio::null()).stdout(Stdio::null());
+        command.args(["--bind", "127.0.0.1:0"]).args(more).stdin(Stdio::null()).stdout(Stdio::null());
         command.spawn().expect("kinocue runs")
     }
 

@@ -22,6 +22,7 @@ mod lasting;
 mod library;
 mod mbox;
 mod playlist;
+mod remedies;
 mod show;
 mod signals;
 mod surfaces;

@@ -11,6 +11,9 @@ use serde_json::Value;
 
 use crate::hall::Hall;
 
+/// A rival that asks would see that it is not alone, and not begin.
+const UNASKING: [&str; 1] = ["--no-acks"];
+
 fn standing(status: &Value, controller: usize) -> &str {
     status["controllers"][controller]["standing"].as_str().expect("a word")
 }
@@ -190,7 +193,7 @@ fn a_controller_that_reboots_between_shows_is_out_until_a_person_homes_it() {
 fn another_machine_that_drives_a_seat_at_rest_is_a_fault_and_the_seat_is_homed_before_it_plays_again() {
     let hall = Hall::open();
     hall.arm("ride");
-    let mut rival = hall.rival();
+    let mut rival = hall.rival(&UNASKING);
     let fault = hall.comes_to("fault");
     assert!(fault["cause"].as_str().expect("text").contains("another master sends frames"), "{fault}");
     assert_eq!(fault["next"], "stop the other master, then clear");
@@ -223,4 +226,26 @@ fn the_halls_homing_refuses_a_controller_that_would_not_search_its_zero() {
     };
     let status = hall.wait(|status| status["state"] == "fault" && told(status));
     assert_eq!(status["cause"], "A1: a seat did not get home");
+}
+
+#[test]
+fn another_machine_that_drives_a_seat_in_mid_show_is_a_fault_that_says_so() {
+    let hall = Hall::open();
+    hall.play("night");
+    hall.lives_on(200);
+    let mut rival = hall.rival(&UNASKING);
+    let fault = hall.comes_to("fault");
+    assert!(fault["cause"].as_str().expect("text").contains("another master sends frames"), "{fault}");
+    assert_eq!(fault["next"], "stop the other master, then clear");
+    assert!(rival.wait().expect("it is ours").success());
+}
+
+#[test]
+fn a_play_does_not_begin_at_controllers_that_a_hall_has_and_sends_no_frame() {
+    let hall = Hall::open();
+    let mut play = hall.rival(&[]);
+    assert_eq!(play.wait().expect("it is ours").code(), Some(79));
+    hall.lives_on(100);
+    assert_eq!(hall.status()["state"], "parked", "a few reads are no frames");
+    assert_eq!(hall.end().motion(), 0);
 }

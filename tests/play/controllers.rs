@@ -29,13 +29,21 @@ fn a_dead_controller_costs_the_live_one_no_frame() {
 
 #[test]
 fn an_emergency_stop_shows_as_refused_frames_and_76() {
-    let (folder, sim) = (Folder::new(), Sim::one(&["--estop-at", "0.4"]));
+    // It has looked for other masters for 0.8 s by then.
+    let (folder, sim) = (Folder::new(), Sim::one(&["--estop-at", "1.3"]));
     let run = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]);
     let report = run.report_of(76);
     let one = first(&report);
     assert!(one["refused"].as_u64() > Some(0), "{one}");
     assert_eq!(one["lost"], 0, "{one}");
     assert_eq!(sim.end().controllers[0]["refused"]["emergency_stop"], one["refused"]);
+}
+
+#[test]
+fn an_emergency_stop_before_the_first_frame_ends_the_play_with_76_and_without_motion() {
+    let (folder, sim) = (Folder::new(), Sim::one(&["--estop-at", "0"]));
+    let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]).report_of(76);
+    assert_eq!(first(&report)["state"]["emergency_stop"], true, "{report}");
 }
 
 #[test]

@@ -148,11 +148,11 @@ fn level_trim_seeks_and_help_show_on_the_live_lines() {
 fn a_stop_stays_until_it_is_cleared_and_the_seats_park_once_they_have_been_read_again() {
     let mut terminal = Terminal::playing();
     terminal.press("s");
-    terminal.wait_for("stopped: stopped by the operator; next: clear, then park or home");
+    terminal.wait_for("stopped: stopped by the operator; next: clear, then park");
     terminal.press("p");
     terminal.wait_for("cannot park while stopped: it stays so until it is cleared; clear first");
     terminal.press("c");
-    terminal.wait_for("recovering: cleared by the operator; next: park, or home");
+    terminal.wait_for("recovering: cleared by the operator; next: park");
     terminal.press("p");
     terminal.wait_for("parked: the seats have parked");
     let (run, sim) = terminal.finish();

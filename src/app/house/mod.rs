@@ -107,15 +107,21 @@ pub struct Closed {
 }
 
 impl House {
-    /// Opens the frame port for a configuration; `crashed` says whether the mark of a crash was there.
+    /// Opens the frame port for a configuration; `crashed` says whether the mark of a crash was there. Where `signals` ask for
+    /// the end, the seats park and the hall closes, be it that whoever leads it does not hear them.
     ///
     /// # Errors
     /// Why not.
-    pub fn open(config: Arc<Config>, crashed: bool, numbers: &Numbers) -> Result<Self, HouseError> {
+    pub fn open(
+        config: Arc<Config>,
+        crashed: bool,
+        numbers: &Numbers,
+        signals: &Arc<AtomicBool>,
+    ) -> Result<Self, HouseError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let halves = boot::bind(&config)?;
-        Self::over(config, crashed, numbers, halves)
+        Self::over(config, crashed, numbers, signals, halves)
     }
 
     /// The same by sockets, or another network, that are open.
@@ -126,11 +132,12 @@ impl House {
         config: Arc<Config>,
         crashed: bool,
         numbers: &Numbers,
+        signals: &Arc<AtomicBool>,
         halves: (Sender, Receiver),
     ) -> Result<Self, HouseError> {
         let rate = Rate::from_hz(config.show.rate_hz);
         let opened = boot::open(&config, numbers, halves)?;
-        let desk = Arc::new(opened.desk());
+        let desk = Arc::new(opened.desk().ended_by(Arc::clone(signals)));
         let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
         let controllers = &config.controllers;
         let live = Arc::new(Live::new(controllers.len()));
@@ -196,7 +203,8 @@ impl House {
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let drains = DrainGrid::new(origin, rate.period());
-            let helpers = Helpers::start(scope, &over, acks, drains, plans).map_err(HouseError::Thread)?;
+            let helpers =
+                Helpers::start(scope, &over, &granted, acks, drains, plans).map_err(HouseError::Thread)?;
             ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
             let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &desk, &leave);

@@ -142,6 +142,13 @@ impl Keeper {
         self.set(|board| board.change(change))
     }
 
+    /// Whether an emergency stop is in effect at a controller of a group: with it the whole hall would stop.
+    fn is_pressed(&self, group: &str) -> bool {
+        let controllers = self.reins.config.controllers.iter().zip(self.reins.live.table());
+        let mut of_group = controllers.filter(|(one, _)| one.group == group);
+        of_group.any(|(_, row)| row.state.emergency_stop())
+    }
+
     /// Takes the group of a controller out.
     fn disable(&mut self, name: &str, who: &Who, why: Option<&str>) -> Result<(), Problem> {
         let why = why.map_or(Ok(None), Out::reason).map_err(|fault| {
@@ -179,6 +186,10 @@ impl Keeper {
             let detail =
                 format!("cannot enable {name} while {}: its preflight has not passed", self.known.state);
             return Err(Problem::new(Code::State, detail, "park, enable it, and run preflight"));
+        }
+        if on && self.is_pressed(&group) {
+            let detail = format!("cannot enable {name}: an emergency stop is in effect there");
+            return Err(Problem::new(Code::State, detail, "release it at its place, then enable the seat"));
         }
         self.set(|board| {
             board.enable(&group, out);

@@ -82,6 +82,7 @@ impl Keeper {
             cause: self.cause(),
             next: self.next_action(&table, now),
             arm_homes: self.known.next == Next::ArmAndHome,
+            may_clear: self.known.state.is_latched() || self.known.next == Next::Clear,
             since_s: now.since(self.known.since).as_secs_f64(),
             lapses_s: self.known.lapses(now),
             moving,

@@ -38,7 +38,7 @@ impl Said {
     pub(super) fn news(&self, news: &News) -> Option<String> {
         let (state, cause, next) = match *news {
             News::Entered { state, cause, next, .. } => (state, cause, next),
-            News::Refused(refusal) => return Some(refusal.to_string()),
+            News::Refused(refusal) => return Some(refusal.by_keys()),
             News::Unplanned(what) => return Some(self.unplanned(what)),
             News::Taken | News::NotLoaded(_) => return None,
         };
@@ -53,6 +53,7 @@ impl Said {
         }
         // Parked, the play is over.
         if state != State::Parked {
+            let next = next.by_keys().map_or_else(|| next.to_string(), str::to_owned);
             let _ = write!(text, "; {}", self.next(next));
         }
         Some(text)
@@ -162,6 +163,16 @@ mod tests {
             "cannot park while recovering: where the seats stand has not been read since they stopped; wait until the \
              controllers have answered"
         );
+    }
+
+    #[test]
+    fn it_names_nothing_that_its_keys_cannot_do() {
+        let text = |next| said().news(&entered(State::Recovering, Cause::Cleared, next)).unwrap();
+        assert!(text(Next::Home).ends_with("leave, then `kinocue home` with nobody on the seats"));
+        assert!(text(Next::ParkOrHome).ends_with("next: park"));
+        for next in Next::ALL {
+            assert!(!text(next).contains("disable"), "{next}");
+        }
     }
 
     #[test]

@@ -10,13 +10,13 @@ fn an_emergency_stop_stops_its_group_at_once_and_the_hall_is_told_once() {
     hall.observed(2, ESTOP);
     hall.look();
     assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok]);
-    assert_eq!(hall.told_hall(), [Event::EmergencyStop(1)]);
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(1), Event::Latched(Latch::Held)]);
     hall.observed(1, What::EmergencyStopOver);
     hall.look();
-    assert_eq!(hall.told_hall().len(), 1, "one is still pressed");
+    assert_eq!(hall.told_hall().len(), 2, "one is still pressed");
     hall.observed(2, What::EmergencyStopOver);
     hall.look();
-    assert_eq!(hall.told_hall()[1..], [Event::AllReleased]);
+    assert_eq!(hall.told_hall()[2..], [Event::AllReleased, Event::Latched(Latch::Over)]);
     assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok], "latched");
 }
 
@@ -27,7 +27,8 @@ fn an_emergency_stop_that_came_and_went_between_two_looks_is_told() {
     hall.observed(3, What::EmergencyStopOver);
     hall.look();
     assert_eq!(hall.health.standing(2), Standing::Stopped);
-    assert_eq!(hall.told_hall(), [Event::EmergencyStop(3), Event::AllReleased]);
+    let told = hall.told_hall();
+    assert_eq!(told, [Event::EmergencyStop(3), Event::AllReleased, Event::Latched(Latch::Over)]);
 }
 
 #[test]
@@ -69,10 +70,10 @@ fn an_error_stops_its_group_and_the_others_go_by_the_configuration() {
     hall.look();
     assert_eq!(hall.health.standing(0), Standing::Error);
     assert_eq!(hall.health.why(0), Why::Error { controller: 0, error: 21 });
-    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Pause, 0)]);
+    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Pause, 0), Event::Latched(Latch::Held)]);
     hall.observed(0, What::Error(0));
     hall.look();
-    assert_eq!((hall.health.standing(0), hall.told_hall()[1]), (Standing::Error, Event::ErrorsGone));
+    assert_eq!((hall.health.standing(0), hall.told_hall()[2]), (Standing::Error, Event::ErrorsGone));
     hall.health.look_anew(0);
     hall.run(2);
     assert_eq!(hall.health.standing(0), Standing::Rejoining);
@@ -83,7 +84,7 @@ fn a_drive_with_an_alarm_parks_whatever_the_configuration_says() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.observed(3, What::ServoError { axis: 2, error: 16 });
     hall.look();
-    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Park, 2)]);
+    assert_eq!(hall.told_hall(), [Event::Policy(Demand::Park, 2), Event::Latched(Latch::Held)]);
     assert_eq!(hall.health.why(2).to_string(), "drive of axis 2: error 16");
 }
 
@@ -95,8 +96,64 @@ fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
     hall.health.on_refused(2);
     hall.look();
     assert_eq!(hall.changes(), [(Standing::Error, Why::Refuses(2))]);
-    assert_eq!(hall.told_hall(), []);
+    assert_eq!(hall.told_hall(), [Event::Latched(Latch::Held)]);
     hall.answers_reads = true;
     hall.run(30);
-    assert_eq!((hall.health.standing(1), hall.told_hall()), (Standing::Error, vec![Event::ErrorsGone]));
+    assert_eq!(hall.health.standing(1), Standing::Error);
+    assert_eq!(hall.told_hall()[1..], [Event::ErrorsGone, Event::Latched(Latch::Over)]);
+}
+
+#[test]
+fn an_emergency_stop_at_a_controller_that_is_out_stops_the_hall_and_holds_up_nobody_until_it_takes_part() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.health.on_part(3, false);
+    hall.observed(3, ESTOP);
+    hall.look();
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(3), Event::AllReleased]);
+    hall.notices.clear();
+    hall.look();
+    assert_eq!(hall.told_hall(), []);
+    hall.health.on_part(3, true);
+    hall.look();
+    assert_eq!(hall.told_hall(), [Event::EmergencyStop(3), Event::Latched(Latch::Held)]);
+}
+
+#[test]
+fn the_hall_is_told_when_groups_that_take_part_are_held_and_when_they_wait_to_be_cleared() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.answers_reads = false;
+    let latches = |hall: &mut Hall| {
+        hall.look();
+        let told = hall.told_hall();
+        hall.notices.clear();
+        told.into_iter().filter(|event| matches!(event, Event::Latched(_))).collect::<Vec<_>>()
+    };
+    hall.observed(0, What::Error(21));
+    hall.observed(3, What::Error(12));
+    assert_eq!(latches(&mut hall), [Event::Latched(Latch::Held)]);
+    hall.observed(0, What::Error(0));
+    assert_eq!(latches(&mut hall), []);
+    hall.observed(3, What::Error(0));
+    assert_eq!(latches(&mut hall), [Event::Latched(Latch::Over)]);
+    [0, 1, 3].into_iter().for_each(|one| hall.health.on_part(one, false));
+    assert_eq!(latches(&mut hall), [Event::Latched(Latch::Free)]);
+}
+
+#[test]
+fn a_released_stop_that_holds_until_a_reset_holds_up_no_clear_and_its_seat_is_out_until_it_was_homed() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.run(100);
+    hall.observed(3, ESTOP);
+    hall.look();
+    hall.observed(3, What::EmergencyStopHeld);
+    hall.look();
+    assert!(hall.told_hall().contains(&Event::AllReleased));
+    assert_eq!(hall.health.standing(2), Standing::Stopped, "latched");
+    hall.health.look_anew(2);
+    hall.run(30);
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Excluded, Why::HeldUntilReset(3)));
+    hall.health.on_homed(3);
+    hall.observed(3, What::EmergencyStopOver);
+    hall.run(30);
+    assert_eq!(hall.health.standing(2), Standing::Rejoining);
 }

@@ -42,6 +42,9 @@ fn event() -> impl Strategy<Value = Event> {
         1 => (select(vec![Demand::Pause, Demand::Park]), 0..3_usize).prop_map(|(demand, group)| Policy(demand, group)),
         1 => (0..3_usize).prop_map(EmergencyStop),
         1 => trouble().prop_map(Event::Trouble),
+        1 => select(vec![Latch::Free, Latch::Held, Latch::Over]).prop_map(Event::Latched),
+        1 => Just(Event::ZerosKnown),
+        1 => (0..400_u64).prop_map(|seconds| Event::Slept(Duration::from_secs(seconds))),
     ]
 }
 
@@ -80,6 +83,7 @@ struct Model {
     /// The last taken request to home was one to arm, and it was not taken back.
     homes_to_arm: bool,
     astray: bool,
+    latch: Latch,
 }
 
 impl Model {
@@ -111,7 +115,10 @@ impl Model {
                 let rest = if from.may_send_motion() { State::Stopping } else { State::Stopped };
                 assert_eq!(to, rest, "stopped while {from}");
             }
-            Request::Clear if taken => assert_eq!((from.is_latched(), to), (true, State::Recovering)),
+            Request::Clear if taken => {
+                let held = matches!(from, State::Parked | State::Recovering) && self.latch == Latch::Over;
+                assert!((from.is_latched() || held) && to == State::Recovering, "cleared while {from}");
+            }
             Request::Arm | Request::HomeAndArm if taken => self.homes_to_arm = to == State::Homing,
             Request::Home | Request::Disarm if taken => self.homes_to_arm &= request == Request::Home,
             _ => {}
@@ -137,6 +144,7 @@ impl Model {
             Event::Trouble(trouble) => self.errors |= trouble.lasts(),
             Event::ErrorsGone => self.errors = false,
             Event::Astray(astray) => self.astray = astray,
+            Event::Latched(latch) => self.latch = latch,
             Event::Readiness(readiness) => self.homes_to_arm &= readiness == Readiness::Ready,
             _ => {}
         }
@@ -203,6 +211,7 @@ proptest! {
             };
             model.check(&before, turn, taken, &hall);
             to_the_show(&mut hall.clone(), now);
+            super::remedies::follow_to_the_show(&mut hall.clone(), now);
         }
     }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::*;
 
-const EVENTS: [(&str, Event); 15] = [
+const EVENTS: [(&str, Event); 17] = [
     ("identified, at park", Event::Identified(PARKED)),
     ("identified, elsewhere", Event::Identified(Finding { at_park: false, ..PARKED })),
     ("rebooted", Event::Rebooted(0)),
@@ -18,6 +18,8 @@ const EVENTS: [(&str, Event); 15] = [
     ("parked", Event::Parked),
     ("policy: pause", Event::Policy(Demand::Pause, 0)),
     ("policy: park", Event::Policy(Demand::Park, 0)),
+    ("asleep for 3 s", Event::Slept(Duration::from_secs(3))),
+    ("asleep for 6 min", Event::Slept(Duration::from_mins(6))),
     ("trouble", Event::Trouble(Trouble::Gate)),
     ("emergency stop", Event::EmergencyStop(0)),
 ];

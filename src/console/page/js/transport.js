@@ -17,7 +17,6 @@ const MAY = {
   pause: ['joining', 'playing', 'freewheeling'],
   resume: ['paused'],
   park: ['recovering', 'parked', 'armed', 'joining', 'playing', 'freewheeling', 'paused'],
-  clear: ['stopped', 'fault'],
   home: ['recovering', 'parked'],
 };
 
@@ -87,12 +86,14 @@ export function showTransport(status, link) {
   showArm(state, status?.arm_homes ?? false);
   showGo(state, status);
   showGoFrom(state, status);
-  for (const what of ['clear', 'home']) {
-    const button = byId(what);
-    // What a press would need is in the next action; these two show only where they are one.
-    setProperty(button, 'hidden', !may(what, status?.state));
-    setProperty(button, 'disabled', !may(what, state));
-  }
+  // What a press would need is in the next action; these two show only where they are one.
+  showWhere('home', may('home', status?.state), state !== null);
+  showWhere('clear', status?.may_clear ?? false, state !== null);
+}
+
+function showWhere(what, wanted, live) {
+  setProperty(byId(what), 'hidden', !wanted);
+  setProperty(byId(what), 'disabled', !wanted || !live);
 }
 
 function showArm(state, homes) {

@@ -1,0 +1,132 @@
+//! Whether what a controller counts while frames go there is what was sent from here: once a second, so that another master is
+//! known within two. How a controller is known again after a silence is of `proof`.
+
+use std::time::Duration;
+
+use super::proof::Traffic;
+use crate::time::MonoTime;
+
+/// How often it is read.
+const EVERY: Duration = Duration::from_secs(1);
+/// Controllers are not asked all at once, but so long one after the other.
+const APART: Duration = Duration::from_millis(20);
+const TURNS: usize = 50;
+/// What is compared begins anew after so long: a network that doubles a datagram now and then is no master.
+const SPAN: Duration = Duration::from_secs(10);
+/// After a longer time without a count nothing is compared.
+const STALE: Duration = Duration::from_secs(30);
+/// So many datagrams more than were sent, and one in so many of those, may be doubled ones.
+const TOLERATED: u64 = 32;
+const DOUBLED: u64 = 64;
+
+/// The counter of one controller.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Counter {
+    /// When it is to be read next.
+    next: Option<MonoTime>,
+    /// What was told, and not judged yet.
+    told: Option<u16>,
+    first: Option<Count>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Count {
+    packets: u16,
+    traffic: Traffic,
+    at: MonoTime,
+}
+
+/// What a count says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Said {
+    /// It got more than was sent.
+    Crowded,
+    /// It began anew.
+    Rebooted,
+}
+
+impl Counter {
+    pub(super) const fn hear(&mut self, packets: u16) {
+        self.told = Some(packets);
+    }
+
+    /// Whether it is time to read it; if so, the next time is due a while later.
+    pub(super) fn take_turn(&mut self, controller: usize, now: MonoTime) -> bool {
+        let turn = u32::try_from(controller % TURNS).unwrap_or_default();
+        let next = *self.next.get_or_insert(now + APART * turn);
+        let due = now >= next;
+        if due {
+            self.next = Some(now + EVERY);
+        }
+        due
+    }
+
+    /// Judges what was told by all that was sent until now, which is a little more than it can have counted.
+    pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<Said> {
+        let packets = self.told.take()?;
+        let count = Count { packets, traffic, at: now };
+        let Some(first) = self.first.filter(|first| now.since(first.at) < STALE) else {
+            self.first = Some(count);
+            return None;
+        };
+        let sent = traffic.sent - first.traffic.sent;
+        let acked = traffic.acked - first.traffic.acked;
+        let grown = u64::from(packets.wrapping_sub(first.packets));
+        let tolerated = TOLERATED + sent / DOUBLED;
+        let fits = grown <= sent + tolerated && grown + tolerated >= acked;
+        if now.since(first.at) >= SPAN || !fits {
+            self.first = Some(count);
+        }
+        if fits {
+            return None;
+        }
+        Some(if u64::from(packets) <= sent { Said::Rebooted } else { Said::Crowded })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn s(seconds: u64) -> MonoTime {
+        MonoTime::from_nanos(seconds * 1_000_000_000)
+    }
+
+    /// Counts once a second of a controller that is sent, and acks, 100 frames a second.
+    fn judge(counts: &[u16]) -> Vec<Option<Said>> {
+        let mut counter = Counter::default();
+        let mut second = 0;
+        let mut one = |packets: &u16| {
+            counter.hear(*packets);
+            second += 1;
+            counter.judge(Traffic { sent: 100 * second, acked: 100 * second }, s(second))
+        };
+        counts.iter().map(&mut one).collect()
+    }
+
+    #[test]
+    fn a_counter_that_grows_as_was_sent_says_nothing_also_over_its_end() {
+        let counts: Vec<u16> = (0..100_u16).map(|second| 60_000_u16.wrapping_add(101 * second)).collect();
+        assert_eq!(judge(&counts), [None; 100], "one in a hundred is doubled");
+    }
+
+    #[test]
+    fn another_master_is_known_by_the_second_count_after_it_began() {
+        assert_eq!(judge(&[500, 600, 750])[2], Some(Said::Crowded));
+        assert_eq!(judge(&[500, 620, 740])[2], Some(Said::Crowded), "twenty a second");
+    }
+
+    #[test]
+    fn a_counter_that_began_anew_is_a_reboot_and_the_next_is_measured_from_there() {
+        assert_eq!(judge(&[40_000, 40_100, 60, 160]), [None, None, Some(Said::Rebooted), None]);
+    }
+
+    #[test]
+    fn controllers_take_turns_and_each_is_read_once_a_second() {
+        let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
+        let mut counter = Counter::default();
+        let times: Vec<u64> =
+            (0..250).map(|tick| 10 * tick).filter(|at| counter.take_turn(3, ms(*at))).collect();
+        assert_eq!(times, [60, 1_060, 2_060]);
+    }
+}
