@@ -67,7 +67,7 @@ pub(crate) struct Line {
 
 impl Line {
     /// Somebody jogs an axis: nobody does while frames come, or have just been asked for.
-    pub(crate) fn jog(&mut self, axis: usize, mm: f64, now: u64, asked_at: u64) -> bool {
+    fn jog(&mut self, axis: usize, mm: f64, now: u64, asked_at: u64) -> bool {
         let quiet = now > self.newest + JUST && now > asked_at + JUST;
         quiet && self.there.is_empty() && self.seat.jog(axis, mm, now)
     }
@@ -129,6 +129,12 @@ impl Ether {
         let ns = ns.max(self.ns());
         self.now.store(ns, Ordering::Relaxed);
         self.world().deliver(ns);
+    }
+
+    /// Somebody jogs an axis of a seat; says whether that could be.
+    pub(crate) fn jog(&self, seat: usize, axis: usize, mm: f64, now: u64) -> bool {
+        let world = &mut *self.world();
+        world.lines[seat].jog(axis, mm, now, world.asked_at)
     }
 
     /// What has come back from a seat.

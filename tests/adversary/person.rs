@@ -137,8 +137,7 @@ impl Person {
             _ => {
                 let axis = self.dice.range(0, hall.kind.axes[seat] as u64) as usize;
                 let mm = self.dice.range(0, 120) as f64 - 60.0;
-                let world = &mut *hall.ether.world();
-                let done = world.lines[seat].jog(axis, mm, now, world.asked_at);
+                let done = hall.ether.jog(seat, axis, mm, now);
                 hall.note(|| format!("seat {}, axis {}: jogged by {mm} mm: {done}", seat + 1, axis + 1));
             }
         }
