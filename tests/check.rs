@@ -88,6 +88,11 @@ fn a_sound_cue_and_a_sound_hall_pass() {
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
     assert!(run.stdout.contains("cues/coaster.csv: passed: 6 axes"), "{}", run.stdout);
     assert!(run.stdout.contains("hall.toml: passed: 4 controllers"), "{}", run.stdout);
+    let unlooked =
+        "coaster.csv: whether a hall has its effects (air, water, wind, leg, smoke, light) was not looked at";
+    assert!(run.stdout.contains(unlooked), "{}", run.stdout);
+    let run = kinocue(&["check", CUE, "--config", HALL]);
+    assert!(!run.stdout.contains("was not looked at"), "{}", run.stdout);
 }
 
 #[test]
@@ -311,4 +316,28 @@ fn play_refuses_a_cue_without_a_passing_proof_before_anything_opens() {
     assert_eq!((run.code, run.stdout.as_str()), (Some(1), ""), "{}", run.stderr);
     assert!(run.stderr.contains("leap.csv:4:10: a2: velocity 375.0 mm/s"), "{}", run.stderr);
     assert!(run.stderr.contains("kinocue fit"), "{}", run.stderr);
+}
+
+#[test]
+fn info_measures_what_check_does_and_says_by_its_exit_code_that_a_curve_leaves_the_stroke() {
+    let folder = tempfile::tempdir().unwrap();
+    // A corner that no frame of a grid falls on that begins with the cue.
+    let text = "# interpolation: linear\ntime_ms,a1\n0,0.5\n1005,0.5\n1505,0.52\n2007,0.52\n";
+    let cue = write(folder.path(), "corner.csv", text);
+    let figures = |command: &str| {
+        let run = kinocue(&[command, &cue, "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&run.stdout).expect("one JSON object");
+        ["velocity", "acceleration", "jerk"].map(|figure| json["axes"][0][figure]["max"].as_f64().unwrap())
+    };
+    for (shown, proved) in figures("info").into_iter().zip(figures("check")) {
+        assert!((shown / proved - 1.0).abs() <= 0.02, "{shown} {proved}");
+    }
+    let text = "time_ms,a1\n0,0\n1000,0\n2000,0\n3000,1\n4000,1\n5000,1\n";
+    let run = kinocue(&["info", &write(folder.path(), "leaves.csv", text)]);
+    assert!(
+        run.code == Some(65) && run.stdout.contains("outside the stroke"),
+        "{:?} {}",
+        run.code,
+        run.stdout
+    );
 }

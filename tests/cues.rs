@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use kinocue::cue::{self, Source};
 use kinocue::motion::SeatType;
-use kinocue::time::ShowTime;
+use kinocue::proof::figures;
+use kinocue::time::{Rate, ShowTime};
 use kinocue::timeline::{EffectSet, Hint, Timeline};
 
 #[path = "../examples/make_cues/files.rs"]
@@ -47,7 +48,7 @@ fn every_cue_keeps_to_nine_tenths_of_the_bench_seat_at_100_and_1000_hz() {
         let seats = vec![Arc::clone(&seat); timeline.axes()];
         assert_eq!(timeline.fits_stroke(0..timeline.axes(), Some(&seat)).faults, None);
         for rate in [100.0, 1000.0] {
-            for (axis, figures) in timeline.figures(rate, &seats).iter().enumerate() {
+            for (axis, figures) in figures(&timeline, Rate::from_hz(rate), &seats).iter().enumerate() {
                 let seat = &figures.seat;
                 for (what, value, limit) in [
                     ("velocity", figures.velocity.value, seat.max_velocity_mm_s),

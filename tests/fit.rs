@@ -134,17 +134,62 @@ fn the_corners_of_an_editors_rows_are_rounded() {
 }
 
 #[test]
+fn a_cue_that_runs_into_the_end_of_the_stroke_is_brought_to_rest_before_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "# units: mm\ntime_ms,a1\n".to_owned();
+    // Gathers speed to 100 mm/s within half a second, and is at 0.1 mm in the end: no amplitude about 0 helps there.
+    for row in 0..=100 {
+        let t = f64::from(row) * 0.01;
+        let way = if t < 0.5 { 100.0 * t * t } else { 25.0 + 100.0 * (t - 0.5) };
+        text += &format!("{},{:.6}\n", row * 10, 75.1 - way);
+    }
+    let cue = write(folder.path(), "runs.csv", text);
+    let run = kinocue(&["check", &cue]);
+    assert!(run.code == Some(1) && run.stderr.contains("runs.csv:103:"), "{}", run.stderr);
+    assert!(
+        run.stderr.contains("a1: the cue ends at 00:01.000 in motion, -100.0 mm/s at 0.100 mm"),
+        "{}",
+        run.stderr
+    );
+    let out = path(folder.path(), "out.csv");
+    let report = fit(&[&cue, "-o", &out]);
+    assert!(report["eased_s"].as_f64().unwrap() <= 0.2, "{report}");
+    assert!(report["factors"][0] == 1.0 && report["change_mm"].as_f64().unwrap() < 10.0, "{report}");
+    assert_passes(&[&out]);
+    assert_passes(&[&out, "--rate", "1000"]);
+}
+
+#[test]
+fn vibration_beyond_what_a_seat_stands_is_lowered_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "# units: mm\ntime_s,a1,v1_hz,v1_amp\n0,75,20,30\n1,75,40,0.1\n2,75,0,0\n";
+    let cue = write(folder.path(), "shake.csv", text);
+    let run = kinocue(&["check", &cue]);
+    assert!(
+        run.code == Some(1) && run.stderr.contains("v1_amp: vibration of 30.000 mm at 20.0 Hz"),
+        "{}",
+        run.stderr
+    );
+    let out = path(folder.path(), "out.csv");
+    assert_eq!(fit(&[&cue, "-o", &out])["vibration_lowered"], 1, "the other is within them");
+    let text = std::fs::read_to_string(&out).unwrap();
+    // 1 g at 20 Hz is 0.621 mm.
+    assert!(text.contains("0,75,20,0.62") && text.contains("75,40,0.1\n"), "{text}");
+    assert_passes(&[&out]);
+}
+
+#[test]
 fn vibration_past_the_stroke_is_lowered() {
     let folder = tempfile::tempdir().unwrap();
     let cue = write(
         folder.path(),
         "shake.csv",
-        "time_s,a1,v1_hz,v1_amp\n0,0.01,20,0.02\n1,0.01,20,0.02\n2,0.01,0,0\n",
+        "time_s,a1,v1_hz,v1_amp\n0,0.01,2,0.02\n1,0.01,2,0.02\n2,0.01,0,0\n",
     );
     let out = path(folder.path(), "out.csv");
     let report = fit(&[&cue, "-o", &out]);
     assert_eq!((&report["vibration_lowered"], &report["factors"][0]), (&1.into(), &1.0.into()));
-    assert!(std::fs::read_to_string(&out).unwrap().contains("0,0.01,20,0.01\n"));
+    assert!(std::fs::read_to_string(&out).unwrap().contains("0,0.01,2,0.01\n"));
     assert_passes(&[&out]);
 }
 

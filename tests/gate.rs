@@ -13,8 +13,8 @@ mod trial;
 mod wild;
 
 use kinocue::gate::{Asked, Gate, Limit, Verdict};
-use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType, Window};
-use kinocue::time::Rate;
+use kinocue::motion::{Limits, MAX_AXES, Measure, Pose, SeatType, Spacing, Window};
+use kinocue::time::{Rate, ShowTime};
 use sound::Sound;
 use trial::{Trial, window};
 use wild::Wild;
@@ -121,4 +121,27 @@ fn after_a_rest_what_was_before_is_forgotten() {
     assert_eq!(sent(&mut gate, 60, [stands; 100]), [stands; 100], "it stands where it was");
     gate.restart(&trial::read(&bench(), at(0.25)));
     assert_eq!(sent(&mut gate, 160, [0.25; 100]), [0.25; 100]);
+}
+
+#[test]
+fn what_is_said_to_be_proved_and_runs_out_of_its_stroke_is_brought_to_rest_inside_within_the_limits() {
+    // 140 mm/s within half a second out of rest, up to the end of the stroke, and there it is over.
+    let speed = |t: f64| {
+        let u = (t / 0.5).clamp(0.0, 1.0);
+        140.0 / 150.0 * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    };
+    let mut gate = standing();
+    let mut measure = Measure::new(Spacing::at_rate(100.0));
+    let mut asked = 0.5_f64;
+    let limits = Limits::of(&SeatType::bench3(1));
+    for index in 0..300_u32 {
+        let t = f64::from(index) * 0.01;
+        asked = (asked + 0.01 * speed(t)).min(1.0);
+        let mut pose = at(asked);
+        gate.admit(&mut pose, u64::from(index), Asked::Proved);
+        let seen = measure.push(ShowTime::from_millis(i64::from(index) * 10), pose[0]);
+        assert!(seen.acceleration.value.abs() <= 1.01 * limits.acceleration, "frame {index}: {seen:?}");
+        assert!(seen.jerk.value.abs() <= 1.01 * limits.jerk, "frame {index}: {seen:?}");
+    }
+    assert!(gate.counts().beyond == 0 && gate.counts().clamps > 0, "{:?}", gate.counts());
 }

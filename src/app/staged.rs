@@ -35,8 +35,7 @@ pub struct Staged {
 pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
     let lanes = lanes(config, timeline, Manner { level: 1.0, silent: false });
     let windows: Vec<Window> = lanes.into_iter().map(|lane| lane.window).collect();
-    let pose = |at| timeline.sample(at, &mut Hint::default());
-    Headroom::measure(&windows, &Curve { pose: &pose, end: timeline.duration() }, rate)
+    Headroom::measure(&windows, timeline, rate)
 }
 
 impl Staged {

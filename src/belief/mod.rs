@@ -8,6 +8,8 @@
 
 mod evidence;
 mod span;
+#[cfg(test)]
+mod tests;
 
 use std::time::Duration;
 

@@ -78,7 +78,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     if args.json {
         print::json(&report)?;
     } else {
-        print::out(&format!("{}{}", report.text, report.tables))?;
+        let notes: String = report.notes.iter().map(|note| format!("{note}\n")).collect();
+        print::out(&format!("{}{notes}{}", report.text, report.tables))?;
         if !report.passed {
             print::tell(report.in_words().trim_end());
         }
@@ -99,6 +100,8 @@ struct Report {
     level: f64,
     trim_ms: i32,
     axes: Vec<AxisReport>,
+    /// What was not looked at.
+    notes: Vec<String>,
     #[serde(skip)]
     exits: Vec<Exit>,
     /// What is said of the files that passed.
@@ -192,6 +195,9 @@ impl Report {
             Err(faults) => return self.cue_faults(&faults),
         };
         let before = self.exits.len();
+        if judge.is_none_or(|judge| judge.hall.is_none()) {
+            self.notes.extend(unwired(path, &timeline));
+        }
         let Some(judge) = judge else {
             timeline
                 .fits_stroke(0..timeline.axes(), None)
@@ -260,6 +266,15 @@ impl Report {
         }
         text
     }
+}
+
+/// That nobody knows whether a hall has the effects of a cue, where it has some.
+fn unwired(path: &Path, timeline: &Timeline) -> Option<String> {
+    let names = timeline.effect_names();
+    (!names.is_empty()).then(|| {
+        let (path, names) = (path.display(), names.join(", "));
+        format!("{path}: whether a hall has its effects ({names}) was not looked at; --config FILE does")
+    })
 }
 
 fn hall_in_words(hall: &Config) -> String {

@@ -6,8 +6,8 @@ use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use serde::Serialize;
 
 use crate::motion::SeatType;
-use crate::proof::{AxisProof, Quantity, SLACK, Worst};
-use crate::timeline::{AxisFigures, Figure};
+use crate::proof::{AxisFigures, AxisProof, Quantity, SLACK, Worst};
+use crate::timeline::Figure;
 
 /// An axis in `--json`; positions in mm from the stroke's lower end.
 #[derive(Debug, Serialize)]

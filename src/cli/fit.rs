@@ -17,9 +17,10 @@ use crate::timeline::Timeline;
 /// Makes a cue keep the limits of its seats.
 ///
 /// Lowers its amplitude about the neutral pose just as far as needed, and never its time.
+/// A cue that ends in motion, without a way to rest from there, is brought to rest in its last stretch where that changes less.
 /// What amplitude cannot cure, as the steps of coarse sources and the corners of straight lines, --smooth takes out with a
 /// low-pass that moves nothing in time; of low-pass and amplitude it takes the pair that changes the cue least. Vibration
-/// that would leave the stroke is lowered too. What is written passes `kinocue check` on the same terms.
+/// that is more than the seat stands on top of that is lowered too. What is written passes `kinocue check` on the same terms.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue fit ride.csv -o fitted.csv",
@@ -109,6 +110,8 @@ struct Report {
     level: f64,
     /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
     factors: Vec<f64>,
+    /// The last seconds in which it is brought to rest; null where it needs none.
+    eased_s: Option<f64>,
     /// The low-pass; null where none was used.
     cut_off_hz: Option<f64>,
     /// The largest change of a position, its axis and its time.
@@ -130,6 +133,7 @@ impl Report {
             rate_hz: fitted.after.terms.rate.hz(),
             level: args.level,
             factors: fitted.factors.clone(),
+            eased_s: fitted.eased_s,
             cut_off_hz: fitted.smoothing.map(|smoothing| smoothing.cut_off_hz),
             change_mm: fitted.change.mm,
             change_axis: format!("a{}", fitted.change.axis + 1),
@@ -144,6 +148,11 @@ impl Report {
 
     fn text(&self, fitted: &Fitted) -> String {
         let mut lines = Vec::new();
+        if let Some(seconds) = self.eased_s {
+            lines.push(format!(
+                "brought to rest in its last {seconds:.2} s, as it ended in motion without room for a stop"
+            ));
+        }
         if let Some(hz) = self.cut_off_hz {
             lines.push(format!("low-pass at {hz:.2} Hz, without delay"));
         }
@@ -151,7 +160,7 @@ impl Report {
         lines.extend(lowered.map(|(axis, factor)| format!("a{}: amplitude x {factor:.4}", axis + 1)));
         if self.vibration_lowered > 0 {
             lines.push(format!(
-                "vibration lowered {} times, to stay inside the stroke",
+                "vibration lowered {} times, to keep to the stroke and to what the seat stands",
                 self.vibration_lowered
             ));
         }

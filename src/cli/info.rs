@@ -9,8 +9,9 @@ use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::plain;
-use crate::time::ShowTime;
-use crate::timeline::{AxisFigures, EffectUse, Held, Hint, Timeline};
+use crate::proof::{self, AxisFigures};
+use crate::time::{Rate, ShowTime};
+use crate::timeline::{EffectUse, Held, Hint, Timeline};
 
 /// How many marks a curve is drawn with.
 const DRAWN: u32 = 64;
@@ -50,7 +51,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     } else {
         print::out(&info.text(&timeline))?
     }
-    Ok(Exit::Done)
+    // Shown all the same; but no seat can play what leaves its stroke.
+    Ok(judge.stroke(&timeline).faults.first().map_or(Exit::Done, load::cue_exit))
 }
 
 /// What is shown of a cue.
@@ -116,7 +118,7 @@ impl Info {
     fn new(timeline: &Timeline, judge: &Judge) -> Self {
         let cue = timeline.cue();
         let seats = judge.seats(timeline.axes());
-        let figures = timeline.figures(judge.rate_hz, &seats);
+        let figures = proof::figures(timeline, Rate::from_hz(judge.rate_hz), &seats);
         let name = cue.path().display().to_string();
         let stroke = judge.stroke(timeline);
         let notes = stroke.held.iter().filter_map(|held| note(held, &figures, timeline));

@@ -159,6 +159,10 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
     let velocity = section.above_zero("max_velocity_mm_s");
     let acceleration = section.above_zero("max_acceleration_mm_s2");
     let jerk = section.above_zero("max_jerk_mm_s3");
+    let shaken = [
+        shaken(&mut section, "max_shaken_velocity_mm_s", "max_velocity_mm_s", velocity),
+        shaken(&mut section, "max_shaken_acceleration_mm_s2", "max_acceleration_mm_s2", acceleration),
+    ];
     let max_rpm = section.whole_in("max_rpm", 1..=65_535);
     let interval = section.whole_in("max_interval_ms", 1..=65_535);
     let park = fractions(&mut section, "park", axes).unwrap_or_default();
@@ -173,6 +177,8 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
         max_velocity_mm_s: velocity?,
         max_acceleration_mm_s2: acceleration?,
         max_jerk_mm_s3: jerk?,
+        max_shaken_velocity_mm_s: shaken[0],
+        max_shaken_acceleration_mm_s2: shaken[1],
         max_rpm,
         max_interval_ms: interval.unwrap_or(FACTORY_INTERVAL_MS),
         park,
@@ -185,6 +191,23 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
         return None;
     }
     Some(seat)
+}
+
+/// What motion and vibration may reach together: no less than motion alone may.
+fn shaken(
+    section: &mut Section<'_, '_, '_>,
+    key: &'static str,
+    alone: &str,
+    least: Option<f64>,
+) -> Option<f64> {
+    let most = section.above_zero(key)?;
+    if let Some(least) = least.filter(|least| most < *least) {
+        let message =
+            format!("{most} is below {alone}, {least}; motion and vibration together may do what motion may");
+        section.get(key)?.fault(section.faults, &message);
+        return None;
+    }
+    Some(most)
 }
 
 /// A pose of the seat: one fraction of the stroke for each axis.

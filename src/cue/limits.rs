@@ -22,6 +22,8 @@ pub const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);
 pub(super) const MAX_MILLIMETRES: f64 = 100_000.0;
 /// The greatest position in pulses: what a frame can carry (SMC manual 2.2.2.5).
 pub(super) const MAX_PULSES: f64 = i32::MAX as f64;
+/// The outputs that a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
+pub(super) const ALL_OUTPUTS: u16 = 0x0fff;
 /// The slowest vibration a frame can carry, Hz: a period of 65,535 x 0.125 ms (SMC manual 2.2.2.9), rounded up.
 pub const MIN_VIBRATION_HZ: f64 = 0.1221;
 /// The fastest vibration, Hz: a period of 0.125 ms (SMC manual 2.2.2.9).

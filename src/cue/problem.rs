@@ -182,7 +182,7 @@ pub enum Problem {
     #[error("{0:?} is neither 0 nor 1")]
     Switch(String),
     /// A raw output word that is none.
-    #[error("{0:?} is no output word; 0 to 65535, or 0x0 to 0xffff")]
+    #[error("{0:?} is no output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12")]
     Word(String),
     /// Octets that do not fill whole rows.
     #[error("{octets} octets are no whole rows of {axes} axes")]

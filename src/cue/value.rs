@@ -1,6 +1,6 @@
 //! Single values: from text to numbers, and whether a cue may have them.
 
-use super::limits::{MAX_TIME, MAX_VIBRATION_HZ, MIN_VIBRATION_HZ};
+use super::limits::{ALL_OUTPUTS, MAX_TIME, MAX_VIBRATION_HZ, MIN_VIBRATION_HZ};
 use super::problem::Problem;
 use super::unit::{DeclaredUnit, Unit};
 use crate::time::ShowTime;
@@ -68,10 +68,13 @@ pub(super) fn word(text: &str) -> Result<u16, Problem> {
         Some(digits) => (digits, 16),
         None => (text, 10),
     };
-    u16::from_str_radix(digits, radix)
-        .ok()
-        .filter(|_| !digits.starts_with('+'))
-        .ok_or_else(|| Problem::Word(shortened(text)))
+    let word = u16::from_str_radix(digits, radix).ok().filter(|_| !digits.starts_with('+'));
+    word.filter(|word| outputs(*word).is_ok()).ok_or_else(|| Problem::Word(shortened(text)))
+}
+
+/// A raw output word as a number: it names outputs that there are (SMC manual 2.2.2.5).
+pub(super) fn outputs(word: u16) -> Result<u16, Problem> {
+    if word & !ALL_OUTPUTS == 0 { Ok(word) } else { Err(Problem::Word(word.to_string())) }
 }
 
 /// The text, cut where it would fill the screen.
@@ -100,8 +103,8 @@ mod tests {
 
     #[test]
     fn words_are_decimal_or_hexadecimal() {
-        assert_eq!((word("65535"), word("0x0fFF")), (Ok(0xffff), Ok(0x0fff)));
-        for text in ["65536", "-1", "+1", "0x", "fff", "0x+1"] {
+        assert_eq!((word("4095"), word("0x0fFF")), (Ok(0x0fff), Ok(0x0fff)));
+        for text in ["4096", "0x1000", "65535", "65536", "-1", "+1", "0x", "fff", "0x+1"] {
             assert!(word(text).is_err(), "{text}");
         }
     }

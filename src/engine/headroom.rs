@@ -3,19 +3,22 @@
 
 use super::fader::{GATHER, RATE};
 use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
-use crate::motion::{Limits, Measure, Reading, Readings, Slot, Spacing, Window};
-use crate::plan::Curve;
+use crate::motion::{Limits, Slot, Window};
+use crate::proof::{HURRY, Loads};
 use crate::time::{Rate, ShowTime};
+use crate::timeline::Timeline;
 
 /// Show time of one entry, nanoseconds.
 const SPAN: i64 = 100_000_000;
+/// What is below this share of a limit is not measured closely: it leaves all that is ever asked.
+const LIGHT: f64 = 0.2;
 /// Entries looked at from the present on: slowing down from the greatest speed takes a tenth of a second, a quarter for a
 /// level, and the measure reaches 81 ms to either side.
 const AHEAD: usize = 4;
 /// Over which time the measure sees a change of pace begin or end, seconds: the shorter of its distances, 16 ms and more.
 const MEASURED_OVER_S: f64 = 0.016;
-/// Two hours are measured in a second at this rate, and what the measure sees hardly depends on it.
-const MEASURED_AT: f64 = 100.0;
+
+const _: () = assert!(1.0 + MAX_SPEED_UP <= HURRY, "the end of a cue is proved for the greatest pace");
 
 /// What each tenth of a second of the cue asks, at full level; built once, then only read.
 #[derive(Debug, Clone)]
@@ -28,22 +31,19 @@ pub struct Headroom {
 }
 
 impl Headroom {
-    /// Measures the cue at full level on every different slot of the windows.
+    /// Measures the cue at full level on every different slot of the windows, as its proof does: however the frames fall on
+    /// it, at the show's own rate. One phase alone may show a tenth less than the one that is met next.
     #[must_use]
-    pub fn measure(windows: &[Window], curve: &Curve<'_>, rate: Rate) -> Self {
-        let spans = usize::try_from(curve.end.as_nanos().max(0) / SPAN).unwrap_or(0) + 1;
+    pub fn measure(windows: &[Window], timeline: &Timeline, rate: Rate) -> Self {
+        let spans = usize::try_from(timeline.duration().as_nanos().max(0) / SPAN).unwrap_or(0) + 1;
         let mut loads = vec![Load::default(); spans];
-        let rate = Rate::from_hz(rate.hz().min(MEASURED_AT));
         let slots = different_slots(windows);
-        let mut measures = vec![Measure::new(Spacing::at_rate(rate.hz())); slots.len()];
-        for index in 0.. {
-            let at = ShowTime::ZERO + rate.offset(index);
-            if at > curve.end {
-                break;
-            }
-            let pose = (curve.pose)(at);
-            for ((axis, slot), measure) in slots.iter().zip(&mut measures) {
-                note(&mut loads, &measure.push(at, slot.place(pose[*axis])), slot.limits);
+        for (axis, slot) in &slots {
+            let met = Loads::of(timeline, *axis, slot, rate, SPAN, LIGHT);
+            for (index, load) in loads.iter_mut().enumerate() {
+                let [velocity, acceleration, jerk] =
+                    [&met.velocity, &met.acceleration, &met.jerk].map(|met| f64::from(met[index]));
+                load.note(velocity, acceleration, jerk, slot.limits);
             }
         }
         let greatest = loads.iter().fold(0.0, |greatest: f64, load| greatest.max(load.greatest()));
@@ -112,6 +112,16 @@ struct Load {
 }
 
 impl Load {
+    /// Keeps what is more than before.
+    fn note(&mut self, velocity: f64, acceleration: f64, jerk: f64, limits: Limits) {
+        raise(&mut self.velocity, velocity, limits.velocity);
+        raise(&mut self.velocity_by_acceleration, velocity, limits.acceleration);
+        raise(&mut self.velocity_by_jerk, velocity, limits.jerk);
+        raise(&mut self.acceleration, acceleration, limits.acceleration);
+        raise(&mut self.acceleration_by_jerk, acceleration, limits.jerk);
+        raise(&mut self.jerk, jerk, limits.jerk);
+    }
+
     fn greatest(&self) -> f64 {
         f64::from(self.velocity.max(self.acceleration).max(self.jerk))
     }
@@ -147,21 +157,6 @@ impl Load {
     }
 }
 
-/// Keeps the loads where each reading was taken.
-fn note(loads: &mut [Load], readings: &Readings, limits: Limits) {
-    let last = loads.len() - 1;
-    let index = |reading: &Reading| usize::try_from(reading.at.as_nanos() / SPAN).unwrap_or(0).min(last);
-    let Readings { velocity, acceleration, jerk, .. } = readings;
-    let load = &mut loads[index(velocity)];
-    raise(&mut load.velocity, velocity.value, limits.velocity);
-    raise(&mut load.velocity_by_acceleration, velocity.value, limits.acceleration);
-    raise(&mut load.velocity_by_jerk, velocity.value, limits.jerk);
-    let load = &mut loads[index(acceleration)];
-    raise(&mut load.acceleration, acceleration.value, limits.acceleration);
-    raise(&mut load.acceleration_by_jerk, acceleration.value, limits.jerk);
-    raise(&mut loads[index(jerk)].jerk, jerk.value, limits.jerk);
-}
-
 #[expect(clippy::cast_possible_truncation, reason = "single precision is some 1e-7 of it")]
 fn raise(kept: &mut f32, value: f64, over: f64) {
     *kept = kept.max((value.abs() / over) as f32);
@@ -169,21 +164,27 @@ fn raise(kept: &mut f32, value: f64, over: f64) {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
     use super::*;
-    use crate::motion::{MAX_AXES, Pose, SeatType};
+    use crate::cue::{self, Source};
+    use crate::motion::SeatType;
+
+    fn timeline(text: &str) -> Timeline {
+        Timeline::new(cue::read(Path::new("test.csv"), text.as_bytes(), &Source::Native).unwrap())
+    }
 
     /// Ten seconds of rest, then ten at a steady share of the seat's greatest speed, back and forth.
     fn headroom(share: f64) -> Headroom {
         let seat = SeatType { max_acceleration_mm_s2: 1e9, max_jerk_mm_s3: 1e12, ..SeatType::bench3(1) };
         let window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
-        let pose = move |at: ShowTime| -> Pose {
-            let mut pose = [0.0; MAX_AXES];
-            let swing = ((at.as_secs_f64() - 10.0).max(0.0) * 1.6 * share) % 2.0;
-            pose[0] = if swing < 1.0 { swing } else { 2.0 - swing };
-            pose
-        };
-        let curve = Curve { pose: &pose, end: ShowTime::from_millis(20_000) };
-        Headroom::measure(&[window], &curve, Rate::from_hz(100.0))
+        let mut text = "# interpolation: linear\ntime_s,a1\n0,0\n".to_owned();
+        let stroke_s = 1.0 / (1.6 * share);
+        for (turn, place) in (0..16).zip([0.0, 1.0].into_iter().cycle()) {
+            writeln!(text, "{},{place}", 10.0 + stroke_s * f64::from(turn)).unwrap();
+        }
+        Headroom::measure(&[window], &timeline(&text), Rate::from_hz(100.0))
     }
 
     #[test]
@@ -205,6 +206,24 @@ mod tests {
     #[test]
     fn the_limit_is_seen_coming() {
         assert_eq!(headroom(1.0).pace(ShowTime::from_millis(9_750), 1.0), 0.0);
+    }
+
+    #[test]
+    fn what_only_one_phase_of_the_grid_shows_is_no_room() {
+        // A bump between two frames of a grid that begins with the cue.
+        let text = "# interpolation: linear\ntime_ms,a1\n0,0.5\n1000,0.5\n1005,0.501\n1010,0.5\n2000,0.5\n";
+        let (timeline, rate, seat) = (timeline(text), Rate::from_hz(100.0), SeatType::bench3(1));
+        let window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
+        let room = Headroom::measure(&[window], &timeline, rate);
+        let digest = crate::proof::Digest::of(timeline.cue());
+        let terms = crate::proof::Terms::of_seat(std::sync::Arc::new(seat), 1, digest, rate, 1.0);
+        let jerk = crate::proof::prove(&timeline, terms).axes[0].jerk;
+        assert!(
+            room.greatest >= 0.98 * jerk.value / jerk.limit && jerk.value > 0.0,
+            "{} {jerk:?}",
+            room.greatest
+        );
+        assert_eq!(room.pace(ShowTime::from_millis(1_000), 1.0), 0.0);
     }
 
     #[test]

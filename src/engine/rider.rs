@@ -278,7 +278,8 @@ impl Rider {
 
     /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the gate lets it pass.
     ///
-    /// Following its course at a level that stands it needs no way out: course and cue are within the limits to their ends.
+    /// Following its course at a level that stands its way out is part of the proof: course and cue are within the limits to
+    /// their ends, and from there to rest.
     pub(super) fn send(&mut self, index: u64, time: Duration, mut pose: Pose) {
         let proved = self.part == Part::With && self.fader.is_still();
         let asked = if proved { Asked::Proved } else { Asked::Anyhow };

@@ -60,7 +60,8 @@ impl Engine {
             (Phase::Riding, Some(switch)) if switch.is_near(self.playhead + SLOWING) => {
                 self.slew.advance(time, 0.0)
             }
-            (Phase::Riding, _) if self.is_wanted_elsewhere() || self.reached < self.course.parked() => {
+            // A join may meet a cue that leaves nothing; what the cue leaves later on says nothing of the move before.
+            (Phase::Riding, _) if self.is_wanted_elsewhere() || self.reached < self.course.settled() => {
                 self.slew.advance(time, 0.0)
             }
             (Phase::Riding, _) => {

@@ -1,8 +1,7 @@
 //! One axis that is not simply let pass: it brakes, waits at rest, and is led back.
 
-use super::brake::Brake;
 use super::limits::{AxisLimits, SLACK};
-use crate::motion::{Measure, Spacing};
+use crate::motion::{Halt, Measure, Spacing};
 use crate::time::ShowTime;
 
 /// What the way back takes at the least, as a join does.
@@ -19,7 +18,7 @@ pub(super) enum Mode {
     Following,
     /// Comes to rest, and stays there.
     Braking {
-        brake: Brake,
+        brake: Halt,
         /// Seconds on it.
         after: f64,
     },
@@ -33,7 +32,7 @@ pub(super) struct Axis {
     pub(super) limits: AxisLimits,
     pub(super) mode: Mode,
     /// The last way to rest that was looked for in good time, and the frame from whose pose it begins.
-    pub(super) way_out: Option<(u64, Brake)>,
+    pub(super) way_out: Option<(u64, Halt)>,
     /// Which of the ways to rest did last.
     pub(super) habit: usize,
     fade: f64,
@@ -68,7 +67,7 @@ impl Axis {
     }
 
     /// Goes onto a way to rest, `seconds` of which the next frame takes.
-    pub(super) fn brake(&mut self, brake: Brake, seconds: f64) -> f64 {
+    pub(super) fn brake(&mut self, brake: Halt, seconds: f64) -> f64 {
         match self.mode {
             Mode::Returning { .. } => self.stretch = (2.0 * self.stretch).min(LONGEST),
             Mode::Following => self.asked.forget(),

@@ -7,7 +7,6 @@
 //! for as long as the measure looks back, it fades from rest onto it.
 
 mod axis;
-mod brake;
 mod calm;
 mod counts;
 mod history;
@@ -18,7 +17,6 @@ mod times;
 pub use counts::{Clamp, Counts, Limit};
 
 use axis::{Axis, Mode};
-use brake::Brake;
 use calm::Calm;
 use counts::Counter;
 use history::{Difference, History};
@@ -27,8 +25,12 @@ use outlook::Outlook;
 use times::Times;
 
 use crate::belief::KnownPose;
-use crate::motion::{MAX_AXES, Pose, Spacing, Window};
+use crate::motion::{AxisState, Halt, Limits, MAX_AXES, Pose, Spacing, Window};
 use crate::time::Rate;
+
+/// What the turn of a pose that was proved may lie outside the stroke, in strokes: what poses show of a motion is off by
+/// some thousandths of a millimetre.
+const ROOM_SLACK: f64 = 1e-4;
 
 /// What became of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +46,8 @@ pub enum Verdict {
 /// What is known of a pose that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
-    /// It lies on a cue whose limits were proved, or on a move that was planned within them, which go on from there.
+    /// It lies on a cue whose limits were proved up to rest after its last pose, or on a move that was planned within them
+    /// and ends at rest or on the cue.
     Proved,
     /// Nothing.
     Anyhow,
@@ -222,8 +225,7 @@ impl Gate {
             }
             return (self.brake(axis, frame), broken);
         }
-        // What was proved to its end leads on within the limits by itself; it need not be ready to stop as well.
-        if held && (by == Asked::Proved || self.leaves_a_way_out(axis, &next, frame)) {
+        if held && self.leads_on(axis, &next, frame, by) {
             self.axes[axis].take_up(mode);
             return (wish, broken);
         }
@@ -231,6 +233,28 @@ impl Gate {
         let (limit, times) = exceeded(&self.axes[axis].limits, &next);
         self.counter.refused(Clamp { axis, asked, allowed, limit, times });
         (allowed, true)
+    }
+
+    /// Whether a way to rest goes on from this pose.
+    ///
+    /// Of what was proved, one does: it can be followed to its end within the limits, and from its last pose a way to rest
+    /// within them is part of the proof (`proof::end`); a planned move ends at rest or on the cue. The stroke has room for a
+    /// stop at once as well, since what turns inside it leaves room to turn sooner. That much is asked here all the same, in
+    /// closed form: what was said to be proved and runs out of its stroke is refused while there is room left.
+    fn leads_on(&mut self, axis: usize, next: &Next, frame: &Frame, by: Asked) -> bool {
+        (by == Asked::Proved && self.has_room(axis, next, frame)) || self.leaves_a_way_out(axis, next, frame)
+    }
+
+    /// Whether the axis can turn inside the stroke, by what its last poses show of its motion.
+    fn has_room(&self, axis: usize, next: &Next, frame: &Frame) -> bool {
+        let AxisLimits { velocity, acceleration, jerk, .. } = self.axes[axis].limits;
+        let limits = Limits { velocity, acceleration, jerk };
+        frame.differences.iter().zip(next.shown).any(|(difference, shown)| {
+            let (velocity, acceleration) = difference.newest(shown);
+            let acceleration = acceleration.clamp(-limits.acceleration, limits.acceleration);
+            let state = AxisState { position: next.position, velocity, acceleration };
+            Halt::least_past(state, limits, 1.0) <= ROOM_SLACK
+        })
     }
 
     /// Whether the axis can come to rest after this pose; the way is kept for the next tick.
@@ -252,7 +276,7 @@ impl Gate {
 
     /// Goes onto a way to rest: the one kept from the tick before, or one that is looked for now.
     fn brake(&mut self, axis: usize, frame: &Frame) -> f64 {
-        let begins_here = |&(index, _): &(u64, Brake)| index + 1 == frame.index;
+        let begins_here = |&(index, _): &(u64, Halt)| index + 1 == frame.index;
         if let Some((_, brake)) = self.axes[axis].way_out.take_if(|way| begins_here(way)) {
             let position = brake.position(frame.seconds);
             let next = self.next(axis, position, frame);

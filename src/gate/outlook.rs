@@ -1,11 +1,10 @@
 //! Whether an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
 
-use super::brake::{Begun, Brake, Means, Motion};
 use super::calm::LEVEL;
 use super::history::{Difference, History};
 use super::limits::AxisLimits;
 use super::times::Times;
-use crate::motion::Spacing;
+use crate::motion::{AxisState, Begun, Halt, Means, Spacing};
 
 /// Poses that a difference can span, without the newest.
 const PAST: usize = 82;
@@ -88,7 +87,7 @@ impl<'a> Outlook<'a> {
     }
 
     /// A way to rest within the limits, and its place among the ways; `first` is tried before all others.
-    pub(super) fn way(&mut self, first: usize) -> Option<(Brake, usize)> {
+    pub(super) fn way(&mut self, first: usize) -> Option<(Halt, usize)> {
         let order = std::iter::once(first).chain((0..WAYS).filter(|&way| way != first));
         for way in order {
             if let Some(brake) = self.brake(way)
@@ -101,8 +100,8 @@ impl<'a> Outlook<'a> {
     }
 
     /// The way to rest that exceeds the limits least.
-    pub(super) fn least(&mut self) -> Brake {
-        let mut least: Option<(Brake, f64)> = None;
+    pub(super) fn least(&mut self) -> Halt {
+        let mut least: Option<(Halt, f64)> = None;
         for way in 0..WAYS {
             let Some(brake) = self.brake(way) else { continue };
             let worst = self.worst(&brake, least.map_or(f64::INFINITY, |(_, worst)| worst));
@@ -113,7 +112,7 @@ impl<'a> Outlook<'a> {
         least.expect("ways that are not aimed are always there").0
     }
 
-    fn brake(&self, way: usize) -> Option<Brake> {
+    fn brake(&self, way: usize) -> Option<Halt> {
         let share = SHARES[way % SHARES.len()];
         let (kind, rest) = (way / OF_A_KIND, way % OF_A_KIND / SHARES.len());
         let (part, cubic) = (PARTS[rest % PARTS.len()], rest < PARTS.len());
@@ -128,7 +127,7 @@ impl<'a> Outlook<'a> {
         let velocity = velocity.clamp(-limits.velocity, limits.velocity);
         let most = PLANNED * limits.acceleration;
         let excess = acceleration.clamp(-most, most) - acceleration;
-        let from = Motion { position: self.positions[PAST - 1], velocity, acceleration }.nudged_by(
+        let from = AxisState { position: self.positions[PAST - 1], velocity, acceleration }.nudged_by(
             excess,
             limits.jerk,
             Begun::Earlier,
@@ -139,15 +138,15 @@ impl<'a> Outlook<'a> {
             jerk: share.1 * limits.jerk,
         };
         match kind {
-            0 => Some(Brake::new(from, means)),
-            1 => Brake::nudged(from, means, Begun::Now),
-            2 => Brake::nudged(from, means, Begun::Earlier),
-            _ => Brake::turned(from, means),
+            0 => Some(Halt::new(from, means)),
+            1 => Halt::nudged(from, means, Begun::Now),
+            2 => Halt::nudged(from, means, Begun::Earlier),
+            _ => Halt::turned(from, means),
         }
     }
 
     /// The greatest share of a limit that the brake takes; at least `enough` where it stops looking.
-    fn worst(&mut self, brake: &Brake, enough: f64) -> f64 {
+    fn worst(&mut self, brake: &Halt, enough: f64) -> f64 {
         let frames_ahead = self.frames_ahead(brake);
         let mut worst = 0.0_f64;
         for place in PAST..PAST + frames_ahead {
@@ -161,7 +160,7 @@ impl<'a> Outlook<'a> {
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "held inside the room")]
-    fn frames_ahead(&self, brake: &Brake) -> usize {
+    fn frames_ahead(&self, brake: &Halt) -> usize {
         let until_rest = (brake.seconds() / self.period).ceil().min(frames(AHEAD)) as usize;
         (until_rest + 3 * self.spacing.m + 1).min(AHEAD)
     }

@@ -2,14 +2,14 @@
 //! anything that the tick thread calls.
 
 mod brake;
+mod halt;
 mod measure;
-mod scan;
 mod seat;
 mod window;
 
 pub use brake::{AxisState, Brake};
+pub(crate) use halt::{Begun, Halt, Means};
 pub use measure::{Measure, Reading, Readings, Spacing};
-pub use scan::{Peak, Peaks, scan};
 pub use seat::{FACTORY_INTERVAL_MS, Pulses, SeatType, in_stroke};
 pub use window::{Limits, Slot, Window};
 

@@ -7,6 +7,9 @@ const FACTORY_RPM: u32 = 3_000;
 /// The longest Time that a controller executes as it leaves the factory, ms (PA0b, IMAX manual 2.3.1).
 pub const FACTORY_INTERVAL_MS: u32 = 3_000;
 
+/// Free fall, mm/s².
+const FREE_FALL_MM_S2: f64 = 9_806.65;
+
 /// A motor position as the controller counts it: whole pulses from the lower end of the stroke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Pulses(pub i32);
@@ -30,6 +33,10 @@ pub struct SeatType {
     pub max_acceleration_mm_s2: f64,
     /// Greatest jerk, mm/s³, above 0.
     pub max_jerk_mm_s3: f64,
+    /// Greatest speed of motion and vibration together, mm/s, where the site says what it is.
+    pub max_shaken_velocity_mm_s: Option<f64>,
+    /// Greatest acceleration of motion and vibration together, mm/s², where the site says what it is.
+    pub max_shaken_acceleration_mm_s2: Option<f64>,
     /// The controller's own limit on speed, turns a minute (PA07), where the site says what it is.
     pub max_rpm: Option<u32>,
     /// The longest Time that the controller executes as it is, ms (PA0b).
@@ -53,6 +60,8 @@ impl SeatType {
             max_velocity_mm_s: 240.0,
             max_acceleration_mm_s2: 3_000.0,
             max_jerk_mm_s3: 60_000.0,
+            max_shaken_velocity_mm_s: None,
+            max_shaken_acceleration_mm_s2: None,
             max_rpm: None,
             max_interval_ms: FACTORY_INTERVAL_MS,
             park: [0.0; MAX_AXES],
@@ -70,6 +79,21 @@ impl SeatType {
     #[must_use]
     pub fn speed_ceiling_mm_s(&self) -> f64 {
         f64::from(self.max_rpm.unwrap_or(FACTORY_RPM)) * self.lead_mm / 60.0
+    }
+
+    /// How fast motion and vibration together may be, mm/s: as fast as the controller lets an axis move, unless the site says
+    /// less. What is faster is cut there, so the axis would not swing as it is said, and lag behind the cue.
+    #[must_use]
+    pub fn shaken_velocity_mm_s(&self) -> f64 {
+        self.max_shaken_velocity_mm_s.unwrap_or(f64::INFINITY).min(self.speed_ceiling_mm_s())
+    }
+
+    /// How hard motion and vibration together may accelerate, mm/s²: at 1 g at the most, unless the site says otherwise. A
+    /// seat that falls any harder leaves the person on it, and meets them again at the bottom of the swing. Where motion
+    /// alone may be harder, vibration may not add to that.
+    #[must_use]
+    pub fn shaken_acceleration_mm_s2(&self) -> f64 {
+        self.max_shaken_acceleration_mm_s2.unwrap_or(FREE_FALL_MM_S2.max(self.max_acceleration_mm_s2))
     }
 
     /// Where the motor stands at `fraction` of the stroke: rounded to nearest, ties away from zero, saturating.

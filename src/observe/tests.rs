@@ -1,5 +1,5 @@
 use super::*;
-use crate::wire::{FrameNo, Timing, VibrationPort, Words};
+use crate::wire::{Access, DP_INPUTS, FrameNo, MAX_LEN, RegisterReply, Timing, VibrationPort, Words};
 
 const X01: u16 = 0b0001;
 const STATION: Code = Code(0x0fc9);
@@ -71,6 +71,22 @@ fn a_configured_input_means_an_emergency_stop_until_its_last_sign_is_gone() {
     observer.on_reply(0, &reply(ReplyCode::Running, 0, 0), at(4));
     let words: Vec<u64> = happened(&observer).into_iter().map(|(ms, _)| ms).collect();
     assert_eq!(words, [1, 4]);
+}
+
+#[test]
+fn an_input_that_is_read_tells_of_an_emergency_stop_too_and_that_it_is_over() {
+    let mut observer = observer(Dialect::Mbox);
+    let mut read = |ms, channel, code, inputs: u16| {
+        let (data, access) = ([inputs], Access::Read);
+        let data = Words::from(&data[..]);
+        let reply = RegisterReply { access, code, channel, error: 0, start: DP_INPUTS, num: 1, data };
+        assert!(!observer.hear(0, reply.emit(&mut [0; MAX_LEN]), at(ms)), "somebody asked for it");
+        observer.states()[0].emergency_stop()
+    };
+    assert!(read(1, 0, ReplyCode::Running, X01));
+    assert!(read(2, 1, ReplyCode::Running, 0), "of another table");
+    assert!(read(3, 0, ReplyCode::Fault, 0), "no value, but an error number");
+    assert!(!read(4, 0, ReplyCode::Running, !X01));
 }
 
 #[test]

@@ -48,7 +48,6 @@ pub struct Course {
     pub start: ShowTime,
     legs: Vec<Leg>,
     settled: ShowTime,
-    parked: ShowTime,
 }
 
 impl Course {
@@ -56,22 +55,13 @@ impl Course {
     #[must_use]
     pub fn new(serial: u32, start: ShowTime, legs: Vec<Leg>) -> Self {
         let settled = legs.iter().map(Leg::settled).fold(start, ShowTime::max);
-        let parking = legs.iter().filter(|leg| leg.then == After::Rest);
-        let parked = parking.map(Leg::settled).fold(start, ShowTime::max);
-        Self { serial, start, legs, settled, parked }
+        Self { serial, start, legs, settled }
     }
 
     /// The show time at which the last of its moves has ended.
     #[must_use]
     pub const fn settled(&self) -> ShowTime {
         self.settled
-    }
-
-    /// The show time at which the last of its lanes that come to rest does so. Their moves use nearly all of the limits, and
-    /// leave no room for a faster pace.
-    #[must_use]
-    pub const fn parked(&self) -> ShowTime {
-        self.parked
     }
 
     /// Whether a lane follows the cue at a show time.

@@ -16,7 +16,8 @@ pub(super) type Before<'a, 'b> = &'a mut (dyn FnMut(ShowTime) -> Pose + 'b);
 /// Where the frames fall against a seam is not known beforehand: so many phases of the grid are looked at.
 const PHASES: i64 = 4;
 
-/// The worst of acceleration and jerk around an instant: 1 is just within the limits.
+/// The worst of velocity, acceleration and jerk around an instant: 1 is just within the limits. A move that meets a fast cue
+/// while it slows down was faster before.
 pub(super) fn roughness_around(
     window: &Window,
     middle: ShowTime,
@@ -35,6 +36,7 @@ pub(super) fn roughness_around(
             for ((slot, axis), measure) in window.moving().zip(&mut measures) {
                 let readings = measure.push(at, pose[slot]);
                 worst = worst
+                    .max(readings.velocity.value.abs() / axis.limits.velocity)
                     .max(readings.acceleration.value.abs() / axis.limits.acceleration)
                     .max(readings.jerk.value.abs() / axis.limits.jerk);
             }

@@ -11,6 +11,9 @@ use crate::motion::Limits;
 /// States nearer than this are the same: a start equal to its target up to rounding makes the solver fail.
 const SAME: f64 = 1e-9;
 
+/// A move that ends farther than this from its target, in strokes or strokes per second, does not lead there.
+const MISSED: f64 = 1e-5;
+
 /// A seat at the very end of its stroke is not refused for the last bit of its position.
 const ROUNDING: f64 = 1e-6;
 
@@ -60,10 +63,26 @@ fn solve(problem: &Problem<'_>, sync: Synchronization, interface: ControlInterfa
     let mut trajectory = Trajectory::<0>::new(Some(axes));
     match Ruckig::<0, ThrowErrorHandler>::new(Some(axes), 0.001).calculate(&input, &mut trajectory) {
         // Some refusals come as a result that is an error.
-        Ok(RuckigResult::Working | RuckigResult::Finished) => Ok(Plan::new(trajectory, axes)),
+        Ok(RuckigResult::Working | RuckigResult::Finished) => {
+            arrived(problem, Plan::new(trajectory, axes), interface)
+        }
         Ok(refusal) => Err(format!("{refusal:?}")),
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// The plan, if it ends where it was to: of a minimum duration the solver sometimes makes a move that does not, and says nothing.
+fn arrived(problem: &Problem<'_>, mut plan: Plan, interface: ControlInterface) -> Result<Plan, String> {
+    let ends = plan.seconds();
+    let misses = |(ends, to): (AxisState, &AxisState)| {
+        let position =
+            interface == ControlInterface::Position && (ends.position - to.position).abs() > MISSED;
+        position || (ends.velocity - to.velocity).abs() > MISSED
+    };
+    if plan.states_at(ends).zip(problem.to).any(misses) {
+        return Err("its move ends elsewhere".to_owned());
+    }
+    Ok(plan)
 }
 
 fn snapped(problem: &Problem<'_>, axis: usize) -> AxisState {

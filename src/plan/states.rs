@@ -31,13 +31,16 @@ pub(super) fn following_by_slot(window: &Window, cue: &Curve<'_>, at: ShowTime) 
     })
 }
 
-/// The same at the cue's very end, from the poses before it alone.
+/// The same at the cue's very end, from the poses before it alone: of the cubic through four of them, since a parabola is off
+/// by a third of the jerk times the square of their distance, 8 mm/s at the limit of the bench seat. Those are nearer to each
+/// other, for what the jerk itself changes meanwhile.
 fn leaving(window: &Window, cue: &Curve<'_>, at: ShowTime) -> [AxisState; MAX_AXES] {
-    let [now, before, earlier] = [at, at - APART, at - 2 * APART].map(|at| window.place(&(cue.pose)(at)));
-    let h = APART.as_secs_f64();
+    let apart = APART / 2;
+    let [now, one, two, three] = [0, 1, 2, 3].map(|back| window.place(&(cue.pose)(at - back * apart)));
+    let h = apart.as_secs_f64();
     std::array::from_fn(|slot| AxisState {
         position: now[slot],
-        velocity: (3.0 * now[slot] - 4.0 * before[slot] + earlier[slot]) / (2.0 * h),
-        acceleration: (now[slot] - 2.0 * before[slot] + earlier[slot]) / (h * h),
+        velocity: (11.0 * now[slot] - 18.0 * one[slot] + 9.0 * two[slot] - 2.0 * three[slot]) / (6.0 * h),
+        acceleration: (2.0 * now[slot] - 5.0 * one[slot] + 4.0 * two[slot] - three[slot]) / (h * h),
     })
 }

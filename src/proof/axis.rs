@@ -1,14 +1,14 @@
-//! One axis of the cue on one seat: position, velocity, acceleration and jerk, and vibration on top.
+//! One axis of the cue on one seat: position, velocity, acceleration and jerk, up to rest after the last pose.
 
 use std::sync::Arc;
 
+use super::end::{Allowed, NoRest, no_rest};
 use super::pieces::{At, Pieces, extremes};
 use super::stencil::{Stencils, step_limit};
 use super::sweep::{Swept, sweep};
 use super::violation::{Breach, Quantity};
 use super::{Found, SLACK, Terms, Worst};
-use crate::cue::{Step, Vibration};
-use crate::motion::{SeatType, Slot};
+use crate::motion::{AxisState, Limits, SeatType, Slot};
 use crate::time::ShowTime;
 use crate::timeline::{Figure, Timeline};
 
@@ -74,20 +74,25 @@ impl Subject<'_> {
     /// Proves the axis; what is broken goes to `found`.
     pub(super) fn prove(&self, terms: &Terms, stencils: &Stencils, found: &mut Vec<Found>) -> AxisProof {
         let pieces = Pieces::new(self.timeline, self.axis, &self.slot);
-        let limits = self.slot.limits;
-        let ceiling = self.seat.speed_ceiling_mm_s() / self.seat.stroke_mm;
-        let step = step_limit(limits.acceleration, terms.rate);
+        let Allowed { limits, step, .. } = self.allowed(terms);
         let mut judge = |quantity, stencils: &[_], order, limit: f64| {
             let swept = sweep(&pieces, stencils, order, limit * SLACK);
             self.note(quantity, &swept, limit, found);
             self.worst(&swept, limit)
         };
-        let velocity = judge(Quantity::Velocity, &stencils.velocity, 1, limits.velocity.min(ceiling));
+        let velocity = judge(Quantity::Velocity, &stencils.velocity, 1, limits.velocity);
         let step = judge(Quantity::Step, &stencils.step, 2, step);
         let acceleration = judge(Quantity::Acceleration, &stencils.acceleration, 2, limits.acceleration);
         let jerk = judge(Quantity::Jerk, &stencils.jerk, 3, limits.jerk);
+        let keeps =
+            [&velocity, &step, &acceleration, &jerk].iter().all(|worst| worst.margin() >= 1.0 - SLACK);
+        if keeps {
+            // What breaks a limit before its end is mended first.
+            let no_rest = no_rest(&pieces, &self.allowed(terms), stencils);
+            found.extend(no_rest.map(|no_rest| self.restless(&pieces, no_rest)));
+        }
         let (lowest, highest) = extremes(self.timeline, self.axis, &self.slot);
-        let shaken = self.shaken(&pieces, terms, found);
+        let shaken = self.shaken(&pieces, terms, stencils, found);
         AxisProof {
             axis: self.axis,
             seat: Arc::clone(self.seat),
@@ -107,8 +112,35 @@ impl Subject<'_> {
         Worst { value, limit: limit * self.seat.stroke_mm, at, line }
     }
 
+    /// What the axis may do: the limits of its seat, and no faster than the controller lets it move.
+    pub(super) fn allowed(&self, terms: &Terms) -> Allowed {
+        let Limits { velocity, acceleration, jerk } = self.slot.limits;
+        let velocity = velocity.min(self.seat.speed_ceiling_mm_s() / self.seat.stroke_mm);
+        Allowed {
+            limits: Limits { velocity, acceleration, jerk },
+            step: step_limit(acceleration, terms.rate),
+            pulse: self.slot.stroke_pulses.recip(),
+        }
+    }
+
+    fn restless(&self, pieces: &Pieces, no_rest: NoRest) -> Found {
+        let (mm, seat) = (self.seat.stroke_mm, self.seat.name.clone());
+        let at = ShowTime::from_nanos(pieces.end());
+        let AxisState { position, velocity, .. } = pieces.last_motion();
+        let (position, velocity) = (position * mm, velocity * mm);
+        let breach = match no_rest {
+            NoRest::NoRoom { missing } => {
+                Breach::NoRoomToRest { velocity, position, missing: missing * mm, stroke: mm, seat, at }
+            }
+            NoRest::TooRough { quantity, value, limit } => {
+                Breach::TooRoughToRest { velocity, quantity, value: value * mm, limit: limit * mm, seat, at }
+            }
+        };
+        Found { at, axis: Some(self.axis), column: format!("a{}", self.axis + 1), breach }
+    }
+
     /// In mm, with the line of the row at or before it.
-    fn figure(&self, met: At) -> Figure {
+    pub(super) fn figure(&self, met: At) -> Figure {
         let at = ShowTime::from_nanos(met.at);
         let line = self.timeline.cue().line(self.timeline.row_before(at));
         Figure { value: met.value * self.seat.stroke_mm, at, line }
@@ -130,80 +162,5 @@ impl Subject<'_> {
                 until: ShowTime::from_nanos(stretch.until),
             },
         }));
-    }
-
-    /// The ends that the axis reaches while it vibrates.
-    fn shaken(&self, pieces: &Pieces, terms: &Terms, found: &mut Vec<Found>) -> Option<(At, At)> {
-        let steps = self.timeline.cue().vibration().get(self.axis)?.as_slice();
-        let mut ends: Option<(At, At)> = None;
-        // A pulse for the rounding of the position and that of the amplitude.
-        let slack = self.slot.stroke_pulses.recip();
-        let mut outside_before = false;
-        for (index, step) in steps.iter().enumerate() {
-            let Some((low, high, amplitude)) = self.swing(pieces, terms, step, steps.get(index + 1)) else {
-                outside_before = false;
-                continue;
-            };
-            ends = Some(ends.map_or((low, high), |(least, most)| {
-                (
-                    if low.value < least.value { low } else { least },
-                    if high.value > most.value { high } else { most },
-                )
-            }));
-            let outside = low.value < -slack || high.value > 1.0 + slack;
-            if outside && !outside_before {
-                let worst = if -low.value > high.value - 1.0 { low } else { high };
-                found.push(self.past_stroke(worst, amplitude, low));
-            }
-            outside_before = outside;
-        }
-        ends
-    }
-
-    /// The lowest and highest point of a vibration, in strokes, and its amplitude.
-    fn swing(
-        &self,
-        pieces: &Pieces,
-        terms: &Terms,
-        step: &Step<Vibration>,
-        next: Option<&Step<Vibration>>,
-    ) -> Option<(At, At, f64)> {
-        let amplitude = step.value.amplitude * self.slot.scale().0;
-        if step.value.hz <= 0.0 || amplitude <= 0.0 {
-            return None;
-        }
-        // What a frame switches acts while the axis moves to the frame's pose, a period later.
-        let until = next.map_or(self.timeline.duration(), |next| next.at + terms.rate.period());
-        let (low, high) = pieces.range(step.at.as_nanos(), until.as_nanos());
-        let low = At { value: low.value - amplitude, ..low };
-        Some((low, At { value: high.value + amplitude, ..high }, amplitude))
-    }
-
-    /// The largest amplitude that the stroke has room for while a vibration lasts, in the cue's unit; none where nothing
-    /// vibrates.
-    pub(super) fn most_amplitude(&self, pieces: &Pieces, terms: &Terms, index: usize) -> Option<f64> {
-        let steps = self.timeline.cue().vibration().get(self.axis)?.as_slice();
-        let (low, high, amplitude) = self.swing(pieces, terms, steps.get(index)?, steps.get(index + 1))?;
-        let room = (low.value + amplitude).min(1.0 - (high.value - amplitude));
-        Some(room.max(0.0) / self.slot.scale().0)
-    }
-
-    fn past_stroke(&self, worst: At, amplitude: f64, low: At) -> Found {
-        let mm = self.seat.stroke_mm;
-        let is_low = worst.at == low.at && worst.value == low.value;
-        let position = if is_low { worst.value + amplitude } else { worst.value - amplitude };
-        let at = ShowTime::from_nanos(worst.at);
-        Found {
-            at,
-            axis: Some(self.axis),
-            column: format!("v{}_amp", self.axis + 1),
-            breach: Breach::VibrationPastStroke {
-                amplitude: amplitude * mm,
-                position: position * mm,
-                stroke: mm,
-                seat: self.seat.name.clone(),
-                at,
-            },
-        }
     }
 }

@@ -1,9 +1,13 @@
-//! Makes a cue keep its limits: amplitude about the neutral pose, never time; and vibration that would leave the stroke.
+//! Makes a cue keep its limits: amplitude about the neutral pose, never time; a last stretch that comes to rest, where that
+//! changes less; and vibration that is more than the seat stands on top of that.
 
 use std::sync::Arc;
 
+use super::ease::eased;
+use super::end::no_rest;
 use super::pieces::Pieces;
 use super::smooth::{Resampled, Smoothing};
+use super::stencil::Stencils;
 use super::{Breach, Digest, Proof, SLACK, Subject, Terms, prove, subjects};
 use crate::cue::{Cue, Interpolation, Vibration};
 use crate::motion::{MAX_AXES, SeatType};
@@ -15,6 +19,8 @@ const ROUNDING: f64 = 0.9995;
 /// How often the amplitude is lowered again: where a curve is held at the stroke's end, what is broken does not shrink in
 /// proportion.
 const ROUNDS: usize = 8;
+/// Halvings that find the amplitude at which an axis can come to rest.
+const HALVINGS: usize = 12;
 
 /// How a cue is made to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,6 +49,8 @@ pub struct Fitted {
     pub timeline: Timeline,
     /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
     pub factors: Vec<f64>,
+    /// In how many of its last seconds it is brought to rest, where it ended in motion that has no way to rest.
+    pub eased_s: Option<f64>,
     /// The low-pass, where one was used.
     pub smoothing: Option<Smoothing>,
     /// The largest change of a position.
@@ -88,26 +96,36 @@ fn list(broken: &[String]) -> String {
 pub fn fit(timeline: Timeline, terms: &Terms, manner: Manner) -> Result<Fitted, FitError> {
     let before = prove(&timeline, terms.clone());
     refuse_others(&before)?;
-    let plain = amplitude(&timeline, timeline.cue().clone(), terms, manner.per_axis);
-    let needs_none = plain.as_ref().is_some_and(|plain| plain.factors.iter().all(|factor| *factor == 1.0));
-    let best = if manner.smooth && !needs_none {
-        smoothest(&timeline, terms, manner.per_axis, plain)
-    } else {
-        plain
-    };
-    let Some(Candidate { cue, factors, smoothing, change }) = best else {
+    let mut best = best_of(&timeline, timeline.cue().clone(), terms, manner);
+    if !all_rest(&timeline, terms) {
+        let rests = eased(&timeline).find(|(_, cue)| all_rest(&Timeline::new(cue.clone()), terms));
+        let other = rests.and_then(|(seconds, cue)| {
+            let candidate = best_of(&timeline, cue, terms, manner)?;
+            Some(Candidate { eased_s: Some(seconds), ..candidate })
+        });
+        best = best.into_iter().chain(other).reduce(|a, b| if b.change.mm < a.change.mm { b } else { a });
+    }
+    let Some(Candidate { cue, factors, eased_s, smoothing, change }) = best else {
         return Err(FitError::NoAmplitude { smooth: manner.smooth });
     };
     let (cue, lowered) = lower_vibration(cue, terms);
     let fitted = Timeline::new(cue);
     let after = prove(&fitted, Terms { cue: Digest::of(fitted.cue()), ..terms.clone() });
     refuse_others(&after)?;
-    Ok(Fitted { timeline: fitted, factors, smoothing, change, lowered, before, after })
+    Ok(Fitted { timeline: fitted, factors, eased_s, smoothing, change, lowered, before, after })
 }
 
 fn refuse_others(proof: &Proof) -> Result<(), FitError> {
-    let movable =
-        |breach: &Breach| matches!(breach, Breach::Motion { .. } | Breach::VibrationPastStroke { .. });
+    let movable = |breach: &Breach| {
+        matches!(
+            breach,
+            Breach::Motion { .. }
+                | Breach::NoRoomToRest { .. }
+                | Breach::TooRoughToRest { .. }
+                | Breach::VibrationPastStroke { .. }
+                | Breach::Shaken { .. }
+        )
+    };
     let others = proof.violations.iter().filter(|violation| !movable(&violation.breach));
     let others: Vec<_> = others.map(|violation| violation.message()).collect();
     if others.is_empty() { Ok(()) } else { Err(FitError::NotMotion(others)) }
@@ -117,26 +135,44 @@ fn refuse_others(proof: &Proof) -> Result<(), FitError> {
 struct Candidate {
     cue: Cue,
     factors: Vec<f64>,
+    eased_s: Option<f64>,
     smoothing: Option<Smoothing>,
     change: Change,
+}
+
+/// The way that changes `original` least of those that make `cue` fit.
+fn best_of(original: &Timeline, cue: Cue, terms: &Terms, manner: Manner) -> Option<Candidate> {
+    let plain = amplitude(original, cue.clone(), terms, manner.per_axis);
+    let needs_none = plain.as_ref().is_some_and(|plain| plain.factors.iter().all(|factor| *factor == 1.0));
+    if needs_none || !manner.smooth {
+        return plain;
+    }
+    smoothest(original, &Timeline::new(cue), terms, manner.per_axis, plain)
+}
+
+/// Whether every axis can come to rest after its last pose.
+fn all_rest(timeline: &Timeline, terms: &Terms) -> bool {
+    let stencils = Stencils::at(terms.rate);
+    subjects(timeline, terms).iter().all(|subject| able_to_rest(subject, terms, &stencils) >= 1.0)
 }
 
 /// Tries low-passes from mild to strong, and keeps the one whose largest change is the smallest.
 fn smoothest(
     original: &Timeline,
+    source: &Timeline,
     terms: &Terms,
     per_axis: bool,
     plain: Option<Candidate>,
 ) -> Option<Candidate> {
-    let source = Resampled::new(original);
+    let resampled = Resampled::new(source);
     let mut attempt = |strength: usize| {
-        let (cue, smoothing) = source.smoothed(original, strength);
+        let (cue, smoothing) = resampled.smoothed(source, strength);
         let candidate = amplitude(original, cue, terms, per_axis)?;
         Some((strength, Candidate { smoothing: Some(smoothing), ..candidate }))
     };
     let least =
         |a: (usize, Candidate), b: (usize, Candidate)| if b.1.change.mm < a.1.change.mm { b } else { a };
-    let ladder = source.strengths();
+    let ladder = resampled.strengths();
     let (best, candidate) = ladder.iter().filter_map(|strength| attempt(*strength)).reduce(least)?;
     // Between the rungs beside the best one.
     let place = ladder.iter().position(|strength| *strength == best).unwrap_or(0);
@@ -162,7 +198,7 @@ fn amplitude(original: &Timeline, cue: Cue, terms: &Terms, per_axis: bool) -> Op
         if needed.iter().all(|factor| *factor >= 1.0) {
             let cue = now.cue().clone();
             let change = largest_change(original, &cue, terms);
-            return Some(Candidate { cue, factors, smoothing: None, change });
+            return Some(Candidate { cue, factors, eased_s: None, smoothing: None, change });
         }
         let least = needed.iter().copied().fold(1.0, f64::min);
         for (factor, needed) in factors.iter_mut().zip(&needed) {
@@ -186,8 +222,10 @@ fn needed(timeline: &Timeline, terms: &Terms) -> Vec<f64> {
         let factor = over.map(|worst| ROUNDING * worst.limit / worst.value).fold(1.0, f64::min);
         factors[axis.axis] = factors[axis.axis].min(factor);
     }
+    let stencils = Stencils::at(terms.rate);
     for subject in subjects(timeline, terms) {
-        factors[subject.axis] = factors[subject.axis].min(within_stroke(&subject));
+        let least = within_stroke(&subject).min(able_to_rest(&subject, terms, &stencils));
+        factors[subject.axis] = factors[subject.axis].min(least);
     }
     factors
 }
@@ -204,6 +242,25 @@ fn within_stroke(subject: &Subject<'_>) -> f64 {
         if is_inside { 1.0 } else { ROUNDING * room / (place - neutral).abs() }
     };
     reach(extremes.min.value).min(reach(extremes.max.value))
+}
+
+/// How much of its amplitude an axis may keep to come to rest after its last pose.
+fn able_to_rest(subject: &Subject<'_>, terms: &Terms, stencils: &Stencils) -> f64 {
+    let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
+    let allowed = subject.allowed(terms);
+    let neutral = neutral_of(subject.seat, subject.axis - subject.first);
+    let rests = |factor: f64| {
+        no_rest(&pieces.ending(stencils.reach(), factor, neutral), &allowed, stencils).is_none()
+    };
+    if rests(1.0) {
+        return 1.0;
+    }
+    let (mut fits, mut fails) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(fits, fails);
+        if rests(middle) { fits = middle } else { fails = middle }
+    }
+    ROUNDING * fits
 }
 
 fn neutral_of(seat: &SeatType, seat_axis: usize) -> f64 {
@@ -252,12 +309,13 @@ fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
     most
 }
 
-/// Lowers the vibration that would leave the stroke to what there is room for; says how many stretches that were.
+/// Lowers the vibration that is more than the seat stands to what there is room for; says how many stretches that were.
 fn lower_vibration(cue: Cue, terms: &Terms) -> (Cue, usize) {
     if cue.vibration().iter().all(|steps| steps.as_slice().is_empty()) {
         return (cue, 0);
     }
     let timeline = Timeline::new(cue);
+    let stencils = Stencils::at(terms.rate);
     let mut lowered = 0;
     let mut tracks: Vec<Vec<Vibration>> = timeline
         .cue()
@@ -268,8 +326,9 @@ fn lower_vibration(cue: Cue, terms: &Terms) -> (Cue, usize) {
     for subject in subjects(&timeline, terms) {
         let Some(track) = tracks.get_mut(subject.axis) else { continue };
         let pieces = Pieces::new(&timeline, subject.axis, &subject.slot);
+        let Some(under) = subject.under(&pieces, terms, &stencils) else { continue };
         for (index, vibration) in track.iter_mut().enumerate() {
-            if let Some(most) = subject.most_amplitude(&pieces, terms, index)
+            if let Some(most) = subject.most_amplitude(&under, terms, index)
                 && vibration.amplitude > most
             {
                 vibration.amplitude = most;

@@ -6,9 +6,14 @@
 
 mod axis;
 mod digest;
+mod ease;
 mod effects;
+mod end;
+mod figures;
 mod fit;
+mod loads;
 mod pieces;
+mod shake;
 mod smooth;
 mod stencil;
 mod sweep;
@@ -19,7 +24,10 @@ mod violation;
 
 pub use axis::AxisProof;
 pub use digest::Digest;
+pub use end::HURRY;
+pub use figures::{AxisFigures, figures};
 pub use fit::{Change, FitError, Fitted, Manner, fit};
+pub use loads::Loads;
 pub use smooth::Smoothing;
 pub use terms::{LimitedEffect, Part, Terms};
 pub use violation::{Breach, Quantity, Violation};

@@ -1,7 +1,9 @@
 //! One axis of a cue as it is sent: cubics between the rows, on a slot's stroke, at its level, held inside its ends.
 
+use std::ops::Range;
+
 use crate::cue::Unit;
-use crate::motion::Slot;
+use crate::motion::{AxisState, Halt, Slot};
 use crate::timeline::{AxisExtremes, Cubic, Extreme, Timeline};
 
 /// So many cubics share one set of bounds.
@@ -157,6 +159,50 @@ impl Pieces {
         self.list[self.list.len() - 1].start
     }
 
+    /// How the axis moves as it comes to the last pose.
+    pub(super) fn last_motion(&self) -> AxisState {
+        let last = &self.list[self.list.len() - 1];
+        let Some(before) = self.list.len().checked_sub(2).map(|index| &self.list[index]) else {
+            return AxisState::at_rest(last.cubic.0[0]);
+        };
+        let Cubic([_, velocity, bend, _]) = before.cubic.from(seconds(last.start - before.start));
+        AxisState { position: last.cubic.0[0], velocity, acceleration: 2.0 * bend }
+    }
+
+    /// What the axis does in the last `reach` nanoseconds, `level` times as far from `neutral`.
+    pub(super) fn ending(&self, reach: i64, level: f64, neutral: f64) -> Self {
+        self.copied(self.index(self.end() - reach)..self.list.len(), |Cubic([c0, c1, c2, c3])| {
+            Cubic([neutral + level * (c0 - neutral), level * c1, level * c2, level * c3])
+        })
+    }
+
+    /// The same axis, which takes a way to rest after its last pose and stays there for so many nanoseconds.
+    pub(super) fn then(&self, way: &Halt, rest: i64) -> Self {
+        let mut then = self.copied(0..self.list.len() - 1, |cubic| cubic);
+        let (mut start, mut since) = (self.end(), 0.0);
+        for (from, jerk, lasts) in way.stretches() {
+            since += lasts;
+            let end = self.end() + nanos(since);
+            let AxisState { position, velocity, acceleration } = from;
+            then.push(start, end, Cubic([position, velocity, acceleration / 2.0, jerk / 6.0]));
+            start = end;
+        }
+        let stays = Cubic([way.rest(), 0.0, 0.0, 0.0]);
+        then.push(start, start + rest, stays);
+        then.push(start + rest, start + rest, stays);
+        then
+    }
+
+    fn copied(&self, pieces: Range<usize>, change: impl Fn(Cubic) -> Cubic) -> Self {
+        let mut copied = Self::with_capacity(pieces.len());
+        for index in pieces {
+            let piece = self.list[index];
+            let end = self.list.get(index + 1).map_or(piece.start, |next| next.start);
+            copied.push(piece.start, end, change(piece.cubic));
+        }
+        copied
+    }
+
     /// The bounds of each run of cubics, in order of time.
     pub(super) fn blocks(&self) -> &[Block] {
         &self.blocks
@@ -268,6 +314,11 @@ pub(super) fn larger(a: f64, b: f64) -> f64 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "spans under a day")]
 pub(super) fn between(from: i64, to: i64, part: f64) -> i64 {
     from + ((to - from) as f64 * part).round() as i64
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "some seconds")]
+fn nanos(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
 }
 
 #[expect(clippy::cast_precision_loss, reason = "spans under a day are exact")]

@@ -52,6 +52,11 @@ impl Stencils {
             jerk: both(3),
         }
     }
+
+    /// The longest that any of them spans, nanoseconds.
+    pub(super) fn reach(&self) -> i64 {
+        self.jerk.iter().map(Stencil::reach).max().unwrap_or(0)
+    }
 }
 
 /// How much velocity may change from frame to frame: 4 x the acceleration x the period or 5 ms.

@@ -36,12 +36,13 @@ pub(super) struct Swept {
 /// Sweeps stencils of the differences of an order (1 to 3) over an axis. The greatest size is given as up to
 /// [`TOLERANCE`] more than it is, never as less, and never as over the threshold where it is not.
 pub(super) fn sweep(pieces: &Pieces, stencils: &[Stencil], order: usize, threshold: f64) -> Swept {
-    let mut swept = Swept::default();
+    let mut over = Over { threshold, swept: Swept::default() };
     let mut passed_over = 0.0_f64;
     for stencil in stencils {
-        let mut one = Sweep { pieces, stencil, threshold, swept: &mut swept };
+        let mut one = Sweep { pieces, stencil, sink: &mut over };
         passed_over = passed_over.max(one.run(order));
     }
+    let mut swept = over.swept;
     swept.worst = swept.worst.max(passed_over);
     swept.over.sort_by_key(|stretch| stretch.from);
     swept.over = merged(&swept.over);
@@ -69,41 +70,82 @@ impl Stretch {
 }
 
 /// Show times of the first pose, and what holds for all of them.
-struct Run {
-    from: i64,
-    until: i64,
+pub(super) struct Run {
+    pub(super) from: i64,
+    pub(super) until: i64,
     /// The pieces that the first pose is on: the first, and the one after the last.
     pieces: (usize, usize),
     /// What the sum cannot be above.
-    bound: f64,
+    pub(super) bound: f64,
     /// How long each cubic that is met lasts; -1 where they differ.
     span: i64,
 }
 
-struct Sweep<'a> {
-    pieces: &'a Pieces,
-    stencil: &'a Stencil,
-    threshold: f64,
-    swept: &'a mut Swept,
+/// What is made of a sum, piece by piece.
+pub(super) trait Sink {
+    /// The size up to which it need not be told what the sum is between two show times.
+    fn ignores(&self, from: i64, until: i64) -> f64;
+
+    /// Takes the sum between two show times, as a cubic over 0 to 1.
+    fn take(&mut self, from: i64, until: i64, cubic: Cubic);
 }
 
-impl Sweep<'_> {
+/// The greatest size, and where it is over a threshold.
+struct Over {
+    threshold: f64,
+    swept: Swept,
+}
+
+impl Sink for Over {
+    fn ignores(&self, _: i64, _: i64) -> f64 {
+        self.swept.worst.min(self.threshold)
+    }
+
+    fn take(&mut self, from: i64, until: i64, cubic: Cubic) {
+        let met = [0.0, 1.0].into_iter().chain(cubic.still()).map(|u| (cubic.at(u).abs(), u));
+        let (worst, u) = met.fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
+        self.note(Stretch { from, until, worst, at: between(from, until, u) });
+    }
+}
+
+impl Over {
+    fn note(&mut self, next: Stretch) {
+        let Stretch { from, worst, at, .. } = next;
+        if worst > self.swept.worst {
+            (self.swept.worst, self.swept.at) = (worst, at);
+        }
+        if worst > self.threshold {
+            let last = self.swept.over.last_mut();
+            match last.filter(|last| (0..=ONE_STRETCH).contains(&(from - last.until))) {
+                Some(last) => last.join(next),
+                None => self.swept.over.push(next),
+            }
+        }
+    }
+}
+
+/// One stencil on its way over an axis.
+pub(super) struct Sweep<'a, T> {
+    pub(super) pieces: &'a Pieces,
+    pub(super) stencil: &'a Stencil,
+    pub(super) sink: &'a mut T,
+}
+
+impl Sweep<'_, Over> {
     /// Gives the greatest bound of what was passed over.
     fn run(&mut self, order: usize) -> f64 {
-        let last = self.pieces.end() - self.stencil.reach();
-        if last < 0 {
-            return 0.0;
-        }
+        let Some(last) = self.last() else { return 0.0 };
         let runs = self.runs(order, last);
         // The most promising first: what it gives rules most others out.
         if let Some(run) = runs.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) {
-            let over = self.swept.over.len();
+            let over = self.sink.swept.over.len();
             self.cells(run);
-            self.swept.over.truncate(over); // it is met again in its turn
+            self.sink.swept.over.truncate(over); // it is met again in its turn
         }
         let mut passed_over = 0.0_f64;
         for run in runs {
-            if run.bound > self.threshold || run.bound > self.swept.worst * (1.0 + TOLERANCE[order - 1]) {
+            let passes = self.sink.swept.worst * (1.0 + TOLERANCE[order - 1]);
+            if run.bound > self.sink.threshold.min(passes) {
                 self.cells(&run);
             } else {
                 passed_over = passed_over.max(run.bound);
@@ -112,8 +154,16 @@ impl Sweep<'_> {
         self.at_the_end(last);
         passed_over
     }
+}
 
-    fn runs(&self, order: usize, last: i64) -> Vec<Run> {
+impl<T: Sink> Sweep<'_, T> {
+    /// The last show time of a first pose; none where the axis is too short for the stencil.
+    pub(super) fn last(&self) -> Option<i64> {
+        let last = self.pieces.end() - self.stencil.reach();
+        (last >= self.pieces.list()[0].start).then_some(last)
+    }
+
+    pub(super) fn runs(&self, order: usize, last: i64) -> Vec<Run> {
         let blocks = self.pieces.blocks();
         let mut runs = Vec::with_capacity(blocks.len());
         for (index, block) in blocks.iter().enumerate() {
@@ -161,7 +211,7 @@ impl Sweep<'_> {
         run.span > 0 && self.stencil.offsets.iter().all(|offset| offset % run.span == 0)
     }
 
-    fn cells(&mut self, run: &Run) {
+    pub(super) fn cells(&mut self, run: &Run) {
         let aligned = self.is_aligned(run);
         match self.stencil.offsets.len() {
             2 if aligned => self.aligned::<2>(run),
@@ -190,9 +240,9 @@ impl Sweep<'_> {
                 }
             }
             let cubic = Cubic(sum).scaled(span);
-            if cubic.may_leave(self.swept.worst.min(self.threshold)) {
-                let at = list[index].start;
-                self.judge(at, at + run.span, cubic);
+            let at = list[index].start + self.stencil.middle;
+            if cubic.may_leave(self.sink.ignores(at, at + run.span)) {
+                self.sink.take(at, at + run.span, cubic);
             }
         }
     }
@@ -234,40 +284,19 @@ impl Sweep<'_> {
             }
         }
         let cubic = Cubic(sum.map(|part| part * self.stencil.scale)).scaled(seconds(next - at));
-        if cubic.may_leave(self.swept.worst.min(self.threshold)) {
-            self.judge(at, next, cubic);
+        let (from, until) = (at + self.stencil.middle, next + self.stencil.middle);
+        if cubic.may_leave(self.sink.ignores(from, until)) {
+            self.sink.take(from, until, cubic);
         }
     }
 
-    /// Takes the sum over a cell, as a cubic over 0 to 1.
-    fn judge(&mut self, at: i64, next: i64, cubic: Cubic) {
-        let met = [0.0, 1.0].into_iter().chain(cubic.still()).map(|u| (cubic.at(u).abs(), u));
-        let (worst, u) = met.fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
-        self.note(at, next, worst, between(at, next, u));
-    }
-
     /// The last pose on the last row: where the curve jumps, as one that holds does, no cell has that.
-    fn at_the_end(&mut self, last: i64) {
+    pub(super) fn at_the_end(&mut self, last: i64) {
         let mut cursors = [0; 4];
         let nodes = self.stencil.offsets.len();
         for (cursor, offset) in cursors.iter_mut().zip(&self.stencil.offsets) {
             *cursor = self.pieces.index(last + offset);
         }
         self.cell(last, last, &cursors[..nodes]);
-    }
-
-    fn note(&mut self, from: i64, until: i64, worst: f64, at: i64) {
-        let middle = self.stencil.middle;
-        if worst > self.swept.worst {
-            (self.swept.worst, self.swept.at) = (worst, at + middle);
-        }
-        if worst > self.threshold {
-            let next = Stretch { from: from + middle, until: until + middle, worst, at: at + middle };
-            let last = self.swept.over.last_mut();
-            match last.filter(|last| (0..=ONE_STRETCH).contains(&(next.from - last.until))) {
-                Some(last) => last.join(next),
-                None => self.swept.over.push(next),
-            }
-        }
     }
 }

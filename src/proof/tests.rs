@@ -235,7 +235,7 @@ fn a_lower_level_breaks_less() {
 #[test]
 fn vibration_must_stay_inside_the_stroke_between_rows_too() {
     // 4 mm about a parabola from 15 mm down to 3.75 mm and back.
-    let rows = "time_s,a1,v1_hz,v1_amp\n0,0.1,0,0\n1,0.025,20,{}\n2,0.1,0,0\n3,0.1,0,0\n";
+    let rows = "time_s,a1,v1_hz,v1_amp\n0,0.1,0,0\n1,0.025,2,{}\n2,0.1,0,0\n3,0.1,0,0\n";
     let shake = |amplitude: &str| on_bench(&rows.replace("{}", amplitude));
     let proof = shake("0.02");
     assert!(proof.passed(), "{:?}", messages(&proof));
@@ -245,6 +245,145 @@ fn vibration_must_stay_inside_the_stroke_between_rows_too() {
     let [message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
     assert!(message.contains("v1_amp: vibration of 4.500 mm about 3."), "{message}");
     assert!(message.contains("leaves the stroke of seat bench3, 0 to 150 mm"), "{message}");
+}
+
+/// A cue of one axis in mm on the bench seat: it stands, then runs straight up to `top` at that speed, and ends there.
+fn ends_at(top: f64, mm_s: f64) -> Proof {
+    // An S-curve of half a second out of rest, and on from there.
+    let speed = |t: f64| {
+        let u = (t / 0.5).clamp(0.0, 1.0);
+        mm_s * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    };
+    let mut text = "# units: mm\ntime_ms,a1\n".to_owned();
+    let mut way = vec![0.0];
+    for row in 1..=1_000 {
+        let t = f64::from(row) * 1e-3;
+        way.push(way[way.len() - 1] + 1e-3 * speed(t - 0.1));
+    }
+    let from = top - way[1_000];
+    for row in (0..=1_000_usize).step_by(10) {
+        text += &format!("{row},{:.9}\n", from + way[row]);
+    }
+    on_bench(&text)
+}
+
+#[test]
+fn a_cue_that_ends_in_motion_where_the_stroke_has_no_room_for_a_stop_is_refused_and_says_how_much_is_missing()
+{
+    // From 140 mm/s with 3,000 mm/s² and 60,000 mm/s³ to rest takes some 6.6 mm, and 6.9 mm as it is asked for.
+    let proof = ends_at(149.0, 140.0);
+    let [message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
+    assert!(
+        message.contains("a1: the cue ends at 00:01.000 in motion, 140.0 mm/s at 149.000 mm"),
+        "{message}"
+    );
+    assert!(
+        message.contains("it lacks 5.8") && message.contains("mm of the stroke, 0 to 150 mm"),
+        "{message}"
+    );
+    assert!(matches!(proof.violations[0].place, Place::Text { line: 103, .. }), "{:?}", proof.violations[0]);
+    assert!(ends_at(141.0, 140.0).passed(), "with 9 mm left there is room");
+}
+
+#[test]
+fn a_cue_that_ends_with_more_acceleration_than_its_last_window_shows_is_refused() {
+    // Jerk of 58,000 mm/s³ for the last 60 ms: 3,480 mm/s² at the end, of which the last window, 20 ms before, sees 2,320.
+    let text = |jerk: f64| {
+        let mut text = "# units: mm\ntime_ms,a1\n".to_owned();
+        for row in 0..=100 {
+            let t = (f64::from(row) * 5e-3 - 0.44).max(0.0);
+            text += &format!("{},{:.9}\n", row * 5, 20.0 + jerk * t * t * t / 6.0);
+        }
+        text
+    };
+    let proof = on_bench(&text(58_000.0));
+    assert!(proof.axes[0].acceleration.margin() > 0.1, "the windows end too soon: {:?}", proof.axes[0]);
+    let [message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
+    assert!(message.contains("the gentlest way to rest from there takes acceleration 3"), "{message}");
+    assert!(on_bench(&text(40_000.0)).passed());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn room_to_rest_is_asked_for_to_a_tenth_of_a_millimetre(mm_s in 20.0..170.0_f64) {
+        let (mut fits, mut fails) = (120.0, 150.0);
+        for _ in 0..12 {
+            let top = f64::midpoint(fits, fails);
+            if ends_at(top, mm_s).passed() { fits = top } else { fails = top }
+        }
+        // What braking with all means takes, from the highest pace and with a little less than all: by steps.
+        let (mut at, mut speed, mut pull) = (0.0, HURRY * mm_s, 0.0_f64);
+        while speed > 0.0 {
+            pull = (pull + 0.95 * 60_000.0 * 1e-6).min(0.95 * 3_000.0);
+            speed -= pull * 1e-6;
+            at += speed * 1e-6;
+        }
+        prop_assert!((150.0 - fits - at).abs() < 0.1, "{fits} {at}");
+    }
+
+    #[test]
+    fn vibration_is_allowed_up_to_what_motion_leaves_of_its_limits_and_no_further(
+        hz in 1.0..200.0_f64, mm_s in 0.0..200.0_f64,
+    ) {
+        let text = |amplitude: f64| {
+            let end = 20.0 + mm_s * 0.4;
+            format!(
+                "# units: mm\n# interpolation: linear\ntime_s,a1,v1_hz,v1_amp\n0,20,0,0\n0.2,{},{hz},{amplitude}\n0.4,{end},0,0\n",
+                20.0 + mm_s * 0.2
+            )
+        };
+        let (mut passes, mut fails) = (0.0, 20.0);
+        for _ in 0..40 {
+            let middle = f64::midpoint(passes, fails);
+            let found = on_bench(&text(middle));
+            let shaken = |v: &Violation| matches!(v.breach, Breach::Shaken { .. });
+            if found.violations.iter().any(shaken) { fails = middle } else { passes = middle }
+        }
+        // As a frame says it, in eighths of a millisecond.
+        let turns = std::f64::consts::TAU * 8_000.0 / (8_000.0 / hz).round();
+        let expected = ((250.0 - mm_s) / turns).min(9_806.65 / (turns * turns));
+        // The sum may be over by 0.1 %.
+        let slack = 1e-3 * (250.0 / turns).min(9_806.65 / (turns * turns)) + 1e-3 * expected;
+        prop_assert!(passes <= 19.9 || expected >= 19.8);
+        prop_assert!(passes > 19.9 || (passes - expected).abs() <= 2.5 * slack + 1e-3 * mm_s / turns, "{passes} {expected}");
+    }
+}
+
+#[test]
+fn thirty_millimetres_at_twenty_hertz_are_refused_wherever_they_fit_into_the_stroke() {
+    let proof = on_bench("# units: mm\ntime_s,a1,v1_hz,v1_amp\n0,75,0,0\n1,75,20,30\n2,75,0,0\n3,75,0,0\n");
+    let [message] = &messages(&proof)[..] else { panic!("{:?}", messages(&proof)) };
+    assert!(
+        message.contains("v1_amp: vibration of 30.000 mm at 20.0 Hz, 473741.0 mm/s² of acceleration"),
+        "{message}"
+    );
+    assert!(
+        message.contains("is over 9806.6 mm/s² in all, the limit of seat bench3, at 00:01.000"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_seat_that_stands_more_vibration_says_so_and_no_drive_goes_beyond_its_own_speed() {
+    let timeline = timeline("# units: mm\ntime_s,a1,v1_hz,v1_amp\n0,75,20,1.5\n1,75,20,1.5\n");
+    let on = |seat: SeatType| prove(&timeline, terms(&timeline, seat, 100.0, 1.0));
+    assert!(!on(SeatType::bench3(1)).passed(), "23,687 mm/s²");
+    let hard = SeatType { max_shaken_acceleration_mm_s2: Some(24_000.0), ..SeatType::bench3(1) };
+    assert!(on(hard.clone()).passed(), "and 188 mm/s");
+    let slow = SeatType { max_shaken_velocity_mm_s: Some(180.0), ..hard.clone() };
+    assert!(
+        messages(&on(slow))[0]
+            .contains("188.5 mm/s of velocity, on motion of 0.0 mm/s is over 180.0 mm/s in all")
+    );
+    let held = SeatType {
+        max_velocity_mm_s: 100.0,
+        max_rpm: Some(2_000),
+        max_shaken_velocity_mm_s: Some(900.0),
+        ..hard
+    };
+    assert!(messages(&on(held))[0].contains("is over 166.7 mm/s in all"), "PA07");
 }
 
 fn hall(limit: EffectLimit) -> Config {

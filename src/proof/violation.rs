@@ -112,6 +112,69 @@ pub enum Breach {
         /// When it is worst.
         at: ShowTime,
     },
+    /// The cue ends in motion, and the stroke has no room to come to rest.
+    #[error(
+        "the cue ends at {at} in motion, {velocity:.1} mm/s at {position:.3} mm, and to come to rest within the limits of seat \
+         {seat} it lacks {missing:.3} mm of the stroke, 0 to {stroke} mm; end more slowly, or further from the end"
+    )]
+    NoRoomToRest {
+        /// How fast the axis is at the last row, mm/s.
+        velocity: f64,
+        /// Where it is then, mm from the stroke's lower end.
+        position: f64,
+        /// How far it would leave the stroke, mm.
+        missing: f64,
+        /// The seat's stroke, mm.
+        stroke: f64,
+        /// The seat type.
+        seat: String,
+        /// When the cue ends.
+        at: ShowTime,
+    },
+    /// The cue ends in such motion that every way to rest breaks a limit.
+    #[error(
+        "the cue ends at {at} in motion, {velocity:.1} mm/s, and the gentlest way to rest from there takes {} {value:.1} {}, over \
+         {limit:.1}, the limit of seat {seat}; let the motion end more gently",
+        quantity.name(), quantity.unit()
+    )]
+    TooRoughToRest {
+        /// How fast the axis is at the last row, mm/s.
+        velocity: f64,
+        /// Which figure is over its limit.
+        quantity: Quantity,
+        /// What it comes to, in its unit.
+        value: f64,
+        /// The most that the seat may do, in the same unit.
+        limit: f64,
+        /// The seat type.
+        seat: String,
+        /// When the cue ends.
+        at: ShowTime,
+    },
+    /// Motion and vibration together move an axis faster, or harder, than its seat may.
+    #[error(
+        "vibration of {amplitude:.3} mm at {hz:.1} Hz, {shaken:.1} {unit} of {}, on motion of {moved:.1} {unit} is over \
+         {limit:.1} {unit} in all, the limit of seat {seat}, at {at}; lower the amplitude or the frequency",
+        quantity.name(), unit = quantity.unit()
+    )]
+    Shaken {
+        /// Velocity or acceleration.
+        quantity: Quantity,
+        /// How far it swings to either side, mm.
+        amplitude: f64,
+        /// How often, as controllers execute it.
+        hz: f64,
+        /// What the vibration alone comes to.
+        shaken: f64,
+        /// What motion alone comes to while it vibrates.
+        moved: f64,
+        /// The most that both may come to.
+        limit: f64,
+        /// The seat type.
+        seat: String,
+        /// Since when it vibrates so.
+        at: ShowTime,
+    },
     /// An effect is switched off too soon.
     #[error(
         "on at {at} for {on:?}, which may be {sent:?} in frames; at least {least:?} is needed (min_on_ms)"

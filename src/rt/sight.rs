@@ -9,7 +9,7 @@ use crate::health::{Identity, Sighting};
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::net::{Delivery, Sender};
 use crate::wire::{
-    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, ReadRequest, RegisterReply, ReplyCode,
+    Access, Code, DP_INPUTS, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, ReadRequest, RegisterReply, ReplyCode,
     position_reads, positions,
 };
 
@@ -83,6 +83,7 @@ impl Looker {
             read(PARAMETERS, MODE.0, MODE.1),
             read(MONITORS, RESET, 1),
             read(MONITORS, VERSIONS.0, VERSIONS.1),
+            read(MONITORS, DP_INPUTS, 1),
         ];
         let reads =
             others.into_iter().chain(packets).chain(position_reads(self.seat.axes, self.code, self.code));
@@ -121,6 +122,8 @@ impl Looker {
             }
             (MONITORS, PACKETS) => self.seen.packets = word(0),
             (MONITORS, RESET) => self.seen.homed = word(0).map(|state| state == RESET_DONE),
+            // The observer hears those, whoever asked.
+            (MONITORS, DP_INPUTS) => {}
             (MONITORS, start) => return self.hear_positions(start, &reply),
             _ => return false,
         }

@@ -10,7 +10,7 @@ mod spline;
 
 pub(crate) use cubic::Cubic;
 pub use extremes::{AxisExtremes, Extreme};
-pub use figures::{AxisFigures, EffectUse, Figure};
+pub use figures::{EffectUse, Figure};
 pub use fit::{HELD_BACK, Held, StrokeFit};
 
 use crate::cue::{Cue, Effects, Unit, Vibration};

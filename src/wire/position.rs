@@ -7,6 +7,9 @@ use crate::motion::Pulses;
 /// The monitor register at which the position of each of axes 1 to 6 begins.
 pub const DP_POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 
+/// The monitor register of the active inputs, bit 0 = X01.
+pub const DP_INPUTS: u16 = 0x5e;
+
 /// Axes of one block of position registers.
 const AXES_PER_BLOCK: usize = 3;
 

@@ -1,8 +1,12 @@
 //! A hall of IMAX and MBOX controllers, which tell no count of their datagrams (DP34), no error number and no emergency stop.
 
+use std::net::UdpSocket;
+
+use kinocue::wire::ReadRequest;
 use serde_json::Value;
 
 use crate::hall::Hall;
+use crate::process::PATIENCE;
 
 /// Serving and parked; the controllers say by an input that an emergency stop is pressed.
 fn open() -> Hall {
@@ -96,4 +100,57 @@ fn an_alarm_of_the_servo_drives_is_named_and_parks_a_hall_of_mbox_controllers() 
     hall.happens("1@err=11");
     let out = hall.wait(|status| standing(status, 0) == "error");
     assert!(told(&out, "A1").contains("alarm of the servo drives, kind 11"), "{out}");
+}
+
+#[test]
+fn an_emergency_stop_of_an_mbox_controller_is_seen_by_its_input_pressed_and_released_in_a_show_and_at_rest() {
+    let hall = open();
+    hall.play("night");
+    hall.happens("2@X1=1");
+    let pressed = hall.wait(|status| standing(status, 1) == "stopped");
+    assert_eq!(pressed["controllers"][1]["emergency_stop"], true, "{pressed}");
+    hall.comes_to("stopped");
+    hall.happens("2@X1=0");
+    hall.wait(|status| status["controllers"][1]["emergency_stop"] == false);
+    hall.done(&["clear"]);
+    hall.wait(|status| status["state"] == "recovering" && standing(status, 1) == "rejoining");
+    // It holds until a reset (PA91 = 2).
+    hall.done(&["home", "--seats-empty"]);
+    hall.wait(|status| status["state"] == "parked" && all_stand(status, "ok"));
+    // Pressed at rest it is shown at rest, though no frame goes.
+    hall.happens("1@X1=1");
+    let pressed = hall.wait(|status| standing(status, 0) == "stopped");
+    assert_eq!(pressed["controllers"][0]["emergency_stop"], true, "{pressed}");
+}
+
+/// A controller that answers each read with registers of 32 bits, as the IMAX manual has them.
+fn wide_controller() -> String {
+    let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    socket.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
+    let address = socket.local_addr().expect("it is bound").to_string();
+    std::thread::spawn(move || {
+        let mut octets = [0; 2048];
+        while let Ok((len, from)) = socket.recv_from(&mut octets) {
+            let Ok(read) = ReadRequest::parse(&octets[..len]) else { continue };
+            let mut answer = octets[..16].to_vec();
+            answer[5] = 2;
+            answer[8..12].fill(0);
+            answer.resize(16 + 4 * usize::from(read.num), 0);
+            let _ = socket.send_to(&answer, from); // who is gone is gone
+        }
+    });
+    address
+}
+
+#[test]
+fn a_controller_with_registers_of_32_bits_is_out_in_words_and_nothing_moves() {
+    let mut hall = closed();
+    let (before, wide) = (hall.relay(1).to(), wide_controller());
+    hall.rewrite(|config| config.replace(&before, &wide));
+    hall.launch();
+    hall.serving().heard(|line| line.contains("registers of 32 bits").then_some(()));
+    let out = hall.wait(|status| standing(status, 1) == "error");
+    assert!(told(&out, "A2").contains("answers with registers of 32 bits"), "{out}");
+    assert_eq!(hall.run(&["arm"]).code, Some(75));
+    assert_eq!(hall.relay(0).count(), 0, "no motion frame");
 }

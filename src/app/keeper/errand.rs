@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use super::Keeper;
+use super::lasting::Again;
 use super::list::List;
 use super::ready::Preflighted;
 use super::show::Cued;
@@ -20,8 +21,8 @@ pub(super) enum Done {
     Listed(Result<(Box<List>, Box<Cued>), Problem>),
     /// The cue of an entry is proved, or why not.
     Entry(usize, Result<Box<Cued>, Problem>),
-    /// What was loaded before was read and proved again: the playlist, and the cue.
-    Again(Option<Result<Box<List>, Problem>>, Result<Box<Cued>, Problem>),
+    /// What was loaded before was read and proved again.
+    Again(Again),
     /// A test of the seats is made, or why not.
     Swept(Result<(Box<Sweep>, Box<Cued>), Problem>),
     /// The controllers were asked for all that preflight judges.
@@ -88,7 +89,7 @@ impl Keeper {
             Some(Done::Cued(cued)) => cued.and_then(|cued| self.take_up(*cued)),
             Some(Done::Listed(listed)) => listed.and_then(|(list, cued)| self.take_up_list(*list, *cued)),
             Some(Done::Entry(entry, cued)) => cued.and_then(|cued| self.take_up_entry(entry, *cued)),
-            Some(Done::Again(list, cued)) => self.take_up_again(list, cued),
+            Some(Done::Again(again)) => self.take_up_again(again),
             Some(Done::Swept(swept)) => swept.and_then(|(sweep, cued)| self.take_up_sweep(*sweep, *cued)),
             Some(Done::Preflighted(preflighted)) => {
                 self.preflighted = Some(*preflighted);

@@ -22,17 +22,29 @@ const WORTH_IT: ShowTime = ShowTime::from_millis(1_000);
 /// How exactly it is known after a crash where a show was.
 const KEPT_EVERY_MS: i64 = 5_000;
 
+/// What was loaded before: the playlist, where there was one, and the cue; each as it is now, or why it is not.
+pub(super) type Again = (Option<Result<Box<List>, Problem>>, Result<Box<Cued>, Problem>);
+
 /// What is known of what lasts, beside the settings themselves.
 #[derive(Debug, Default)]
 pub(super) struct Lasting {
     /// What was loaded before, while it is loaded again.
     loading: Option<LoadedShow>,
+    /// It is loaded, and the hall moves: it is taken up once it rests.
+    ready: Option<Again>,
     /// What came back with the start of the program, in words; none once a show has begun.
     came_back: Option<String>,
     /// Nobody has armed the hall since the start of the program.
     unsaid: bool,
     /// Where the film was when the seats left the cue.
     left_at: Option<ShowTime>,
+}
+
+impl Lasting {
+    /// The same for another hall, which loads anew what was loaded.
+    pub(super) fn go_over(&mut self) -> Self {
+        Self { loading: None, ready: None, ..std::mem::take(self) }
+    }
 }
 
 impl Memory {
@@ -96,17 +108,21 @@ impl Keeper {
             let cued = cued.and_then(|id| read(&library, &config, &id));
             let list =
                 loaded.playlist.map(|place| List::again(&shelf, &library, &config, &place, &loaded.cue));
-            Done::Again(list.map(|list| list.map(Box::new)), cued)
+            Done::Again((list.map(|list| list.map(Box::new)), cued))
         });
     }
 
     /// Takes up what was loaded before. A playlist that has gone leaves the cue.
-    pub(super) fn take_up_again(
-        &mut self,
-        list: Option<Result<Box<List>, Problem>>,
-        cued: Result<Box<Cued>, Problem>,
-    ) -> Result<(), Problem> {
+    pub(super) fn take_up_again(&mut self, again: Again) -> Result<(), Problem> {
+        if self.may("load").is_err() {
+            self.lasting.ready = Some(again);
+            return Ok(());
+        }
+        let (list, cued) = again;
         let before = self.lasting.loading.take();
+        if self.cued.is_some() {
+            return Ok(()); // a person has loaded another meanwhile
+        }
         match list {
             Some(Ok(list)) => self.list = Some(*list),
             Some(Err(problem)) => self.note(problem.to_string()),
@@ -116,6 +132,16 @@ impl Keeper {
         let same = before.filter(|before| before.sha256 == cued.sha256);
         cued.left_at = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
         self.take_up(cued)
+    }
+
+    /// Takes it up where it waits for the hall to rest.
+    pub(super) fn settle_again(&mut self) {
+        if self.may("load").is_ok()
+            && let Some(again) = self.lasting.ready.take()
+            && let Err(problem) = self.take_up_again(again)
+        {
+            self.note(problem.to_string());
+        }
     }
 
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.

@@ -213,6 +213,7 @@ impl Keeper {
         self.settle_record();
         self.follow_sweep();
         self.end_errand();
+        self.settle_again();
         self.heed_schedule();
         self.settle_homing();
         self.tell_readiness();

@@ -70,7 +70,7 @@ impl Keeper {
         }
         Memory {
             settings: Some(self.settings()),
-            lasting: std::mem::take(&mut self.lasting),
+            lasting: self.lasting.go_over(),
             latched,
             notes: std::mem::take(&mut self.notes),
             untold: Vec::new(),

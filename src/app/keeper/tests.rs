@@ -123,6 +123,22 @@ fn what_was_loaded_is_loaded_after_a_restart_and_nothing_starts() {
 }
 
 #[test]
+fn what_was_loaded_before_is_taken_up_once_the_seats_rest() {
+    let mut rig = Rig::playing();
+    let cued = rig.keeper.cued.take().unwrap();
+    rig.keeper.take_up_again((None, Ok(Box::new(cued)))).unwrap();
+    assert!(rig.keeper.cued.is_none(), "the seats move");
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    assert_eq!(rig.keeper.cued.as_ref().unwrap().id, "one");
+    let mut other = rig.keeper.cued.take().unwrap();
+    rig.ask(Ask::Load { cue: "two".to_owned() }).unwrap();
+    other.id = "three".to_owned();
+    rig.keeper.take_up_again((None, Ok(Box::new(other)))).unwrap();
+    assert_eq!(rig.keeper.cued.as_ref().unwrap().id, "two", "a person has loaded that since");
+}
+
+#[test]
 fn a_cue_that_is_gone_after_a_restart_is_named_and_the_hall_goes_on_without() {
     let memory = after_a_restart(Rig::parked());
     let mut rig = Rig::starting(memory);

@@ -128,8 +128,8 @@ fn effects_and_words_have_their_values() {
         "2:5: fx_air: \"2\" is neither 0 nor 1\n3:5: fx_air: \"on\" is neither 0 nor 1"
     );
     assert_eq!(
-        faults("time_ms,a1,io\n0,0,65536\n1,0,0"),
-        "2:5: io: \"65536\" is no output word; 0 to 65535, or 0x0 to 0xffff"
+        faults("time_ms,a1,io\n0,0,0x1000\n1,0,0"),
+        "2:5: io: \"0x1000\" is no output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12"
     );
 }
 

@@ -236,10 +236,10 @@ impl Reading {
     fn io(&mut self, at: At, io: message::Io) -> Result<(), Problem> {
         let begun = self.seen.get(&Topic::Io).is_some_and(|(count, _)| *count > 1);
         match (io.effects, io.word, &mut self.cue.effects) {
-            (None, Some(word), Effects::Words(steps)) => steps.push(at.time(), word),
+            (None, Some(word), Effects::Words(steps)) => steps.push(at.time(), value::outputs(word)?),
             (None, Some(word), Effects::Named { .. }) if !begun => {
                 let mut steps = Steps::default();
-                steps.push(at.time(), word);
+                steps.push(at.time(), value::outputs(word)?);
                 self.cue.effects = Effects::Words(steps);
             }
             (Some(switches), None, Effects::Named { names, steps }) => {

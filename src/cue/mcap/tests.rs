@@ -85,7 +85,7 @@ fn csv_to_mcap_to_csv_keeps_every_value() {
     assert_eq!((second.vibration(), second.effects()), (first.vibration(), first.effects()));
     assert_eq!(csv_of(&second), csv_of(&first));
     assert_eq!(csv_of(&csv(&csv_of(&first))), csv_of(&first));
-    let words = csv("time_ms,a1,io\n0,0,0x5\n1,1,65535\n");
+    let words = csv("time_ms,a1,io\n0,0,0x5\n1,1,4095\n");
     assert_eq!(csv_of(&load(&mcap_of(&words)).unwrap()), csv_of(&words));
 }
 
@@ -149,6 +149,7 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
         ("/cue/io", r#"{"effects":{"air":2}}"#, "\"2\" is neither 0 nor 1"),
         ("/cue/io", r#"{"effects":{"Air":1}}"#, "an effect's name is made of"),
         ("/cue/io", r#"{"word":65536}"#, "not the JSON of its topic: invalid value"),
+        ("/cue/io", r#"{"word":4096}"#, "\"4096\" is no output word; 0 to 4095"),
         ("/cue/io", r#"{"word":1,"effects":{"air":1}}"#, "the raw output word and named effects exclude"),
         ("/cue/io", "{}", "not the JSON of its topic: neither effects nor word"),
     ] {
