@@ -50,6 +50,8 @@ pub(super) struct Rider {
     fallen: bool,
     /// Ticks for which nothing goes to it, as its last frame leads that far ahead.
     ahead: u32,
+    /// Whether this tick is one of them.
+    skips: bool,
     /// Whether it was away, and is not where the others are yet.
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
@@ -81,6 +83,7 @@ impl Rider {
             blind: false,
             fallen: false,
             ahead: 0,
+            skips: false,
             returning: false,
             refused: false,
             refusal_untold: false,
@@ -102,14 +105,14 @@ impl Rider {
 
     /// Whether this tick is one of those that its last frame leads ahead.
     pub(super) const fn take_ahead(&mut self) -> bool {
-        let is_ahead = self.ahead > 0;
+        self.skips = self.ahead > 0;
         self.ahead = self.ahead.saturating_sub(1);
-        is_ahead
+        self.skips
     }
 
     /// Whether a frame goes to it in this tick.
     pub(super) const fn gets_a_frame(&self) -> bool {
-        self.is_there() && self.ahead == 0
+        self.is_there() && !self.skips
     }
 
     /// The pose sent last.
@@ -147,6 +150,7 @@ impl Rider {
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
         (self.part, self.leaving, self.blind, self.ahead) = (Part::Away, None, false, 0);
+        self.skips = false;
     }
 
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
@@ -165,6 +169,7 @@ impl Rider {
         self.trail.rest(*known.pose());
         self.gate.restart(known);
         (self.part, self.leaving, self.blind, self.ahead) = (Part::Still, None, false, 0);
+        self.skips = false;
         (self.refused, self.returning) = (false, true);
     }
 
