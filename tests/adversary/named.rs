@@ -354,6 +354,25 @@ fn nor_are_those_that_were_lost_while_replies_to_older_ones_still_came() {
 }
 
 #[test]
+fn a_seat_whose_frames_are_held_back_is_not_joined_from_what_it_reports_before_they_come() {
+    for at in [0, 100, 200] {
+        let ether = ether(THREE, |seat| seat.report_ms = 100);
+        lead(THREE, &ether, false, |hall| {
+            hall.load(0);
+            assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
+            hall.pass(300);
+            hall.ask(Request::Arm);
+            assert!(hall.comes_to(|state| state == State::Armed, 1_000), "{:?}", hall.state);
+            hall.ask(Request::Go);
+            hall.pass(at);
+            hall.ether.turns(0, Weather::Held, 700);
+            hall.pass(3_000);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
 fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap() {
     let ether = ether(THREE, |_| {});
     lead(THREE, &ether, false, |hall| {
