@@ -4,7 +4,7 @@ use std::fmt;
 
 /// Losses, repeats and changes of order within this long are what README admits: what was to take so long is made up for in
 /// one frame.
-pub(crate) const ADMITTED_MS: f64 = 50.0;
+const ADMITTED_MS: f64 = 50.0;
 /// How much faster than its type allows a seat may be: roundings of pulses and milliseconds.
 const SLACK: f64 = 1.01;
 /// Pulses that rounding may add to a distance.
@@ -51,6 +51,11 @@ impl fmt::Display for Breach {
     }
 }
 
+/// How far apart two frames may have been sent that are executed one after the other, where what was in between is admitted.
+pub(crate) fn admitted_ms(period_ms: f64, jitter_ms: f64) -> f64 {
+    ADMITTED_MS + 2.0 * period_ms + jitter_ms
+}
+
 /// One move of one frame, as the seat executes it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Executed {
@@ -75,7 +80,7 @@ pub(crate) struct Executed {
 impl Executed {
     /// The first axis that goes too far, how far, mm, and in which way.
     pub(crate) fn verdict(&self, mm_s: f64) -> Option<(usize, f64, How)> {
-        let admitted = self.apart_ms <= ADMITTED_MS + 2.0 * self.period_ms + self.jitter_ms;
+        let admitted = self.apart_ms <= admitted_ms(self.period_ms, self.jitter_ms);
         // What was lost for a moment is made up for in one frame; what came in a heap is executed in haste, where the seat is
         // set to.
         let time = if self.bunched { self.time_ms } else { self.ms };

@@ -197,6 +197,41 @@ fn a_seat_that_is_jogged_after_it_was_found_up_at_the_start_parks_from_where_it_
     assert_at_park(&ether, 6);
 }
 
+#[test]
+fn a_seat_that_is_still_being_jogged_when_park_is_asked_for_is_not_yanked() {
+    let ether = ether(SIX, |_| {});
+    ether.world().lines[0].seat.put(2, 100.0);
+    lead(SIX, &ether, false, |hall| {
+        hall.load(0);
+        assert!(hall.comes_to(|state| state == State::Recovering, 5_000), "{:?}", hall.state);
+        hall.pass(1_000);
+        assert!(hall.ether.jog(0, 2, -70.0, hall.ether.ns()));
+        hall.pass(400);
+        assert!(hall.parks(), "{:?}", hall.state);
+    });
+    assert_no_breach(&ether);
+}
+
+#[test]
+fn a_seat_that_was_jogged_just_before_go_is_not_yanked() {
+    for passes in [100, 300, 500, 700] {
+        let ether = ether(SIX, |_| {});
+        lead(SIX, &ether, false, |hall| {
+            hall.load(0);
+            assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
+            hall.pass(300);
+            hall.ask(Request::Arm);
+            assert!(hall.comes_to(|state| state == State::Armed, 1_000), "{:?}", hall.state);
+            hall.pass(500);
+            assert!(hall.ether.jog(0, 3, 11.0, hall.ether.ns()));
+            hall.pass(passes);
+            hall.ask(Request::Go);
+            hall.pass(1_000);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
 // D3: more than six axes, of which no register tells.
 
 #[test]
@@ -319,6 +354,25 @@ fn nor_are_those_that_were_lost_while_replies_to_older_ones_still_came() {
 }
 
 #[test]
+fn a_seat_whose_frames_are_held_back_is_not_joined_from_what_it_reports_before_they_come() {
+    for at in [0, 100, 200] {
+        let ether = ether(THREE, |seat| seat.report_ms = 100);
+        lead(THREE, &ether, false, |hall| {
+            hall.load(0);
+            assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
+            hall.pass(300);
+            hall.ask(Request::Arm);
+            assert!(hall.comes_to(|state| state == State::Armed, 1_000), "{:?}", hall.state);
+            hall.ask(Request::Go);
+            hall.pass(at);
+            hall.ether.turns(0, Weather::Held, 700);
+            hall.pass(3_000);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
 fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap() {
     let ether = ether(THREE, |_| {});
     lead(THREE, &ether, false, |hall| {
@@ -329,6 +383,24 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
         hall.pass(4_000);
     });
     assert_no_breach(&ether);
+}
+
+#[test]
+fn a_seat_whose_power_went_is_sent_nothing_when_it_comes_back_with_another_zero() {
+    for park in [false, true] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(400);
+            if park {
+                hall.ask(Request::Park);
+            }
+            let now = hall.ether.ns();
+            hall.ether.world().lines[0].seat.reboot(now, 1_000 * MS);
+            hall.pass(3_000);
+        });
+        assert_no_breach(&ether);
+    }
 }
 
 /// The greatest acceleration of the first axes of a seat over a span of 30 ms, mm/s², in so many milliseconds to come.

@@ -88,7 +88,8 @@ impl Hall {
         let request = if body.is_empty() { request } else { request.json(body) };
         if matches!(path, "show/go" | "show/resume" | "show/park") {
             self.stopped = None;
-            self.town.ether.world().asked = true;
+            let (now, world) = (self.town.ether.ns(), &mut *self.town.ether.world());
+            (world.asked, world.asked_at) = (true, now);
         } else if path == "show/stop" {
             self.stopped.get_or_insert(self.town.ether.ns());
         }
@@ -158,7 +159,7 @@ impl Hall {
     fn jog(&mut self, seat: usize) {
         let (axis, mm) = (self.dice.range(0, 3) as usize, self.dice.range(0, 100) as f64 - 50.0);
         let now = self.town.ether.ns();
-        let done = self.town.ether.world().lines[seat].seat.jog(axis, mm, now);
+        let done = self.town.ether.jog(seat, axis, mm, now);
         self.note(format!("seat {}, axis {}: jogged by {mm} mm: {done}", seat + 1, axis + 1));
         if done {
             self.pass(1_500);

@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use super::judge::{Breach, Executed, PULSES_PER_MM};
+use super::judge::{Breach, Executed, PULSES_PER_MM, admitted_ms};
 use super::words::{self, Frame, Heard};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -262,11 +262,16 @@ impl Seat {
         self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
     }
 
-    /// How long ago the frame was sent after which this one comes: that which was executed before, or the first of a motion.
+    /// From the sending of the frame after which this one comes: of that which was executed before or, where that is long ago,
+    /// of the first of a motion that was lost since.
     fn apart_ms(&self, command: &Command) -> f64 {
-        let of_executed = self.executed.map_or(u64::MAX, |sent| sent.abs_diff(command.sent_ns));
-        let of_lost = (command.sent_ns - command.lost_since) as f64 / MS as f64 + self.settings.period_ms;
-        (of_executed as f64 / MS as f64).min(of_lost)
+        let Settings { period_ms, jitter_ms, .. } = self.settings;
+        let ms = |ns: u64| ns as f64 / MS as f64;
+        let of_executed = self.executed.map_or(f64::INFINITY, |sent| ms(sent.abs_diff(command.sent_ns)));
+        if of_executed <= admitted_ms(period_ms, jitter_ms) {
+            return of_executed;
+        }
+        ms(command.sent_ns - command.lost_since) + period_ms
     }
 
     fn judge(&mut self, executed: &Executed, frame: u32, at_ns: u64) {
