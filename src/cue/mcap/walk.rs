@@ -56,24 +56,19 @@ impl Walk {
     /// # Errors
     /// What cannot be so, in words; [`Self::record`] is then where.
     pub(super) fn pass(&mut self, mut octets: &[u8]) -> Result<(), String> {
-        while !octets.is_empty() {
-            let wanted = self.wanted();
-            let take = if self.over {
-                octets.len()
-            } else if self.left > 0 {
-                usize::try_from(self.left).unwrap_or(usize::MAX).min(octets.len())
+        while !octets.is_empty() && !self.over {
+            let room = if self.left > 0 { self.left } else { (self.wanted() - self.head.len()) as u64 };
+            let (taken, rest) =
+                octets.split_at(usize::try_from(room).unwrap_or(usize::MAX).min(octets.len()));
+            if self.left > 0 {
+                self.left -= taken.len() as u64;
             } else {
-                (wanted - self.head.len()).min(octets.len())
-            };
-            let (taken, rest) = octets.split_at(take);
-            octets = rest;
-            if !self.over && self.left == 0 {
                 self.keep(taken)?;
-            } else {
-                self.left = self.left.saturating_sub(take as u64);
             }
-            self.at += take as u64;
+            self.at += taken.len() as u64;
+            octets = rest;
         }
+        self.at += octets.len() as u64;
         Ok(())
     }
 
