@@ -222,7 +222,10 @@ impl Belief {
             return;
         }
         // A report comes unasked, past frames that are held back on their way; an answer comes after all that was sent before.
-        if self.gap && reading.by == Source::Report && !matches!(self.known, Known::Measured(_, Source::Registers)) {
+        if self.gap
+            && reading.by == Source::Report
+            && !matches!(self.known, Known::Measured(_, Source::Registers))
+        {
             return;
         }
         let told = reading.slots & self.own;

@@ -126,7 +126,7 @@ fn one_that_is_held_until_a_reset_is_told_once_and_pressed_anew_is_one_again() {
 }
 
 #[test]
-fn an_input_that_is_read_tells_of_an_emergency_stop_too_and_that_it_is_over() {
+fn an_input_that_is_read_tells_of_an_emergency_stop_too_and_looks_alone_that_it_is_over() {
     let mut observer = observer(Dialect::Mbox);
     let mut read = |ms, channel, code, inputs: u16| {
         let (data, access) = ([inputs], Access::Read);
@@ -138,7 +138,9 @@ fn an_input_that_is_read_tells_of_an_emergency_stop_too_and_that_it_is_over() {
     assert!(read(1, 0, ReplyCode::Running, X01));
     assert!(read(2, 1, ReplyCode::Running, 0), "of another table");
     assert!(read(3, 0, ReplyCode::Fault, 0), "no value, but an error number");
-    assert!(!read(4, 0, ReplyCode::Running, !X01));
+    assert!(read(4, 0, ReplyCode::Running, !X01));
+    observer.on_look(0, Look { stop: StopSign::Over, inputs: Some(!X01) }, at(5));
+    assert!(!observer.states()[0].emergency_stop());
 }
 
 #[test]

@@ -72,8 +72,7 @@ fn the_first_twenty_faults_are_named_and_the_others_counted() {
 }
 
 /// Rows of a motion editor for a platform of six legs: about 1 s each, in mm, slow enough for the corners of straight lines.
-const ROWS: &str =
-    "line,time_ms,x,y,z,u,v,w\n1,1000,0,0,0,0,0,0\n2,1000,11,10,9,11,10,9\n3,1000,0,0,0,0,0,0\n";
+const ROWS: &str = "line,time_ms,x,y,z,u,v,w\n1,1000,0,0,0,0,0,0\n2,1000,11,10,9,11,10,9\n3,1000,0,0,0,0,0,0\n4,500,0,0,0,0,0,0\n";
 
 #[test]
 fn rows_of_a_motion_editor_play_and_each_is_reached_when_its_time_is_over() {
@@ -103,8 +102,9 @@ fn rows_of_a_motion_editor_play_and_each_is_reached_when_its_time_is_over() {
 #[test]
 fn twenty_bytes_a_second_play_once_they_are_converted() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
-    let octets: Vec<u8> =
-        (0..30_u8).flat_map(|row| [(29 - row).min(row) * 2, (29 - row).min(row), 0]).collect();
+    let octets: Vec<u8> = (0..34_u8)
+        .flat_map(|row| [29_u8.saturating_sub(row).min(row) * 2, 29_u8.saturating_sub(row).min(row), 0])
+        .collect();
     let (raw, cue) = (folder.write("ride.bin", octets), folder.path("ride.csv"));
     let [raw, cue_text] = [&raw, &cue].map(|path| path.to_str().expect("text"));
     let run = kinocue(&["convert", raw, cue_text, "--from", "u8", "--axes", "3", "--rate", "20"]);

@@ -99,6 +99,10 @@ fn script(config: &Config) -> (Vec<Part>, String) {
         parts.push(Part { name: (*name).to_owned(), from: time(at), to: time(at + EFFECT_MS), axis: None });
         at += EFFECT_MS;
     }
+    // It ends at rest: the last axis comes back before that.
+    if effects.is_empty() {
+        row(at, None, None);
+    }
     row(at + LEAD_MS, None, None);
     (parts, text)
 }

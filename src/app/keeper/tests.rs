@@ -346,7 +346,8 @@ fn a_test_that_is_made_while_the_hall_is_disarmed_is_forgotten() {
         rig.hear();
         rig.settle();
         rig.wait_until(|_| test.is_finished() && other.is_finished());
-        assert_eq!(test.join().unwrap().unwrap_err().code, Code::State);
+        let problem = test.join().unwrap().unwrap_err();
+        assert_eq!(problem.code, Code::State, "{problem:?}");
         let cued = rig.keeper.cued.as_ref().map(|cued| cued.id.clone());
         assert_eq!((cued.as_deref(), rig.keeper.sweep.is_none()), (Some("one"), true), "{held_by:?}");
         assert!(rig.keeper.reins.desk.mix(1).on, "the other row is as it was");
