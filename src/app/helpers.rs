@@ -77,6 +77,7 @@ impl<'scope> Helpers<'scope> {
         let closed_at = Monotonic.now();
         accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
         let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
-        Run { ended, accounts, granted, spun: ticks.clock.spun(), refusals, clamps, origin, closed_at }
+        let (spun, tallies) = (ticks.clock.spun(), ticks.places.tallies().collect());
+        Run { ended, accounts, granted, spun, refusals, clamps, tallies, origin, closed_at }
     }
 }

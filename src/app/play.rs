@@ -14,7 +14,7 @@ use super::report::Report;
 use super::stage::Stage;
 use super::staged::Staged;
 use super::sum_up::{About, sum_up};
-use crate::belief::{Evidence, Reading};
+use crate::belief::{Evidence, FRESH, Reading};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::{Ending, Show};
@@ -31,7 +31,7 @@ use crate::rt::{
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
-use crate::time::Rate;
+use crate::time::{MonoTime, Rate};
 use crate::timeline::Timeline;
 
 /// Why nothing was played. Nothing has moved then.
@@ -264,7 +264,7 @@ impl Play {
         let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
         let mut played = sum_up(about, &self.config.controllers, &prepared, &run);
         if run.ended.ending == Ending::Completed {
-            played.astray = astray(&self.config, &parks, &self.control.live);
+            played.astray = astray(&self.config, &parks, &self.control.live, run.closed_at);
         }
         Ok(played)
     }
@@ -288,11 +288,14 @@ fn look_for_others(
 }
 
 /// The seats that told, after the last frame, that they are not at park.
-fn astray(config: &Config, windows: &[Window], live: &Live) -> Vec<String> {
+fn astray(config: &Config, windows: &[Window], live: &Live, now: MonoTime) -> Vec<String> {
     let is_up = |lane: &usize| {
         let window = &windows[*lane];
         let reading = live.evidence(*lane).and_then(Evidence::reading);
-        reading.is_some_and(|(_, Reading { pose, slots, .. })| {
+        reading.is_some_and(|(_, Reading { pose, slots, at, .. })| {
+            if now.since(at) > FRESH {
+                return false; // what it told before the show says nothing of its end
+            }
             let told = window.moving().filter(|(slot, _)| slots >> slot & 1 == 1);
             told.into_iter().any(|(slot, axis)| (pose[slot] - axis.park).abs() > PARKED)
         })

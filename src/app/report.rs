@@ -200,6 +200,14 @@ pub struct ControllerReport {
     pub port_closed: u64,
     /// Times that the last gate held its motion back.
     pub clamps: u64,
+    /// Frames that were not sent, because from somewhere that its seat might be they would have been too fast.
+    pub withheld: u64,
+    /// Times that it was not known any more which frames arrive.
+    pub gaps: u64,
+    /// Frames that found it busy with one before, by the sum of their Times, and were late by that.
+    pub late: u64,
+    /// Of these, frames that found it with more than two to do, and were hurried for that (PA06).
+    pub hurried: u64,
     /// Ack latency, µs.
     pub ack_us: LatencyReport,
     /// What it last said of itself.

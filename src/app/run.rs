@@ -1,5 +1,6 @@
 //! What the threads of a play or of a hall come back with.
 
+use crate::belief::Tally;
 use crate::gate::Counts;
 use crate::plan::PlanError;
 use crate::rt::{Accounts, Ended, Spun};
@@ -21,6 +22,8 @@ pub struct Run {
     pub refusals: Vec<PlanError>,
     /// What the last gate had to do, lane by lane.
     pub clamps: Vec<Counts>,
+    /// What the check of where seats may be had to do, lane by lane.
+    pub tallies: Vec<Tally>,
     /// The instant of tick 0.
     pub origin: MonoTime,
     /// The instant at which the accounts were closed.

@@ -93,6 +93,10 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         send_failed: counts.send_failed,
         port_closed: counts.port_closed,
         clamps: run.clamps[index].clamps,
+        withheld: run.tallies[index].withheld,
+        gaps: run.tallies[index].gaps,
+        late: run.tallies[index].late,
+        hurried: run.tallies[index].hurried,
         ack_us: LatencyReport::of(tracker.latency(index)),
         state: StateReport::of(&run.accounts.observer.states()[index], run.closed_at),
     }
@@ -117,6 +121,12 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
              on axis {axis}; check the cue, and tell us if it passes",
             one.name
         ))
+    }));
+    notes.extend(controllers.iter().zip(&run.tallies).filter(|(_, tally)| tally.withheld > 0).map(|(one, tally)| {
+        format!(
+            "{}: {} frames were withheld, because from somewhere that its seat might have been they would have been too fast",
+            one.name, tally.withheld
+        )
     }));
     if run.ended.unposted > 0 {
         notes.push(format!(

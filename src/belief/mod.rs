@@ -14,7 +14,7 @@ mod tests;
 use std::time::Duration;
 
 pub use evidence::{Evidence, Reading, Source};
-use span::{SPAN, Spans};
+use span::Spans;
 
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::time::MonoTime;
@@ -244,11 +244,11 @@ impl Belief {
         self.gap &= self.within != self.own;
     }
 
-    /// That the ack thread is slow is no gap: what an ack may still be read for is not missing.
+    /// That the ack thread is slow is no gap: what an ack may still be read for is not missing. Of a span the oldest frame counts,
+    /// so that a frame is missed after 40 to 50 ms.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
-        let unheard =
-            || self.spans.waiting_since(self.acked).is_some_and(|since| told.since(since) > GAP + SPAN);
+        let unheard = || self.spans.waiting_since(self.acked).is_some_and(|since| told.since(since) > GAP);
         refused || (self.asks && unheard())
     }
 

@@ -8,7 +8,7 @@ use crate::wire::FrameNo;
 
 /// The ticks whose frames are kept together. What is acked within a span is told apart from the rest of it only once the next
 /// span is: shorter ones would tell more precisely, and cost more.
-pub(super) const SPAN: Duration = Duration::from_millis(10);
+const SPAN: Duration = Duration::from_millis(10);
 /// More than a gap's worth; once they are used up the last one takes all that follows.
 const SPANS: usize = 8;
 

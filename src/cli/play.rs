@@ -259,5 +259,12 @@ pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
             anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
         return Err(why).or_exit(Exit::Unavailable);
     }
+    if !played.astray.is_empty() {
+        let who = played.astray.join(", ");
+        let why = anyhow!(
+            "{who} tells that it is not at park, where its last frames led; look at it before the next play"
+        );
+        return Err(why).or_exit(Exit::TryAgain);
+    }
     Ok(Exit::Done)
 }
