@@ -311,13 +311,20 @@ impl Belief {
     #[must_use]
     pub fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
-        let begins = self.is_quiet(now);
-        if begins && !self.is_fresh(now) && self.within != 0 {
+        if self.is_quiet(now) && !self.is_fresh(now) && self.within != 0 {
             return false;
         }
-        let from_all = self.gap || begins;
+        let farthest = self.farthest(pose, now);
+        farthest.iter().zip(&self.speed).all(|(farthest, speed)| *farthest <= speed * time)
+    }
+
+    /// How far from `pose` each axis may be at the most; 0 where the seat has no such axis.
+    #[must_use]
+    pub fn farthest(&self, pose: &Pose, now: MonoTime) -> Pose {
+        let from_all = self.gap || self.is_quiet(now);
         let last = self.spans.last();
-        (0..MAX_AXES).filter(|slot| self.own >> slot & 1 == 1).all(|slot| {
+        let mut farthest = [0.0; MAX_AXES];
+        for slot in (0..MAX_AXES).filter(|slot| self.own >> slot & 1 == 1) {
             let (low, high) = if self.within >> slot & 1 == 0 {
                 (0.0, 1.0)
             } else if from_all {
@@ -325,9 +332,9 @@ impl Belief {
             } else {
                 (last[slot], last[slot])
             };
-            let farthest = (pose[slot] - low).abs().max((pose[slot] - high).abs());
-            farthest <= self.speed[slot] * time
-        })
+            farthest[slot] = (pose[slot] - low).abs().max((pose[slot] - high).abs());
+        }
+        farthest
     }
 
     /// Notes a frame that the kernel took.

@@ -1,6 +1,7 @@
 //! The life of a play, tick by tick: where show time stands, which course the lanes follow, and what each frame says.
 //! Tick thread; told the time, never asks; allocates nothing.
 
+mod blind;
 mod fader;
 mod headroom;
 mod mix;
@@ -249,15 +250,16 @@ impl Engine {
         self.riders[lane].is_there() && !self.is_at_rest()
     }
 
-    /// Leads a lane of which nobody knows which frames reach it so far ahead with this tick's frame that `is_enough` of the pose
-    /// and of the milliseconds that it takes there. Says how many; none where no frame of up to `at_most` will do.
-    pub fn stretch(
-        &mut self,
-        lane: usize,
-        at_most: u32,
-        is_enough: impl Fn(&Pose, u32) -> bool,
-    ) -> Option<u32> {
-        self.riders[lane].stretch(self.frames - 1, self.show.rate, at_most, is_enough)
+    /// Whether nobody knows which frames reach a lane: its frames come from [`Engine::slow_down`] alone.
+    #[must_use]
+    pub fn is_blind(&self, lane: usize) -> bool {
+        self.riders[lane].is_blind()
+    }
+
+    /// Sets the pose of a lane that is blind one step further towards its rest, `farthest` being how far each slot may be from
+    /// its present one. Says how long that takes, `longest_ms` at the most; none where nothing goes to the lane any more.
+    pub fn slow_down(&mut self, lane: usize, longest_ms: u32, farthest: &Pose) -> Option<u32> {
+        self.riders[lane].slow_down(self.frames - 1, self.show.rate, longest_ms, farthest)
     }
 
     /// A lane that has just fallen out, and is to be looked at; each is said once.
@@ -346,8 +348,10 @@ impl Engine {
     /// Serves one tick: sets the poses and says what their frames carry.
     pub fn tick(&mut self, missed: u64) -> Step {
         self.count_missed(missed);
+        self.riders.iter_mut().for_each(|rider| rider.pass(missed));
         if matches!(self.phase, Phase::Closing(0) | Phase::Done) {
             self.phase = Phase::Done;
+            self.riders.iter_mut().filter(|rider| rider.is_blind()).for_each(Rider::fall_out);
             return Step::Over;
         }
         if self.phase == Phase::Waiting {
@@ -404,11 +408,10 @@ impl Engine {
         self.reached = self.playhead;
         let index = self.frames - 1;
         let cue = self.timeline.sample(self.reached, &mut self.hint);
-        let there = self.riders.iter_mut().enumerate().filter(|(_, rider)| rider.is_there());
-        for (lane, rider) in there {
-            if rider.skip() {
-                continue;
-            }
+        // The frames of one that is blind are made as they leave, from what is known by then.
+        let led = |rider: &Rider| rider.is_there() && !rider.is_blind();
+        let riders = self.riders.iter_mut().enumerate().filter(|(_, rider)| led(rider));
+        for (lane, rider) in riders {
             let pose = rider.next(lane, time, &mut self.course, self.reached, &cue);
             rider.send(index, time, pose);
         }

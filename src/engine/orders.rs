@@ -122,12 +122,11 @@ impl Engine {
     }
 
     /// Nobody knows which frames reach a lane: it is brought to rest by frames that are slow enough from wherever it may be
-    /// ([`Engine::stretch`]), and then it is away, until it is found.
+    /// ([`Engine::slow_down`]), and then it is away, until it is found.
     pub fn go_blind(&mut self, lane: usize) {
         if self.sends_nothing() {
             return self.fall_out(lane);
         }
-        self.brake(lane);
         self.riders[lane].go_blind();
     }
 

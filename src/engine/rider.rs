@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::blind::{self, Axis, Grid};
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
@@ -24,6 +25,8 @@ pub(super) enum Part {
     With,
     /// Comes to rest, for that long by now.
     Braking(Duration),
+    /// Nobody knows which frames reach it: it is brought to rest by slow ones ([`blind`]), and is away then.
+    Blind,
     /// Rests where it is, until a course leads on from there.
     Still,
     /// Nothing goes to it: nobody has told yet where it stands.
@@ -44,13 +47,10 @@ pub(super) struct Rider {
     pub(super) out: bool,
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
-    /// Whether nobody knows which frames reach it: it is brought to rest by slow ones, and is away then.
-    blind: bool,
     /// Whether it has just come to be away, and is to be looked at before it can come back.
     fallen: bool,
-    /// Ticks to come for which nothing goes to it, as its last frame leads that far ahead; and whether this is one of them.
+    /// Ticks for which its last frame leads it, this one included.
     ahead: u32,
-    skips: bool,
     /// Whether it was away, and is not where the others are yet.
     returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
@@ -79,10 +79,8 @@ impl Rider {
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             leaving: None,
-            blind: false,
             fallen: false,
             ahead: 0,
-            skips: false,
             returning: false,
             refused: false,
             refusal_untold: false,
@@ -102,16 +100,19 @@ impl Rider {
         !matches!(self.part, Part::Unseen | Part::Away)
     }
 
-    /// Whether this tick is one of those that its last frame leads ahead: nothing goes to it then.
-    pub(super) const fn skip(&mut self) -> bool {
-        self.skips = self.ahead > 0;
-        self.ahead = self.ahead.saturating_sub(1);
-        self.skips
+    /// Another tick begins, after so many that were missed.
+    pub(super) fn pass(&mut self, missed: u64) {
+        self.ahead = self.ahead.saturating_sub(u32::try_from(missed + 1).unwrap_or(u32::MAX));
     }
 
     /// Whether a frame goes to it in this tick.
     pub(super) const fn gets_a_frame(&self) -> bool {
-        self.is_there() && !self.skips
+        self.is_there() && self.ahead == 0
+    }
+
+    /// Whether nobody knows which frames reach it.
+    pub(super) fn is_blind(&self) -> bool {
+        self.part == Part::Blind
     }
 
     /// The pose sent last.
@@ -141,15 +142,18 @@ impl Rider {
         }
     }
 
-    /// Nobody knows which frames reach it; to be called after [`Rider::brake`].
-    pub(super) const fn go_blind(&mut self) {
-        self.blind = self.is_there();
+    /// Nobody knows which frames reach it. One that rests is left where it is.
+    pub(super) fn go_blind(&mut self) {
+        match self.part {
+            Part::With | Part::Braking(_) => self.part = Part::Blind,
+            Part::Still => self.fall_out(),
+            Part::Blind | Part::Unseen | Part::Away => {}
+        }
     }
 
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
-        (self.part, self.leaving, self.blind) = (Part::Away, None, false);
-        (self.ahead, self.skips) = (0, false);
+        (self.part, self.leaving, self.ahead) = (Part::Away, None, 0);
     }
 
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
@@ -167,8 +171,7 @@ impl Rider {
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
         self.gate.restart(known);
-        (self.part, self.leaving, self.blind) = (Part::Still, None, false);
-        (self.ahead, self.skips) = (0, false);
+        (self.part, self.leaving, self.ahead) = (Part::Still, None, 0);
         (self.refused, self.returning) = (false, true);
     }
 
@@ -184,7 +187,9 @@ impl Rider {
     pub(super) fn halt(&mut self) {
         self.trail.rest(*self.pose());
         self.gate.rest();
-        if self.is_there() {
+        if self.is_blind() {
+            self.fall_out();
+        } else if self.is_there() {
             self.part = Part::Still;
         }
     }
@@ -206,7 +211,7 @@ impl Rider {
 
     /// Whether it moves on its own way to rest.
     pub(super) const fn is_braking(&self) -> bool {
-        matches!(self.part, Part::Braking(_))
+        matches!(self.part, Part::Braking(_) | Part::Blind)
     }
 
     /// Where it is to be `time` after the frame before; `at` on its course, and `cue` there.
@@ -226,7 +231,7 @@ impl Rider {
                 self.count_holds();
                 *self.pose()
             }
-            Part::Unseen | Part::Away => *self.pose(),
+            Part::Blind | Part::Unseen | Part::Away => *self.pose(),
         }
     }
 
@@ -238,9 +243,6 @@ impl Rider {
 
     /// One more frame that holds it, or none if there have been enough.
     fn count_holds(&mut self) {
-        if self.blind {
-            return self.fall_out(); // it was told where to rest, in a frame that took its time
-        }
         if let Some(left) = &mut self.leaving {
             *left -= 1;
             if *left == 0 {
@@ -249,35 +251,28 @@ impl Rider {
         }
     }
 
-    /// Goes on along its way to rest until `is_enough` of the pose and of the milliseconds that lead there, those of its next
-    /// frame included, of which `times` gives the Times that follow it. Says how many milliseconds that makes; none where it is
-    /// not on such a way, or it takes longer than `at_most`.
-    pub(super) fn stretch(
+    /// Goes on with frame `index`, counted from 0, towards its rest though nobody knows which frames reach it; `farthest` away each
+    /// slot may be from its pose, and no frame takes longer than `longest_ms`. Says how long this one takes; none where it has
+    /// fallen out, because it rests, or because nothing can be sent to it.
+    pub(super) fn slow_down(
         &mut self,
-        mut index: u64,
+        index: u64,
         rate: Rate,
-        at_most: u32,
-        is_enough: impl Fn(&Pose, u32) -> bool,
+        longest_ms: u32,
+        farthest: &Pose,
     ) -> Option<u32> {
-        let mut lasts = rate.time_ms(index);
-        if !self.blind {
+        let (pose, speed) = (*self.pose(), self.trail.speed(blind::sight_s(rate)));
+        let mut axes = [Axis::PADDING; MAX_AXES];
+        for (slot, own) in self.window.slots().iter().enumerate().filter(|(_, own)| own.is_own) {
+            axes[slot] = Axis::new(pose[slot], speed[slot], farthest[slot], &own.limits, rate);
+        }
+        let Some(leg) = blind::next_leg(&axes, Grid { rate, index, longest_ms }) else {
+            self.fall_out();
             return None;
-        }
-        while !is_enough(self.pose(), lasts) {
-            index += 1;
-            let time_ms = rate.time_ms(index);
-            lasts += time_ms;
-            if lasts > at_most {
-                return None;
-            }
-            self.ahead += 1;
-            if let Part::Braking(since) = self.part {
-                let time = Duration::from_millis(u64::from(time_ms));
-                let pose = self.brake_on(since + time);
-                self.send(index, time, pose);
-            }
-        }
-        Some(lasts)
+        };
+        self.trail.push(Duration::from_millis(u64::from(leg.lasts_ms)), leg.to);
+        self.ahead = leg.ticks;
+        Some(leg.lasts_ms)
     }
 
     /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the gate lets it pass.
@@ -300,8 +295,8 @@ impl Rider {
     pub(super) fn scene(&self) -> LaneScene {
         let place = match self.part {
             Part::With => Place::OnCourse,
-            Part::Unseen | Part::Away => Place::Away,
-            Part::Braking(_) | Part::Still if self.leaving.is_some() || self.blind => Place::Away,
+            Part::Blind | Part::Unseen | Part::Away => Place::Away,
+            Part::Braking(_) | Part::Still if self.leaving.is_some() => Place::Away,
             Part::Braking(_) | Part::Still => Place::Still(*self.pose()),
         };
         LaneScene { place, level: self.fader.level(), out: self.wants_out() }
@@ -316,8 +311,8 @@ impl Rider {
     pub(super) fn needs_a_course(&self) -> bool {
         let apart = match self.part {
             Part::With => self.out != self.wants_out(),
-            Part::Still => self.leaving.is_none() && !self.blind,
-            Part::Braking(_) | Part::Unseen | Part::Away => false,
+            Part::Still => self.leaving.is_none(),
+            Part::Braking(_) | Part::Blind | Part::Unseen | Part::Away => false,
         };
         apart && !self.refused
     }

@@ -68,6 +68,23 @@ impl Trail {
         states
     }
 
+    /// How fast each slot went to that pose: the mean of the newest frames that together took `seconds`, or of the newest one
+    /// where that took longer.
+    pub(super) fn speed(&self, seconds: f64) -> Pose {
+        let ages = (1..KEPT).map(|back| (self.newest + KEPT - back) % KEPT);
+        let since = |place: usize| self.times[self.newest] - self.times[place];
+        // Whole milliseconds may fall short of a period, and the oldest of a thousand frames a second is 15 ms back.
+        let is_enough = |place: &usize| since(*place) >= 0.9 * seconds;
+        let from = ages.clone().find(is_enough).or_else(|| ages.last());
+        let mut speed = [0.0; MAX_AXES];
+        if let Some(from) = from {
+            for (axis, speed) in speed.iter_mut().enumerate() {
+                *speed = (self.pose()[axis] - self.poses[from][axis]) / since(from);
+            }
+        }
+        speed
+    }
+
     /// How many frames make [`APART_S`]; one where they come less often, five at the most.
     fn apart(&self) -> usize {
         let before = (self.newest + KEPT - 1) % KEPT;
@@ -110,6 +127,17 @@ mod tests {
             assert!((state.velocity - expected.velocity).abs() < 1e-6, "{times:?}: {state:?}");
             assert!((state.acceleration - expected.acceleration).abs() < 1e-4, "{times:?}: {state:?}");
         }
+    }
+
+    #[test]
+    fn its_speed_is_the_mean_of_so_long_and_that_of_a_long_frame_alone() {
+        let mut trail = Trail::at_rest([0.0; MAX_AXES]);
+        for place in [0.01, 0.03, 0.06] {
+            trail.push(Duration::from_millis(10), [place; MAX_AXES]);
+        }
+        assert!((trail.speed(0.020)[0] - 2.5).abs() < 1e-9, "{}", trail.speed(0.020)[0]);
+        trail.push(Duration::from_millis(100), [0.16; MAX_AXES]);
+        assert!((trail.speed(0.020)[0] - 1.0).abs() < 1e-9, "{}", trail.speed(0.020)[0]);
     }
 
     #[test]

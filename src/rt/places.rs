@@ -144,27 +144,26 @@ impl Places {
     }
 
     /// Whether this tick's frame of a lane may leave, and what it says of time. Where it would be too fast from somewhere that
-    /// the seat may be, a lane that is blind is led further ahead, and any other is held: nothing is sent to it, and it is
-    /// looked at.
+    /// the seat may be, the lane is held: nothing is sent to it, and it is looked at. One that is blind gets a frame of its own.
     #[inline]
     #[must_use]
     pub fn admit(&mut self, lane: usize, engine: &mut Engine, beat: &Beat, at: MonoTime) -> Option<Beat> {
+        let beat = if engine.is_blind(lane) { self.slow_down(lane, engine, at)? } else { *beat };
         let belief = &mut self.lanes[lane].belief;
         if belief.allows(engine.pose(lane), beat.lasts_ms, at) {
-            return Some(*beat);
+            return Some(beat);
         }
-        self.stretch(lane, engine, beat, at)
+        belief.withheld();
+        engine.fall_out(lane);
+        None
     }
 
     #[cold]
-    fn stretch(&mut self, lane: usize, engine: &mut Engine, beat: &Beat, at: MonoTime) -> Option<Beat> {
-        let Place { belief, longest_ms } = &mut self.lanes[lane];
-        let lasts_ms = engine.stretch(lane, *longest_ms, |pose, lasts_ms| belief.allows(pose, lasts_ms, at));
-        if lasts_ms.is_none() {
-            belief.withheld();
-            engine.fall_out(lane);
-        }
-        lasts_ms.map(|lasts_ms| Beat::still(Timing::Relative, lasts_ms).lasting(beat.lasts_ms.max(lasts_ms)))
+    fn slow_down(&self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<Beat> {
+        let Place { belief, longest_ms } = &self.lanes[lane];
+        let farthest = belief.farthest(engine.pose(lane), at);
+        let lasts_ms = engine.slow_down(lane, *longest_ms, &farthest)?;
+        Some(Beat::still(Timing::Relative, lasts_ms))
     }
 
     /// Notes what became of a frame.

@@ -53,8 +53,17 @@ impl Rate {
     /// within half a millisecond of the exact grid.
     #[must_use]
     pub fn time_ms(self, index: u64) -> u32 {
-        let span = self.sum_ms(index + 1) - self.sum_ms(index);
-        u32::try_from(span).expect("a period is at most a second")
+        self.span_ms(index, 1)
+    }
+
+    /// The Times of so many frames together, from frame `index` on.
+    ///
+    /// # Panics
+    /// Where they are longer than 49 days.
+    #[must_use]
+    pub fn span_ms(self, index: u64, frames: u32) -> u32 {
+        let span = self.sum_ms(index + u64::from(frames)) - self.sum_ms(index);
+        u32::try_from(span).expect("a period is at most a second, and no Time is longer than days")
     }
 
     fn sum_ms(self, frames: u64) -> u128 {

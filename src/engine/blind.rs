@@ -1,0 +1,313 @@
+//! How a lane comes to rest of which nobody knows which frames arrive: by few frames of long Times, each a straight line that
+//! is a step slower than the one before. Pure arithmetic; allocates nothing.
+//!
+//! A seat that hears all of them is to slow down within its limits, and one that heard none since any place of the gap is
+//! not to be pulled after it. Let `h` be the distance from the pose sent last back to the farthest place where the axis may
+//! be, and `s` the speed of the next line, which takes `T`. It ends `h + s T` from that place at the most, and so much
+//! may be gone at the greatest speed `V` in `T`: `h + s T <= V T`, so `T >= h / (V - s)`. All axes of a frame share the
+//! longest of their Times; a longer one than it needs leaves an axis more room, as `s < V`.
+//!
+//! A line meets the next in a step of speed. The measure (`motion::Spacing`) takes acceleration from poses 20 ms apart, so a
+//! step `d` alone within its sight is `d / 20 ms`: one of `a` x 20 ms is just what the limit `a` allows, as long as no two of
+//! them fall within 20 ms. That is why no line is shorter.
+//!
+//! What is gone is not known to be gone: after the line `h` is `h + s T = h V / (V - s)`, and near `V` that grows quickly.
+//! Where all of the way to rest at the gentlest steps fits neither the stroke, nor the Times of the controller, nor a
+//! second, the steps are as much larger as it takes. Speed comes first, the stroke second, acceleration third.
+//!
+//! The limiter works on the regular grid of frames, and these leave it: they are bounded by this arithmetic, and each by
+//! `Belief::allows` before it is sent. The limiter is restarted from a reading before the lane moves again.
+
+use crate::motion::{Limits, MAX_AXES, Pose, Spacing};
+use crate::time::Rate;
+
+/// What of the greatest speed is used: the rest is for roundings to pulses and milliseconds.
+const SPEED_SHARE: f64 = 0.98;
+/// What of the greatest acceleration a step uses: the seam with what the axis did before is seen by the measure as well.
+const STEP_SHARE: f64 = 0.9;
+/// How long the whole way may take, ms: it is gone without knowing where the seat is, and a stop waits for it.
+const LONGEST_WAY_MS: f64 = 1_000.0;
+/// From one size of steps to the next that is tried, and how many are: the largest is 800 times the gentlest.
+const HARDER: f64 = 1.12;
+const TRIES: usize = 60;
+
+/// One axis on its way; strokes and seconds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Axis {
+    place: f64,
+    /// How fast it went there; signed.
+    speed: f64,
+    /// How far from there it may be at the most.
+    farthest: f64,
+    /// The greatest speed.
+    velocity: f64,
+    /// What one step takes from its speed.
+    step: f64,
+}
+
+/// The grid of frames, from the next one on, and what it asks of lines.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    pub(super) rate: Rate,
+    /// The frame that comes next, counted from 0.
+    pub(super) index: u64,
+    /// The longest Time of one frame, ms.
+    pub(super) longest_ms: u32,
+}
+
+/// The next line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Leg {
+    /// Where each axis goes.
+    pub(super) to: Pose,
+    /// Its Time, and the ticks that it takes, the one in which it is sent included.
+    pub(super) lasts_ms: u32,
+    pub(super) ticks: u32,
+}
+
+/// The shortest line, and how far back speed is looked at, seconds: the distance of the measure.
+pub(super) fn sight_s(rate: Rate) -> f64 {
+    f64::from(sight_ticks(rate)) / rate.hz()
+}
+
+fn sight_ticks(rate: Rate) -> u32 {
+    u32::try_from(Spacing::at_rate(rate.hz()).n).unwrap_or(u32::MAX)
+}
+
+impl Axis {
+    /// A slot of which the seat has no axis: it moves nothing.
+    pub(super) const PADDING: Self =
+        Self { place: 0.0, speed: 0.0, farthest: 0.0, velocity: f64::INFINITY, step: 0.0 };
+
+    /// An axis at `place` that came there with `speed`, and may be `farthest` from there.
+    pub(super) fn new(place: f64, speed: f64, farthest: f64, limits: &Limits, rate: Rate) -> Self {
+        Self {
+            place,
+            speed,
+            farthest,
+            velocity: SPEED_SHARE * limits.velocity,
+            step: STEP_SHARE * limits.acceleration * sight_s(rate),
+        }
+    }
+
+    fn slow(&mut self, harder: f64) {
+        let speed = (self.speed.abs() - harder * self.step).max(0.0);
+        self.speed = speed.copysign(self.speed);
+    }
+
+    /// How long a line at its speed has to be.
+    fn needs_s(&self) -> f64 {
+        let spare = self.velocity - self.speed.abs();
+        if spare > 0.0 { self.farthest / spare } else { f64::INFINITY }
+    }
+
+    fn go(&mut self, seconds: f64) {
+        self.place += self.speed * seconds;
+        self.farthest += self.speed.abs() * seconds;
+    }
+}
+
+impl Grid {
+    /// The shortest line of at least so many seconds: its ticks, and its Time; none where that is longer than may be.
+    fn line(&self, seconds: f64) -> Option<(u32, u32)> {
+        if seconds * 1e3 > f64::from(self.longest_ms) {
+            return None;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a Time in ticks fits")]
+        let ticks = (seconds * self.rate.hz()).ceil() as u32;
+        let mut ticks = ticks.max(sight_ticks(self.rate));
+        while f64::from(self.rate.span_ms(self.index, ticks)) < seconds * 1e3 {
+            ticks += 1; // whole milliseconds may fall short by one
+        }
+        let lasts_ms = self.rate.span_ms(self.index, ticks);
+        (lasts_ms <= self.longest_ms).then_some((ticks, lasts_ms))
+    }
+}
+
+/// The next line of that way to rest; none once all axes rest, or where no frame can bring them there.
+pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
+    let mut axes = *axes;
+    // Each axis as gently as it can alone: one that is short of room is not to brake the others.
+    for axis in &mut axes {
+        axis.step *= gentlest(std::slice::from_ref(axis), grid)?;
+    }
+    let harder = gentlest(&axes, grid)?;
+    slow(&mut axes, harder);
+    if rest(&axes) { None } else { go(&mut axes, grid) }
+}
+
+/// How many times as large as they are the steps have to be.
+fn gentlest(axes: &[Axis], grid: Grid) -> Option<f64> {
+    let sizes = std::iter::successors(Some(1.0), |size| Some(size * HARDER));
+    sizes.take(TRIES).find(|size| fits(axes, grid, *size))
+}
+
+/// Whether the whole way fits with steps so many times as large.
+fn fits(axes: &[Axis], mut grid: Grid, harder: f64) -> bool {
+    let mut kept = [Axis::PADDING; MAX_AXES];
+    kept[..axes.len()].copy_from_slice(axes);
+    let axes = &mut kept[..axes.len()];
+    let mut way_ms = 0.0;
+    loop {
+        slow(axes, harder);
+        if rest(axes) {
+            return true;
+        }
+        let Some(leg) = go(axes, grid) else { return false };
+        grid.index += u64::from(leg.ticks);
+        way_ms += f64::from(leg.lasts_ms);
+        if way_ms > LONGEST_WAY_MS {
+            return false;
+        }
+    }
+}
+
+fn slow(axes: &mut [Axis], harder: f64) {
+    axes.iter_mut().for_each(|axis| axis.slow(harder));
+}
+
+fn rest(axes: &[Axis]) -> bool {
+    axes.iter().all(|axis| axis.speed == 0.0)
+}
+
+/// Goes one line on at the present speeds; none where that leads out of a stroke, or takes too long.
+fn go(axes: &mut [Axis], grid: Grid) -> Option<Leg> {
+    let needs_s = axes.iter().map(Axis::needs_s).fold(0.0, f64::max);
+    let (ticks, lasts_ms) = grid.line(needs_s)?;
+    let mut to = [0.0; MAX_AXES];
+    for (axis, to) in axes.iter_mut().zip(&mut to) {
+        axis.go(f64::from(lasts_ms) * 1e-3);
+        *to = axis.place;
+    }
+    let inside = axes.iter().all(|axis| axis.speed == 0.0 || (0.0..=1.0).contains(&axis.place));
+    inside.then_some(Leg { to, lasts_ms, ticks })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::motion::Measure;
+    use crate::time::ShowTime;
+
+    const LIMITS: Limits = Limits { velocity: 240.0 / 150.0, acceleration: 3_000.0 / 150.0, jerk: 400.0 };
+
+    fn grid(hz: f64, longest_ms: u32) -> Grid {
+        Grid { rate: Rate::from_hz(hz), index: 0, longest_ms }
+    }
+
+    /// An axis of a bench seat: where it is, mm, how fast, mm/s, and how far away it may be, mm.
+    fn axis(place: f64, speed: f64, farthest: f64, rate: Rate) -> Axis {
+        Axis::new(place / 150.0, speed / 150.0, farthest / 150.0, &LIMITS, rate)
+    }
+
+    fn one(axis: Axis) -> [Axis; MAX_AXES] {
+        let mut axes = [Axis::PADDING; MAX_AXES];
+        axes[0] = axis;
+        axes
+    }
+
+    /// All lines to rest, each planned from the end of the one before, as it is in a show.
+    fn way(mut axes: [Axis; MAX_AXES], mut grid: Grid) -> Vec<Leg> {
+        let mut legs = Vec::new();
+        while let Some(leg) = next_leg(&axes, grid) {
+            for (axis, to) in axes.iter_mut().zip(leg.to) {
+                axis.speed = (to - axis.place) / (f64::from(leg.lasts_ms) * 1e-3);
+                axis.farthest += (to - axis.place).abs();
+                axis.place = to;
+            }
+            grid.index += u64::from(leg.ticks);
+            legs.push(leg);
+            assert!(legs.len() < 100, "{legs:?}");
+        }
+        legs
+    }
+
+    /// The sharpest acceleration that the measure sees where a seat goes on for 200 ms with `speed` and then hears all of these, mm/s².
+    fn sharpest(place: f64, speed: f64, legs: &[Leg]) -> f64 {
+        let mut measure = Measure::new(Spacing::at_rate(1_000.0));
+        let mut knots = vec![(-200.0, place - speed * 0.2), (0.0, place)];
+        for leg in legs {
+            let (end, _) = knots[knots.len() - 1];
+            knots.push((end + f64::from(leg.lasts_ms), leg.to[0] * 150.0));
+        }
+        let (end, rest) = knots[knots.len() - 1];
+        knots.push((end + 200.0, rest));
+        let mut worst = 0.0_f64;
+        for pair in knots.windows(2) {
+            let [(from, a), (to, b)] = [pair[0], pair[1]];
+            for ms in 1..=(to - from) as i64 {
+                let at = ShowTime::from_millis(from as i64 + ms);
+                let readings = measure.push(at, a + (b - a) * ms as f64 / (to - from));
+                worst = worst.max(readings.acceleration.value.abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn a_line_takes_just_as_long_as_the_greatest_speed_needs_from_the_farthest_place() {
+        let grid = grid(1_000.0, 3_000);
+        let leg = next_leg(&one(axis(75.0, 154.0, 12.0, grid.rate)), grid).expect("it moves");
+        // At 100 mm/s: 12 mm at what is left of 235.2 mm/s.
+        assert_eq!((leg.lasts_ms, leg.ticks), (89, 89), "12 / 135.2 s");
+        assert!((leg.to[0] * 150.0 - 83.9).abs() < 1e-9, "{}", leg.to[0] * 150.0);
+    }
+
+    #[test]
+    fn a_lane_that_is_slower_than_one_step_rests_at_once() {
+        let grid = grid(100.0, 3_000);
+        assert_eq!(next_leg(&one(axis(75.0, -50.0, 10.0, grid.rate)), grid), None);
+        assert_eq!(next_leg(&[Axis::PADDING; MAX_AXES], grid), None);
+    }
+
+    #[test]
+    fn a_seat_that_hears_all_lines_slows_down_within_its_limits_where_there_is_room() {
+        for (hz, speed) in [(100.0, 180.0), (100.0, -120.0), (1_000.0, 180.0), (60.0, 150.0)] {
+            let grid = grid(hz, 3_000);
+            let legs = way(one(axis(75.0, speed, speed.abs() * 0.07, grid.rate)), grid);
+            let sharpest = sharpest(75.0, speed, &legs);
+            assert!(!legs.is_empty() && sharpest <= 3_000.0, "{hz} Hz, {speed} mm/s: {sharpest} mm/s²");
+        }
+    }
+
+    #[test]
+    fn where_the_stroke_has_no_room_it_slows_down_harder_and_stays_inside() {
+        let grid = grid(100.0, 3_000);
+        for place in [75.0, 120.0, 140.0, 149.0] {
+            let legs = way(one(axis(place, 220.0, 16.0, grid.rate)), grid);
+            assert!(legs.iter().all(|leg| leg.to[0] <= 1.0), "{legs:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_line_is_too_fast_from_any_place_or_leaves_the_stroke_or_the_way_its_time(
+            axes in prop::collection::vec((0.0..150.0, -240.0..240.0, 0.0..150.0), 3),
+            hz in 1.0..1_000.0,
+            longest_ms in 50_u32..3_000,
+        ) {
+            let mut grid = grid(hz, longest_ms);
+            let mut kept = [Axis::PADDING; MAX_AXES];
+            for (kept, (place, speed, farthest)) in kept.iter_mut().zip(axes) {
+                *kept = axis(place, speed, farthest, grid.rate);
+            }
+            let mut way_ms = 0;
+            for leg in way(kept, grid) {
+                let seconds = f64::from(leg.lasts_ms) * 1e-3;
+                prop_assert!(leg.lasts_ms <= longest_ms);
+                prop_assert_eq!(leg.lasts_ms, grid.rate.span_ms(grid.index, leg.ticks));
+                for (axis, to) in kept.iter_mut().zip(leg.to).take(3) {
+                    axis.farthest += (to - axis.place).abs();
+                    prop_assert!(axis.farthest <= LIMITS.velocity * seconds + 1e-9);
+                    prop_assert!((0.0..=1.0).contains(&to));
+                    axis.place = to;
+                }
+                grid.index += u64::from(leg.ticks);
+                way_ms += leg.lasts_ms;
+            }
+            prop_assert!(way_ms <= 2 * 1_000, "{} ms", way_ms);
+        }
+    }
+}
