@@ -221,13 +221,6 @@ impl Belief {
         if self.busy_until > MonoTime::default() && reading.at < self.busy_until + SETTLE {
             return;
         }
-        // A report comes unasked, past frames that are held back on their way; an answer comes after all that was sent before.
-        if self.gap
-            && reading.by == Source::Report
-            && !matches!(self.known, Known::Measured(_, Source::Registers))
-        {
-            return;
-        }
         let told = reading.slots & self.own;
         let is_a_point = self.spans.is_a_point();
         let agrees = is_a_point && told & !self.within == 0 && !self.is_elsewhere(told, &reading.pose);

@@ -61,10 +61,15 @@ impl Positions {
         }
     }
 
-    /// Hears where axes are, from `first` on.
+    /// Hears where axes are, from `first` on. A report tells of those alone that have no register: it comes unasked, past frames
+    /// that are held back on their way, while an answer comes after all that was sent before what it answers.
     pub(super) fn hear(&mut self, first: usize, positions: &[Pulses], at: MonoTime, by: Source) {
-        self.by = by;
         for (axis, pulses) in (first..self.seat.axes).zip(positions) {
+            if by == Source::Report && axis < REGISTERS {
+                self.mind_order(axis, *pulses, by);
+                continue;
+            }
+            self.by = by;
             let fraction = self.seat.fraction(*pulses);
             let is_outside = !(-OUTSIDE..=1.0 + OUTSIDE).contains(&fraction);
             if is_outside {
@@ -104,9 +109,9 @@ impl Positions {
         self.home = true;
     }
 
-    /// A frame went to it.
+    /// A frame went to it: where it stood before says nothing of whether it rests.
     pub(super) const fn on_sent(&mut self) {
-        self.home = false;
+        (self.home, self.told) = (false, [None; MAX_AXES]);
     }
 
     /// The axis, from 0, that is not inside its stroke, and where it says that it is.
@@ -201,7 +206,9 @@ mod tests {
         let homed = positions.reading(ms(100)).unwrap();
         assert_eq!((homed.slots, homed.by), (0xff, Source::Homing));
         positions.on_sent();
-        assert_eq!(positions.reading(ms(100)).unwrap().slots, 0b11_1111, "frames have led them since");
+        assert_eq!(positions.reading(ms(100)), None, "frames have led them since");
+        positions.hear(0, &[Pulses(0); 6], ms(150), Source::Registers);
+        assert_eq!(positions.reading(ms(150)).unwrap().slots, 0b11_1111);
         positions.hear(0, &[Pulses(9); 8], ms(200), Source::Report);
         assert_eq!(positions.reading(ms(200)).unwrap().slots, 0xff);
     }
