@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::blind::{self, Axis, Grid};
+use super::blind::{self, Axis, Grid, LONGEST_WAY_MS};
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
@@ -25,8 +25,9 @@ pub(super) enum Part {
     With,
     /// Comes to rest, for that long by now.
     Braking(Duration),
-    /// Nobody knows which frames reach it: it is brought to rest by slow ones ([`blind`]), and is away then.
-    Blind,
+    /// Nobody knows which frames reach it: it is brought to rest by slow ones ([`blind`]), for so many milliseconds by now, and is away
+    /// then.
+    Blind(u32),
     /// Rests where it is, until a course leads on from there.
     Still,
     /// Nothing goes to it: nobody has told yet where it stands.
@@ -111,8 +112,8 @@ impl Rider {
     }
 
     /// Whether nobody knows which frames reach it.
-    pub(super) fn is_blind(&self) -> bool {
-        self.part == Part::Blind
+    pub(super) const fn is_blind(&self) -> bool {
+        matches!(self.part, Part::Blind(_))
     }
 
     /// The pose sent last.
@@ -145,9 +146,9 @@ impl Rider {
     /// Nobody knows which frames reach it. One that rests is left where it is.
     pub(super) fn go_blind(&mut self) {
         match self.part {
-            Part::With | Part::Braking(_) => self.part = Part::Blind,
+            Part::With | Part::Braking(_) => self.part = Part::Blind(0),
             Part::Still => self.fall_out(),
-            Part::Blind | Part::Unseen | Part::Away => {}
+            Part::Blind(_) | Part::Unseen | Part::Away => {}
         }
     }
 
@@ -211,7 +212,7 @@ impl Rider {
 
     /// Whether it moves on its own way to rest.
     pub(super) const fn is_braking(&self) -> bool {
-        matches!(self.part, Part::Braking(_) | Part::Blind)
+        matches!(self.part, Part::Braking(_) | Part::Blind(_))
     }
 
     /// Where it is to be `time` after the frame before; `at` on its course, and `cue` there.
@@ -231,7 +232,7 @@ impl Rider {
                 self.count_holds();
                 *self.pose()
             }
-            Part::Blind | Part::Unseen | Part::Away => *self.pose(),
+            Part::Blind(_) | Part::Unseen | Part::Away => *self.pose(),
         }
     }
 
@@ -261,17 +262,19 @@ impl Rider {
         longest_ms: u32,
         farthest: &Pose,
     ) -> Option<u32> {
+        let Part::Blind(since_ms) = self.part else { return None };
         let (pose, speed) = (*self.pose(), self.trail.speed(blind::sight_s(rate)));
         let mut axes = [Axis::PADDING; MAX_AXES];
         for (slot, own) in self.window.slots().iter().enumerate().filter(|(_, own)| own.is_own) {
             axes[slot] = Axis::new(pose[slot], speed[slot], farthest[slot], &own.limits, rate);
         }
-        let Some(leg) = blind::next_leg(&axes, Grid { rate, index, longest_ms }) else {
+        let grid = Grid { rate, index, longest_ms, left_ms: LONGEST_WAY_MS.saturating_sub(since_ms) };
+        let Some(leg) = blind::next_leg(&axes, grid) else {
             self.fall_out();
             return None;
         };
         self.trail.push(Duration::from_millis(u64::from(leg.lasts_ms)), leg.to);
-        self.ahead = leg.ticks;
+        (self.part, self.ahead) = (Part::Blind(since_ms + leg.lasts_ms), leg.ticks);
         Some(leg.lasts_ms)
     }
 
@@ -295,7 +298,7 @@ impl Rider {
     pub(super) fn scene(&self) -> LaneScene {
         let place = match self.part {
             Part::With => Place::OnCourse,
-            Part::Blind | Part::Unseen | Part::Away => Place::Away,
+            Part::Blind(_) | Part::Unseen | Part::Away => Place::Away,
             Part::Braking(_) | Part::Still if self.leaving.is_some() => Place::Away,
             Part::Braking(_) | Part::Still => Place::Still(*self.pose()),
         };
@@ -312,7 +315,7 @@ impl Rider {
         let apart = match self.part {
             Part::With => self.out != self.wants_out(),
             Part::Still => self.leaving.is_none(),
-            Part::Braking(_) | Part::Blind | Part::Unseen | Part::Away => false,
+            Part::Braking(_) | Part::Blind(_) | Part::Unseen | Part::Away => false,
         };
         apart && !self.refused
     }

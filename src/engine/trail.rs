@@ -71,11 +71,11 @@ impl Trail {
     /// How fast each slot went to that pose: the mean of the newest frames that together took `seconds`, or of the newest one
     /// where that took longer.
     pub(super) fn speed(&self, seconds: f64) -> Pose {
-        let ages = (1..KEPT).map(|back| (self.newest + KEPT - back) % KEPT);
+        let mut ages = (1..KEPT).map(|back| (self.newest + KEPT - back) % KEPT);
         let since = |place: usize| self.times[self.newest] - self.times[place];
         // Whole milliseconds may fall short of a period, and the oldest of a thousand frames a second is 15 ms back.
         let is_enough = |place: &usize| since(*place) >= 0.9 * seconds;
-        let from = ages.clone().find(is_enough).or_else(|| ages.last());
+        let from = ages.clone().find(is_enough).or_else(|| ages.next_back());
         let mut speed = [0.0; MAX_AXES];
         if let Some(from) = from {
             for (axis, speed) in speed.iter_mut().enumerate() {
