@@ -3,7 +3,7 @@
 //! makes a pose of what nobody measured or confirmed.
 //!
 //! An axis is somewhere between the places that it may have been left in: where the newest acked frame led it from, and where every
-//! frame since then would have it ([`span::Spans`]). Each frame is held against all of these before it is sent
+//! frame since then would have it (`span`). Each frame is held against all of these before it is sent
 //! ([`Belief::allows`]). Tick thread; told the time; allocates nothing.
 
 mod evidence;

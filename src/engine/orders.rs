@@ -154,6 +154,10 @@ impl Engine {
                 rider.come_back(known);
                 // Its controller's sum of Times has been broken off.
                 self.stamps.break_off();
+                // What was to follow the end was planned without it.
+                if self.switch.as_ref().is_some_and(|switch| switch.goal.is_after_the_end()) {
+                    self.drop_switch();
+                }
             }
             // Somebody moved it, or it was homed.
             _ if rests && !is_at(&rider.window, known.pose(), rider.pose(), near) => rider.come_back(known),

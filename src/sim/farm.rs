@@ -15,7 +15,6 @@ use super::log::Logs;
 use super::station::{Station, listen};
 use super::{Command, CommandError, Counts, Options, Setup};
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime;
 use crate::time::{Clock as _, MonoTime};
 
 /// Why virtual controllers cannot start.
@@ -108,11 +107,7 @@ impl Farm {
             due: start,
         };
         let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let run = move || {
-            realtime::below_the_tick_thread();
-            keeper.run()
-        };
-        let thread = thread.spawn(run).map_err(system)?;
+        let thread = thread.spawn(move || keeper.run()).map_err(system)?;
         Ok(Self { addresses, remote: Remote { orders: sender, bell }, thread: Some(thread) })
     }
 

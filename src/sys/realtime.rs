@@ -76,12 +76,6 @@ pub fn normal_priority() -> io::Result<()> {
     set_scheduler(libc::SCHED_OTHER, 0)
 }
 
-/// Gives the calling thread real-time service below that of a tick thread, where the system allows it: for virtual controllers,
-/// which stand for machines of their own. Elsewhere it has ordinary scheduling.
-pub fn below_the_tick_thread() {
-    let _ = request_below(PRIORITY);
-}
-
 /// Gives the calling thread real-time service below a thread of that priority, so that what it watches over does not hang on how
 /// busy the machine is; says whether it has it. Where the kernel refuses, or that thread has none, it is an ordinary one.
 #[must_use]

@@ -290,10 +290,7 @@ impl Relay {
         let [pulled, done] = [false; 2].map(|flag| Arc::new(AtomicBool::new(flag)));
         let (unplugged, over) = (Arc::clone(&pulled), Arc::clone(&done));
         let (seen, frames) = channel();
-        let thread = std::thread::spawn(move || {
-            kinocue::sys::realtime::below_the_tick_thread(); // a network is not slow because a machine is busy
-            relay(&inner, controller, (&unplugged, &over), &seen);
-        });
+        let thread = std::thread::spawn(move || relay(&inner, controller, (&unplugged, &over), &seen));
         Self { socket, frames, pulled, done, thread: Some(thread) }
     }
 
