@@ -91,8 +91,8 @@ impl Places {
         now: MonoTime,
         moving: bool,
     ) -> bool {
-        let begins = moving && !std::mem::replace(&mut self.moved, moving) && mail.live().has_reader();
-        if begins {
+        let moved = std::mem::replace(&mut self.moved, moving);
+        if moving && !moved && mail.live().has_reader() {
             self.waits = Some((now, now));
             mail.live().want(now);
         }

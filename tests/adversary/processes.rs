@@ -225,7 +225,7 @@ fn setting(name: &str) -> Option<u64> {
 
 #[test]
 fn no_history_of_a_real_process_moves_a_seat_faster_than_its_type_allows_or_unasked() {
-    let count = setting("KINOCUE_PROCESSES").unwrap_or(4);
+    let count = setting("KINOCUE_PROCESSES").unwrap_or(2);
     let first = setting("KINOCUE_SEED").unwrap_or(FIRST);
     let [next, bad, played] = [0; 3].map(AtomicU64::new);
     let work = || {
