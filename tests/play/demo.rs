@@ -57,7 +57,11 @@ impl Console {
             let (status, hall) = self.get("/api/v1/status");
             let hall: Value = serde_json::from_str(&hall).unwrap_or_else(|error| panic!("{error}: {hall}"));
             assert!(status == 200 && Monotonic.now() < until, "{status}: {hall}");
-            if hall["state"] == "playing" && hall["moving"] == true {
+            // A ride that has not sent a frame yet is over as soon as it is to end, and is none; until then the position is that
+            // of the ride before, near its end.
+            let at_s = hall["show"]["position_s"].as_f64().unwrap_or(0.0);
+            let is_under_way = (0.1..8.0).contains(&at_s);
+            if hall["state"] == "playing" && hall["moving"] == true && is_under_way {
                 return hall;
             }
         }
