@@ -195,6 +195,7 @@ fn frames(count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
+    use std::time::Duration;
 
     use proptest::prelude::*;
 
@@ -229,7 +230,7 @@ mod tests {
             gate.is_seeded = true;
             gate.rest_in(pose);
             let mut calm = 0;
-            for frame in 0..(4.0 * hz) as u64 {
+            for frame in (0..).take_while(|frame| rate.offset(*frame) < Duration::from_secs(4)) {
                 at += f64::from(times.of(frame)) * 1e-3;
                 pose[0] = place(at);
                 gate.calm.begin(f64::from(rate.time_ms(frame)) * 1e-3);
