@@ -8,7 +8,7 @@ use kinocue::net::{Delivery, Network, Origin, SendFault};
 use kinocue::time::{Clock, MonoTime};
 
 use super::dice::Dice;
-use super::seat::{Arrival, MS, Seat, Settings};
+use super::seat::{Arrival, MS, REGISTERS, Seat, Settings};
 use super::words::{self, Heard};
 
 /// What befalls the datagrams of a seat for a while.
@@ -66,10 +66,12 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Somebody jogs an axis: nobody does while frames come, or have just been asked for.
+    /// Somebody jogs an axis: nobody does while frames come, or have just been asked for; nor one of which nothing tells, unless
+    /// the seat has to be homed.
     fn jog(&mut self, axis: usize, mm: f64, now: u64, asked_at: u64) -> bool {
         let quiet = now > self.newest + JUST && now > asked_at + JUST;
-        quiet && self.there.is_empty() && self.seat.jog(axis, mm, now)
+        let is_told = axis < REGISTERS || self.seat.settings.report_ms > 0 || !self.seat.homed;
+        quiet && is_told && self.there.is_empty() && self.seat.jog(axis, mm, now)
     }
 
     fn is(&self, now: u64, weather: Weather) -> Option<u64> {
@@ -158,7 +160,7 @@ impl World {
     /// Brings what has arrived at the seats by then, and has them answer.
     fn deliver(&mut self, now: u64) {
         let Self { lines, dice, .. } = self;
-        for (index, line) in lines.iter_mut().enumerate() {
+        for line in lines.iter_mut() {
             while line.there.front().is_some_and(|packet| packet.at <= now) {
                 let Some(Packet { at, sent, lost_since, asked, octets }) = line.there.pop_front() else {
                     break;
@@ -168,7 +170,7 @@ impl World {
                 }
             }
             line.seat.advance(now);
-            if let Some(report) = line.seat.report(index as u16 + 1, now) {
+            if let Some(report) = line.seat.report(now) {
                 line.answer(report, now, dice);
             }
         }

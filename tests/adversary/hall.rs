@@ -68,6 +68,8 @@ pub(crate) struct Hall<'h, 'l> {
     pub(crate) state: State,
     since: u64,
     homing: Option<Homing>,
+    /// Orders to home that each seat had heard before the last homing.
+    homings: Vec<u32>,
     ready: bool,
     show_over: bool,
     pub(crate) closed: bool,
@@ -111,6 +113,7 @@ pub(crate) fn open<T>(
             state: State::Boot,
             since: ether.ns(),
             homing: None,
+            homings: Vec::new(),
             ready: false,
             show_over: false,
             closed: false,
@@ -233,10 +236,15 @@ impl Hall<'_, '_> {
     fn see_to_homing(&mut self) {
         let now = self.ether.ns();
         let lanes: Vec<usize> = (0..self.kind.axes.len()).filter(|lane| self.takes_part(*lane)).collect();
-        let is_open = |lane: &&usize| !self.ether.world().lines[**lane].seat.homed;
+        // One whose order was lost is as it was before, home or not.
+        let is_open = |lane: &&usize| {
+            let (seat, before) = (&self.ether.world().lines[**lane].seat, self.homings.get(**lane));
+            !seat.homed || before == Some(&seat.homings)
+        };
         let open: Vec<usize> = lanes.iter().filter(is_open).copied().collect();
         match self.homing {
             Some(Homing::UnderWay { told: 0 }) => {
+                self.homings = self.ether.world().lines.iter().map(|line| line.seat.homings).collect();
                 lanes.into_iter().for_each(|lane| self.tell_home(lane));
                 self.homing = Some(Homing::UnderWay { told: now });
             }

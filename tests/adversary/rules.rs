@@ -1,5 +1,7 @@
 //! That the seats do what the manuals say, and that the judge sees what it is there to see.
 
+use kinocue::wire::{Code, Status};
+
 use super::cues::KINDS;
 use super::hall::seats;
 use super::judge::{How, PULSES_PER_MM};
@@ -119,4 +121,11 @@ fn a_seat_whose_power_went_counts_from_where_it_stands() {
     assert_eq!(reply[16..20], [0; 4]);
     assert_eq!(mm(&mut seat, 1_900).round() as i32, 100);
     assert!(!seat.homed);
+}
+
+#[test]
+fn a_report_is_of_the_station_that_its_address_says_and_is_heard_as_that() {
+    let mut seat = seat(|seat| (seat.report_ms, seat.address.0) = (100, [127, 0, 1, 7]));
+    let report = Status::parse(&seat.report(BEGIN).expect("it is time for one")).expect("it is one").station;
+    assert_eq!(report, Code::station([127, 0, 1, 7]));
 }

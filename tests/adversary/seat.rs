@@ -23,8 +23,9 @@ const JOG_MM_S: f64 = 40.0;
 const LED: u64 = 150 * MS;
 /// How long frames count as bunched after two of them came closer together than they were sent.
 const BUNCHED: u64 = 500 * MS;
-/// Registers of the axes' positions.
-const POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
+/// Axes that have registers of their positions, and the first of the two of each.
+pub(crate) const REGISTERS: usize = 6;
+const POSITIONS: [u16; REGISTERS] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 
 /// How its controller is set.
 #[derive(Debug, Clone, Copy)]
@@ -99,6 +100,8 @@ pub(crate) struct Seat {
     bunched_until: u64,
     packets: u16,
     pub(crate) homed: bool,
+    /// Orders to home that it has heard.
+    pub(crate) homings: u32,
     dead_until: u64,
     rebooting: bool,
     /// The button, and since when it is so; and whether the controller has seen it.
@@ -128,6 +131,7 @@ impl Seat {
             bunched_until: 0,
             packets: 17,
             homed: true,
+            homings: 0,
             dead_until: 0,
             rebooting: false,
             button: (false, 0),
@@ -306,6 +310,7 @@ impl Seat {
             Heard::Write { channel, start, value } => {
                 if (channel, start, value) == (2, 0, 0) {
                     let zero = [0.0; 12];
+                    self.homings += 1;
                     (self.zero, self.homed, self.stopped) = (zero, false, self.button.0);
                     (self.last_absolute, self.executed) = (None, None);
                     self.go(zero, OWN_MM_S, arrival.at, true);
@@ -427,12 +432,14 @@ impl Seat {
     }
 
     /// A status report, when it is time for one.
-    pub(crate) fn report(&mut self, id: u16, now: u64) -> Option<Vec<u8>> {
+    pub(crate) fn report(&mut self, now: u64) -> Option<Vec<u8>> {
         if self.settings.report_ms == 0 || self.rebooting || now < self.next_report {
             return None;
         }
         self.next_report = now + u64::from(self.settings.report_ms) * MS;
         let positions: Vec<i32> = (0..self.settings.axes).map(|axis| self.told(axis, now)).collect();
+        let ([.., column, row], _) = self.settings.address;
+        let id = u16::from_be_bytes([column, row]);
         Some(words::report(id, &positions, u16::from(self.button.0)))
     }
 }
