@@ -7,6 +7,7 @@ use kinocue::net::{DrainGrid, over};
 use kinocue::rt::{Command, Line, News, Order, Ticked};
 use kinocue::state::{Event, Readiness, Request, State, Trouble};
 use kinocue::time::{MonoTime, Rate, ShowTime};
+use kinocue::wire::Dialect;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -85,6 +86,7 @@ pub(crate) fn open<T>(
     lead: impl FnOnce(&mut Hall<'_, '_>) -> T,
 ) -> (T, Numbers) {
     let book = kind.book();
+    ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
     let halves = over(Arc::new(ether.clone()));
     let house = House::over(Arc::clone(&book.config), crashed, numbers, &Arc::default(), halves)
         .expect("the hall opens");
@@ -128,7 +130,10 @@ pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
     let seat = |(index, axes): (usize, &usize)| Settings {
         axes: *axes,
         mm_s: 240.0,
-        high_first: false,
+        mbox: kind.dialect == Dialect::Mbox,
+        lies: false,
+        // As its manual has it.
+        high_first: kind.dialect == Dialect::Mbox,
         hurry: true,
         cut_ms: 3_000,
         stop_mode: 0,
