@@ -33,11 +33,11 @@ const ROWS: &[Row] = &[
     ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
     ("pairs of runs, but for names", repeats::but_for_names, Less, 263.0, 170.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 19.0, 2.0),
-    ("lines of code", counts::lines_of_code, Less, 47_937.0, 39_800.0),
-    ("public items and fields", counts::public_items, Less, 2_852.0, 400.0),
+    ("lines of code", counts::lines_of_code, Less, 48_059.0, 39_800.0),
+    ("public items and fields", counts::public_items, Less, 2_856.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 57.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 585.0, 390.0),
-    ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 0.8, 3.0),
+    ("lines of the longest file", counts::longest_file, Less, 596.0, 390.0),
+    ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.4, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];
 
