@@ -315,6 +315,7 @@ mod tests {
     use crate::config::from_to_args;
     use crate::cue::{Source, read};
     use crate::fanout::{Manner, lanes};
+    use crate::motion::Pulses;
     use crate::timeline::Timeline;
     use crate::wire::position_words;
 
