@@ -6,22 +6,13 @@
 mod common {
     pub(crate) mod spread;
 }
-mod asked {
-    pub(crate) mod chance;
-    pub(crate) mod judge;
-    pub(crate) mod sound;
-    pub(crate) mod trial;
-    pub(crate) mod wild;
-}
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use asked::sound::{self, Sound};
-use asked::trial::{Trial, standing};
-use asked::wild::{self, Wild};
 use common::spread::{Spread, verdict};
 use kinocue::gate::{Asked, Gate, Verdict};
+use kinocue::harness::asked::{Sound, Trial, Wild, sound, standing, wild};
 use kinocue::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock as _, Rate};
