@@ -36,7 +36,7 @@ pub mod proof;
 pub mod belief;
 pub mod engine;
 pub mod fanout;
-pub mod gate;
+pub mod limiter;
 pub mod plan;
 pub mod rt;
 pub mod state;
@@ -49,7 +49,7 @@ pub mod tracker;
 pub mod device;
 pub mod preflight;
 
-pub mod hall;
+pub mod control;
 pub mod journal;
 pub mod library;
 pub mod playlist;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use common::{ORIGIN, swell};
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
@@ -54,18 +54,18 @@ const fn found(homed: bool, at_park: bool) -> Deed {
 }
 
 /// Four seconds for one seat of one axis.
-fn staged() -> Staged {
+fn staged() -> StagedShow {
     staged_at(ShowTime::ZERO)
 }
 
-fn staged_at(start: ShowTime) -> Staged {
+fn staged_at(start: ShowTime) -> StagedShow {
     let text = swell(1, 4, 30.0, 0.2);
     let timeline = Timeline::new(
         cue::read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).expect("the cue is sound"),
     );
     let config = from_to_args(&["127.0.0.1:7408".to_owned()], &[], 1).expect("the address is sound");
     let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start, plays: 1 };
-    Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false }).expect("there is a join")
+    StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false }).expect("there is a join")
 }
 
 /// A clock that jumps, with what happens at each tick of that number.

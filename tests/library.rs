@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use kinocue::hall::{Code, Problem};
+use kinocue::control::{Code, Problem};
 use kinocue::library::{Bounds, CueInfo, Hall, Library, Proved};
 use kinocue::playlist::Playlist;
 use tempfile::TempDir;

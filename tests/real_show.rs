@@ -15,7 +15,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use common::{Worst, swell, worst_of_lines};
-use kinocue::app::{Control, Play, Played, Reins};
+use kinocue::app::{Control, Play, PlayHandle, Played};
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Mix, Show};
@@ -39,7 +39,7 @@ const FOLLOWING: State = State::Playing(Ride::Following);
 /// Leads a show from a thread of its own; however that ends, the show does too.
 struct Leader {
     control: Control,
-    reins: Reins,
+    handle: PlayHandle,
     /// What was refused while other news was waited for.
     refused: Vec<Refusal>,
 }
@@ -61,10 +61,10 @@ impl Leader {
 
     /// What is waited for afterwards has to be new: a machine that was held up makes news of its own.
     fn command(&mut self, command: Command) {
-        while let Ok(news) = self.reins.news.pop() {
+        while let Ok(news) = self.handle.news.pop() {
             self.keep_refusal(news);
         }
-        self.reins.commands.push(command).expect("there is room");
+        self.handle.commands.push(command).expect("there is room");
     }
 
     fn keep_refusal(&mut self, news: News) {
@@ -88,7 +88,7 @@ impl Leader {
     fn wait_for(&mut self, wanted: State) {
         self.wait_until(&format!("{wanted:?}"), |leader| {
             loop {
-                match leader.reins.news.pop().ok()? {
+                match leader.handle.news.pop().ok()? {
                     News::Entered { state, .. } if state == wanted => return Some(()),
                     news => leader.keep_refusal(news),
                 }
@@ -134,7 +134,7 @@ impl Leader {
         self.control.desk.stop();
         self.wait_for(State::Stopped);
         self.ask(Request::Resume);
-        self.wait_until("the refusal", |leader| match leader.reins.news.pop().ok()? {
+        self.wait_until("the refusal", |leader| match leader.handle.news.pop().ok()? {
             News::Refused(refusal) => Some(refusal.why),
             News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
         })
@@ -175,8 +175,8 @@ impl Real {
         let play = Play::new(config, timeline, show, manner).expect("the show is gentle");
         let control = play.control().clone();
         std::thread::scope(|scope| {
-            let attend = |reins| {
-                let mut leader = Leader { control, reins, refused: Vec::new() };
+            let attend = |handle| {
+                let mut leader = Leader { control, handle, refused: Vec::new() };
                 scope.spawn(move || {
                     lead(&mut leader);
                     assert_eq!(leader.refused, [], "nothing was refused on the way");

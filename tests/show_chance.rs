@@ -146,7 +146,7 @@ proptest! {
             return Ok(());
         }
         prop_assert!(is_within(worst(&played)), "{:?}", worst(&played));
-        prop_assert_eq!(played.clamps[0].worst, None, "the gate has nothing to do");
+        prop_assert_eq!(played.clamps[0].worst, None, "the limiter has nothing to do");
         prop_assert!(played.ended.ending != Ending::Fault);
         let last = played.frames.last().expect("there are frames");
         prop_assert_eq!((last.request.positions[0].0, last.request.outputs), (0, 0), "it ends parked");
@@ -186,7 +186,7 @@ proptest! {
             return Ok(());
         }
         prop_assert!(is_within(worst(&played)), "{:?}", worst(&played));
-        prop_assert_eq!(played.clamps[0].worst, None, "the gate has nothing to do");
+        prop_assert_eq!(played.clamps[0].worst, None, "the limiter has nothing to do");
         prop_assert!(played.ended.ending != Ending::Fault);
         let last = played.frames.last().expect("there are frames");
         prop_assert_eq!(last.request.outputs, 0);

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::net::SocketAddrV4;
 use std::path::Path;
 
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
 use kinocue::engine::Show;
@@ -24,12 +24,12 @@ pub(crate) fn stage(
     rate_hz: f64,
     to: &[SocketAddrV4],
     silent: bool,
-) -> (Staged, Vec<Watched>) {
+) -> (StagedShow, Vec<Watched>) {
     let tos: Vec<String> = to.iter().map(|address| format!("{address},axes={AXES}")).collect();
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
     let show =
         Show { rate: Rate::from_hz(rate_hz), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
-    let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent });
+    let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent });
     let watched = config.controllers.iter().map(Watched::of).collect();
     (staged.expect("the ride is gentle"), watched)
 }

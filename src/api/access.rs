@@ -9,7 +9,7 @@ use subtle::{Choice, ConstantTimeEq as _};
 
 use super::tries::Tries;
 use crate::config;
-use crate::hall::{Code, Problem, Role, Surface, Who};
+use crate::control::{Code, Problem, Role, Surface, Who};
 use crate::time::MonoTime;
 
 /// The longest token that is hashed.

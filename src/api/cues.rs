@@ -21,7 +21,7 @@ use super::asker::Asker;
 use super::input::{Id, check_length};
 use super::problem::bad_value;
 use super::shared::{Shared, turn};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::library::{CueId, CueInfo, CurveData, Library, MAX_POINTS};
 
 /// Pieces that wait for the disk at the most.

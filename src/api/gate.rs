@@ -22,7 +22,7 @@ use super::problem::{bad_value, panicked, render};
 use super::rest::Rest;
 use super::shared::Shared;
 use super::show::STOP;
-use crate::hall::{Code, Place, Problem, Surface, Who};
+use crate::control::{Code, Place, Problem, Surface, Who};
 use crate::log::{Line, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;

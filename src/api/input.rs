@@ -12,7 +12,7 @@ use hyper::body::Bytes;
 use serde::de::DeserializeOwned;
 
 use super::problem::bad_value;
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::library;
 
 /// The longest body outside of uploads, octets.

@@ -19,7 +19,7 @@ use tokio::runtime::{self, Runtime};
 use tokio::sync::{mpsc, watch};
 
 use crate::config;
-use crate::hall::Handle;
+use crate::control::Handle;
 use crate::library::Library;
 use crate::log::Log;
 use crate::playlist::Shelf;

@@ -12,7 +12,7 @@ use hyper::body::Bytes;
 use tokio::sync::OnceCell;
 
 use super::problem::bad_value;
-use crate::hall::Problem;
+use crate::control::Problem;
 use crate::time::MonoTime;
 
 /// The longest key.
@@ -130,7 +130,7 @@ impl Reply {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hall::Code;
+    use crate::control::Code;
 
     fn at(seconds: u64) -> MonoTime {
         MonoTime::from_nanos(0) + Duration::from_secs(seconds)

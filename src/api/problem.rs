@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::hall::{Code, Problem, Status};
+use crate::control::{Code, Problem, Status};
 
 /// The type of a problem's body.
 pub(super) const PROBLEM_JSON: &str = "application/problem+json";

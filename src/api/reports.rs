@@ -19,7 +19,7 @@ use super::input::Name;
 use super::pieces::Pieces;
 use super::problem::bad_value;
 use super::shared::{Shared, turn};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::journal::{self, Most, Report};
 
 /// The newest of a day, and no more.

@@ -16,7 +16,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::guarded::Guarded;
 use super::peer::Peer;
-use crate::hall::{Place, Places};
+use crate::control::{Place, Places};
 use crate::log::{Line, Log, Priority};
 
 /// Connections over TCP.

@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use super::problem::nothing_there;
 use super::shared::Shared;
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::metrics;
 use crate::state::State as HallState;
 use crate::sys::clock::Monotonic;

@@ -14,7 +14,7 @@ use super::once::Once;
 use super::problem::panicked;
 use super::streams::Streams;
 use super::tries::Tries;
-use crate::hall::{Code, Handle, Problem, Status};
+use crate::control::{Code, Handle, Problem, Status};
 use crate::library::Library;
 use crate::log::Log;
 use crate::playlist::Shelf;

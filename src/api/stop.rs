@@ -14,7 +14,7 @@ use rustix::net::sockopt::socket_peercred;
 
 use super::socket::{self, SocketFile};
 use super::{ApiError, peer};
-use crate::hall::Handle;
+use crate::control::Handle;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -180,7 +180,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::hall::{Ask, Inbox, Role, Status, handle};
+    use crate::control::{Command, Inbox, Role, Status, handle};
     use crate::rt::Desk;
 
     struct Hall {
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(say(&hall.path, "stop\n"), "stopping\n");
         assert!(hall.desk.take_stop());
         let noted = hall.inbox.next(Duration::ZERO).unwrap().desired;
-        assert_eq!((noted.ask, noted.who.role), (Ask::Stop, Role::Engineer));
+        assert_eq!((noted.ask, noted.who.role), (Command::Stop, Role::Engineer));
         assert_eq!(noted.who.name, peer::user(rustix::process::getuid().as_raw()));
         assert_eq!(say(&hall.path, " STOP\r\n"), "stopping\n");
         assert_eq!(say(&hall.path, "stop"), "stopping\n", "a line without its end");

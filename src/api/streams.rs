@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
 
-use crate::hall::{Code, Problem, Surface, Who};
+use crate::control::{Code, Problem, Surface, Who};
 
 /// How many are pushed to at a time over TCP, and over the control socket.
 const MOST: (usize, usize) = (32, 16);
@@ -83,7 +83,7 @@ mod tests {
     use std::task::{Context, Waker};
 
     use super::*;
-    use crate::hall::Role;
+    use crate::control::Role;
 
     fn who(role: Role, name: &str) -> Who {
         Who { role, surface: Surface::Http, name: name.to_owned() }

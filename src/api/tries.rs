@@ -5,7 +5,7 @@ use std::net::IpAddr;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::hall::network;
+use crate::control::network;
 use crate::time::MonoTime;
 
 /// Wrong tries of one address within [`WINDOW`]; after that it is told to wait.

@@ -198,7 +198,7 @@ pub struct ControllerReport {
     pub send_failed: u64,
     /// Reports of the kernel that its port is closed.
     pub port_closed: u64,
-    /// Times that the last gate held its motion back.
+    /// Times that the limiter held its motion back.
     pub clamps: u64,
     /// Frames that were not sent, because from somewhere that its seat might be they would have been too fast.
     pub withheld: u64,

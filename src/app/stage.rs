@@ -4,7 +4,7 @@ use std::io;
 use std::thread;
 use std::time::Duration;
 
-use super::helpers::{Helpers, Over};
+use super::helpers::{EndFlags, Helpers};
 use super::play::Control;
 use super::run::Run;
 use crate::engine::Engine;
@@ -47,7 +47,7 @@ impl Stage {
         control: &Control,
     ) -> io::Result<Run> {
         let Self { silent, rate, spin, engine, lanes, places, sender, mut mail } = self;
-        let over = Over::default();
+        let over = EndFlags::default();
         let granted = realtime::request();
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;

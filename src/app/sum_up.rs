@@ -6,8 +6,8 @@ use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport
 use super::run::Run;
 use crate::config::Controller;
 use crate::engine::Ending;
-use crate::gate::Clamp;
 use crate::health::Groups;
+use crate::limiter::Clamp;
 use crate::time::Rate;
 
 /// What happened to controllers and to groups, in the order of time.
@@ -117,7 +117,7 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
         let axis = axis + 1;
         let count = clamps.clamps;
         Some(format!(
-            "{}: the last gate held its motion back {count} times, at the worst from {times:.2} times its limit of {limit} \
+            "{}: the limiter held its motion back {count} times, at the worst from {times:.2} times its limit of {limit} \
              on axis {axis}; check the cue, and tell us if it passes",
             one.name
         ))

@@ -17,7 +17,7 @@ use crate::config::Config;
 use crate::doctor::chart::{buckets, draw};
 use crate::doctor::lateness::{Load, RATE_HZ, Run};
 use crate::doctor::measure::measure;
-use crate::doctor::{Hall, Line, Verdict, judge, look, ready};
+use crate::doctor::{Hall, Line, Verdict, facts, judge, ready};
 use crate::sys::realtime::normal_priority;
 
 /// Tells whether this machine is real-time, and if not, what to change.
@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         Some(path) => hall(&load::config(path)?),
         None => Hall { controllers: args.controllers, neighbours: args.controllers },
     };
-    let mut lines = judge(&look(), hall);
+    let mut lines = judge(&facts(), hall);
     let loads: &[Load] = match (args.seconds, args.load) {
         (0, _) => &[],
         (_, false) => &[Load::Idle],

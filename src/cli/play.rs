@@ -21,14 +21,14 @@ use crate::time::{Rate, ShowTime, parse_time};
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 
+mod health;
+mod keyboard;
 mod keys;
-mod leader;
+mod messages;
 mod progress;
-mod said;
-mod standings;
 
+use messages::Messages;
 use progress::Progress;
-use said::Said;
 
 const EXAMPLES: [&str; 4] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
@@ -128,9 +128,9 @@ fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bo
     let control = play.control().clone();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Said { control, ctrl_c, length, join: play.join(), names };
+    let said = Messages { control, ctrl_c, length, join: play.join(), names };
     let progress = Progress::start(said, for_ever);
-    let played = play.run(|reins| progress.lead(reins)).map_err(|error| refused(error, &cue));
+    let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Exit, Failure, OrExit as _, print};
-use crate::app::house::HouseError;
+use crate::app::runtime::RuntimeError;
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
 use crate::app::surfaces::Sockets;
 use crate::log::{Line, Log, Priority};
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         let exit = match &error {
-            ServeError::House(HouseError::Net(NetError::Refused { cause, .. }))
+            ServeError::Runtime(RuntimeError::Net(NetError::Refused { cause, .. }))
                 if cause.kind() == std::io::ErrorKind::AddrInUse =>
             {
                 Exit::TryAgain

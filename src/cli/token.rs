@@ -9,7 +9,7 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use super::{Exit, Failure, OrExit as _, print};
-use crate::hall::Role;
+use crate::control::Role;
 
 /// 256 bits, which nobody guesses.
 const OCTETS: usize = 32;

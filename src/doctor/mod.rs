@@ -7,9 +7,9 @@
 
 pub mod chart;
 pub mod clocks;
+pub mod facts;
 pub mod kernel;
 pub mod lateness;
-pub mod look;
 pub mod measure;
 pub mod memory;
 pub mod network;
@@ -19,7 +19,7 @@ pub mod text;
 
 use serde::Serialize;
 
-pub use look::look;
+pub use facts::facts;
 
 /// A fact, or why it could not be seen, in words.
 pub type Seen<T> = Result<T, String>;

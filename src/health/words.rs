@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-use super::{Change, Standing, Why};
+use super::{Change, HealthState, Why};
 use crate::wire::DPFE;
 
 /// What has to be said, loudly, where acks are off.
 pub const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
                             its own reports at best";
 
-impl fmt::Display for Standing {
+impl fmt::Display for HealthState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Ok => "ok",
@@ -24,7 +24,7 @@ impl fmt::Display for Standing {
     }
 }
 
-impl Standing {
+impl HealthState {
     /// What a person does about it.
     #[must_use]
     pub const fn next(self) -> &'static str {
@@ -49,7 +49,7 @@ impl Why {
             Self::Moved(_) => {
                 Some("find out what moved it; then park, or start a show: it joins slowly from where it is")
             }
-            Self::Crowded(_) => {
+            Self::OtherMaster(_) => {
                 Some("stop the other machine; then park, and home it with nobody on the seat")
             }
             Self::Wide(_) => Some(
@@ -103,7 +103,7 @@ impl fmt::Display for Why {
             Self::Refuses(_) => "it refuses frames",
             Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
-            Self::Crowded(_) => {
+            Self::OtherMaster(_) => {
                 "it got more datagrams (DP34) than were sent from here: another machine sends to it"
             }
             Self::NotHome(_) => "it was reset: it is not home (DPF0)",

@@ -13,7 +13,7 @@ use rustix::process::{Pid, PidfdFlags, pidfd_open};
 use serde::de::DeserializeOwned;
 
 use super::{Bounds, Drawing, Hall, Verdict};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 

@@ -30,8 +30,8 @@ use std::time::Duration;
 use sha2::{Digest as _, Sha256};
 
 use crate::config::Store;
+use crate::control::{Code, Problem};
 use crate::cue::{self, Source, limits};
-use crate::hall::{Code, Problem};
 use crate::sys::folder::{Folder, Stamp};
 use crate::timeline::Timeline;
 use index::Index;

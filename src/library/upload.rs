@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use sha2::{Digest as _, Sha256};
 
 use super::{CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
 
 /// What the names of unfinished files begin with; no id does.

@@ -18,7 +18,7 @@ mod limit;
 
 pub use crate::plain::escaped;
 use journal::Journal;
-use limit::Limiter;
+use limit::RateLimiter;
 
 /// Lines that wait to be written at the most.
 const QUEUE: usize = 256;
@@ -102,7 +102,7 @@ struct Shared {
 
 #[derive(Debug, Default)]
 struct State {
-    limiter: Limiter,
+    limiter: RateLimiter,
     queue: VecDeque<Line>,
     closing: bool,
     written: bool,

@@ -1,7 +1,7 @@
 //! Figures of each controller.
 
 use super::{Family, Labels, Values, flag};
-use crate::hall::ControllerStatus;
+use crate::control::ControllerStatus;
 
 pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<Family> {
     let mut all = standing(controllers);
@@ -44,7 +44,7 @@ fn frames(all: &[ControllerStatus]) -> Vec<Family> {
             help: "What became of the frames that asked; lost: no reply within a second",
             values: Values::Counters(acks.collect()),
         },
-        counters(all, "limit_interventions", "How often the last gate held motion back", |one| one.clamps),
+        counters(all, "limit_interventions", "How often the limiter held motion back", |one| one.clamps),
     ]
 }
 

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::hall::{
+use crate::control::{
     ControllerStatus, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus, Severity, ShowStatus,
     Warning,
 };

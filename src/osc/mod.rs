@@ -28,7 +28,7 @@ use std::sync::Arc;
 pub use counts::Counts;
 
 use crate::config::OscPort;
-use crate::hall::Handle;
+use crate::control::Handle;
 use port::Port;
 
 /// Why the port cannot be opened.

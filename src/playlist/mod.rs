@@ -21,7 +21,7 @@ use jiff::civil::{Time, Weekday};
 use jiff::tz::TimeZone;
 
 use crate::config::{Config, Preset};
-use crate::hall::LevelsChange;
+use crate::control::LevelsChange;
 use crate::library::{CueId, Id};
 
 /// The name of a playlist.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{Playlist, PlaylistId};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
 
 /// The largest playlist that is read, octets.

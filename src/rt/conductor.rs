@@ -227,7 +227,7 @@ impl Conductor {
             return Some(Event::Trouble(Trouble::Planner));
         }
         if engine.take_gate_fault() {
-            return Some(Event::Trouble(Trouble::Gate));
+            return Some(Event::Trouble(Trouble::Limiter));
         }
         match self.machine.state() {
             State::Playing(_) if engine.is_homeward() => Some(Event::CueEnded),

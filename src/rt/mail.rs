@@ -277,7 +277,7 @@ impl Mail {
         self.live.told()
     }
 
-    /// Notes how often the last gate held a lane back.
+    /// Notes how often the limiter held a lane back.
     pub(super) fn clamps(&self, lane: usize, clamps: u64) {
         self.live.on_clamps(lane, clamps);
     }

@@ -12,7 +12,7 @@ use crate::time::MonoTime;
 
 mod watchdog;
 
-pub use watchdog::{Feeder, Hunger, Pulse};
+pub use watchdog::{FeedDecision, Pulse, WatchdogThread};
 
 /// How often the line in `systemctl status` changes at the most.
 const STATUS_EVERY: Duration = Duration::from_secs(1);

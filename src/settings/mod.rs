@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub use file::{Kept, Loading, SettingsFile};
 pub use words::seats_out;
 
-use crate::hall::{Levels, Surface};
+use crate::control::{Levels, Surface};
 use crate::journal::PlaylistPlace;
 use crate::time::TRIM_MS;
 

@@ -5,7 +5,7 @@ use jiff::civil::Date;
 use jiff::tz::TimeZone;
 
 use super::{LONGEST_WHY, LoadedShow, Out, Settings};
-use crate::hall::Levels;
+use crate::control::Levels;
 use crate::time::ShowTime;
 
 impl Out {

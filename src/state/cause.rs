@@ -67,8 +67,8 @@ pub enum Trouble {
         /// Its error number.
         error: u16,
     },
-    /// The last gate held motion back three times in a second.
-    Gate,
+    /// The limiter held motion back three times in a second.
+    Limiter,
     /// A move could not be planned.
     Planner,
     /// Replies are no longer read: nobody would hear of an emergency stop.
@@ -114,7 +114,7 @@ impl Trouble {
             | Self::Drive { controller, .. }
             | Self::Homing(controller)
             | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
-            Self::Gate | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
+            Self::Limiter | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
         }
     }
 

@@ -142,7 +142,7 @@ impl Machine {
         }
         match self.cause {
             Cause::StoppedHoming => Next::AwaitStandstill,
-            Cause::Trouble(Trouble::Gate) => Next::CheckCue,
+            Cause::Trouble(Trouble::Limiter) => Next::CheckCue,
             Cause::Trouble(Trouble::Homing(_) | Trouble::HomingTime) => Next::LookAtSeat,
             Cause::Trouble(Trouble::OtherMaster(_)) => Next::StopOtherMaster,
             Cause::Trouble(Trouble::Deaf) => Next::Restart,

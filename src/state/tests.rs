@@ -16,22 +16,24 @@ fn way_to(state: State) -> (Vec<Step>, State) {
     use Request::{Arm, Clear, Go, Home, Park, Pause, Stop};
     let found = [Step::Tell(Event::Identified(PARKED)), Step::Tell(Event::Readiness(Readiness::Ready))];
     let then = |steps: &[Step]| found.iter().chain(steps).copied().collect::<Vec<_>>();
-    let go = [Step::Ask(Arm), Step::Ask(Go)];
+    let go = [Step::Command(Arm), Step::Command(Go)];
     let going = |steps: &[Step]| then(&[&go, steps].concat());
     let way = match state {
         State::Boot => vec![],
-        State::Recovering => then(&[Step::Ask(Stop), Step::Ask(Clear), Step::Tell(Event::PositionsRead)]),
+        State::Recovering => {
+            then(&[Step::Command(Stop), Step::Command(Clear), Step::Tell(Event::PositionsRead)])
+        }
         State::Parked => then(&[]),
-        State::Homing => then(&[Step::Ask(Home)]),
-        State::Armed => then(&[Step::Ask(Arm)]),
+        State::Homing => then(&[Step::Command(Home)]),
+        State::Armed => then(&[Step::Command(Arm)]),
         State::Playing(Ride::Joining) => going(&[]),
         State::Playing(Ride::Following) => going(&[Step::Tell(Event::Joined)]),
         State::Playing(Ride::Freewheeling) => going(&[Step::Tell(Event::Late)]),
-        State::Paused => going(&[Step::Ask(Pause)]),
-        State::Parking => going(&[Step::Ask(Park)]),
-        State::Stopping => going(&[Step::Ask(Stop)]),
-        State::Stopped => then(&[Step::Ask(Stop)]),
-        State::Fault => then(&[Step::Tell(Event::Trouble(Trouble::Gate))]),
+        State::Paused => going(&[Step::Command(Pause)]),
+        State::Parking => going(&[Step::Command(Park)]),
+        State::Stopping => going(&[Step::Command(Stop)]),
+        State::Stopped => then(&[Step::Command(Stop)]),
+        State::Fault => then(&[Step::Tell(Event::Trouble(Trouble::Limiter))]),
     };
     (way, state)
 }
@@ -39,13 +41,13 @@ fn way_to(state: State) -> (Vec<Step>, State) {
 /// A request or an event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Step {
-    Ask(Request),
+    Command(Request),
     Tell(Event),
 }
 
 fn take(hall: &mut Machine, step: Step, now: MonoTime) -> Result<(), Refusal> {
     match step {
-        Step::Ask(request) => hall.request(request, now),
+        Step::Command(request) => hall.request(request, now),
         Step::Tell(event) => {
             hall.event(event, now);
             Ok(())
@@ -399,7 +401,7 @@ fn stopped_goes_before_fault_and_keeps_it_known() {
 #[test]
 fn the_first_thing_that_went_wrong_is_the_one_named() {
     let mut hall = told(State::Parked, Event::Trouble(DRIVE));
-    hall.event(Event::Trouble(Trouble::Gate), s(2));
+    hall.event(Event::Trouble(Trouble::Limiter), s(2));
     assert_eq!((hall.cause(), hall.since()), (Cause::Trouble(DRIVE), s(1)));
 }
 

@@ -128,7 +128,7 @@ impl Trouble {
         match self {
             Self::Controller { .. } => "a controller has an error",
             Self::Drive { .. } => "a drive has an alarm",
-            Self::Gate => "the limits held motion back three times in a second",
+            Self::Limiter => "the limits held motion back three times in a second",
             Self::Planner => "a move could not be planned",
             Self::Deaf => {
                 "replies were not read for too long, and nobody would have heard of an emergency stop"

@@ -26,7 +26,7 @@ use std::time::Duration;
 use tokio::task::JoinSet;
 
 use crate::config::TextPort;
-use crate::hall::{Handle, Places, Role, Surface, Who};
+use crate::control::{Handle, Places, Role, Surface, Who};
 use talk::Talk;
 
 /// Connections at the most; of more the one that was silent longest goes, before all one that never asked anything.

@@ -13,7 +13,7 @@ use tokio::time::timeout;
 
 use super::line::{Fault, Order, order};
 use crate::config::GearWord;
-use crate::hall::{Ask, Code, Handle, Place, Posted, Problem, Status, Who};
+use crate::control::{Code, Command, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
 /// Octets of a line at the most, its end included.
@@ -121,7 +121,7 @@ impl Talk {
         let read = match order {
             Order::Status => Read::Answered(Ok(self.hall.status())),
             // A stop is done with this; its answer is for the journal and the peer.
-            Order::Ask(ask) => match self.hall.post(self.who.clone(), ask) {
+            Order::Command(ask) => match self.hall.post(self.who.clone(), ask) {
                 Ok(posted) => Read::Posted(posted),
                 Err(problem) => Read::Answered(Err(problem)),
             },
@@ -131,7 +131,7 @@ impl Talk {
 
     /// The first lines where a token is wanted: it, or a stop, which waits for none.
     fn first(&self, line: &[u8], wanted: &mut Option<[u8; 32]>) -> (Read, Then) {
-        if matches!(order(line, &[]), Ok(Order::Ask(Ask::Stop))) {
+        if matches!(order(line, &[]), Ok(Order::Command(Command::Stop))) {
             return self.take(line);
         }
         let token = line.strip_prefix(b"token ").map(|token| Sha256::digest(token.trim_ascii()));
@@ -147,7 +147,7 @@ impl Talk {
     }
 
     fn hear_a_stop(&self, line: &[u8]) {
-        if matches!(order(line, &[]), Ok(Order::Ask(Ask::Stop))) {
+        if matches!(order(line, &[]), Ok(Order::Command(Command::Stop))) {
             self.hall.stop();
             self.hall.note_stop(self.who.clone());
         }

@@ -131,9 +131,11 @@ impl Person {
                 hall.note(|| format!("seat {}: its power goes for {dark} ms", seat + 1));
                 hall.ether.world().lines[seat].seat.reboot(now, dark * MS);
             }
-            2 | 3 => hall.set(seat, Mix { on: self.dice.one_in(2), ..hall.reins.desk.mix(seat) }),
-            4 => hall
-                .set(seat, Mix { motion: self.dice.range(2, 11) as f64 / 10.0, ..hall.reins.desk.mix(seat) }),
+            2 | 3 => hall.set(seat, Mix { on: self.dice.one_in(2), ..hall.runtime.desk.mix(seat) }),
+            4 => hall.set(
+                seat,
+                Mix { motion: self.dice.range(2, 11) as f64 / 10.0, ..hall.runtime.desk.mix(seat) },
+            ),
             _ => {
                 let axis = self.dice.range(0, hall.kind.axes[seat] as u64) as usize;
                 let mm = self.dice.range(0, 120) as f64 - 60.0;

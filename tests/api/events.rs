@@ -90,7 +90,7 @@ fn there_is_room_for_so_many_and_a_place_is_free_again_when_one_goes() {
 #[test]
 fn viewers_who_watch_do_not_shut_the_booth_out() {
     let hall = Hall::with(long_status(), |api| kinocue::config::Api {
-        open_role: Some(kinocue::hall::Role::View),
+        open_role: Some(kinocue::control::Role::View),
         ..api
     });
     let watch = |token: Option<&str>| {

@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::thread;
 
-use kinocue::hall::{Ask, Role};
+use kinocue::control::{Command, Role};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::Hall;
@@ -84,7 +84,8 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
     hall.sleep();
     thread::scope(|scope| {
         // One after the other asks, until nothing more fits into the queue.
-        let stuffed: Vec<_> = (0..64).map(|_| hall.handle.post(engineer(), Ask::Pause).unwrap()).collect();
+        let stuffed: Vec<_> =
+            (0..64).map(|_| hall.handle.post(engineer(), Command::Pause).unwrap()).collect();
         assert_eq!(hall.socket().post("/api/v1/show/pause").problem(), problem(429, "busy"));
         let _idle: Vec<_> = (0..64).map(|_| hall.socket().connect()).collect();
         let _floods: Vec<_> =
@@ -103,10 +104,10 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
     });
 }
 
-fn engineer() -> kinocue::hall::Who {
-    kinocue::hall::Who {
+fn engineer() -> kinocue::control::Who {
+    kinocue::control::Who {
         role: Role::Engineer,
-        surface: kinocue::hall::Surface::Schedule,
+        surface: kinocue::control::Surface::Schedule,
         name: "test".to_owned(),
     }
 }

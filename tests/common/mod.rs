@@ -10,13 +10,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Mix, Show};
 use kinocue::fanout::Manner;
-use kinocue::gate::Counts;
+use kinocue::limiter::Counts;
 use kinocue::motion::{MAX_AXES, Measure, Pose, SeatType, Spacing};
 use kinocue::net::Delivery;
 use kinocue::rt::{
@@ -119,7 +119,7 @@ impl Virtual {
         let rate = Rate::from_hz(self.rate_hz);
         let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
         let manner = Manner { level: self.level, silent: false };
-        let staged = Staged::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
+        let staged = StagedShow::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
@@ -349,7 +349,7 @@ pub struct Played {
     pub happened: Vec<(MonoTime, Event)>,
     /// What the hall made known.
     pub news: Vec<News>,
-    /// What the gate had to do, lane by lane.
+    /// What the limiter had to do, lane by lane.
     pub clamps: Vec<Counts>,
     /// How long the first join takes.
     pub join: ShowTime,

@@ -11,7 +11,7 @@ use std::time::Duration;
 use counting::Calls;
 use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
-use kinocue::health::{Groups, Health, Notice};
+use kinocue::health::{Groups, HealthTable, Notice};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
 use kinocue::state::{Event, Machine, Request, Ride, State, Why};
@@ -137,7 +137,7 @@ fn the_allocator_counts_its_own_thread_and_no_other() {
 fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_start() {
     let mut now = MonoTime::default() + PERIOD;
     let mut hall = Machine::new(now);
-    let mut health = Health::new(Groups::named(["A", "A", "B"]), LossPolicy::Park, 1, PERIOD);
+    let mut health = HealthTable::new(Groups::named(["A", "A", "B"]), LossPolicy::Park, 1, PERIOD);
     let mut notices = 0;
     let before = Calls::so_far();
     for tick in 1..=10_000_u32 {

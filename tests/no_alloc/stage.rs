@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
@@ -241,13 +241,13 @@ fn ride() -> Timeline {
 }
 
 /// The ride to a controller of six axes and one of three, in loops until it is stopped.
-fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (Staged, Vec<Watched>) {
+fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (StagedShow, Vec<Watched>) {
     let timeline = ride();
     let tos = [format!("{},axes=6", addresses[0]), format!("{},axes=3", addresses[1])];
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
     let show =
         Show { rate: Rate::from_hz(1000.0), timing: Timing::Absolute, start: ShowTime::ZERO, plays: 0 };
-    let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false })
+    let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false })
         .expect("the ride is gentle");
     (staged, config.controllers.iter().map(Watched::of).collect())
 }

@@ -10,7 +10,7 @@ use super::server::{ServerArgs, in_path};
 use super::view::Status;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
-use crate::hall::LevelsChange;
+use crate::control::LevelsChange;
 use crate::time::parse_trim;
 
 /// The commands that set what lasts.

@@ -69,7 +69,7 @@ fn exit(code: &str, status: u16) -> Exit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hall::Code;
+    use crate::control::Code;
 
     fn failure(status: u16, text: &str) -> Failure {
         done(&Reply { status, text: text.to_owned() }).unwrap_err()

@@ -9,21 +9,21 @@ use anyhow::Context as _;
 use super::play;
 use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
-use crate::app::keeper::Signals;
 use crate::app::serve::{Parts, Places, serve};
-use crate::hall::Role;
+use crate::app::supervisor::Signals;
+use crate::control::Role;
 use crate::log::Log;
 use crate::sim::{Farm, Options};
 use crate::{config, console};
 
 mod folder;
-mod guide;
 mod screen;
+mod script;
 mod seats;
 
 use folder::Folder;
-use guide::Guide;
 use screen::Screen;
+use script::Script;
 use seats::SEATS;
 
 /// The cue as the report names it.
@@ -67,14 +67,14 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let log = Log::start(move |line| lines.tell(line)).or_exit(Exit::System)?;
     let parts = Parts { config, places, pages: console::page, signals: signals.clone(), log };
     drop(port);
-    let mut guide = None;
+    let mut script = None;
     let served = serve(parts, |handle, addresses| {
         let console = addresses.first().map(|address| link(*address, &token.token)).unwrap_or_default();
         welcome(&farm.addresses(), &console);
-        guide = Some(Guide::start(handle, signals, screen, on_terminal.then_some(console)));
+        script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console)));
     });
     // Over by now, as nothing of the hall is left.
-    let guided = guide.transpose().or_exit(Exit::System)?.map_or(Ok(()), Guide::finish);
+    let guided = script.transpose().or_exit(Exit::System)?.map_or(Ok(()), Script::finish);
     let reported = play::tell(&served?.sum_up(CUE_NAME.to_owned()), args.json);
     farm.stop().or_exit(Exit::Io)?;
     folder.remove().context("the folder of the demo is left").or_exit(Exit::Io)?;

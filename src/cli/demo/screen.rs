@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tokio::sync::watch;
 
 use crate::cli::print;
-use crate::hall::Status;
+use crate::control::Status;
 use crate::time::ShowTime;
 
 /// Where it is seen. Clones share it.

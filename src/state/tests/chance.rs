@@ -18,7 +18,7 @@ fn trouble() -> impl Strategy<Value = Trouble> {
     select(vec![
         DRIVE,
         Trouble::Controller { controller: 1, error: 21 },
-        Trouble::Gate,
+        Trouble::Limiter,
         Trouble::Planner,
         Trouble::Homing(2),
         Trouble::OtherMaster(0),
@@ -51,8 +51,8 @@ fn event() -> impl Strategy<Value = Event> {
 fn turn() -> impl Strategy<Value = Turn> {
     use Request::{Clear, Go, HomeAndArm, Park, Resume};
     prop_oneof![
-        4 => select(Request::ALL.to_vec()).prop_map(|request| Turn::Step(Step::Ask(request))),
-        4 => select(vec![HomeAndArm, Go, Resume, Park, Clear]).prop_map(|request| Turn::Step(Step::Ask(request))),
+        4 => select(Request::ALL.to_vec()).prop_map(|request| Turn::Step(Step::Command(request))),
+        4 => select(vec![HomeAndArm, Go, Resume, Park, Clear]).prop_map(|request| Turn::Step(Step::Command(request))),
         8 => event().prop_map(|event| Turn::Step(Step::Tell(event))),
         4 => (0..1_000_i64).prop_map(Turn::Clock),
         1 => (-4_000_000..4_000_000_i64).prop_map(Turn::Clock),
@@ -90,7 +90,7 @@ impl Model {
     fn check(&mut self, before: &Machine, turn: Turn, taken: bool, after: &Machine) {
         let (from, to) = (before.state(), after.state());
         match turn {
-            Turn::Step(Step::Ask(request)) => self.on_request(before, request, taken, after),
+            Turn::Step(Step::Command(request)) => self.on_request(before, request, taken, after),
             Turn::Step(Step::Tell(event)) => self.on_event(from, event, to),
             Turn::Clock(_) => assert!(height(to) <= height(from), "time alone led from {from} to {to}"),
         }

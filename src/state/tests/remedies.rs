@@ -61,7 +61,7 @@ fn whatever_goes_wrong_wherever_what_is_named_next_can_be_done_and_leads_to_a_sh
     let troubles = [
         DRIVE,
         Trouble::Controller { controller: 1, error: 21 },
-        Trouble::Gate,
+        Trouble::Limiter,
         Trouble::Planner,
         Trouble::Deaf,
         Trouble::Homing(2),
