@@ -22,7 +22,7 @@ use kinocue::engine::{Mix, Show};
 use kinocue::fanout::Manner;
 use kinocue::motion::SeatType;
 use kinocue::rt::{Command, News};
-use kinocue::state::{Refusal, Request, Ride, State, Why};
+use kinocue::state::{PlayMode, Refusal, State, Transition, Why};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock as _, Rate, ShowTime};
 use kinocue::timeline::Timeline;
@@ -34,7 +34,7 @@ use tempfile::NamedTempFile;
 const PATIENCE: Duration = Duration::from_secs(30);
 /// How often it is looked for.
 const LOOK: Duration = Duration::from_millis(1);
-const FOLLOWING: State = State::Playing(Ride::Following);
+const FOLLOWING: State = State::Playing(PlayMode::Following);
 
 /// Leads a show from a thread of its own; however that ends, the show does too.
 struct Leader {
@@ -51,7 +51,7 @@ impl Drop for Leader {
 }
 
 impl Leader {
-    fn ask(&mut self, request: Request) {
+    fn ask(&mut self, request: Transition) {
         self.command(Command::Request(request));
     }
 
@@ -111,10 +111,10 @@ impl Leader {
     /// Everything but the end: a pause, a seek each way, levels, a trim, and a seat that is off for a while.
     fn lead(&mut self, rate_hz: u32) {
         self.wait_for(FOLLOWING);
-        self.ask(Request::Pause);
+        self.ask(Transition::Pause);
         self.wait_for(State::Paused);
         self.wait_for_ticks(u64::from(rate_hz) / 8 + 1); // decelerated, and some hold frames
-        self.ask(Request::Resume);
+        self.ask(Transition::Resume);
         self.wait_for(FOLLOWING);
         self.seek(11);
         self.control.desk.set(1, Mix { on: false, ..Mix::FULL });
@@ -133,7 +133,7 @@ impl Leader {
     fn stop(&mut self) -> Why {
         self.control.desk.stop();
         self.wait_for(State::Stopped);
-        self.ask(Request::Resume);
+        self.ask(Transition::Resume);
         self.wait_until("the refusal", |leader| match leader.handle.news.pop().ok()? {
             News::Refused(refusal) => Some(refusal.why),
             News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,

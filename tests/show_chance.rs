@@ -10,7 +10,7 @@ use common::{Event, Played, Virtual, Worst};
 use kinocue::engine::{Ending, Mix};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::Alarm;
-use kinocue::state::{self, Request};
+use kinocue::state::{self, Transition};
 use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::Timing;
 use proptest::prelude::*;
@@ -64,9 +64,9 @@ fn event() -> impl Strategy<Value = Event> {
 fn lead() -> impl Strategy<Value = Event> {
     prop_oneof![
         1 => Just(Event::Stop),
-        2 => Just(Event::Ask(Request::Pause)),
-        3 => Just(Event::Ask(Request::Resume)),
-        1 => Just(Event::Ask(Request::Park)),
+        2 => Just(Event::Ask(Transition::Pause)),
+        3 => Just(Event::Ask(Transition::Resume)),
+        1 => Just(Event::Ask(Transition::Park)),
         3 => (0..14_000_i64).prop_map(|ms| Event::Seek(ShowTime::from_millis(ms))),
         3 => (-600..600_i32).prop_map(Event::Trim),
         4 => (0.0..1.0_f64).prop_map(|motion| Event::Mix(0, Mix { motion, ..Mix::FULL })),
@@ -175,12 +175,12 @@ proptest! {
         // Whatever state that left it in, a person clears it, and parks.
         let read = Event::Alarm(Alarm::Event(state::Event::PositionsRead));
         show = show
-            .with(wake_up(&waves, rate, 1.31), Event::Ask(Request::Park))
-            .with(wake_up(&waves, rate, 1.4), Event::Ask(Request::Clear))
+            .with(wake_up(&waves, rate, 1.31), Event::Ask(Transition::Park))
+            .with(wake_up(&waves, rate, 1.4), Event::Ask(Transition::Clear))
             .with(wake_up(&waves, rate, 1.45), read)
-            .with(wake_up(&waves, rate, 1.5), Event::Ask(Request::Park))
-            .with(wake_up(&waves, rate, 1.8), Event::Ask(Request::Resume))
-            .with(wake_up(&waves, rate, 1.9), Event::Ask(Request::Park));
+            .with(wake_up(&waves, rate, 1.5), Event::Ask(Transition::Park))
+            .with(wake_up(&waves, rate, 1.8), Event::Ask(Transition::Resume))
+            .with(wake_up(&waves, rate, 1.9), Event::Ask(Transition::Park));
         let played = show.play();
         if played.frames.is_empty() {
             return Ok(());

@@ -49,7 +49,7 @@ pub(super) async fn choose(asker: Asker, Json(choice): Json<Choice>) -> Result<S
     asker.ask(Command::Playlist { id }).await
 }
 
-/// Makes an entry of the playlist the next to be played.
+/// Selects the playlist entry to play next.
 #[utoipa::path(
     post, path = "/api/v1/playlist/select", tag = "playlist", request_body = Select,
     responses((status = 200, body = Status))

@@ -69,7 +69,7 @@ fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
     Err(bad_value(faults.join(", "), "levels are from 0, nothing, to 1, all of it").with(faults))
 }
 
-/// Sets levels and effects as a preset of the configuration says.
+/// Applies a preset of the configuration: levels and effects.
 #[utoipa::path(
     post, path = "/api/v1/presets/{name}", tag = "settings", params(("name" = String, Path, description = "Its name")),
     responses((status = 200, body = Status))

@@ -100,7 +100,7 @@ pub(super) async fn resume(asker: Asker, _: Nothing) -> Reply {
     asker.ask(Command::Resume).await
 }
 
-/// Goes on elsewhere in the cue.
+/// Jumps to another position in the cue.
 #[utoipa::path(
     post, path = "/api/v1/show/seek", tag = "show", request_body = Seek, responses((status = 200, body = Status))
 )]

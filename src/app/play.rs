@@ -157,7 +157,7 @@ pub struct Played {
     /// Controllers that acked nothing, or were lost at the end; none where no replies were asked for.
     pub silent: Vec<String>,
     /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
-    pub astray: Vec<String>,
+    pub off_park: Vec<String>,
 }
 
 impl Play {
@@ -264,7 +264,7 @@ impl Play {
         let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
         let mut played = sum_up(about, &self.config.controllers, &prepared, &run);
         if run.ended.ending == Ending::Completed {
-            played.astray = astray(&self.config, &parks, &self.control.live, run.closed_at);
+            played.off_park = off_park(&self.config, &parks, &self.control.live, run.closed_at);
         }
         Ok(played)
     }
@@ -288,7 +288,7 @@ fn look_for_others(
 }
 
 /// The seats that told, after the last frame, that they are not at park.
-fn astray(config: &Config, windows: &[Window], live: &Live, now: MonoTime) -> Vec<String> {
+fn off_park(config: &Config, windows: &[Window], live: &Live, now: MonoTime) -> Vec<String> {
     let is_up = |lane: &usize| {
         let window = &windows[*lane];
         let reading = live.evidence(*lane).and_then(Evidence::reading);

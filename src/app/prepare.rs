@@ -9,7 +9,7 @@ use crate::belief::Taken;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
-use crate::plan::homing_time;
+use crate::plan::slow_park_time;
 use crate::rt::{AckLoop, Live, Phase, Places, Sent};
 use crate::time::{Clock, MonoTime};
 use crate::wire::{MAX_LEN, position_reads};
@@ -30,7 +30,7 @@ const SETTLE: Duration = Duration::from_millis(20);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Prepared {
     /// Slow frames, by controller.
-    pub(super) homing: Vec<u64>,
+    pub(super) park_frames: Vec<u64>,
     /// Controllers whose way to park may have been faster than 50 mm/s, because PA0b cuts a longer Time.
     pub(super) hurried: Vec<usize>,
 }
@@ -38,7 +38,7 @@ pub(super) struct Prepared {
 impl Prepared {
     /// Nothing done for so many controllers.
     pub(super) fn nothing(controllers: usize) -> Self {
-        Self { homing: vec![0; controllers], hurried: Vec::new() }
+        Self { park_frames: vec![0; controllers], hurried: Vec::new() }
     }
 }
 
@@ -182,14 +182,14 @@ impl<C: Clock> Preparation<'_, C> {
 
     /// When it arrives; none where no Time that the controller executes is long enough.
     fn send_to_park(&mut self, lane: usize, prepared: &mut Prepared) -> Option<MonoTime> {
-        let (time_ms, hurried) = homing_time(self.controllers[lane].seat.stroke_mm);
+        let (time_ms, hurried) = slow_park_time(self.controllers[lane].seat.stroke_mm);
         let time_ms = time_ms.min(self.lanes[lane].longest_ms);
         let (park, at) = (self.lanes[lane].window.park(), self.clock.now());
         if !self.places.belief(lane).allows(&park, time_ms, at) {
             return None;
         }
         let mut buf = [0; MAX_LEN];
-        let (stamped, datagram) = self.lanes[lane].encode_homing(time_ms, &mut buf);
+        let (stamped, datagram) = self.lanes[lane].encode_slow_park(time_ms, &mut buf);
         let of = u16::try_from(lane).expect("fewer controllers than ports");
         self.acks.on_sent(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at });
         if let Delivery::Failed(_) = self.sender.send(lane, datagram) {
@@ -198,7 +198,7 @@ impl<C: Clock> Preparation<'_, C> {
             let (frame, asked) = (stamped.frame, stamped.asked);
             self.places.taken(lane, &Taken { frame, asked, pose: &park, lasts_ms: time_ms, at });
         }
-        prepared.homing[lane] += 1;
+        prepared.park_frames[lane] += 1;
         if hurried {
             prepared.hurried.push(lane);
         }

@@ -12,9 +12,11 @@ use crate::rt::Spun;
 use crate::sys::realtime::RealTime;
 use crate::time::MonoTime;
 
-/// What became of a play. Fields may be added, never changed.
+/// What became of a play. Within one `format` fields are added, never changed.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
+    /// The layout of this document ([`crate::control::FORMAT`]).
+    pub format: u32,
     /// The cue file, as it was named.
     pub cue: String,
     /// `completed`, `stopped` or `fault`.
@@ -187,7 +189,7 @@ pub struct ControllerReport {
     /// Not answered within 1 s.
     pub lost: u64,
     /// Slow frames before tick 0, which brought it to its park pose.
-    pub homing: u64,
+    pub park_frames: u64,
     /// Further replies to an answered frame.
     pub duplicate: u64,
     /// Replies after 1 s.
@@ -272,7 +274,7 @@ const COLUMNS: [&str; 17] = [
     "acked",
     "refused",
     "lost",
-    "homing",
+    "park",
     "dup",
     "stale",
     "stray",
@@ -293,7 +295,7 @@ impl ControllerReport {
             self.acked,
             self.refused,
             self.lost,
-            self.homing,
+            self.park_frames,
             self.duplicate,
             self.stale,
             self.stray,

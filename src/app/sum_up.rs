@@ -5,6 +5,7 @@ use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
 use crate::config::Controller;
+use crate::control::FORMAT;
 use crate::engine::Ending;
 use crate::health::Groups;
 use crate::limiter::Clamp;
@@ -46,6 +47,7 @@ pub(super) struct About {
 pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepared, run: &Run) -> Played {
     let About { cue, rate, ending, silent } = about;
     let report = Report {
+        format: FORMAT,
         cue,
         result: match ending {
             Ending::Completed => "completed",
@@ -71,7 +73,7 @@ pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepar
         refusals: run.granted.refusals.clone(),
         notes: notes(controllers, prepared, run),
         silent: lost.map(|index| controllers[index].name.clone()).collect(),
-        astray: Vec::new(),
+        off_park: Vec::new(),
     }
 }
 
@@ -86,7 +88,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         acked: counts.acked,
         refused: counts.refused(),
         lost: counts.lost,
-        homing: prepared.homing[index],
+        park_frames: prepared.park_frames[index],
         duplicate: counts.duplicate,
         stale: counts.stale,
         stray: counts.stray,

@@ -47,7 +47,7 @@ pub enum CaptureError {
         found: [u8; 4],
     },
     /// A packet of an interface that pcapng has not described.
-    #[error("octet {at}: a packet of interface {found}, of {known} described")]
+    #[error("octet {at}: packet refers to interface {found}; {known} described")]
     Interface {
         /// Where its block begins.
         at: u64,

@@ -23,7 +23,7 @@ use printer::{Halt, Manner, Printer};
 /// Where controllers (PA14) and hosts (PA24) listen.
 const PORTS: [u16; 2] = [7408, 8410];
 
-/// Puts messages of the protocol in words.
+/// Decodes protocol messages.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -54,7 +54,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 
-    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; may be given several times.
+    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; repeatable.
     #[arg(long, value_name = "N", conflicts_with = "all")]
     port: Vec<u16>,
 

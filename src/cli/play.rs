@@ -37,7 +37,7 @@ const EXAMPLES: [&str; 4] = [
     "kinocue play storm.mcap --config hall.toml --start 01:30 --json > report.json",
 ];
 
-/// Plays one cue to the controllers, and reports what became of every frame.
+/// Plays one cue to the controllers, and reports the fate of every frame.
 ///
 /// Ctrl-C parks the seats and ends with the report; a second Ctrl-C, half a second after the first or later, ends at once and
 /// leaves the seats where they are. On a terminal keys lead the play; ? says which. None of it is an emergency stop: that one is
@@ -59,13 +59,13 @@ pub(super) struct Args {
     /// Ticks per second, 1 to 1000 [default: 100, or the configuration's].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
-    /// Which Time the frames carry [default: relative, or the configuration's].
+    /// The kind of Time that the frames carry [default: relative, or the configuration's].
     #[arg(long, value_parser = ["relative", "absolute"])]
     time: Option<String>,
-    /// Where in the cue to begin: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
+    /// Where in the cue to start: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     start: Option<ShowTime>,
-    /// Plays in all; 0 plays until stopped.
+    /// Number of plays; 0 plays until stopped.
     #[arg(long = "loop", value_name = "N", default_value_t = 1)]
     plays: u32,
     /// Intensity of motion and vibration about the seats' neutral pose: 60% or -6dB.
@@ -77,13 +77,13 @@ pub(super) struct Args {
     /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
-    /// Ask for a reply in each Nth frame, 1 to 1000 [default: 1, or the configuration's].
+    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
-    /// Ask for no replies, and read none.
+    /// Request no acks, and read none.
     #[arg(long)]
     no_acks: bool,
-    /// Wake up this long before each tick and spin, 0 to 900 µs: less late for more processor time [default: 0, or the
+    /// Wake up this long before each tick and spin, 0 to 900 µs: less lateness for more processor time [default: 0, or the
     /// configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,
@@ -259,8 +259,8 @@ pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
             anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
         return Err(why).or_exit(Exit::Unavailable);
     }
-    if !played.astray.is_empty() {
-        let who = played.astray.join(", ");
+    if !played.off_park.is_empty() {
+        let who = played.off_park.join(", ");
         let why = anyhow!(
             "{who} tells that it is not at park, where its last frames led; look at it before the next play"
         );

@@ -12,9 +12,9 @@ use crate::{config, console};
 
 /// Runs the service of a hall.
 ///
-/// Keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
+/// Keeps its seats parked, its controllers monitored and its shows ready, until it is terminated.
 ///
-/// Nothing moves until somebody asks for it, by the client commands, the web console or any other surface. SIGTERM parks the
+/// Nothing moves until somebody commands it, by the client commands, the web console or any other surface. SIGTERM parks the
 /// seats and ends with 0; SIGHUP reads the configuration anew where nothing is armed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

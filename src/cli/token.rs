@@ -16,7 +16,7 @@ const OCTETS: usize = 32;
 /// The longest name.
 const MAX_NAME: usize = 64;
 
-/// Makes a token with which somebody comes in over HTTP.
+/// Creates an access token for HTTP.
 ///
 /// The lines of the configuration that let them in come with it.
 ///
@@ -28,10 +28,10 @@ Examples:
   kinocue token tablet --role operate
   kinocue token booth --role engineer --json")]
 pub(super) struct Args {
-    /// Who gets it, as the journal is to name them.
+    /// The name of its holder in the journal.
     #[arg(value_parser = parse_name)]
     name: String,
-    /// What they may do: look; run the show; home, arm, clear and change the library as well.
+    /// What it permits: viewing; running the show; and homing, arming, clearing and changing the library.
     #[arg(long, value_enum)]
     role: RoleArg,
     /// Print one JSON object with all of it.

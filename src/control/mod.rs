@@ -15,7 +15,7 @@ pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, han
 pub use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub use status::{
-    ControllerStatus, EntryStatus, Histogram, JournalLine, Percentiles, PlaylistStatus, PreflightStatus,
-    RealTimeStatus, Severity, ShowStatus, Status, TestRow, TestStatus, Warning,
+    ControllerStatus, EntryStatus, FORMAT, Histogram, JournalLine, Percentiles, PlaylistStatus,
+    PreflightStatus, RealTimeStatus, Severity, ShowStatus, Status, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

@@ -9,16 +9,22 @@ use utoipa::ToSchema;
 use super::Levels;
 use crate::state::{Cause, Next, State};
 
+/// The layout of [`Status`] and of the report of a play: the number goes up when a field changes its name or its meaning. 1 was that
+/// of 0.1.
+pub const FORMAT: u32 = 2;
+
 /// The whole state of the hall.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Status {
+    /// The layout of this document, 2 since kinocue 0.2: the number goes up when a field changes its name or its meaning.
+    pub format: u32,
     /// The name of the hall.
     pub hall: String,
     /// The version of the program.
     pub version: &'static str,
     /// Seconds since the program started.
     pub uptime_s: f64,
-    /// One word: `boot`, `recovering`, `parked`, `homing`, `armed`, `joining`, `playing`, `freewheeling`, `paused`, `parking`,
+    /// One word: `boot`, `recovering`, `parked`, `homing`, `armed`, `joining`, `playing`, `holding`, `paused`, `parking`,
     /// `stopping`, `stopped` or `fault`.
     pub state: &'static str,
     /// Why it is in that state.
@@ -75,6 +81,7 @@ impl Status {
     pub fn starting(hall: &str) -> Self {
         Self {
             hall: hall.to_owned(),
+            format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),
             uptime_s: 0.0,
             state: State::Boot.word(),
@@ -221,7 +228,7 @@ pub struct ControllerStatus {
     pub enabled: bool,
     /// `ok`, `degraded`, `lost`, `rejoining`, `stopped`, `error`, `excluded`, `unwatched`, `unknown`, or
     /// `out` where the configuration has it out for good.
-    pub standing: &'static str,
+    pub health: &'static str,
     /// Why it stands so, and what to do.
     pub why: String,
     /// Seconds since it was last heard; null where it never was.

@@ -160,7 +160,7 @@ impl Scheduling {
             _ if refused.is_some_and(|refusal| refusal.not_permitted) && self.entitled() => Line::bad(
                 ID,
                 found
-                    + "; refused although right or limit allow it, so by the group or by a filter of the container",
+                    + "; refused although the limit allows it: blocked by the control group or a seccomp filter",
                 "no CPUWeight=, CPUQuota= or Delegate= in the unit and its slice; or boot with rt_group_sched=0; in a \
                  container: --cap-add SYS_NICE and a seccomp profile that allows sched_setscheduler",
             ),

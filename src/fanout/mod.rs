@@ -100,7 +100,7 @@ impl Lane {
     }
 
     /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects off.
-    pub fn encode_homing<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+    pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
         let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
         let beat = Beat::still(Timing::Relative, time_ms);
         let written = self.encode(&beat, &park, Mix::STILL, buf);

@@ -100,7 +100,7 @@ fn vibration_stands_two_octets_further_back_where_port_out_takes_four() {
     assert_eq!((octets.len(), &octets[32..36]), (48, &[0, 0, 0, 3][..]));
     let frame = MotionRequest::parse_as(VibrationPort::Four, octets).unwrap();
     assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
-    let (_, octets) = lane.encode_homing(3_000, &mut buf);
+    let (_, octets) = lane.encode_slow_park(3_000, &mut buf);
     assert_eq!(octets.len(), 38, "a frame without vibration is the same for all");
 }
 
@@ -109,7 +109,7 @@ fn the_way_home_is_relative_and_plain_and_takes_a_frame_number() {
     let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
     let mut lane = lanes(&hall(&["127.0.0.1:1"], 1), &cue, FULL).remove(0);
     let mut buf = [0xa5; MAX_LEN];
-    let (first, octets) = lane.encode_homing(3_000, &mut buf);
+    let (first, octets) = lane.encode_slow_park(3_000, &mut buf);
     assert_eq!((first.frame, &octets[4..6]), (FrameNo(1), &[0x14, 0x01][..]));
     let (second, octets) =
         lane.encode(&Beat::still(Timing::Relative, 10), &lane.window.park(), Mix::FULL, &mut buf);

@@ -199,7 +199,7 @@ impl Member {
         self.look_again = self.must_be_home && at.since(self.read) >= LOOK_AGAIN;
     }
 
-    /// A sighting that nobody asked for since the controller was lost is none.
+    /// Takes a sighting. Ignores an identity reply not requested since the loss.
     pub(super) fn on_sighting(&mut self, sighting: &Sighting, at: MonoTime) {
         if !std::mem::take(&mut self.reading) {
             return;

@@ -31,10 +31,12 @@ impl HealthState {
         match self {
             Self::Ok => "nothing",
             Self::Rejoining => "park, or start a show: it joins slowly",
-            Self::Degraded => "look at the network",
-            Self::Lost => "look at its power and network; it joins again by itself if it did not reboot",
-            Self::Stopped => "release the emergency stop at its place, then clear",
-            Self::Error => "put the error right at the controller; with the seats parked or stopped, clear",
+            Self::Degraded => "check the network",
+            Self::Lost => "check its power and network; it rejoins by itself unless it rebooted",
+            Self::Stopped => "release the emergency-stop button at its place, then clear",
+            Self::Error => {
+                "clear the error at the controller; then, with the seats parked or stopped, clear the hall"
+            }
             Self::Excluded => "park, then home it with nobody on the seat",
             Self::Unwatched => "watch the seat",
         }
@@ -74,7 +76,7 @@ impl fmt::Display for Why {
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
             Self::Unsteady(_) => {
-                "frames to it, or its acks, were missing for over 50 ms three times within a minute: look at the network"
+                "frames to it, or its acks, were missing for over 50 ms three times within a minute: check the network"
             }
             Self::Ambiguous(_) => {
                 "in either order of their words its positions are inside the stroke, and nothing says which is true: home it"

@@ -14,7 +14,7 @@ const STATES: [&str; 13] = [
     "armed",
     "joining",
     "playing",
-    "freewheeling",
+    "holding",
     "paused",
     "parking",
     "stopping",

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::TickReport;
 use super::table::Row;
 use crate::belief::Evidence;
-use crate::state::{Ride, State};
+use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
 
@@ -59,9 +59,9 @@ impl Phase {
         match state {
             State::Boot => Self::Asking,
             State::Homing => Self::Homing,
-            State::Armed | State::Playing(Ride::Joining) => Self::Joining,
-            State::Playing(Ride::Following) => Self::Playing,
-            State::Playing(Ride::Freewheeling) => Self::Freewheeling,
+            State::Armed | State::Playing(PlayMode::Joining) => Self::Joining,
+            State::Playing(PlayMode::Following) => Self::Playing,
+            State::Playing(PlayMode::Holding) => Self::Freewheeling,
             State::Paused => Self::Paused,
             State::Stopping => Self::Stopping,
             State::Stopped => Self::Stopped,

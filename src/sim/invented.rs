@@ -7,7 +7,7 @@ use crate::wire::VibrationPort;
 /// Answers to what the manuals leave open. The defaults are guesses; each can be played the other way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invented {
-    /// Commands that wait at most; one more is Err21.
+    /// Commands that can be queued; one more is Err21.
     pub queue_depth: usize,
     /// How long a controller homes.
     pub homing: Duration,

@@ -1,6 +1,6 @@
 //! Why a hall is in the state it is in.
 
-use super::{Readiness, Request};
+use super::{Readiness, Transition};
 
 /// Why a hall is in the state it is in. Its words are [`Cause::words`]; which controller or group they speak of is
 /// [`Cause::whose`], for whoever knows the names.
@@ -15,7 +15,7 @@ pub enum Cause {
     /// All seats are at their park poses.
     FoundParked,
     /// A person asked for it.
-    Asked(Request),
+    Asked(Transition),
     /// A person asked for a stop while the controllers homed, which no frame can end.
     StoppedHoming,
     /// The seats are home.

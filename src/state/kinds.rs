@@ -18,7 +18,7 @@ pub enum State {
     /// Ready to go, for ten minutes.
     Armed,
     /// The seats move with the cue.
-    Playing(Ride),
+    Playing(PlayMode),
     /// The seats hold; hold frames are sent.
     Paused,
     /// The seats decelerate, to [`State::Stopped`] or to [`State::Fault`].
@@ -33,13 +33,13 @@ pub enum State {
 
 /// How seats move with the cue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Ride {
+pub enum PlayMode {
     /// On their way onto the moving cue.
     Joining,
     /// On the cue.
     Following,
     /// They hold after a gap, and will join again by themselves.
-    Freewheeling,
+    Holding,
 }
 
 impl State {
@@ -50,9 +50,9 @@ impl State {
         Self::Parked,
         Self::Homing,
         Self::Armed,
-        Self::Playing(Ride::Joining),
-        Self::Playing(Ride::Following),
-        Self::Playing(Ride::Freewheeling),
+        Self::Playing(PlayMode::Joining),
+        Self::Playing(PlayMode::Following),
+        Self::Playing(PlayMode::Holding),
         Self::Paused,
         Self::Parking,
         Self::Stopping,
@@ -88,13 +88,13 @@ impl State {
 
 /// What a person can ask for. Who it is, and whether they may, is settled before it comes here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Request {
+pub enum Transition {
     /// Let the controllers find their zero. The seats move over their whole stroke by themselves: whoever asks has made
     /// sure that nobody sits on them.
     Home,
     /// Make ready to go. Refused where a position is unknown: nothing moves by this.
     Arm,
-    /// The same, and where a position is unknown the seats are homed first, as [`Request::Home`] does it and under the same
+    /// The same, and where a position is unknown the seats are homed first, as [`Transition::Home`] does it and under the same
     /// condition.
     HomeAndArm,
     /// No longer ready to go.
@@ -115,7 +115,7 @@ pub enum Request {
     Clear,
 }
 
-impl Request {
+impl Transition {
     /// Every request there is.
     pub const ALL: [Self; 11] = [
         Self::Home,

@@ -24,7 +24,7 @@ mod words;
 use std::time::Duration;
 
 pub use cause::{Cause, Trouble, Whose};
-pub use kinds::{Demand, Event, Finding, Latch, Readiness, Request, Ride, State};
+pub use kinds::{Demand, Event, Finding, Latch, PlayMode, Readiness, State, Transition};
 pub use next::Next;
 pub use refusal::{Refusal, Why};
 

@@ -1,6 +1,6 @@
 //! What a person does next.
 
-use super::{Cause, Latch, Machine, Readiness, Ride, State, Trouble};
+use super::{Cause, Latch, Machine, PlayMode, Readiness, State, Trouble};
 
 /// What a person does next; worded by its `Display`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,7 +95,7 @@ impl Machine {
             State::Parked => self.next_parked(),
             State::Homing => Next::AwaitHome,
             State::Armed => Next::Go,
-            State::Playing(Ride::Freewheeling) => Next::AwaitJoin,
+            State::Playing(PlayMode::Holding) => Next::AwaitJoin,
             State::Playing(_) => Next::Watch,
             State::Paused => Next::Resume,
             State::Stopping | State::Parking => Next::AwaitRest,

@@ -72,7 +72,7 @@ def hold_up(table, sim, tablet):
     sim.send_signal(signal.SIGCONT)
 
     def are_well(status):
-        return all(one["standing"] == "ok" for one in status["controllers"])
+        return all(one["health"] == "ok" for one in status["controllers"])
 
     time.sleep(0.3)
     status, took = tablet.until("all back", are_well, 5)

@@ -5,7 +5,7 @@ use kinocue::app::runtime::{Loops, Numbers, Runtime, RuntimeHandle};
 use kinocue::engine::{Mix, Show};
 use kinocue::net::{DrainGrid, over};
 use kinocue::rt::{Command, Line, News, Order, Ticked};
-use kinocue::state::{Event, Readiness, Request, State, Trouble};
+use kinocue::state::{Event, Readiness, State, Transition, Trouble};
 use kinocue::time::{MonoTime, Rate, ShowTime};
 
 use std::sync::Arc;
@@ -328,13 +328,13 @@ impl Hall<'_, '_> {
     }
 
     /// Somebody asks for something.
-    pub(crate) fn ask(&mut self, request: Request) {
+    pub(crate) fn ask(&mut self, request: Transition) {
         self.note(|| format!("asks: {request:?}"));
-        if matches!(request, Request::Go | Request::Resume | Request::Park) {
+        if matches!(request, Transition::Go | Transition::Resume | Transition::Park) {
             let (now, world) = (self.ether.ns(), &mut *self.ether.world());
             (world.asked, world.asked_at) = (true, now);
         }
-        if request == Request::Stop {
+        if request == Transition::Stop {
             self.runtime.desk.stop();
         } else {
             self.command(Command::Request(request));

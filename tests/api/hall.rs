@@ -212,7 +212,7 @@ pub fn with_controller() -> Status {
         address: "127.0.0.1:7408".to_owned(),
         group: "A1".to_owned(),
         enabled: true,
-        standing: "ok",
+        health: "ok",
         why: String::new(),
         heard_s: None,
         ack_rate: None,

@@ -23,7 +23,7 @@ use kinocue::rt::{
     Alarm, Answer, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, Places, PlanLoop,
     Planning, Task, TickLoop, mailboxes,
 };
-use kinocue::state::Request;
+use kinocue::state::Transition;
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
@@ -42,7 +42,7 @@ pub enum Event {
     /// Somebody presses stop.
     Stop,
     /// Somebody asks for something.
-    Ask(Request),
+    Ask(Transition),
     /// Somebody seeks.
     Seek(ShowTime),
     /// Something is seen of a controller.

@@ -21,7 +21,7 @@ use kinocue::rt::{
     Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
     Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
 };
-use kinocue::state::Request;
+use kinocue::state::Transition;
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
@@ -41,7 +41,7 @@ pub(crate) enum Deed {
     /// The tick thread sleeps that many periods too long.
     Oversleep(u32),
     /// Somebody asks for something.
-    Ask(Request),
+    Ask(Transition),
     /// Somebody wants to go on elsewhere in the film.
     Seek(ShowTime),
     /// The show is exchanged for another one.

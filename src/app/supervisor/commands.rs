@@ -4,7 +4,7 @@ use super::{ANSWER, LOOK_FOR_ANSWER, Supervisor};
 use crate::control::{Asked, Code, Command, Desired, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command as TickCommand;
 use crate::settings::{LONGEST_WHY, Out};
-use crate::state::{Request, State};
+use crate::state::{State, Transition};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime, TRIM_MS};
 
@@ -24,15 +24,15 @@ impl Supervisor {
             Command::Select { entry } => return self.select(entry, asked),
             Command::Test { rows } => return self.test(&rows, asked),
             Command::Preflight => return self.preflight(asked),
-            Command::Home => self.request(Request::Home),
+            Command::Home => self.request(Transition::Home),
             Command::Arm { seats_empty } => {
-                let request = if seats_empty { Request::HomeAndArm } else { Request::Arm };
+                let request = if seats_empty { Transition::HomeAndArm } else { Transition::Arm };
                 self.request(request).inspect(|()| self.say_what_lasts())
             }
-            Command::Disarm => self.request(Request::Disarm),
+            Command::Disarm => self.request(Transition::Disarm),
             Command::Go => {
                 let counted = self.count_before();
-                let go = self.are_buckled().and_then(|()| self.request(Request::Go));
+                let go = self.are_buckled().and_then(|()| self.request(Transition::Go));
                 go.inspect(|()| self.begin_show(&who.to_string(), who.surface, counted))
             }
             Command::GoFrom(film) => {
@@ -40,14 +40,14 @@ impl Supervisor {
                 let go = self.are_buckled().and_then(|()| self.go_from(film));
                 go.inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
             }
-            Command::Pause => self.request(Request::Pause),
-            Command::Resume => self.request(Request::Resume),
-            Command::Park => self.request(Request::Park),
+            Command::Pause => self.request(Transition::Pause),
+            Command::Resume => self.request(Transition::Resume),
+            Command::Park => self.request(Transition::Park),
             // Whoever pressed it meant what was latched then.
             Command::Clear if asked.is_before(self.mirror.since) => {
                 Err(overtaken("clear", self.mirror.state))
             }
-            Command::Clear => self.request(Request::Clear),
+            Command::Clear => self.request(Transition::Clear),
             Command::Stop => {
                 // The flag is set already where it came by a handle; the machine takes a stop in every state.
                 self.runtime.desk.stop();
@@ -70,8 +70,8 @@ impl Supervisor {
         self.answer(asked, result);
     }
 
-    fn request(&mut self, request: Request) -> Result<(), Problem> {
-        if matches!(request, Request::Arm | Request::HomeAndArm | Request::Home) {
+    fn request(&mut self, request: Transition) -> Result<(), Problem> {
+        if matches!(request, Transition::Arm | Transition::HomeAndArm | Transition::Home) {
             // Both need the line, or a show that nobody is about to replace.
             self.is_free()?;
         }
@@ -117,7 +117,7 @@ impl Supervisor {
             return Err(Problem::new(Code::State, detail, "arm first; while it plays or is paused, seek"));
         }
         self.seek(film)?;
-        self.request(Request::Go).inspect_err(|_| self.rewind())
+        self.request(Transition::Go).inspect_err(|_| self.rewind())
     }
 
     fn trim(&mut self, ms: i32) -> Result<(), Problem> {
@@ -191,7 +191,7 @@ impl Supervisor {
         }
         if on && self.is_pressed(&group) {
             let detail = format!("cannot enable {name}: an emergency stop is in effect there");
-            return Err(Problem::new(Code::State, detail, "release it at its place, then enable the seat"));
+            return Err(Problem::new(Code::State, detail, "release its button, then enable the seat"));
         }
         self.set(|settings| {
             settings.enable(&group, out);

@@ -14,7 +14,7 @@ use crate::journal::{PlaylistPlace, stamp};
 use crate::library::{IdError, Library};
 use crate::playlist::{Entry, Playlist, PlaylistId, Schedule, Shelf, Then, next_start};
 use crate::rt::Command as TickCommand;
-use crate::state::{Cause, Request, State};
+use crate::state::{Cause, State, Transition};
 
 /// The playlist that is loaded.
 #[derive(Debug)]
@@ -212,10 +212,10 @@ impl Supervisor {
         self.tell_readiness();
         self.are_buckled()?;
         if start == Start::GoOn {
-            self.command(TickCommand::Request(Request::Arm))?;
+            self.command(TickCommand::Request(Transition::Arm))?;
         }
         let before = self.count_before();
-        self.command(TickCommand::Request(Request::Go))?;
+        self.command(TickCommand::Request(Transition::Go))?;
         self.begin_show("the playlist", Surface::Schedule, before);
         Ok(())
     }

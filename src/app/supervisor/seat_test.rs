@@ -13,7 +13,7 @@ use crate::control::{Asked, Code, Problem, Surface, TestRow, TestStatus};
 use crate::cue::{self, Source};
 use crate::motion::MAX_AXES;
 use crate::rt::{Command as TickCommand, Row};
-use crate::state::{Request, State};
+use crate::state::{State, Transition};
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 
@@ -167,7 +167,7 @@ impl Supervisor {
         seat_test.before = self.cued.replace(cued).map(Box::new);
         self.seat_test = Some(seat_test);
         let before = self.count_before();
-        let begun = self.stage().and_then(|()| self.command(TickCommand::Request(Request::Go)));
+        let begun = self.stage().and_then(|()| self.command(TickCommand::Request(Transition::Go)));
         match &begun {
             Ok(()) => self.begin_show("a test of the seats", Surface::Socket, before),
             Err(_) => {

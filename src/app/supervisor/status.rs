@@ -7,7 +7,7 @@ use jiff::Zoned;
 
 use super::{Supervisor, belts};
 use crate::config::Controller;
-use crate::control::{ControllerStatus, Histogram, Percentiles, RealTimeStatus, Status};
+use crate::control::{ControllerStatus, FORMAT, Histogram, Percentiles, RealTimeStatus, Status};
 use crate::engine::Unplanned;
 use crate::rt::Row;
 use crate::state::{Next, Whose};
@@ -76,6 +76,7 @@ impl Supervisor {
         let position = |cued: &super::ProvedShow| if moving { live.show() } else { cued.start };
         Status {
             hall: self.runtime.config.show.name.clone(),
+            format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),
             uptime_s: now.since(self.ports.began).as_secs_f64(),
             state: self.mirror.state.word(),
@@ -175,7 +176,7 @@ impl Supervisor {
             address: controller.address.to_string(),
             group: controller.group.clone(),
             enabled: self.settings.is_on(index),
-            standing: row.map_or("unknown", |row| super::warnings::word(row.standing)),
+            health: row.map_or("unknown", |row| super::warnings::word(row.standing)),
             why: match self.settings.out.get(self.settings.group(index)) {
                 Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
                 None => why,
@@ -216,7 +217,7 @@ fn absent(controller: &Controller) -> ControllerStatus {
         seat: controller.seat.name.clone(),
         address: controller.address.to_string(),
         group: controller.group.clone(),
-        standing: "out",
+        health: "out",
         why: "out for good: enabled = false in the configuration".to_owned(),
         ..ControllerStatus::default()
     }

@@ -73,14 +73,14 @@ impl Ticks {
         let machine = Arc::clone(&self.machine);
         let mut machine = machine.lock().unwrap();
         if self.desk.take_stop() {
-            machine.request(crate::state::Request::Stop, now).unwrap();
+            machine.request(crate::state::Transition::Stop, now).unwrap();
         }
         machine.tick(now);
         self.tell(&machine);
         while let Ok(command) = self.commands.pop() {
             let answer = match command {
                 TickCommand::Request(request) => machine.request(request, now),
-                TickCommand::Seek(_) => machine.request(crate::state::Request::Seek, now),
+                TickCommand::Seek(_) => machine.request(crate::state::Transition::Seek, now),
                 TickCommand::Event(event) => {
                     machine.event(event, now);
                     Ok(())

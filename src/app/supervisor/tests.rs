@@ -10,7 +10,7 @@ use crate::control::{Code, Command, LevelsChange, Role, Surface, Who};
 use crate::engine::Unplanned;
 use crate::rt::{News, TickReport};
 use crate::settings::Out;
-use crate::state::{Event, Next, Ride, Trouble};
+use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 
 const ARM: Command = Command::Arm { seats_empty: false };
@@ -174,7 +174,7 @@ fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before(
     assert!(rig.supervisor.status().next.contains("or go on from 00:02.500"));
     assert_eq!(rig.ask(Command::GoFrom(ShowTime::from_millis(4_000))).unwrap_err().code, Code::Value);
     rig.ask(place).unwrap();
-    assert_eq!(rig.state(), State::Playing(Ride::Joining));
+    assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
     let cued = rig.supervisor.cued.as_ref().unwrap();
     assert_eq!((cued.start, cued.left_at), (ShowTime::from_millis(2_500), None));
     rig.tell(Event::Joined);

@@ -29,9 +29,9 @@ pub(in crate::cli) enum Command {
     /// Lists the cues of the daemon's library.
     #[command(after_help = "Examples:\n  kinocue cues\n  kinocue cues --json")]
     Cues(ServerArgs),
-    /// Puts a cue file into the daemon's library.
+    /// Uploads a cue file to the daemon's library.
     ///
-    /// It is checked and its limits are proved first; a bad one is not taken.
+    /// The file is checked and proved first; a bad one is rejected.
     #[command(after_help = "\
 Examples:
   kinocue upload coaster.csv

@@ -26,7 +26,7 @@ pub(in crate::cli) struct ServerArgs {
     /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
     #[arg(long, value_name = "PATH")]
     pub(super) socket: Option<PathBuf>,
-    /// Print the JSON of the reply as it came.
+    /// Print the reply as JSON, unchanged.
     #[arg(long)]
     pub(in crate::cli) json: bool,
 }

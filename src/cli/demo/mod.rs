@@ -34,7 +34,7 @@ const CUE: &[u8] = include_bytes!("../../../cues/bench-ride.csv");
 
 /// Plays the bench ride to four virtual controllers, with nothing to set up.
 ///
-/// It is the daemon at work, with its web console: the address is said at once. On a terminal the console stays up after the
+/// It is the daemon itself, with its web console, whose address is printed at once. On a terminal the console stays up after the
 /// ride until Ctrl-C, to arm and go again there. Two of the controllers are a pair that shares one frame (PA95). Everything
 /// stays on this machine, in a folder that is gone at the end.
 #[derive(Debug, clap::Args)]

@@ -14,7 +14,7 @@ use super::keys::{Action, Decoder, HELP};
 use crate::app::Control;
 use crate::engine::Mix;
 use crate::rt::{Command, Phase};
-use crate::state::Request;
+use crate::state::Transition;
 use crate::sys::clock::Monotonic;
 use crate::sys::terminal::Keyboard;
 use crate::time::{Clock as _, MonoTime, ShowTime, TRIM_MS};
@@ -51,12 +51,12 @@ impl Leader {
     fn act(&mut self, action: Action, now: MonoTime) -> Option<&'static str> {
         match action {
             Action::PauseOrResume if self.control.live.phase() == Phase::Paused => {
-                self.ask(Command::Request(Request::Resume))
+                self.ask(Command::Request(Transition::Resume))
             }
-            Action::PauseOrResume => self.ask(Command::Request(Request::Pause)),
+            Action::PauseOrResume => self.ask(Command::Request(Transition::Pause)),
             Action::Jump(seconds) => self.jump(seconds, now),
-            Action::Clear => self.ask(Command::Request(Request::Clear)),
-            Action::Park => self.ask(Command::Request(Request::Park)),
+            Action::Clear => self.ask(Command::Request(Transition::Clear)),
+            Action::Park => self.ask(Command::Request(Transition::Park)),
             Action::Stop => self.stop(),
             Action::Level(step) => self.level(step),
             Action::Trim(step) => self.trim(step),
@@ -187,7 +187,7 @@ mod tests {
     }
 
     /// What was asked: a request, or a jump.
-    fn asked(consumer: &mut Consumer<Command>) -> Vec<Result<Request, ShowTime>> {
+    fn asked(consumer: &mut Consumer<Command>) -> Vec<Result<Transition, ShowTime>> {
         let command = |command| match command {
             Command::Request(request) => Ok(request),
             Command::Seek(film) => Err(film),
@@ -203,7 +203,7 @@ mod tests {
             leader.control.live.enter(phase);
             assert_eq!(leader.act(Action::PauseOrResume, at(0)), None);
         }
-        let expected = [Request::Pause, Request::Resume, Request::Pause].map(Ok);
+        let expected = [Transition::Pause, Transition::Resume, Transition::Pause].map(Ok);
         assert_eq!(asked(&mut commands), expected);
     }
 

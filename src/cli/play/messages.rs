@@ -7,7 +7,7 @@ use super::{CtrlC, keyboard};
 use crate::app::Control;
 use crate::engine::Unplanned;
 use crate::rt::{News, Phase};
-use crate::state::{Cause, Request, State, Whose};
+use crate::state::{Cause, State, Transition, Whose};
 use crate::time::ShowTime;
 
 /// What there is to say of a play.
@@ -43,7 +43,7 @@ impl Messages {
             News::Taken | News::NotLoaded(_) => return None,
         };
         let mut text = match (state, cause) {
-            (State::Playing(_), Cause::Asked(Request::Go)) => {
+            (State::Playing(_), Cause::Asked(Transition::Go)) => {
                 format!("{state} ({:.2} s): {cause}", self.join.as_secs_f64())
             }
             _ => format!("{state}: {cause}"),
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use crate::engine::Mix;
     use crate::rt::{Desk, TickReport};
-    use crate::state::{Next, Refusal, Ride, Trouble, Why};
+    use crate::state::{Next, PlayMode, Refusal, Trouble, Why};
     use crate::time::MonoTime;
 
     fn said() -> Messages {
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn a_state_comes_with_its_cause_and_the_next_action() {
         let said = said();
-        let go = entered(State::Playing(Ride::Joining), Cause::Asked(Request::Go), Next::Watch);
+        let go = entered(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Go), Next::Watch);
         assert_eq!(
             said.news(&go).unwrap(),
             "joining (1.25 s): started by the operator; next: nothing; pause, park or stop as needed"
@@ -143,13 +143,13 @@ mod tests {
         let pressed = entered(State::Stopped, Cause::EmergencyStop(1), Next::Release);
         assert_eq!(
             said.news(&pressed).unwrap(),
-            "stopped: emergency stop (A2); next: release the emergency stop, then clear"
+            "stopped: emergency stop (A2); next: release the emergency-stop button, then clear"
         );
         let broken = Trouble::Controller { controller: 0, error: 7 };
         let fault = entered(State::Fault, Cause::Trouble(broken), Next::PutRight);
         assert_eq!(
             said.news(&fault).unwrap(),
-            "fault: a controller has an error (A1); next: put the error right at the controller, then clear"
+            "fault: a controller has an error (A1); next: clear the error at the controller, then clear the hall"
         );
         let parked = entered(State::Parked, Cause::ArrivedAtPark, Next::Arm);
         assert_eq!(said.news(&parked).unwrap(), "parked: the seats have parked", "the play is over");
@@ -157,10 +157,11 @@ mod tests {
 
     #[test]
     fn a_refusal_says_what_stands_against_it_and_what_to_do_first() {
-        let refusal = Refusal { state: State::Recovering, asked: Request::Park, why: Why::PositionsNotRead };
+        let refusal =
+            Refusal { state: State::Recovering, asked: Transition::Park, why: Why::PositionsNotRead };
         assert_eq!(
             said().news(&News::Refused(refusal)).unwrap(),
-            "cannot park while recovering: where the seats stand has not been read since they stopped; wait until the \
+            "cannot park while recovering: the seats' positions have not been read since they stopped; wait until the \
              controllers have answered"
         );
     }

@@ -46,7 +46,7 @@ fn table() -> String {
     let mut row = |head: String, cell: &dyn Fn(State) -> String| {
         rows.push((head, State::ALL.into_iter().map(cell).collect()));
     };
-    for request in Request::ALL {
+    for request in Transition::ALL {
         row(format!("**{request}**"), &|state| cell(state, Step::Command(request)));
     }
     for (name, event) in EVENTS {

@@ -5,9 +5,9 @@ use std::path::Path;
 use super::*;
 use crate::app::supervisor::testing::Rig;
 use crate::control::LevelsChange;
-use crate::state::{Event, Ride};
+use crate::state::{Event, PlayMode};
 
-const JOINING: State = State::Playing(Ride::Joining);
+const JOINING: State = State::Playing(PlayMode::Joining);
 const DAY: &str = "title = \"Day\"\n[[entry]]\ncue = \"one\"\nthen = \"go\"\n[[entry]]\ncue = \"two\"\nthen = \"go\"\n\
     [[entry]]\ncue = \"three\"\nlevel = 0.5\n";
 
@@ -107,9 +107,9 @@ fn nothing_goes_on_after_a_stop_that_was_cleared_before_the_next_cue_was_loaded(
     rig.supervisor.runtime.desk.stop();
     rig.hear_of(State::Stopped);
     rig.happens(|machine, now| {
-        machine.request(Request::Clear, now).unwrap();
+        machine.request(Transition::Clear, now).unwrap();
         machine.event(Event::PositionsRead, now);
-        machine.request(Request::Park, now).unwrap();
+        machine.request(Transition::Park, now).unwrap();
     });
     rig.hear_of(State::Parking);
     rig.happens(|machine, now| machine.event(Event::Parked, now));
