@@ -249,8 +249,8 @@ fn two_seats() -> Virtual {
     Virtual { to: to.to_vec(), ..ride() }
 }
 
-fn octets(played: &Played, lane: usize) -> Vec<Vec<u8>> {
-    played.lane(lane).map(|frame| frame.octets.clone()).collect()
+fn bytes(played: &Played, lane: usize) -> Vec<Vec<u8>> {
+    played.lane(lane).map(|frame| frame.bytes.clone()).collect()
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn a_seat_that_is_switched_off_parks_softly_and_on_joins_again_while_the_other_g
     let played = two_seats().with(400, Event::Mix(1, off)).with(1_200, Event::Mix(1, Mix::FULL)).play();
     assert_within(played.worst());
     assert_within(played.worst_of_lane(1, 0..played.lane(1).count()));
-    assert_eq!(octets(&played, 0), octets(&smooth, 0));
+    assert_eq!(bytes(&played, 0), bytes(&smooth, 0));
     let second: Vec<i32> = played.lane(1).map(pulses).collect();
     assert_eq!(second[1_100], 0, "parked");
     assert_eq!(second[1_600], pulses(&smooth.lane(1).nth(1_600).unwrap().clone()), "with the cue again");
@@ -289,7 +289,7 @@ fn a_seat_that_is_off_stays_parked_through_pauses_seeks_loops_and_the_end() {
 fn a_lost_controller_is_brought_to_rest_told_so_three_times_and_gets_nothing_until_it_is_back() {
     let smooth = two_seats().play();
     let played = two_seats().with(500, Event::Alarm(Alarm::Leave(1))).play();
-    assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
+    assert_eq!(bytes(&played, 0), bytes(&smooth, 0), "the other plays on");
     let count = played.lane(1).count();
     assert!((503..=530).contains(&count), "{count} frames");
     assert_within(played.worst_of_lane(1, 0..count));
@@ -324,7 +324,7 @@ fn a_controller_that_is_heard_again_while_it_is_brought_to_rest_joins_from_where
             .with(back, Event::Found(1, [0.5; MAX_AXES]))
             .with(600, Event::FoundThere(1))
             .play();
-        assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
+        assert_eq!(bytes(&played, 0), bytes(&smooth, 0), "the other plays on");
         let count = played.lane(1).count();
         assert_within(played.worst_of_lane(1, 0..count));
         assert!(count < played.lane(0).count(), "{back}: it was away");
@@ -376,7 +376,7 @@ fn a_seek_to_which_no_move_leads_is_told_and_the_show_goes_on_where_it_is() {
     let seek = Event::Seek(ShowTime::from_millis(15_000));
     let played = ride().with(500, Event::Refuse).with(500, seek).play();
     assert_eq!(played.news.iter().filter_map(unplanned).collect::<Vec<_>>(), [Unplanned::Seek]);
-    assert_eq!(octets(&played, 0), octets(&smooth, 0));
+    assert_eq!(bytes(&played, 0), bytes(&smooth, 0));
 }
 
 #[test]

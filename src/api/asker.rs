@@ -1,4 +1,4 @@
-//! A request to change something: who asks, when they asked, and the way to the hall.
+//! A request that changes something: its sender, its time, and the handle of the hall.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,7 +63,7 @@ impl Asker {
         Ok(StatusReply(self.shared.write(&status)))
     }
 
-    /// Whether they are an engineer, who may change the library.
+    /// True if they are an engineer, who may change the library.
     pub(super) fn engineer(&self) -> Result<(), Problem> {
         self.least(Role::Engineer, "changing the library")
     }

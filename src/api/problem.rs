@@ -45,7 +45,7 @@ pub(super) struct Hall<'p> {
     cause: &'p str,
     /// What a person does next.
     next: &'p str,
-    /// Where in the cue the film is, s; null where none is loaded.
+    /// Where in the cue the film is, s; null if none is loaded.
     position_s: Option<f64>,
 }
 

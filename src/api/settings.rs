@@ -1,4 +1,4 @@
-//! What is set rather than done: trim, levels, presets; and what is asked of the hall as a whole.
+//! Settings (trim, levels, presets), and commands to the hall as a whole.
 
 use serde::Deserialize;
 use utoipa::ToSchema;

@@ -88,7 +88,7 @@ impl StopDesk {
         }
     }
 
-    /// Waits until there is something to do; says whether that is to end, none where the system would not wait.
+    /// Waits until there is something to do; says whether that is to end, `None` if the system would not wait.
     fn wait(&self) -> Option<bool> {
         let now = Monotonic.now();
         let ends = self.peers.iter().map(|caller| caller.until).chain(self.pause_until).min();
@@ -134,11 +134,11 @@ impl StopDesk {
 impl Caller {
     /// Takes in what is there; whether more is to come.
     fn listen(&mut self, handle: &Handle) -> bool {
-        let mut octets = [0; LINE];
+        let mut bytes = [0; LINE];
         loop {
-            match self.stream.read(&mut octets) {
+            match self.stream.read(&mut bytes) {
                 Ok(0) => break,
-                Ok(read) => self.line.extend_from_slice(&octets[..read]),
+                Ok(read) => self.line.extend_from_slice(&bytes[..read]),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return true,
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 Err(_) => return false,
@@ -160,7 +160,7 @@ impl Caller {
     }
 
     fn is_stop(&self) -> bool {
-        let line = self.line.split(|&octet| octet == b'\n').next().unwrap_or_default();
+        let line = self.line.split(|&byte| byte == b'\n').next().unwrap_or_default();
         line.trim_ascii().eq_ignore_ascii_case(b"stop")
     }
 

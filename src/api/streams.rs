@@ -34,7 +34,7 @@ impl Streams {
     /// A place for `who`.
     ///
     /// # Errors
-    /// Where there is none, and nobody whose role is less.
+    /// If there is none, and nobody whose role is less.
     pub(super) fn take(&self, who: &Who) -> Result<Stream, Problem> {
         let mut watching = lock(&self.0);
         let count = |is: &dyn Fn(&Who) -> bool| watching.iter().filter(|one| is(&one.who)).count();

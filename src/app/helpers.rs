@@ -67,7 +67,7 @@ impl<'scope> Helpers<'scope> {
     /// Ends them, the tick loop having ended, and closes the accounts.
     ///
     /// # Panics
-    /// Where one of them panicked.
+    /// If one of them panicked.
     pub(super) fn end(self, ticks: &Ticks<'_>, ended: Ended, granted: RealTime, origin: MonoTime) -> Run {
         self.over.acks.store(true, Ordering::Release);
         self.over.plans.store(true, Ordering::Release);

@@ -121,7 +121,7 @@ pub struct Play {
     mail: Mail,
     ends: MailEnds,
     control: Control,
-    /// Whether nothing may move.
+    /// True if nothing may move.
     holds: bool,
 }
 
@@ -154,7 +154,7 @@ pub struct Played {
     pub refusals: Vec<String>,
     /// What else a person should know, in words.
     pub notes: Vec<String>,
-    /// Controllers that acked nothing, or were lost at the end; none where no replies were asked for.
+    /// Controllers that acked nothing, or were lost at the end; `None` if no replies were asked for.
     pub silent: Vec<String>,
     /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
     pub off_park: Vec<String>,
@@ -214,7 +214,7 @@ impl Play {
     /// [`PlayError::Unsure`] where a seat to be held may not stand where it should.
     ///
     /// # Panics
-    /// Where one of its threads panicked.
+    /// If one of its threads panicked.
     pub fn run(mut self, lead: impl FnOnce(PlayHandle) -> bool) -> Result<Played, PlayError> {
         let (sender, receiver) = open(&self.config)?.split();
         let show = self.staged.show.clone();

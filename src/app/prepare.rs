@@ -1,5 +1,5 @@
-//! Before tick 0: reads where every seat stands, so that it joins from there. A seat of which not all axes tell is brought to
-//! park by one frame that is slow enough from anywhere in the stroke, and has to be acked where acks are asked for.
+//! Before tick 0: reads the position of every seat, so that it joins from there. A seat that does not report all its axes is brought to
+//! park by one frame that is slow enough from anywhere in the stroke, and has to be acked if acks are on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -103,14 +103,14 @@ impl<C: Clock> Preparation<'_, C> {
         lanes.map(|lane| self.controllers[lane].name.clone()).collect()
     }
 
-    /// Whether a seat told of all its axes, and whether it was at rest; none where it told nothing.
+    /// Whether a seat told of all its axes, and whether it was at rest; `None` if it told nothing.
     fn reading(&self, lane: usize) -> Option<(bool, bool)> {
         let (_, reading) = self.live.evidence(lane)?.reading()?;
         let own = self.lanes[lane].window.own();
         Some((reading.slots & own == own, reading.rests))
     }
 
-    /// Whether a seat tells that it stands at park, to a pulse.
+    /// True if a seat tells that it stands at park, to a pulse.
     fn is_at_park(&self, lane: usize) -> bool {
         let reading = self.live.evidence(lane).and_then(|evidence| evidence.reading());
         let window = &self.lanes[lane].window;
@@ -173,14 +173,14 @@ impl<C: Clock> Preparation<'_, C> {
         unsure
     }
 
-    /// Whether the last frame to a lane was acked, or asked for no ack.
+    /// True if the last frame to a lane was acked, or asked for no ack.
     fn is_acked(&self, lane: usize) -> bool {
         let last = self.lanes[lane].last_frame();
         let acked = self.live.evidence(lane).and_then(|evidence| evidence.acked());
         self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(last) >= 0)
     }
 
-    /// When it arrives; none where no Time that the controller executes is long enough.
+    /// When it arrives; `None` if no Time that the controller executes is long enough.
     fn send_to_park(&mut self, lane: usize, prepared: &mut Prepared) -> Option<MonoTime> {
         let (time_ms, hurried) = slow_park_time(self.controllers[lane].seat.stroke_mm);
         let time_ms = time_ms.min(self.lanes[lane].longest_ms);

@@ -50,12 +50,12 @@ pub struct EventReport {
     pub what: String,
 }
 
-/// The last known state of a controller; null where it never told.
+/// The last known state of a controller; null if it never told.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateReport {
     /// Seconds since it was last heard.
     pub heard_s_ago: Option<f64>,
-    /// Whether an emergency stop is in effect.
+    /// True if an emergency stop is in effect.
     pub emergency_stop: bool,
     /// Its error number (chapter 6 of the manuals); 0 for none.
     pub error: Option<u16>,
@@ -95,7 +95,7 @@ impl StateReport {
     }
 }
 
-/// Percentiles in µs; null where nothing was counted.
+/// Percentiles in µs; null if nothing was counted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LatencyReport {
     /// Half of them are no longer.
@@ -130,7 +130,7 @@ pub struct RealTimeReport {
     pub policy: String,
     /// Its priority; 0 for policies without one.
     pub priority: u8,
-    /// Whether memory is locked.
+    /// True if memory is locked.
     pub memory_locked: bool,
     /// How long the tick thread spun before each deadline.
     pub spin_us: SpinReport,

@@ -94,7 +94,7 @@ impl Mark {
         Ok(mark)
     }
 
-    /// Whether the daemon before left it and did not take it away.
+    /// True if the daemon before left it and did not take it away.
     fn is_there(&self) -> Result<bool, ServeError> {
         self.0.try_exists().map_err(|cause| self.failed(cause))
     }
@@ -168,7 +168,7 @@ impl Served {
 /// [`ServeError`]; nothing has moved then, or all of it is parked or at rest.
 ///
 /// # Panics
-/// Where one of its threads panicked.
+/// If one of its threads panicked.
 pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
     let mark = Mark::of(&parts.places.state)?;
     let crashed = mark.is_there()?;

@@ -20,7 +20,7 @@ const RUN_UP: Duration = Duration::from_millis(20);
 
 /// What the threads of a play share out among themselves.
 pub(super) struct Stage {
-    /// Whether no replies are to come.
+    /// True if no replies are to come.
     pub(super) silent: bool,
     pub(super) rate: Rate,
     /// How long before a deadline the tick thread stops sleeping and spins.

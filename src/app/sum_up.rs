@@ -1,4 +1,4 @@
-//! What a play comes to: the report, and what a person should hear beside it.
+//! Sums up a play: the report, and notes for the person.
 
 use super::play::Played;
 use super::prepare::Prepared;
@@ -39,7 +39,7 @@ pub(super) struct About {
     pub(super) rate: Rate,
     /// How it ended.
     pub(super) ending: Ending,
-    /// Whether no frame asked for a reply.
+    /// True if no frame asked for a reply.
     pub(super) silent: bool,
 }
 

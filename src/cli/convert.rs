@@ -26,7 +26,7 @@ pub(super) struct Args {
     /// The file to write; its name ends in .csv or .mcap.
     output: PathBuf,
     /// Format of the field to read: rows are line,time_ms,x,y,z,u,v,w, where time_ms is how long a row takes; u8 are
-    /// raw octets, one an axis, 0 to 255 over the stroke.
+    /// raw bytes, one an axis, 0 to 255 over the stroke.
     #[arg(long, value_enum, value_name = "FORMAT")]
     from: Option<Format>,
     /// Unit of the positions in rows: mm, percent, fraction or pulse.

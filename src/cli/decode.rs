@@ -50,7 +50,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = Reading::Smc)]
     dialect: Reading,
 
-    /// Octets of Port Out in frames with vibration, and of the inputs in the answers: 2 or 4.
+    /// Bytes of Port Out in frames with vibration, and of the inputs in the answers: 2 or 4.
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 

@@ -110,9 +110,9 @@ struct Report {
     level: f64,
     /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
     factors: Vec<f64>,
-    /// The last seconds in which it is brought to rest; null where it needs none.
+    /// The last seconds in which it is brought to rest; null if it needs none.
     eased_s: Option<f64>,
-    /// The low-pass; null where none was used.
+    /// The low-pass; null if none was used.
     cut_off_hz: Option<f64>,
     /// The largest change of a position, its axis and its time.
     change_mm: f64,

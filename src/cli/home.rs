@@ -59,7 +59,7 @@ struct ControllerReport<'a> {
     name: &'a str,
     address: String,
     home: bool,
-    /// From the order to the end of homing; null where that was not reached.
+    /// From the order to the end of homing; null if that was not reached.
     seconds: Option<f64>,
     fault: Option<String>,
 }

@@ -101,7 +101,7 @@ struct VibrationReport {
 }
 
 impl VibrationReport {
-    /// Whether another axis vibrates alike.
+    /// True if another axis vibrates alike.
     fn is_as(&self, other: &Self) -> bool {
         let figures = |v: &Self| (v.min_hz, v.max_hz, v.max_amplitude_mm);
         figures(self) == figures(other)

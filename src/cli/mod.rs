@@ -164,9 +164,9 @@ fn run(command: Command) -> Result<Exit, Failure> {
     }
 }
 
-/// Octets of Port Out in vibration frames.
+/// Bytes of Port Out in vibration frames.
 fn vibration_port(text: &str) -> Result<VibrationPort, String> {
-    let port = text.parse().ok().and_then(VibrationPort::of_octets);
+    let port = text.parse().ok().and_then(VibrationPort::of_bytes);
     port.ok_or_else(|| "it is 2 or 4".to_owned())
 }
 

@@ -182,12 +182,12 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
 #[derive(Debug, Clone, Default)]
 pub(super) struct CtrlC {
     pressed: Arc<AtomicBool>,
-    /// Whether the next one ends the program at once.
+    /// True if the next one ends the program at once.
     armed: Arc<AtomicBool>,
 }
 
 impl CtrlC {
-    /// Whether it was pressed.
+    /// True if it was pressed.
     pub(super) fn is_pressed(&self) -> bool {
         self.pressed.load(Ordering::Relaxed)
     }
@@ -197,7 +197,7 @@ impl CtrlC {
         self.armed.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the next one ends the program at once.
+    /// True if the next one ends the program at once.
     pub(super) fn is_armed(&self) -> bool {
         self.armed.load(Ordering::Relaxed)
     }

@@ -125,7 +125,7 @@ fn explain(which: Option<&str>) -> Result<Exit, Failure> {
 /// What asking one controller came to.
 struct Asked {
     route: Result<Route, String>,
-    /// None where there is no way to it.
+    /// `None` if there is no way to it.
     survey: Option<Survey>,
 }
 

@@ -238,7 +238,7 @@ fn report(outcomes: &[Outcome], json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Ctrl-C and SIGTERM as an octet on a socket, which a thread can wait for.
+/// Ctrl-C and SIGTERM as a byte on a socket, which a thread can wait for.
 struct Signals(UnixStream);
 
 impl Signals {

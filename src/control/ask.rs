@@ -87,7 +87,7 @@ pub struct Levels {
     pub motion: f64,
     /// Of the vibration, 0 to 1.
     pub vibration: f64,
-    /// Whether each effect may be on.
+    /// True if each effect may be on.
     pub effects: BTreeMap<String, bool>,
     /// Of motion and vibration in each row, 0 to 1, on top of the hall's.
     pub rows: BTreeMap<String, f64>,
@@ -103,7 +103,7 @@ pub struct LevelsChange {
     /// Of the vibration, 0 to 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vibration: Option<f64>,
-    /// Whether an effect may be on, by its name.
+    /// True if an effect may be on, by its name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub effects: BTreeMap<String, bool>,
     /// Of motion and vibration in a row, 0 to 1.
@@ -140,7 +140,7 @@ impl Command {
         }
     }
 
-    /// Whether it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
+    /// True if it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
     /// another by then.
     #[must_use]
     pub const fn goes_stale(&self) -> bool {

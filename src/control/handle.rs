@@ -44,7 +44,7 @@ impl Asked {
         self.desired.ask.goes_stale() && now.since(self.asked_at) > FRESH
     }
 
-    /// Whether it was asked before that instant.
+    /// True if it was asked before that instant.
     #[must_use]
     pub fn is_before(&self, at: MonoTime) -> bool {
         self.asked_at < at
@@ -61,7 +61,7 @@ impl Asked {
 pub struct Inbox(mpsc::Receiver<Asked>);
 
 impl Inbox {
-    /// The next ask, waited for so long; none where nobody asked. None as well where all surfaces are gone. What has gone
+    /// The next ask, waited for so long; `None` if nobody asked. None as well where all surfaces are gone. What has gone
     /// stale while it waited is answered here and never comes out: nobody expects it any more.
     #[must_use]
     pub fn next(&self, wait: Duration) -> Option<Asked> {

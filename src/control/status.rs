@@ -1,4 +1,4 @@
-//! What the hall says of itself. The supervisor makes one of these ten times a second and after every change; every surface shows
+//! The status of the hall. The supervisor publishes one ten times a second and after every change; every surface shows
 //! this and nothing else.
 
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use crate::state::{Cause, Next, State};
 /// of 0.1.
 pub const FORMAT: u32 = 2;
 
-/// The whole state of the hall.
+/// The whole status of the hall.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Status {
     /// The layout of this document, 2 since kinocue 0.2: the number goes up when a field changes its name or its meaning.
@@ -31,15 +31,15 @@ pub struct Status {
     pub cause: String,
     /// What a person does next.
     pub next: String,
-    /// Whether arming homes the seats first, which is for empty seats alone.
+    /// True if arming homes the seats first, which is for empty seats alone.
     pub arm_homes: bool,
-    /// Whether there is something to clear: the hall, or controllers that wait for it.
+    /// True if there is something to clear: the hall, or controllers that wait for it.
     pub may_clear: bool,
     /// Seconds since it is in that state.
     pub since_s: f64,
-    /// Seconds until that state ends by itself; null where it does not.
+    /// Seconds until that state ends by itself; null if it does not.
     pub lapses_s: Option<f64>,
-    /// Whether motion frames leave.
+    /// True if motion frames leave.
     pub moving: bool,
     /// What is loaded.
     pub show: Option<ShowStatus>,
@@ -147,7 +147,7 @@ pub struct PlaylistStatus {
     pub entries: Vec<EntryStatus>,
     /// Which entry is loaded, counted from 0.
     pub current: usize,
-    /// When the next one starts by itself, RFC 3339; null where none does.
+    /// When the next one starts by itself, RFC 3339; null if none does.
     pub next_start: Option<String>,
 }
 
@@ -160,19 +160,19 @@ pub struct EntryStatus {
     pub title: Option<String>,
     /// How long it is, s.
     pub length_s: f64,
-    /// The preset that is set before its own levels; null where there is none.
+    /// The preset that is set before its own levels; null if there is none.
     pub preset: Option<String>,
-    /// The level of its motion, 0 to 1; null where the preset's or the hall's stays.
+    /// The level of its motion, 0 to 1; null if the preset's or the hall's stays.
     pub level: Option<f64>,
-    /// Its trim, ms; null where the hall's stays.
+    /// Its trim, ms; null if the hall's stays.
     pub trim_ms: Option<i32>,
     /// What follows its end: `hold` (a person goes on) or `go`.
     pub then: &'static str,
-    /// The time of day at which it starts, HH:MM or HH:MM:SS; null where a person starts it.
+    /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
     pub at: Option<String>,
 }
 
-/// Percentiles in µs; null where nothing was counted.
+/// Percentiles in µs; null if nothing was counted.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct Percentiles {
     /// Half of them are no longer.
@@ -205,7 +205,7 @@ pub struct RealTimeStatus {
     pub policy: String,
     /// Its priority; 0 for policies without one.
     pub priority: u8,
-    /// Whether memory is locked.
+    /// True if memory is locked.
     pub memory_locked: bool,
     /// What was refused, each with what to do.
     pub refusals: Vec<String>,
@@ -224,16 +224,16 @@ pub struct ControllerStatus {
     pub address: String,
     /// Whom it shares a rigid seat with.
     pub group: String,
-    /// Whether it is to take part.
+    /// True if it is to take part.
     pub enabled: bool,
     /// `ok`, `degraded`, `lost`, `rejoining`, `stopped`, `error`, `excluded`, `unwatched`, `unknown`, or
     /// `out` where the configuration has it out for good.
     pub health: &'static str,
     /// Why it stands so, and what to do.
     pub why: String,
-    /// Seconds since it was last heard; null where it never was.
+    /// Seconds since it was last heard; null if it never was.
     pub heard_s: Option<f64>,
-    /// Acks over frames that asked, in the last second; null where none asked.
+    /// Acks over frames that asked, in the last second; null if none asked.
     pub ack_rate: Option<f64>,
     /// Latency of its acks since the program started.
     pub ack_p50_us: Option<f64>,
@@ -253,28 +253,28 @@ pub struct ControllerStatus {
     pub send_failed: u64,
     /// How often the limiter held its motion back.
     pub clamps: u64,
-    /// Whether it knows its position; null where it never told.
+    /// True if it knows its position; null if it never told.
     pub homed: Option<bool>,
-    /// Whether an emergency stop is in effect.
+    /// True if an emergency stop is in effect.
     pub emergency_stop: bool,
-    /// Its error number; null where it never told.
+    /// Its error number; null if it never told.
     pub error: Option<u16>,
-    /// Error number of each drive; null where it never told.
+    /// Error number of each drive; null if it never told.
     pub servo_errors: Option<Vec<u16>>,
-    /// Inputs, bit 0 = X01; null where it never told.
+    /// Inputs, bit 0 = X01; null if it never told.
     pub inputs: Option<u16>,
-    /// Inputs of belts that are open, from 1 for X01; null where it has no belts, or has not told lately.
+    /// Inputs of belts that are open, from 1 for X01; null if it has no belts, or has not told lately.
     pub belts_open: Option<Vec<u8>>,
-    /// Outputs, bit 0 = Y01; null where it never told.
+    /// Outputs, bit 0 = Y01; null if it never told.
     pub outputs: Option<u16>,
-    /// Where its axes are, mm: measured where it measures, else as it was commanded; null where nobody knows.
+    /// Where its axes are, mm: measured where it measures, else as it was commanded; null if nobody knows.
     pub positions_mm: Option<Vec<f64>>,
 }
 
 /// What the last preflight found.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PreflightStatus {
-    /// Whether nothing fails.
+    /// True if nothing fails.
     pub passed: bool,
     /// Seconds since then.
     pub age_s: f64,
@@ -287,7 +287,7 @@ pub struct PreflightStatus {
 /// A test that moves each axis and switches each effect in turn.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct TestStatus {
-    /// Whether it runs; if not, the rows are its result.
+    /// True if it runs; if not, the rows are its result.
     pub running: bool,
     /// What it does at present, or how it ended, in a few words.
     pub step: String,
@@ -310,11 +310,11 @@ pub struct TestRow {
     pub asked: u64,
     /// Of these: acked.
     pub acked: u64,
-    /// Ack latency meanwhile, µs: half of them are no longer; null where none was acked.
+    /// Ack latency meanwhile, µs: half of them are no longer; null if none was acked.
     pub p50_us: Option<f64>,
     /// 99 of 100 of them are no longer, µs.
     pub p99_us: Option<f64>,
-    /// Whether the controller took part as it should.
+    /// True if the controller took part as it should.
     pub passed: bool,
 }
 
@@ -337,7 +337,7 @@ pub struct Warning {
     pub id: String,
     /// How grave it is.
     pub severity: Severity,
-    /// The controller it is about; null where it is the hall.
+    /// The controller it is about; null if it is the hall.
     pub controller: Option<String>,
     /// What is the matter.
     pub text: String,

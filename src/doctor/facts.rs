@@ -72,17 +72,17 @@ fn strange(path: &str) -> String {
     format!("{path} is not as expected")
 }
 
-/// Whole names in a folder that begin so; none where there is no such folder.
+/// Whole names in a folder that begin so; `None` if there is no such folder.
 fn entries(folder: impl AsRef<Path>, begins: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let fits = |rest: &str| !rest.is_empty() && rest.bytes().all(|octet| octet.is_ascii_digit());
+    let fits = |rest: &str| !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit());
     let named = entries.filter(|entry| {
         entry.file_name().to_str().and_then(|name| name.strip_prefix(begins)).is_some_and(fits)
     });
     named.map(|entry| entry.path()).collect()
 }
 
-/// The kernel's configuration, where a distribution leaves it as plain text; empty where it does not.
+/// The kernel's configuration, where a distribution leaves it as plain text; empty if it does not.
 fn kernel_config() -> String {
     let release = text_of("/proc/sys/kernel/osrelease");
     let release = release.trim();

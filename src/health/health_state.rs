@@ -1,10 +1,10 @@
-//! How a group of controllers stands, why, and what follows from it.
+//! Health of a group of controllers, its cause, and its consequences.
 
 use crate::motion::Pulses;
 use crate::state;
 use crate::time::MonoTime;
 
-/// How a motion group stands. One member's trouble is the whole group's: the seat is rigid.
+/// Health of a motion group. One member's trouble is the whole group's: the seat is rigid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum HealthState {
     /// All is well.
@@ -26,13 +26,13 @@ pub enum HealthState {
 }
 
 impl HealthState {
-    /// Whether motion frames may go to it.
+    /// True if motion frames may go to it.
     #[must_use]
     pub const fn may_move(self) -> bool {
         matches!(self, Self::Ok | Self::Degraded | Self::Rejoining | Self::Unwatched)
     }
 
-    /// Whether its registers are to be read, to see when it is back or put right.
+    /// True if its registers are to be read, to see when it is back or put right.
     #[must_use]
     pub const fn is_looked_at(self) -> bool {
         matches!(self, Self::Lost | Self::Stopped | Self::Error)
@@ -116,12 +116,12 @@ pub enum Why {
     Other(usize),
     /// This controller, which counts no packets, was silent for so long that it may have rebooted.
     Gap(usize),
-    /// Whether this controller has rebooted cannot be told.
+    /// True if this controller has rebooted cannot be told.
     Unproved(usize),
 }
 
 impl Why {
-    /// The controller it is about; none where that is the whole group.
+    /// The controller it is about; `None` if that is the whole group.
     #[must_use]
     pub const fn controller(self) -> Option<usize> {
         match self {

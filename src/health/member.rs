@@ -300,17 +300,17 @@ impl Member {
         self.pressed = pressed;
     }
 
-    /// Whether an emergency stop began since this was last asked.
+    /// True if an emergency stop began since this was last asked.
     pub(super) const fn take_press(&mut self) -> bool {
         std::mem::replace(&mut self.press_untold, false)
     }
 
-    /// Whether an emergency stop is in effect that the hall waits for.
+    /// True if an emergency stop is in effect that the hall waits for.
     pub(super) const fn holds(&self) -> bool {
         self.pressed && !self.out
     }
 
-    /// Whether another master was found since this was last asked.
+    /// True if another master was found since this was last asked.
     pub(super) const fn take_crowd(&mut self) -> bool {
         std::mem::replace(&mut self.crowd_untold, false)
     }
@@ -340,7 +340,7 @@ impl Member {
         self.counter = Counter::default();
     }
 
-    /// Whether something is still wrong with it.
+    /// True if something is still wrong with it.
     pub(super) fn ails(&self) -> bool {
         self.error != 0 || self.alarm.1 != 0 || self.refusing || self.drives.iter().any(|error| *error != 0)
     }
@@ -371,7 +371,7 @@ impl Member {
         }
     }
 
-    /// Whether frames go there, and it is time to read its packet counter; if so, it counts as sent.
+    /// True if frames go there, and it is time to read its packet counter; if so, it counts as sent.
     pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
         let flows = self.framed.is_some_and(|at| now.since(at) < FLOWS);
         let due = flows && self.counter.take_turn(self.controller, now);
@@ -415,7 +415,7 @@ impl Member {
         self.unheard = 0;
     }
 
-    /// Whether its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a
+    /// True if its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a
     /// show: that it is not home any more is the only sign of a reset.
     pub(super) fn wants_baseline(&self, now: MonoTime) -> bool {
         self.look_again
@@ -425,7 +425,7 @@ impl Member {
             })
     }
 
-    /// Whether it is time for a read; if so, the next one is due a while later.
+    /// True if it is time for a read; if so, the next one is due a while later.
     pub(super) fn take_read(&mut self, now: MonoTime) -> bool {
         let due = self.next_read.is_none_or(|next| now >= next);
         if due {

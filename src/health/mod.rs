@@ -1,5 +1,5 @@
-//! How each motion group stands: told of frames, acks, reports and reads, it says who is degraded, lost, back, stopped,
-//! wrong or out, what the hall does about it, and whose registers are to be read. Ack thread; pure: told the time; its
+//! Health of each motion group: from frames, acks, reports and reads it decides who is degraded, lost, back, stopped,
+//! in error or excluded, what the hall does about it, and whose registers are to be read. Ack thread; pure: the time is an argument; its
 //! memory is made at the start.
 //!
 //! Life is an ack, the first one to a frame that asked and newer than any acked before, or a status report. Repeated,
@@ -90,7 +90,7 @@ impl HealthTable {
         self
     }
 
-    /// Whether somebody wants a controller to take part: clearing and parking wait for nobody else.
+    /// True if somebody wants a controller to take part: clearing and parking wait for nobody else.
     pub fn on_part(&mut self, controller: usize, takes_part: bool) {
         self.members[controller].out = !takes_part;
     }
@@ -205,7 +205,7 @@ impl HealthTable {
         self.members[controller].outside = outside;
     }
 
-    /// Whether the positions of a controller make two places of each, and nothing says in which order their words come.
+    /// True if the positions of a controller make two places of each, and nothing says in which order their words come.
     pub fn on_ambiguous(&mut self, controller: usize, ambiguous: bool) {
         self.members[controller].ambiguous = ambiguous;
     }

@@ -18,13 +18,13 @@ struct Hall {
     frame: u32,
     /// How many datagrams each controller has received.
     packets: Vec<u16>,
-    /// How late acks come; none where they do not.
+    /// How late acks come; `None` if they do not.
     ack_after: Vec<Option<Duration>>,
     ack_every: u32,
     notices: Vec<(MonoTime, Notice)>,
     answers_reads: bool,
     homed: bool,
-    /// Whether they tell how many datagrams they received, as MBOX controllers do not.
+    /// True if they tell how many datagrams they received, as MBOX controllers do not.
     counts: bool,
     alarm: u16,
 }

@@ -44,7 +44,7 @@ impl HealthState {
 }
 
 impl Why {
-    /// What a person does about it before all else; none where the standing says enough.
+    /// What a person does about it before all else; `None` if the standing says enough.
     #[must_use]
     pub const fn next(self) -> Option<&'static str> {
         match self {

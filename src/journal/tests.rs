@@ -365,9 +365,9 @@ proptest! {
 
     /// Whatever a file holds, a report is made of what can be read.
     #[test]
-    fn no_file_is_too_damaged_for_a_report(octets in prop::collection::vec(any::<u8>(), 0..2_000)) {
+    fn no_file_is_too_damaged_for_a_report(bytes in prop::collection::vec(any::<u8>(), 0..2_000)) {
         let dir = tempfile::tempdir().unwrap();
-        fs::write(dir.path().join("kinocue-2026-11-21-000.jsonl"), &octets).unwrap();
+        fs::write(dir.path().join("kinocue-2026-11-21-000.jsonl"), &bytes).unwrap();
         let mut journal = Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T08:00:00Z"));
         journal.note(&action("2026-11-21T09:00:00.000+00:00", "go"));
         drop(journal);

@@ -160,7 +160,7 @@ impl Asked {
         !kept
     }
 
-    /// Whether all that the measure looks back on has kept the limits.
+    /// True if all that the measure looks back on has kept the limits.
     const fn is_sound(&self) -> bool {
         self.sound > 3 * self.spacing.m + 1
     }

@@ -66,7 +66,7 @@ pub struct Counts {
     pub looked: u64,
     /// The clamp that exceeded its limit most.
     pub worst: Option<Clamp>,
-    /// Whether three clamps ever began within a second, or one lasted as long.
+    /// True if three clamps ever began within a second, or one lasted as long.
     pub fault: bool,
 }
 

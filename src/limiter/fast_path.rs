@@ -163,7 +163,7 @@ impl FastPath {
         calm
     }
 
-    /// Whether an axis is calm at that position.
+    /// True if an axis is calm at that position.
     pub(super) fn is_calm(&self, axis: usize, position: f64) -> bool {
         self.glance(axis, position).calm
     }

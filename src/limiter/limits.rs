@@ -23,7 +23,7 @@ impl AxisLimits {
         Self { velocity, acceleration, jerk, step: 4.0 * acceleration * period.max(0.005) }
     }
 
-    /// Whether the next pose keeps the limits: inside the stroke, frame velocity, its step, both distances. Not-a-number does not.
+    /// True if the next pose keeps the limits: inside the stroke, frame velocity, its step, both distances. Not-a-number does not.
     #[inline]
     pub(super) fn hold(&self, next: &Next) -> bool {
         let [n, m] = next.shown;

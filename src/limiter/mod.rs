@@ -60,9 +60,9 @@ pub struct Limiter {
     fast_path: FastPath,
     history: History,
     times: Times,
-    /// Whether every axis is sent what is asked.
+    /// True if every axis is sent what is asked.
     following: bool,
-    /// Whether it was told where the lane stands.
+    /// True if it was told where the lane stands.
     is_seeded: bool,
     counter: Counter,
 }
@@ -235,7 +235,7 @@ impl Limiter {
         (allowed, true)
     }
 
-    /// Whether a way to rest goes on from this pose.
+    /// True if a way to rest goes on from this pose.
     ///
     /// Of what was proved, one does: it can be followed to its end within the limits, and from its last pose a way to rest
     /// within them is part of the proof (`proof::end`); a planned move ends at rest or on the cue. The stroke has room for a
@@ -246,7 +246,7 @@ impl Limiter {
             || self.leaves_a_way_out(axis, next, frame)
     }
 
-    /// Whether the axis can turn inside the stroke, by what its last poses show of its motion.
+    /// True if the axis can turn inside the stroke, by what its last poses show of its motion.
     fn has_room(&self, axis: usize, next: &Next, frame: &Frame) -> bool {
         let AxisLimits { velocity, acceleration, jerk, .. } = self.axes[axis].limits;
         let limits = Limits { velocity, acceleration, jerk };
@@ -258,7 +258,7 @@ impl Limiter {
         })
     }
 
-    /// Whether the axis can come to rest after this pose; the way is kept for the next tick.
+    /// True if the axis can come to rest after this pose; the way is kept for the next tick.
     fn leaves_a_way_out(&mut self, axis: usize, next: &Next, frame: &Frame) -> bool {
         let state = &mut self.axes[axis];
         if self.fast_path.is_calm(axis, next.position) {

@@ -1,4 +1,4 @@
-//! Whether an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
+//! Decides if an axis can still come to rest: ways to brake, tried against the measure over the frames to come.
 
 use super::fast_path::LEVEL;
 use super::history::{Difference, History};

@@ -53,7 +53,7 @@ impl Times {
         self.period.0 + 1
     }
 
-    /// Whether all frames have the same Time.
+    /// True if all frames have the same Time.
     pub(super) const fn are_even(&self) -> bool {
         1_000_000_u64.is_multiple_of(self.millihertz)
     }

@@ -1,4 +1,4 @@
-//! At most one line a second for each cause; told the time.
+//! Limits the log to one line a second for each cause; the time is an argument.
 
 use std::collections::HashMap;
 use std::time::Duration;

@@ -48,7 +48,7 @@ fn frames(all: &[ControllerStatus]) -> Vec<Family> {
     ]
 }
 
-/// Whether it answers; none where nobody listens for its answers, or asks.
+/// True if it answers; `None` if nobody listens for its answers, or asks.
 fn answers(health: &str) -> Option<f64> {
     match health {
         "lost" | "unknown" => Some(0.0),

@@ -1,4 +1,4 @@
-//! The status of the hall as figures for Prometheus: `OpenMetrics` text, in base units, nothing of it told by the tick thread.
+//! The status of the hall as figures for Prometheus: `OpenMetrics` text, in base units; the tick thread formats none of it.
 //! Every label has as many values as the configuration has names. Control plane.
 
 use std::fmt;

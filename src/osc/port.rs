@@ -74,12 +74,12 @@ impl Port {
     pub(super) async fn serve(mut self, incoming: &tokio::net::UdpSocket) -> io::Result<Infallible> {
         let mut feedback = interval(FEEDBACK);
         feedback.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut octets = [0; packet::MOST];
+        let mut bytes = [0; packet::MOST];
         loop {
             tokio::select! {
-                received = incoming.recv_from(&mut octets) => {
+                received = incoming.recv_from(&mut bytes) => {
                     let (len, from) = received?;
-                    self.take(&octets[..len], from, Monotonic.now());
+                    self.take(&bytes[..len], from, Monotonic.now());
                 }
                 Some(outcome) = self.asked.join_next() => {
                     self.answered(&outcome.expect("what is asked neither panics nor is it given up"));
@@ -218,8 +218,8 @@ impl Port {
 
 /// Sends a message where the system takes it now; what comes late is worth nothing.
 fn send(out: &UdpSocket, counts: &Counts, message: &OscMessage, to: SocketAddrV4) {
-    let octets = encoder::encode(&OscPacket::Message(message.clone()));
-    if octets.is_ok_and(|octets| out.send_to(&octets, to).is_ok()) {
+    let bytes = encoder::encode(&OscPacket::Message(message.clone()));
+    if bytes.is_ok_and(|bytes| out.send_to(&bytes, to).is_ok()) {
         return;
     }
     counts.add(Count::Unsent);

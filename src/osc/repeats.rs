@@ -14,7 +14,7 @@ const WINDOW: Duration = Duration::from_secs(1);
 pub(super) struct Repeats(Vec<(Command, MonoTime)>);
 
 impl Repeats {
-    /// Whether the same go, resume or seek was asked within a second before; if not, it is noted. What brings the seats to
+    /// True if the same go, resume or seek was asked within a second before; if not, it is noted. What brings the seats to
     /// rest is never a repeat, and neither are levels, which faders bring back to where they were.
     pub(super) fn is_repeat(&mut self, ask: &Command, at: MonoTime) -> bool {
         if !matches!(ask, Command::Go | Command::Resume | Command::Seek(_)) {

@@ -71,11 +71,11 @@ impl Stage {
 
     /// The next message to the gear that is called so.
     fn heard(&self, word: &str) -> Vec<OscType> {
-        let mut octets = [0; 2048];
+        let mut bytes = [0; 2048];
         loop {
-            let (len, from) = self.gear.recv_from(&mut octets).expect("something is said");
+            let (len, from) = self.gear.recv_from(&mut bytes).expect("something is said");
             assert_eq!(from, self.port);
-            let (_, packet) = decoder::decode_udp(&octets[..len]).unwrap();
+            let (_, packet) = decoder::decode_udp(&bytes[..len]).unwrap();
             let OscPacket::Message(message) = packet else { panic!("a bundle") };
             if message.addr == format!("/kinocue/{word}") {
                 return message.args;
@@ -231,12 +231,12 @@ fn a_subscriber_hears_state_position_warnings_and_the_beat() {
 }
 
 #[test]
-fn octets_that_are_no_osc_are_counted_and_the_port_lives_on() {
+fn bytes_that_are_no_osc_are_counted_and_the_port_lives_on() {
     let stage = Stage::new();
-    for octets in
+    for bytes in
         [b"".as_slice(), b"GET / HTTP/1.1\r\n\r\n", &[0xff; 1400], b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\xff\xff"]
     {
-        stage.gear.send_to(octets, stage.port).unwrap();
+        stage.gear.send_to(bytes, stage.port).unwrap();
     }
     stage.say("park", vec![]);
     assert_eq!(stage.asked(), Command::Park);

@@ -1,4 +1,4 @@
-//! What a playlist may say, and when it says that something is due.
+//! Playlists: what one may hold, and when an entry is due.
 
 use std::fs;
 use std::path::Path;

@@ -21,7 +21,7 @@ const BETWEEN: Duration = Duration::from_secs(10);
 /// What counts the ticks, and the drains of the ack thread.
 pub type Pulse = [u64; 2];
 
-/// Whether the watchdog is to be fed, by counters of ticks and of drains; told the time.
+/// True if the watchdog is to be fed, by counters of ticks and of drains; told the time.
 #[derive(Debug)]
 pub struct FeedDecision {
     patience: Duration,
@@ -38,7 +38,7 @@ impl FeedDecision {
         Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: [now; 2] }
     }
 
-    /// Whether all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
+    /// True if all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
     /// or opens, that is as good for ten seconds.
     #[must_use]
     pub fn feed(&mut self, beats: Option<Pulse>, now: MonoTime) -> bool {
@@ -67,7 +67,7 @@ impl WatchdogThread {
     /// priority.
     ///
     /// # Errors
-    /// Where the system starts no further thread.
+    /// If the system starts no further thread.
     pub fn start(
         interval: Duration,
         period: Duration,

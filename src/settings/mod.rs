@@ -55,7 +55,7 @@ pub struct Out {
     pub surface: Surface,
     /// When, RFC 3339.
     pub at: String,
-    /// Why; none where nobody said.
+    /// Why; `None` if nobody said.
     pub why: Option<String>,
 }
 

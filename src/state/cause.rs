@@ -57,7 +57,7 @@ pub enum Trouble {
     Controller {
         /// Which, counted from 0.
         controller: usize,
-        /// Its error number; 0 where it gave none.
+        /// Its error number; 0 if it gave none.
         error: u16,
     },
     /// A drive has an alarm.
@@ -93,7 +93,7 @@ pub enum Whose {
 }
 
 impl Cause {
-    /// Which controller or group it speaks of; none where it is the whole hall.
+    /// Which controller or group it speaks of; `None` if it is the whole hall.
     #[must_use]
     pub const fn whose(self) -> Option<Whose> {
         match self {
@@ -118,7 +118,7 @@ impl Trouble {
         }
     }
 
-    /// Whether it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
+    /// True if it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
     #[must_use]
     pub const fn lasts(self) -> bool {
         matches!(self, Self::Controller { .. } | Self::Drive { .. })

@@ -1,4 +1,4 @@
-//! A line of text into what it asks.
+//! Parses a line of text into a command.
 
 use crate::config::{GearWord, parse_level};
 use crate::control::{Code, Command, LevelsChange, Problem};
@@ -188,9 +188,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_octets_panic_and_none_arm(octets in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
-            let line = [word.as_bytes(), b" ", &octets].concat();
-            for line in [octets.as_slice(), line.as_slice()] {
+        fn no_bytes_panic_and_none_arm(bytes in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
+            let line = [word.as_bytes(), b" ", &bytes].concat();
+            for line in [bytes.as_slice(), line.as_slice()] {
                 if let Ok(Order::Command(ask)) = ordered(line) {
                     prop_assert!(!["arm", "disarm", "home", "clear", "load"].contains(&ask.word()));
                 }

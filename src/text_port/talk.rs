@@ -16,11 +16,11 @@ use crate::config::GearWord;
 use crate::control::{Code, Command, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
-/// Octets of a line at the most, its end included.
+/// Bytes of a line at the most, its end included.
 const LONGEST: u64 = 256;
 /// Lines that may wait for their answers; of who sends more ahead nothing but a stop is heard any more.
 const AHEAD: usize = 16;
-/// Of what came behind the last line so much is read, octets, and waited for so long.
+/// Of what came behind the last line so much is read, bytes, and waited for so long.
 const REST: u64 = 64 << 10;
 const PARTING: Duration = Duration::from_secs(1);
 /// How long a peer may take to read its answer.
@@ -39,7 +39,7 @@ pub(super) struct Talk {
     pub(super) hall: Handle,
     pub(super) who: Who,
     pub(super) allow: Vec<GearWord>,
-    /// SHA-256 of the token that the first line shows; none where none is wanted.
+    /// SHA-256 of the token that the first line shows; `None` if none is wanted.
     pub(super) token: Option<[u8; 32]>,
     /// A connection without a line for so long is closed.
     pub(super) idle: Duration,
@@ -191,7 +191,7 @@ pub(super) fn reply(answer: &Answer) -> String {
 fn too_long() -> Problem {
     Problem::new(
         Code::Value,
-        format!("the line is longer than {LONGEST} octets"),
+        format!("the line is longer than {LONGEST} bytes"),
         "end each line with LF or CRLF",
     )
 }

@@ -61,11 +61,11 @@ impl Stage {
 struct Peer(BufReader<TcpStream>);
 
 impl Peer {
-    fn send(&mut self, octets: &[u8]) {
-        self.0.get_mut().write_all(octets).unwrap();
+    fn send(&mut self, bytes: &[u8]) {
+        self.0.get_mut().write_all(bytes).unwrap();
     }
 
-    /// The next line; empty where the port closed the connection.
+    /// The next line; empty if the port closed the connection.
     fn line(&mut self) -> String {
         let mut line = String::new();
         self.0.read_line(&mut line).unwrap();
@@ -150,7 +150,7 @@ fn a_line_without_end_and_lines_without_number_end_the_connection() {
     let stage = Stage::new();
     let mut peer = stage.connect();
     peer.send(&[b'a'; 256]);
-    assert!(peer.line().starts_with("error value the line is longer than 256 octets"));
+    assert!(peer.line().starts_with("error value the line is longer than 256 bytes"));
     assert_eq!(peer.line(), "");
     let mut peer = stage.connect();
     peer.send(&b"park\n".repeat(100));

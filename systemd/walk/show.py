@@ -103,8 +103,8 @@ def gear(table, tablet):
 
 
 def osc_message(address):
-    octets = address.encode() + b"\0"
-    return octets + b"\0" * (-len(octets) % 4) + b",\0\0\0"
+    bytes = address.encode() + b"\0"
+    return bytes + b"\0" * (-len(bytes) % 4) + b",\0\0\0"
 
 
 def stops(terminal, table, booth, tablet):

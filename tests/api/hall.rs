@@ -244,7 +244,7 @@ fn hash(token: &str) -> [u8; 32] {
 fn library(dir: &Path) -> Library {
     let config = dir.join("hall.toml");
     fs::write(&config, CONFIG).unwrap();
-    let bounds = Bounds { max_octets: 100_000, ..Bounds::default() };
+    let bounds = Bounds { max_bytes: 100_000, ..Bounds::default() };
     let hall = library::Hall { config, program: env!("CARGO_BIN_EXE_kinocue").into(), bounds };
     Library::open(&dir.join("cues"), hall).unwrap()
 }

@@ -175,7 +175,7 @@ fn a_connection_is_good_for_one_request_after_another() {
     let mut connection = hall.socket().connect();
     let first = b"POST /api/v1/show/pause HTTP/1.1\r\nHost: localhost\r\n\r\n";
     connection.write_all(first).unwrap();
-    connection.write_all(&Request::new("POST", "/api/v1/show/park").octets(&hall.socket())).unwrap();
+    connection.write_all(&Request::new("POST", "/api/v1/show/park").bytes(&hall.socket())).unwrap();
     let both = String::from_utf8(Reply::read(&mut *connection).body).unwrap();
     assert!(both.contains("asked: pause") && both.contains("asked: park"), "{both}");
     assert_eq!(hall.asks(), [Command::Pause, Command::Park]);

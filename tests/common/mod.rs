@@ -327,7 +327,7 @@ impl FrameSink for Link<'_> {
         let stroke = SeatType::bench3(1).stroke_pulses();
         let there = |slot: usize| request.positions.get(slot).map_or(0.0, |at| f64::from(at.0) / stroke);
         self.stands.borrow_mut()[lane] = std::array::from_fn(there);
-        self.frames.push(Frame { lane, at: self.now.get(), request, octets: datagram.to_vec() });
+        self.frames.push(Frame { lane, at: self.now.get(), request, bytes: datagram.to_vec() });
         Delivery::Sent
     }
 }
@@ -338,7 +338,7 @@ pub struct Frame {
     pub lane: usize,
     pub at: MonoTime,
     pub request: MotionRequest,
-    pub octets: Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 /// A show that was played.

@@ -129,10 +129,10 @@ fn wide_controller() -> String {
     socket.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
     let address = socket.local_addr().expect("it is bound").to_string();
     std::thread::spawn(move || {
-        let mut octets = [0; 2048];
-        while let Ok((len, from)) = socket.recv_from(&mut octets) {
-            let Ok(read) = ReadRequest::parse(&octets[..len]) else { continue };
-            let mut answer = octets[..16].to_vec();
+        let mut bytes = [0; 2048];
+        while let Ok((len, from)) = socket.recv_from(&mut bytes) {
+            let Ok(read) = ReadRequest::parse(&bytes[..len]) else { continue };
+            let mut answer = bytes[..16].to_vec();
             answer[5] = 2;
             answer[8..12].fill(0);
             answer.resize(16 + 4 * usize::from(read.num), 0);

@@ -203,10 +203,10 @@ impl Clock for Drains<'_> {
 
 /// A controller that answers every frame, until it is sent an empty datagram.
 fn answer(peer: &UdpSocket, pace: &Pace) {
-    let (mut octets, mut buf) = ([0; MAX_LEN], [0; MAX_LEN]);
+    let (mut bytes, mut buf) = ([0; MAX_LEN], [0; MAX_LEN]);
     loop {
-        let (len, from) = peer.recv_from(&mut octets).expect("loopback works");
-        let Ok(frame) = MotionRequest::parse(&octets[..len]) else { return };
+        let (len, from) = peer.recv_from(&mut bytes).expect("loopback works");
+        let Ok(frame) = MotionRequest::parse(&bytes[..len]) else { return };
         let MotionRequest { timing, channel, frame, time_ms, positions, extend, vibration, .. } = frame;
         let code = ReplyCode::Running;
         let reply = MotionReply {

@@ -90,7 +90,7 @@ pub(super) fn terminal(columns: u16) -> (File, OwnedFd) {
 pub(super) fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String> {
     let (written, read) = channel();
     std::thread::spawn(move || {
-        let mut octets = [0; 4096];
+        let mut bytes = [0; 4096];
         loop {
             let mut both = [
                 PollFd::new(&terminal, PollFlags::IN),
@@ -100,8 +100,8 @@ pub(super) fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String>
             if !both[1].revents().is_empty() {
                 return;
             }
-            let Ok(count @ 1..) = terminal.read(&mut octets) else { return };
-            let _ = written.send(String::from_utf8_lossy(&octets[..count]).into_owned()); // nobody may be waiting
+            let Ok(count @ 1..) = terminal.read(&mut bytes) else { return };
+            let _ = written.send(String::from_utf8_lossy(&bytes[..count]).into_owned()); // nobody may be waiting
         }
     });
     read

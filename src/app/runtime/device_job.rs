@@ -1,4 +1,4 @@
-//! Asking the controllers of a hall for registers while nothing moves: the same conversations as `preflight` and `home` hold,
+//! Register requests to the controllers of a hall while nothing moves: the same exchanges as `preflight` and `home` make,
 //! over the hall's own frame port.
 
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub enum DeviceJob {
     Home {
         /// Which, counted from 0.
         lanes: Vec<usize>,
-        /// Set once no more of them is to begin, be it that its order has to be repeated. Those that have begun go on by
+        /// Set once no more of them is to begin, even if its order has to be repeated. Those that have begun go on by
         /// themselves, and are watched until they are home.
         called_off: Arc<AtomicBool>,
     },
@@ -39,7 +39,7 @@ pub enum DeviceJob {
 pub enum Finding {
     /// What each controller told.
     Surveyed(Vec<Survey>),
-    /// Whether each of these controllers is home; where one would go there without a search, those alone that would, and
+    /// True if each of these controllers is home; where one would go there without a search, those alone that would, and
     /// no seat was moved.
     Homed(Vec<(usize, Result<(), HomeError>)>),
 }
@@ -59,7 +59,7 @@ impl Link for OverLine<'_> {
     }
 
     fn drain(&mut self, on: &mut Watch<'_>) {
-        self.line.drain(&mut |controller, octets, at| on(Origin::Controller(controller), octets, at));
+        self.line.drain(&mut |controller, bytes, at| on(Origin::Controller(controller), bytes, at));
     }
 
     fn port_closed(&self, lane: usize) -> u64 {

@@ -108,7 +108,7 @@ pub struct RuntimeEnd {
 
 impl Runtime {
     /// Opens the frame port for a configuration; `crashed` says whether the mark of a crash was there. Where `signals` ask for
-    /// the end, the seats park and the hall closes, be it that whoever leads it does not hear them.
+    /// the end, the seats park and the hall closes, even if whoever leads it does not hear them.
     ///
     /// # Errors
     /// Why not.
@@ -191,7 +191,7 @@ impl Runtime {
     /// [`RuntimeError::Thread`]; nothing was sent then.
     ///
     /// # Panics
-    /// Where one of its threads panicked.
+    /// If one of its threads panicked.
     pub fn run(self, lead: impl FnOnce(RuntimeHandle, Line)) -> Result<RuntimeEnd, RuntimeError> {
         let granted = realtime::request();
         let (runtime, line, Parts { acks, plans, mut ticks }) = self.part(granted.clone());

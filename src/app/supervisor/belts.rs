@@ -15,7 +15,7 @@ use crate::time::{Clock as _, MonoTime};
 /// What was told longer ago says nothing of now: while nothing moves the inputs are read every half a second or so.
 const FRESH: Duration = Duration::from_secs(3);
 
-/// The belts of a controller that are open; none where it has none, or has not told lately.
+/// The belts of a controller that are open; `None` if it has none, or has not told lately.
 pub(super) fn open(controller: &Controller, state: &ControllerState, now: MonoTime) -> Option<u16> {
     let inputs = state.inputs.filter(|inputs| inputs.age(now) <= FRESH)?;
     (controller.belt_inputs != 0).then_some(inputs.value & controller.belt_inputs)
@@ -29,9 +29,9 @@ pub(super) fn numbers(mask: u16) -> Vec<u8> {
 /// A controller whose belts are not all known to be closed.
 struct Unbuckled<'k> {
     controller: &'k Controller,
-    /// None where it does not tell.
+    /// `None` if it does not tell.
     open: Option<u16>,
-    /// Whether GO waits for it.
+    /// True if GO waits for it.
     holds: bool,
 }
 
@@ -80,7 +80,7 @@ impl Supervisor {
             .collect()
     }
 
-    /// Whether nobody has to be buckled before the seats move.
+    /// True if nobody has to be buckled before the seats move.
     pub(super) fn are_buckled(&self) -> Result<(), Problem> {
         match self.awaited_belts(&self.runtime.live.table(), Monotonic.now()) {
             None => Ok(()),
@@ -91,7 +91,7 @@ impl Supervisor {
         }
     }
 
-    /// Whose belts GO waits for; none where it need not.
+    /// Whose belts GO waits for; `None` if it need not.
     fn awaited_belts(&self, table: &[Row], now: MonoTime) -> Option<String> {
         let unbuckled = self.unbuckled(table, now);
         let holding = unbuckled.iter().filter(|one| one.holds);

@@ -1,4 +1,4 @@
-//! What surfaces ask, and what is done for it.
+//! Executes the commands of surfaces.
 
 use super::{ANSWER, LOOK_FOR_ANSWER, Supervisor};
 use crate::control::{Asked, Code, Command, Desired, LevelsChange, Problem, Who, overtaken};
@@ -144,7 +144,7 @@ impl Supervisor {
         self.set(|settings| settings.change(change))
     }
 
-    /// Whether an emergency stop is in effect at a controller of a group: with it the whole hall would stop.
+    /// True if an emergency stop is in effect at a controller of a group: with it the whole hall would stop.
     fn is_pressed(&self, group: &str) -> bool {
         let controllers = self.runtime.config.controllers.iter().zip(self.runtime.live.table());
         let mut of_group = controllers.filter(|(one, _)| one.group == group);

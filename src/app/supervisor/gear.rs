@@ -13,7 +13,7 @@ pub(super) struct Before {
 }
 
 impl Supervisor {
-    /// Whether it may be done for whom it is asked for.
+    /// True if it may be done for whom it is asked for.
     ///
     /// # Errors
     /// Where gear would undo what a person did.

@@ -1,4 +1,4 @@
-//! What operators have set: levels, effects, seats on or off, and what that means for each lane.
+//! Settings of the operators: levels, effects, seats on or off, and their consequences for each lane.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,7 +17,7 @@ pub(super) struct HallSettings {
     pub(super) trim_ms: i32,
     /// Groups that are taken out, also such as this configuration does not know: one that comes back with the next is out still.
     pub(super) out: BTreeMap<String, Out>,
-    /// Rows that alone take part, while seats are tested; none where all do.
+    /// Rows that alone take part, while seats are tested; `None` if all do.
     pub(super) only: Option<BTreeSet<String>>,
     lanes: Vec<LanePlace>,
 }
@@ -105,7 +105,7 @@ impl HallSettings {
         entry.why = why.or_else(|| entry.why.take());
     }
 
-    /// Whether a lane is to take part.
+    /// True if a lane is to take part.
     pub(super) fn is_on(&self, lane: usize) -> bool {
         let LanePlace { row, group } = &self.lanes[lane];
         let tested = match (&self.only, row) {

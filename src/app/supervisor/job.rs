@@ -1,4 +1,4 @@
-//! What takes long is done on a thread of its own, one thing at a time; whoever asked for it is answered when it is done.
+//! Runs slow work on a thread of its own, one job at a time; the command is answered when the job is done.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -40,7 +40,7 @@ pub(super) struct Job {
 }
 
 impl Supervisor {
-    /// Whether something long may begin; else why not. In a hall that closes nothing may: it would hold the port that the next
+    /// True if something long may begin; else why not. In a hall that closes nothing may: it would hold the port that the next
     /// one opens.
     pub(super) fn is_free(&self) -> Result<(), Problem> {
         if self.runtime.leave.load(Ordering::Acquire) {

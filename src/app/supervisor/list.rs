@@ -227,7 +227,7 @@ impl Supervisor {
         self.begin_record(who, surface, before);
     }
 
-    /// Whether what is loaded is that entry of the playlist.
+    /// True if what is loaded is that entry of the playlist.
     pub(super) fn is_entry(&self, entry: usize) -> bool {
         let cue = self.cued.as_ref().map(|cued| cued.id.as_str());
         self.list

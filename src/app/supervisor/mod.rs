@@ -1,5 +1,5 @@
-//! The supervisor of a hall: answers what surfaces ask, gives the tick thread what it needs next, finds out what it cannot, and
-//! says ten times a second how all of it stands. A thread of the control plane; whatever takes long it has done elsewhere
+//! The supervisor of a hall: executes the commands of surfaces, prepares shows for the tick thread, runs slow work as jobs, and
+//! publishes the status ten times a second. A thread of the control plane; slow work is done elsewhere
 //! (`job`), so that a pause or a park never waits behind a preflight.
 
 mod belts;
@@ -95,7 +95,7 @@ pub struct SupervisorEnd {
     pub ports: SupervisorPorts,
     /// What the hall came to.
     pub closed: Box<RuntimeEnd>,
-    /// The configuration to open the next hall with; none where the program ends.
+    /// The configuration to open the next hall with; `None` if the program ends.
     pub reload: Option<Arc<Config>>,
     /// How its last show ended; stopped where there was none.
     pub ended: Ending,

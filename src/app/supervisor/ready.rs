@@ -18,7 +18,7 @@ use crate::time::{Clock as _, MonoTime};
 pub(super) struct Preflighted {
     at: MonoTime,
     answered: usize,
-    /// Whether nothing fails at each controller.
+    /// True if nothing fails at each controller.
     passed: Vec<bool>,
     findings: Vec<(usize, Warning)>,
 }
@@ -63,7 +63,7 @@ impl Preflighted {
         }
     }
 
-    /// Whether nothing fails at those that take part.
+    /// True if nothing fails at those that take part.
     pub(super) fn has_passed(&self, is_on: impl Fn(usize) -> bool) -> bool {
         self.passed.iter().enumerate().all(|(controller, passed)| *passed || !is_on(controller))
     }
@@ -84,7 +84,7 @@ impl Preflighted {
     }
 }
 
-/// A finding as surfaces show it; none where all is well.
+/// A finding as surfaces show it; `None` if all is well.
 fn told(controller: &str, finding: preflight::Finding) -> Option<Warning> {
     let severity = match (finding.severity(), &finding.accepted) {
         (preflight::Severity::Fail, None) => Severity::Error,
@@ -120,7 +120,7 @@ impl Supervisor {
         });
     }
 
-    /// Whether nothing fails at the controllers of a group.
+    /// True if nothing fails at the controllers of a group.
     pub(super) fn is_preflighted(&self, group: &str) -> bool {
         let controllers = &self.runtime.config.controllers;
         let of_group = |lane: usize| controllers[lane].group == group;

@@ -1,4 +1,4 @@
-//! What is written down: what was asked by whom, and what was played.
+//! Records for the journal: commands with their operators, and shows.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -85,7 +85,7 @@ impl Records {
         self.journal
     }
 
-    /// Whether a show has begun, and is not over.
+    /// True if a show has begun, and is not over.
     pub(super) fn is_under_way(&self) -> bool {
         self.open.as_ref().is_some_and(|open| open.over.is_none())
     }

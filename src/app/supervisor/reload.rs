@@ -1,4 +1,4 @@
-//! What the system asks of the program: to end, and to read its configuration anew, for which another hall is opened.
+//! Signals of the system: to end, and to reload the configuration, for which another hall is opened.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::state::State;
 /// What goes over from a hall to the one that is opened with another configuration, or comes from before the start.
 #[derive(Debug, Default)]
 pub struct Carryover {
-    /// What was set and loaded; none where nobody has set anything.
+    /// What was set and loaded; `None` if nobody has set anything.
     pub(super) settings: Option<Settings>,
     pub(super) lasting: Lasting,
     /// What was latched: another configuration clears nothing.
@@ -42,7 +42,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Whether the program is to end.
+    /// True if the program is to end.
     #[must_use]
     pub fn is_leaving(&self) -> bool {
         self.leave.load(Ordering::Acquire)

@@ -1,4 +1,4 @@
-//! What the supervisor says unasked: to the service manager, and to the log.
+//! Unsolicited messages of the supervisor: to the service manager, and to the log.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

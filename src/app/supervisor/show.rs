@@ -27,7 +27,7 @@ pub(super) struct ProvedShow {
     headroom: Headroom,
     /// Show time at which it begins.
     pub(super) start: ShowTime,
-    /// Where the film was when its last show ended before the cue did; none where there is nothing to go on from.
+    /// Where the film was when its last show ended before the cue did; `None` if there is nothing to go on from.
     pub(super) left_at: Option<ShowTime>,
     /// How long the first move onto it takes, seconds.
     pub(super) join_s: f64,
@@ -129,7 +129,7 @@ impl Supervisor {
         self.send("loading", asked, move || JobResult::Loaded(read(&library, &config, &id)));
     }
 
-    /// Whether the hall is at rest, and nobody has made it ready to go, so that another cue may be loaded, or controllers asked.
+    /// True if the hall is at rest, and nobody has made it ready to go, so that another cue may be loaded, or controllers asked.
     pub(super) fn may(&self, what: &str) -> Result<(), Problem> {
         let remedy = match self.mirror.state {
             State::Armed => "disarm first",

@@ -1,4 +1,4 @@
-//! What the tick thread has told: the state of the hall, and what became of the command that waits for its answer.
+//! Mirrors the state of the hall from the tick thread's news, with the result of the command that awaits its answer.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ pub(super) struct StateMirror {
     pub(super) cause: Cause,
     pub(super) next: Next,
     pub(super) since: MonoTime,
-    /// Commands that were given and not answered yet, be it that nobody waits any more.
+    /// Commands that were given and not answered yet, even if nobody waits any more.
     open: u32,
     /// The answer to the command that was given last.
     answer: Option<Result<(), Problem>>,
@@ -42,7 +42,7 @@ impl StateMirror {
         None
     }
 
-    /// Seconds until the state ends by itself; none where it does not.
+    /// Seconds until the state ends by itself; `None` if it does not.
     pub(super) fn lapses(&self, now: MonoTime) -> Option<f64> {
         let end = self.since + self.state.lasts()?;
         Some(end.since(now).as_secs_f64())

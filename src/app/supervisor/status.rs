@@ -54,7 +54,7 @@ impl Rates {
         }
     }
 
-    /// Acks over frames whose fate is known, of the last second; none where there were none.
+    /// Acks over frames whose fate is known, of the last second; `None` if there were none.
     fn of(&self, controller: usize) -> Option<f64> {
         let (_, first) = self.counted.front()?;
         let (_, last) = self.counted.back()?;

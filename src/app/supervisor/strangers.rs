@@ -34,7 +34,7 @@ impl Strangers {
         }
     }
 
-    /// How many answers of the last minute make another machine likely; none where too few came.
+    /// How many answers of the last minute make another machine likely; `None` if too few came.
     pub(super) fn of(&self, controller: usize) -> Option<u64> {
         let before = self.counted.front()?.1.get(controller)?;
         let grown = self.newest.get(controller)?.saturating_sub(*before);

@@ -270,7 +270,7 @@ impl Rig {
         }
     }
 
-    /// The state that the machine is in, be it that the supervisor has not heard of it.
+    /// The state that the machine is in, even if the supervisor has not heard of it.
     pub(super) fn state(&self) -> State {
         self.double.machine.lock().unwrap().state()
     }

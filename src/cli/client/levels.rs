@@ -90,7 +90,7 @@ pub(in crate::cli) struct LevelArgs {
 /// Effects.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct EffectsArgs {
-    /// Whether they may be on.
+    /// True if they may be on.
     #[arg(value_name = "on|off", value_parser = ["on", "off"])]
     switch: String,
     /// Their names [default: all].

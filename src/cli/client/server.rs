@@ -105,11 +105,10 @@ impl ServerArgs {
     }
 }
 
-/// A name as a part of a path: whatever is no plain letter or digit is written as octets.
+/// A name as a part of a path: whatever is no plain letter or digit is written as bytes.
 pub(super) fn in_path(name: &str) -> String {
-    let plain = |octet: &u8| octet.is_ascii_alphanumeric() || b"-_.~".contains(octet);
-    let written =
-        |octet: u8| if plain(&octet) { char::from(octet).to_string() } else { format!("%{octet:02X}") };
+    let plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_.~".contains(byte);
+    let written = |byte: u8| if plain(&byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
     name.bytes().map(written).collect()
 }
 

@@ -76,7 +76,7 @@ All positions are read anew before anything moves.")]
     Reload(ServerArgs),
 }
 
-/// Whether the seats may home first, and where the daemon is.
+/// Permission to home first, and the daemon's socket.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct ArmArgs {
     /// Confirm that nobody sits on the seats and nothing lies on or under them: they may home first.

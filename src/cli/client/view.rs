@@ -207,7 +207,7 @@ impl Controller {
         format!("{}{off}", self.health)
     }
 
-    /// Whether the configuration has it out, so that nobody counts it.
+    /// True if the configuration has it out, so that nobody counts it.
     pub(super) fn is_out_for_good(&self) -> bool {
         self.health == "out"
     }

@@ -6,16 +6,16 @@ use std::net::SocketAddrV4;
 use serde_json::{Map, Value, json};
 
 use super::Filter;
-use super::input::{MAX_OCTETS, octets};
+use super::input::{MAX_BYTES, bytes};
 use super::message::{Reading, sheet};
 use super::tally::Tally;
 use crate::capture::{Capture, CaptureError, Content, Datagram, Fragment, Packet};
 use crate::wire::VibrationPort;
 
-/// The most octets of a malformed message that are shown.
+/// The most bytes of a malformed message that are shown.
 const SHOWN: usize = 64;
 /// The longest line of hex: digits, separators and line end of the longest datagram.
-const MAX_LINE: usize = 16 * MAX_OCTETS;
+const MAX_LINE: usize = 16 * MAX_BYTES;
 
 /// How messages are written.
 #[derive(Debug, Clone, Copy)]
@@ -81,7 +81,7 @@ impl<W: Write> Printer<W> {
 
     /// Decodes messages of the command line.
     pub(super) fn messages(&mut self, messages: &[Vec<u8>]) -> io::Result<()> {
-        messages.iter().try_for_each(|octets| self.message(Place::Argument, octets))
+        messages.iter().try_for_each(|bytes| self.message(Place::Argument, bytes))
     }
 
     /// Decodes lines of hex, a message each; empty lines are let pass, unless there is nothing else.
@@ -104,8 +104,8 @@ impl<W: Write> Printer<W> {
             }
             is_empty = false;
             let place = Place::Line(number);
-            match octets(&text) {
-                Ok(octets) => self.message(place, &octets)?,
+            match bytes(&text) {
+                Ok(bytes) => self.message(place, &bytes)?,
                 Err(error) => {
                     self.tally.not_hex += 1;
                     self.refuse(place, "not hex", json!({ "why": error.to_string() }), &error.to_string())?;
@@ -162,7 +162,7 @@ impl<W: Write> Printer<W> {
                     return Ok(());
                 }
                 let (source, to) = ends(&fragment);
-                let why = format!("from octet {} of it on; not put together", fragment.offset);
+                let why = format!("from byte {} of it on; not put together", fragment.offset);
                 self.refuse(place(source, to), "fragment", json!({ "offset": fragment.offset }), &why)
             }
             Content::Other => {
@@ -182,12 +182,12 @@ impl<W: Write> Printer<W> {
         }
         self.tally.cut += 1;
         let (kept, len) = (datagram.payload.len(), datagram.payload_len);
-        let why = format!("the capture kept {kept} of {len} octets");
-        self.refuse(place, "cut", json!({ "kept": kept, "octets": len }), &why)
+        let why = format!("the capture kept {kept} of {len} bytes");
+        self.refuse(place, "cut", json!({ "kept": kept, "bytes": len }), &why)
     }
 
-    fn message(&mut self, place: Place, octets: &[u8]) -> io::Result<()> {
-        match sheet(octets, self.manner.reading, self.manner.port) {
+    fn message(&mut self, place: Place, bytes: &[u8]) -> io::Result<()> {
+        match sheet(bytes, self.manner.reading, self.manner.port) {
             Ok(sheet) => {
                 self.tally.message(&sheet);
                 match self.manner {
@@ -199,11 +199,11 @@ impl<W: Write> Printer<W> {
             Err(error) => {
                 self.tally.malformed += 1;
                 let literal = self.manner.reading != Reading::Imax
-                    && sheet(octets, Reading::Imax, self.manner.port).is_ok();
+                    && sheet(bytes, Reading::Imax, self.manner.port).is_ok();
                 let hint = if literal { "; with --dialect imax it is one" } else { "" };
                 let why = format!("{error}{hint}");
-                let object = json!({ "octet": error.offset(), "why": why, "hex": hex(octets) });
-                self.refuse(place, "malformed", object, &format!("{why}: {}", shown(octets)))
+                let object = json!({ "byte": error.offset(), "why": why, "hex": hex(bytes) });
+                self.refuse(place, "malformed", object, &format!("{why}: {}", shown(bytes)))
             }
         }
     }
@@ -277,13 +277,13 @@ fn skip_line(input: &mut impl BufRead) -> io::Result<()> {
     Ok(())
 }
 
-fn hex(octets: &[u8]) -> String {
-    octets.iter().map(|octet| format!("{octet:02x}")).collect()
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn shown(octets: &[u8]) -> String {
-    match octets.get(..SHOWN) {
-        Some(front) if octets.len() > SHOWN => format!("{}...", hex(front)),
-        _ => hex(octets),
+fn shown(bytes: &[u8]) -> String {
+    match bytes.get(..SHOWN) {
+        Some(front) if bytes.len() > SHOWN => format!("{}...", hex(front)),
+        _ => hex(bytes),
     }
 }

@@ -99,9 +99,9 @@ fn welcome(controllers: &[SocketAddrV4], console: &str) {
 
 /// Puts everything that the daemon reads where it reads it.
 fn furnish(folder: &Folder, hall: &str) -> Result<Places, Failure> {
-    let put = |name: &str, octets: &[u8]| {
+    let put = |name: &str, bytes: &[u8]| {
         folder
-            .write(name, octets)
+            .write(name, bytes)
             .with_context(|| format!("cannot write {name} of the demo"))
             .or_exit(Exit::Io)
     };

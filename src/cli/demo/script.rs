@@ -31,7 +31,7 @@ impl Script {
     /// Begins. With a console to go on with, the hall stays when the ride is over; else it ends then, by `signals`.
     ///
     /// # Errors
-    /// Where the system starts no further thread; the hall ends then.
+    /// If the system starts no further thread; the hall ends then.
     pub(super) fn start(
         handle: Handle,
         signals: Signals,

@@ -1,4 +1,4 @@
-//! What is said of controllers while a play runs: who is lost, who refuses, who is back.
+//! Messages on controllers while a play runs: lost, refusing frames, back.
 
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -9,9 +9,9 @@ pub(super) struct HealthMessages(Vec<Seen>);
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
-    /// What was said of it last; none where all was well.
+    /// What was said of it last; `None` if all was well.
     trouble: Option<(HealthState, Why)>,
-    /// Whether a refusal was said.
+    /// True if a refusal was said.
     refused: bool,
 }
 
@@ -46,7 +46,7 @@ impl HealthMessages {
     }
 }
 
-/// Whether it takes part as it should.
+/// True if it takes part as it should.
 const fn is_well(standing: HealthState) -> bool {
     matches!(standing, HealthState::Ok | HealthState::Degraded | HealthState::Unwatched)
 }

@@ -142,9 +142,9 @@ pub(super) fn start(
 ) -> io::Result<JoinHandle<()>> {
     Builder::new().name("keys".to_owned()).spawn(move || {
         let mut decoder = Decoder::default();
-        let mut octets = [0; 64];
+        let mut bytes = [0; 64];
         while !over.load(Ordering::Relaxed) {
-            let Ok(count) = keyboard.read(&mut octets, WAIT) else {
+            let Ok(count) = keyboard.read(&mut bytes, WAIT) else {
                 // Nobody is there any more to clear or to park: as if the terminal had been closed.
                 leader.control.leave.store(true, Ordering::Relaxed);
                 return;
@@ -153,7 +153,7 @@ pub(super) fn start(
                 decoder.forget();
             }
             leader.commands = leader.commands.take().or_else(|| handle.try_recv().ok());
-            for action in octets[..count].iter().filter_map(|octet| decoder.take(*octet)) {
+            for action in bytes[..count].iter().filter_map(|byte| decoder.take(*byte)) {
                 if let Some(note) = leader.act(action, Monotonic.now()) {
                     let _ = notes.send(note); // where nobody speaks, nothing is said
                 }

@@ -1,4 +1,4 @@
-//! What is said of a play, as text: from its state, its cause and the figures of the instant.
+//! Messages of a play: from its state, its cause and its current figures.
 
 use std::fmt::{Display, Write as _};
 use std::time::Duration;
@@ -33,7 +33,7 @@ impl Messages {
         format!("bringing {seats} {noun} to park (up to {:.1} s)", time.as_secs_f64())
     }
 
-    /// What has happened: the state with its cause and the next action, or why a request was not taken; none where there is
+    /// What has happened: the state with its cause and the next action, or why a request was not taken; `None` if there is
     /// nothing to say.
     pub(super) fn news(&self, news: &News) -> Option<String> {
         let (state, cause, next) = match *news {

@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// What a first Ctrl-C does, and what a second one will.
 const LEAVING: &str = "the seats park as far as they may move, and the play ends; half a second from now on Ctrl-C again would end it at once";
 
-/// The threads; none where the system starts no further one, which is no reason to fail.
+/// The threads; `None` if the system starts no further one, which is no reason to fail.
 pub(super) struct Progress {
     over: Arc<AtomicBool>,
     teller: Option<JoinHandle<()>>,

@@ -40,7 +40,7 @@ pub(super) struct Leeway {
     #[arg(long, value_enum, default_value_t = Requests::Motion)]
     auto_reset_counts: Requests,
 
-    /// Whether registers not named in the manuals read 0 or are refused.
+    /// True if registers not named in the manuals read 0 or are refused.
     #[arg(long, value_enum, default_value_t = Unused::Zero)]
     unused_registers: Unused,
 
@@ -64,7 +64,7 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "N", default_value_t = 1_000)]
     servo_registers: u16,
 
-    /// Octets of Port Out in vibration frames, and of the inputs in the answers: 2 or 4.
+    /// Bytes of Port Out in vibration frames, and of the inputs in the answers: 2 or 4.
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 
