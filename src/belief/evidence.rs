@@ -27,8 +27,10 @@ pub struct Reading {
     pub slots: u16,
     /// When the oldest part of it was read.
     pub at: MonoTime,
-    /// Whether an earlier reading found it in the same place.
+    /// Whether earlier readings found it in the same place.
     pub rests: bool,
+    /// Whether one found it elsewhere, not long ago.
+    pub moves: bool,
     /// Where it comes from.
     pub by: Source,
 }
@@ -37,7 +39,7 @@ impl Reading {
     /// A seat that was read at rest, of all of its axes.
     #[must_use]
     pub const fn at_rest(pose: Pose, at: MonoTime) -> Self {
-        Self { pose, slots: u16::MAX, at, rests: true, by: Source::Registers }
+        Self { pose, slots: u16::MAX, at, rests: true, moves: false, by: Source::Registers }
     }
 }
 
@@ -55,7 +57,8 @@ pub struct Evidence {
 
 const SOME: u64 = 1 << 32;
 const RESTS: u32 = 1 << 16;
-const BY: u32 = 17;
+const MOVES: u32 = 1 << 17;
+const BY: u32 = 18;
 
 impl Evidence {
     /// The newest frame that was acked.
@@ -100,6 +103,7 @@ impl Evidence {
             slots: (word & 0xffff) as u16,
             at: MonoTime::from_nanos(at),
             rests: word & RESTS != 0,
+            moves: word & MOVES != 0,
             by,
         };
         (self.version.load(Ordering::Relaxed) == version).then_some((version, reading))
@@ -121,7 +125,8 @@ impl Evidence {
             Source::Homing => 2,
         };
         let rests = if reading.rests { RESTS } else { 0 };
-        self.slots.store(u32::from(reading.slots) | rests | by << BY, Ordering::Relaxed);
+        let moves = if reading.moves { MOVES } else { 0 };
+        self.slots.store(u32::from(reading.slots) | rests | moves | by << BY, Ordering::Relaxed);
         // Zero stays for "none": after 2^31 readings the count begins anew.
         let next = version.wrapping_add(2);
         self.version.store(if next == 0 { 2 } else { next }, Ordering::Release);

@@ -22,6 +22,8 @@ use crate::wire::FrameNo;
 
 /// So long without an ack, or without a frame that the kernel takes, is a gap: from then on nobody knows which frames arrive.
 pub const GAP: Duration = Duration::from_millis(50);
+/// So long without one it is, even if the ack thread has not told meanwhile of what arrived.
+const GAP_UNTOLD: Duration = Duration::from_millis(100);
 /// Evidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
 /// three axes each, and one of them may be lost.
 pub const FRESH: Duration = Duration::from_millis(1_500);
@@ -210,7 +212,9 @@ impl Belief {
         }
         self.spans.end_at_last();
         self.within = self.own;
-        self.known = if self.asks { Known::Confirmed(now) } else { Known::Commanded(now) };
+        // Since then it may have been moved.
+        let over = self.busy_until.min(now);
+        self.known = if self.asks { Known::Confirmed(over) } else { Known::Commanded(over) };
         self.gap &= self.asks;
     }
 
@@ -223,7 +227,10 @@ impl Belief {
         }
         let told = reading.slots & self.own;
         let is_a_point = self.spans.is_a_point();
-        let agrees = is_a_point && told & !self.within == 0 && !self.is_elsewhere(told, &reading.pose);
+        let agrees = is_a_point
+            && !reading.moves
+            && told & !self.within == 0
+            && !self.is_elsewhere(told, &reading.pose);
         if !agrees && !reading.rests {
             self.within &= !told;
             self.known = Known::Contradicted(now);
@@ -237,11 +244,12 @@ impl Belief {
         self.gap &= self.within != self.own;
     }
 
-    /// That the ack thread is slow is no gap: what an ack may still be read for is not missing. Of a span the oldest frame counts,
-    /// so that a frame is missed after 40 to 50 ms.
+    /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing. Of a span the oldest
+    /// frame counts, so that a frame is missed after 40 to 50 ms.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
-        let unheard = || self.spans.waiting_since(self.acked).is_some_and(|since| told.since(since) > GAP);
+        let is_missed = |since| told.since(since) > GAP || now.since(since) > GAP_UNTOLD;
+        let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
         refused || (self.asks && unheard())
     }
 
@@ -348,6 +356,12 @@ impl Belief {
     /// Notes that the kernel did not take a frame.
     pub fn refused(&mut self, at: MonoTime) {
         self.refused_since.get_or_insert(at);
+    }
+
+    /// The seat may have been moved unseen: what was known of it is known no more.
+    pub fn forget(&mut self) {
+        (self.known, self.within) = (Known::Nothing, 0);
+        self.spans = Spans::at(*self.spans.last());
     }
 
     /// Notes that a frame was not sent.

@@ -3,7 +3,7 @@
 
 use super::fader::{GATHER, RATE};
 use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
-use crate::motion::{Limits, Slot, Window};
+use crate::motion::{Limits, Slot, Spacing, Window};
 use crate::proof::{HURRY, Loads};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -12,12 +12,9 @@ use crate::timeline::Timeline;
 const SPAN: i64 = 100_000_000;
 /// What is below this share of a limit is not measured closely: it leaves all that is ever asked.
 const LIGHT: f64 = 0.2;
-/// Entries looked at from the present on: slowing down from the greatest speed takes a tenth of a second, a quarter for a
-/// level, and the measure reaches 81 ms to either side.
+/// Entries looked at from the one before the present on: slowing down from the greatest speed takes a tenth of a second, a
+/// quarter for a level, and a reading is of the middle of its poses, 45 ms off at 100 Hz.
 const AHEAD: usize = 4;
-/// Over which time the measure sees a change of pace begin or end, seconds: the shorter of its distances, 16 ms and more.
-const MEASURED_OVER_S: f64 = 0.016;
-
 const _: () = assert!(1.0 + MAX_SPEED_UP <= HURRY, "the end of a cue is proved for the greatest pace");
 
 /// What each tenth of a second of the cue asks, at full level; built once, then only read.
@@ -28,6 +25,8 @@ pub struct Headroom {
     least: Limits,
     /// The greatest share of any limit anywhere.
     greatest: f64,
+    /// The jerk that the measure sees where an acceleration of 1 becomes one of -1, per second.
+    turn: f64,
 }
 
 impl Headroom {
@@ -47,20 +46,20 @@ impl Headroom {
             }
         }
         let greatest = loads.iter().fold(0.0, |greatest: f64, load| greatest.max(load.greatest()));
-        Self { loads: loads.into(), least: least_limits(&slots), greatest }
+        Self { loads: loads.into(), least: least_limits(&slots), greatest, turn: turn(rate) }
     }
 
     /// The greatest speed-up from `at` on, with motion at `level`. Never allocates.
     #[must_use]
     pub fn pace(&self, at: ShowTime, level: f64) -> f64 {
-        let leaves = self.ahead(at).iter().map(|load| load.leaves_pace(level));
+        let leaves = self.ahead(at).iter().map(|load| load.leaves_pace(level, self.turn));
         leaves.fold(MAX_SPEED_UP, f64::min)
     }
 
     /// What of the greatest rates of a level may be used from `at` on, 0 to 1. Never allocates.
     #[must_use]
     pub fn fade(&self, at: ShowTime, level: f64) -> f64 {
-        let leaves = self.ahead(at).iter().map(|load| load.leaves_fade(level, self.least));
+        let leaves = self.ahead(at).iter().map(|load| load.leaves_fade(level, self.least, self.turn));
         leaves.fold(1.0, f64::min).max(0.0)
     }
 
@@ -75,6 +74,16 @@ impl Headroom {
         let last = (first + AHEAD).min(self.loads.len());
         &self.loads[first.saturating_sub(1)..last]
     }
+}
+
+/// The jerk that the measure sees of an acceleration that turns from 1 to -1 at once: twice the greatest weight that a third
+/// difference gives to one frame, which is 1 over a distance of one period, 7/9 of its share of a longer one.
+#[expect(clippy::cast_precision_loss, reason = "1 to 20 periods")]
+fn turn(rate: Rate) -> f64 {
+    let n = Spacing::at_rate(rate.hz()).n;
+    // A pace is constant within a frame, hence the weights of frames and not of a curve (docs/limiter.md, section 2).
+    let shortest_s = (n as f64 / rate.hz() * 1e3).floor() * 1e-3;
+    2.0 * if n == 1 { 1.0 } else { 7.0 / 9.0 } / shortest_s
 }
 
 fn least_limits(slots: &[(usize, Slot)]) -> Limits {
@@ -128,10 +137,12 @@ impl Load {
 
     /// How much faster time may run: speed grows with the pace, acceleration with its square, jerk with its cube, and
     /// changing the pace adds to both.
-    fn leaves_pace(&self, level: f64) -> f64 {
+    fn leaves_pace(&self, level: f64, turn: f64) -> f64 {
+        // Derivatives of x(s(t)) with s' the pace (docs/limiter.md, section 6).
         let at_level = |share: f32| level * f64::from(share);
         let added = CHANGE_PER_S * at_level(self.velocity_by_acceleration);
-        let jerk_added = CHANGE_PER_S * at_level(self.velocity_by_jerk) / MEASURED_OVER_S;
+        let bends = 3.0 * (1.0 + MAX_SPEED_UP) * at_level(self.acceleration_by_jerk);
+        let jerk_added = CHANGE_PER_S * (turn * at_level(self.velocity_by_jerk) + bends);
         let paces = [
             1.0 / at_level(self.velocity),
             ((1.0 - added).max(0.0) / at_level(self.acceleration)).sqrt(),
@@ -143,14 +154,15 @@ impl Load {
 
     /// What of the greatest rates of a level fits: with x = neutral + level (cue - neutral), the product rule says what
     /// they add, the cue being a stroke away from neutral at the most.
-    fn leaves_fade(&self, level: f64, least: Limits) -> f64 {
+    fn leaves_fade(&self, level: f64, least: Limits, turn: f64) -> f64 {
+        // Derivatives of a product (docs/limiter.md, section 6).
         let left = |share: f32| 1.0 - level * f64::from(share);
         let adds = [
             RATE / least.velocity,
             2.0 * RATE * f64::from(self.velocity_by_acceleration) + GATHER / least.acceleration,
             3.0 * RATE * f64::from(self.acceleration_by_jerk)
                 + 3.0 * GATHER * f64::from(self.velocity_by_jerk)
-                + GATHER / MEASURED_OVER_S / least.jerk,
+                + GATHER * turn / least.jerk,
         ];
         let lefts = [left(self.velocity), left(self.acceleration), left(self.jerk)];
         lefts.into_iter().zip(adds).map(|(left, adds)| left / adds).fold(1.0, f64::min)
@@ -164,12 +176,18 @@ fn raise(kept: &mut f32, value: f64, over: f64) {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
     use std::fmt::Write as _;
     use std::path::Path;
+    use std::time::Duration;
 
+    use proptest::prelude::*;
+
+    use super::super::slew::Slew;
     use super::*;
     use crate::cue::{self, Source};
-    use crate::motion::SeatType;
+    use crate::motion::{Measure, Readings, SeatType, Spacing};
+    use crate::timeline::Hint;
 
     fn timeline(text: &str) -> Timeline {
         Timeline::new(cue::read(Path::new("test.csv"), text.as_bytes(), &Source::Native).unwrap())
@@ -230,5 +248,71 @@ mod tests {
     fn a_cue_one_per_cent_below_the_limit_leaves_one_per_cent() {
         let left = headroom(1.0 / 1.01).pace(ShowTime::from_millis(15_000), 1.0);
         assert!((left - 0.01).abs() < 2e-4, "{left}");
+    }
+
+    /// Limits of which the cue uses these shares of velocity, acceleration and jerk.
+    fn just_enough(timeline: &Timeline, rate: Rate, shares: [f64; 3]) -> SeatType {
+        let free = SeatType {
+            max_velocity_mm_s: 1e9,
+            max_acceleration_mm_s2: 1e9,
+            max_jerk_mm_s3: 1e12,
+            max_rpm: Some(u32::MAX),
+            ..SeatType::bench3(1)
+        };
+        let digest = crate::proof::Digest::of(timeline.cue());
+        let terms = crate::proof::Terms::of_seat(std::sync::Arc::new(free.clone()), 1, digest, rate, 1.0);
+        let axis = &crate::proof::prove(timeline, terms).axes[0];
+        SeatType {
+            max_velocity_mm_s: axis.velocity.value / shares[0],
+            max_acceleration_mm_s2: axis.acceleration.value / shares[1],
+            max_jerk_mm_s3: axis.jerk.value / shares[2],
+            ..free
+        }
+    }
+
+    fn worst_of(limits: Limits, readings: Readings) -> f64 {
+        let Readings { velocity, acceleration, jerk, .. } = readings;
+        (velocity.value.abs() / limits.velocity)
+            .max(acceleration.value.abs() / limits.acceleration)
+            .max(jerk.value.abs() / limits.jerk)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn however_the_pace_changes_within_what_a_cue_leaves_the_limits_are_kept(
+            hz in prop::sample::select(vec![10.0, 25.0, 30.0, 50.0, 60.0, 72.0, 100.0, 240.0, 1000.0]),
+            waves in [(0.3..4.0_f64, 0.3..1.0_f64), (0.3..4.0, 0.0..0.5)],
+            shares in [0.85..1.0_f64, 0.85..1.0, 0.85..1.0],
+            owed in prop::collection::vec((0.02..0.6_f64, -0.004..0.004_f64), 10..40),
+        ) {
+            let rate = Rate::from_hz(hz);
+            let wave = |at: f64| -> f64 { waves.iter().map(|(hz, part)| part * (TAU * hz * at).sin()).sum() };
+            let most: f64 = waves.iter().map(|wave| wave.1).sum::<f64>() + 1e-3;
+            let mut text = "time_ms,a1\n".to_owned();
+            for ms in (0..8_000).step_by(10) {
+                writeln!(text, "{ms},{}", 0.5 + 0.4 * wave(f64::from(ms) * 1e-3) / most).unwrap();
+            }
+            let timeline = timeline(&text);
+            let window = Window::new(vec![Slot::new(&just_enough(&timeline, rate, shares), 0, Some(0), 1.0)]);
+            let limits = window.slots()[0].limits;
+            let headroom = Headroom::measure(&[window], &timeline, rate);
+            let (mut slew, mut measure, mut hint) = (Slew::new(rate), Measure::new(Spacing::at_rate(hz)), Hint::default());
+            let (mut playhead, mut sent, mut frame) = (ShowTime::ZERO, ShowTime::ZERO, 0);
+            let mut owed = owed.into_iter();
+            let mut next_s = 0.0;
+            while playhead < ShowTime::from_millis(7_700) {
+                if sent.as_secs_f64() >= next_s && let Some((wait, seconds)) = owed.next() {
+                    next_s += wait;
+                    slew.owe(seconds);
+                }
+                let time = Duration::from_millis(rate.time_ms(frame).into());
+                (frame, sent) = (frame + 1, sent + time);
+                playhead += slew.advance(time, headroom.pace(playhead, 1.0));
+                let worst = worst_of(limits, measure.push(sent, timeline.sample(playhead, &mut hint)[0]));
+                prop_assert!(worst <= 1.001, "{hz} Hz, {playhead:?}: {worst} at pace {}", slew.pace());
+            }
+        }
     }
 }

@@ -217,7 +217,7 @@ impl Engine {
             holds: Holds::new(show.rate),
             playhead: show.start,
             reached: show.start,
-            slew: Slew::default(),
+            slew: Slew::new(show.rate),
             stamps: Stamps::new(show.timing),
             show,
             timeline,

@@ -130,6 +130,11 @@ impl Engine {
         self.riders[lane].go_blind();
     }
 
+    /// Nobody knows any more where the seat of that lane is: nothing goes to it until it is found.
+    pub fn lose_sight(&mut self, lane: usize) {
+        self.riders[lane].lose_sight();
+    }
+
     /// Nothing goes to that lane from now on.
     pub fn cut(&mut self, lane: usize) {
         self.riders[lane].cut();

@@ -152,6 +152,17 @@ impl Rider {
         }
     }
 
+    /// Nobody knows any more where its seat is. One that was to leave, or of which nobody knew which frames reach it, is away.
+    pub(super) const fn lose_sight(&mut self) {
+        match self.part {
+            Part::With | Part::Braking(_) | Part::Still if self.leaving.is_none() => {
+                (self.part, self.ahead) = (Part::Unseen, 0);
+            }
+            Part::Unseen | Part::Away => {}
+            Part::With | Part::Braking(_) | Part::Still | Part::Blind(_) => self.fall_out(),
+        }
+    }
+
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
         (self.part, self.leaving, self.ahead) = (Part::Away, None, 0);

@@ -2,10 +2,17 @@
 
 use std::time::Duration;
 
+use crate::motion::Spacing;
+use crate::time::Rate;
+
+// Jerk grows by 6 %; a lag of 50 ms is gone in 2.6 s (docs/limiter.md, section 7).
 /// The most that show time runs faster or slower than the clock.
 pub const MAX_SPEED_UP: f64 = 0.02;
 /// How quickly that may change, per second: 0.2 % per 10 ms.
 pub(super) const CHANGE_PER_S: f64 = 0.2;
+
+/// Sums of some hundred Times are off by less, seconds.
+const ROUNDING_S: f64 = 1e-9;
 
 /// How far the show is from where it should be, and how fast that is being taken back.
 #[derive(Debug, Clone)]
@@ -17,18 +24,19 @@ pub(super) struct Slew {
     speed_up: f64,
     /// For how long show time has run as the clock does, seconds.
     calm_s: f64,
-}
-
-/// Further back than this the measure does not see, seconds.
-const SEEN_S: f64 = 0.081;
-
-impl Default for Slew {
-    fn default() -> Self {
-        Self { owed_s: 0.0, missed_s: 0.0, speed_up: 0.0, calm_s: SEEN_S }
-    }
+    /// Further back than this the measure does not see, seconds.
+    seen_s: f64,
 }
 
 impl Slew {
+    /// Show time that runs as the clock does, and has for long.
+    pub(super) fn new(rate: Rate) -> Self {
+        // The longest window of the measure: three of its longer distances, 81 ms at 1,000 Hz (docs/limiter.md, section 1).
+        let periods = u32::try_from(3 * Spacing::at_rate(rate.hz()).m).unwrap_or(u32::MAX);
+        let seen_s = f64::from(periods) / rate.hz() - ROUNDING_S;
+        Self { owed_s: 0.0, missed_s: 0.0, speed_up: 0.0, calm_s: seen_s, seen_s }
+    }
+
     /// Show time falls behind by `span`.
     pub(super) fn fall_behind(&mut self, span: Duration) {
         self.owed_s += span.as_secs_f64();
@@ -53,7 +61,7 @@ impl Slew {
 
     /// Forgets lag and speed: show time was set anew.
     pub(super) fn reset(&mut self) {
-        *self = Self::default();
+        *self = Self { owed_s: 0.0, missed_s: 0.0, speed_up: 0.0, calm_s: self.seen_s, ..*self };
     }
 
     /// Show time was moved on by `seconds`, and runs no faster than the clock from here on.
@@ -70,7 +78,7 @@ impl Slew {
 
     /// Whether no change of pace is left in what the measure sees.
     pub(super) fn is_calm(&self) -> bool {
-        self.calm_s >= SEEN_S
+        self.calm_s >= self.seen_s
     }
 
     /// How fast show time runs, as a multiple of the clock.
@@ -106,6 +114,7 @@ impl Slew {
 
     /// The greatest speed from which what is owed is just closed while slowing down gently.
     fn closing_speed(&self, dt: f64) -> f64 {
+        // Slowing by c dt a frame from k c dt covers c dt^2 k (k + 1) / 2; solved for k c dt (docs/limiter.md, section 6).
         let owed = self.owed_s.abs();
         let from_rest = (dt * dt / 4.0 + 2.0 * owed / CHANGE_PER_S).sqrt() - dt / 2.0;
         (CHANGE_PER_S * from_rest).min(owed / dt)
@@ -120,7 +129,7 @@ mod tests {
     fn a_lag_is_closed_without_passing_the_speed_its_change_or_the_goal() {
         for (hz, lag_ms) in [(100, 10), (100, 30), (1000, 1), (1000, 45), (50, 40), (10, 50), (20, 50)] {
             let period = Duration::from_secs(1) / hz;
-            let mut slew = Slew::default();
+            let mut slew = Slew::new(Rate::from_hz(f64::from(hz)));
             slew.fall_behind(Duration::from_millis(lag_ms));
             let (mut gained, mut before) = (0.0, 0.0);
             for _ in 0..10 * hz {
@@ -139,7 +148,7 @@ mod tests {
 
     #[test]
     fn a_show_that_is_ahead_waits_for_the_film_as_gently() {
-        let mut slew = Slew::default();
+        let mut slew = Slew::new(Rate::from_hz(100.0));
         slew.owe(-0.5);
         let period = Duration::from_millis(10);
         let mut passed = 0.0;
@@ -154,11 +163,28 @@ mod tests {
 
     #[test]
     fn without_head_room_the_lag_stays() {
-        let mut slew = Slew::default();
+        let mut slew = Slew::new(Rate::from_hz(100.0));
         slew.fall_behind(Duration::from_millis(20));
         for _ in 0..1000 {
             assert_eq!(slew.advance(Duration::from_millis(10), 0.0), Duration::from_millis(10));
         }
         assert_eq!(slew.lag(), Duration::from_millis(20));
+    }
+
+    #[test]
+    fn no_window_of_the_measure_has_a_change_of_pace_in_it_once_the_pace_is_calm() {
+        for hz in [10.0, 24.0, 50.0, 60.0, 72.0, 100.0, 1000.0] {
+            let rate = Rate::from_hz(hz);
+            let mut slew = Slew::new(rate);
+            slew.owe(0.001);
+            let (mut frame, mut steady) = (0, 0);
+            while frame == 0 || !slew.is_calm() {
+                slew.advance(Duration::from_millis(rate.time_ms(frame).into()), MAX_SPEED_UP);
+                frame += 1;
+                steady = if slew.pace() == 1.0 { steady + 1 } else { 0 };
+            }
+            let seen = 3 * Spacing::at_rate(hz).m;
+            assert!((seen..=seen + 1).contains(&steady), "{hz} Hz: {steady} frames of {seen}");
+        }
     }
 }

@@ -42,6 +42,7 @@ pub(super) struct Axis {
 
 impl Axis {
     pub(super) fn new(limits: AxisLimits, spacing: Spacing) -> Self {
+        // The greatest derivatives of u^3 (10 - 15 u + 6 u^2) are 15/8, 10/sqrt 3 and 60 (docs/limiter.md, section 7).
         let share = |limit: f64| FADE_SHARE * limit;
         let fade = (1.875 / share(limits.velocity))
             .max((5.7735 / share(limits.acceleration)).sqrt())
@@ -69,6 +70,7 @@ impl Axis {
     /// Goes onto a way to rest, `seconds` of which the next frame takes.
     pub(super) fn brake(&mut self, brake: Halt, seconds: f64) -> f64 {
         match self.mode {
+            // What the fade adds to what it fades onto shrinks with its length, so a longer one may be let pass.
             Mode::Returning { .. } => self.stretch = (2.0 * self.stretch).min(LONGEST),
             Mode::Following => self.asked.forget(),
             Mode::Braking { .. } => {}

@@ -9,6 +9,7 @@
 use super::limits::AxisLimits;
 use crate::motion::{MAX_AXES, Pose, Spacing};
 
+// Any shares below 1 are right; why these: docs/limiter.md, section 3.
 /// Shares of the acceleration and of the jerk up to which frames are calm, and with which an axis is thought to brake.
 pub(super) const LEVEL: (f64, f64) = (0.9, 0.8);
 
@@ -91,13 +92,14 @@ impl FastPath {
             rows.step[axis] = limits.step;
             rows.acceleration[axis] = acceleration;
             rows.jerk[axis] = jerk;
-            // Where Times are 1 and 2 ms in turns, a difference over long ones weighs up to twice as much as the others.
+            // No frame weighs more than 2/n in a difference, Times of 1 and 2 ms in turns included (docs/limiter.md, section 2).
             rows.rest[0][axis] = (limits.acceleration - acceleration) * spacing.n as f64 / 2.0;
             rows.rest[1][axis] = (limits.jerk - jerk) * spacing.n as f64 / 2.0;
             rows.half_per_jerk[axis] = 0.5 / jerk;
             rows.half_per_acceleration[axis] = 0.5 / acceleration;
             rows.half_rise[axis] = 0.5 * acceleration / jerk;
         }
+        // The present stretch and the one before are summed, so at least one whole one: more than a difference spans.
         let stretch = 3 * spacing.m + 1;
         let mut calm = Self {
             rows,
@@ -207,13 +209,14 @@ impl FastPath {
             (acceleration.abs() - rows.acceleration[axis]).max(0.0),
             (jerk.abs() - rows.jerk[axis]).max(0.0),
         ];
-        // At the pose itself, of the cubic through the newest four.
+        // At the pose itself, of the cubic through the newest four: a brake from there has no jump of acceleration in it.
         let speed = velocity + spans.frame * (0.5 * acceleration + spans.two * jerk * (1.0 / 6.0));
         let pull = acceleration + (spans.frame + spans.two) * jerk * (1.0 / 3.0);
         let (rising, falling) = (pull.max(0.0), (-pull).max(0.0));
         let up = speed.max(0.0) + rising * rising * rows.half_per_jerk[axis];
         let down = (-speed).max(0.0) + falling * falling * rows.half_per_jerk[axis];
-        // The last jerk weighs on the three frames to come as well.
+        // A brake from here is seen together with old poses by one more acceleration, and by fewer than three more jerks
+        // (docs/limiter.md, section 3).
         let calm = (self.sums[0][0][axis] + self.sums[1][0][axis] + 2.0 * beyond[0] <= rows.rest[0][axis])
             & (self.sums[0][1][axis] + self.sums[1][1][axis] + 4.0 * beyond[1] <= rows.rest[1][axis])
             & (pull.abs() <= rows.acceleration[axis])
@@ -231,6 +234,7 @@ impl FastPath {
     #[inline(always)]
     fn way(&self, axis: usize, speed: f64, acceleration: f64) -> f64 {
         let rows = &self.rows;
+        // Let go at full speed, then stop: exact with a hold, more than the way without one (docs/limiter.md, section 3).
         speed
             * (2.0 * acceleration * rows.half_per_jerk[axis]
                 + speed * rows.half_per_acceleration[axis]
@@ -253,5 +257,62 @@ impl Seen {
         self.acceleration[axis] = glance.acceleration;
         self.beyond[0][axis] = glance.beyond[0];
         self.beyond[1][axis] = glance.beyond[1];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::history::Difference;
+    use super::super::times::Times;
+    use super::*;
+    use crate::time::Rate;
+
+    /// What the newest of the differences of that order is, where poses are as `x` says.
+    fn over(apart: usize, order: usize, at: &[f64], x: impl Fn(usize) -> f64) -> f64 {
+        let newest = at.len() - 1;
+        // Of an acceleration, nothing is asked of the fourth pose.
+        let places = [0, 1, 2, 3].map(|count| newest.saturating_sub(count * apart));
+        let mut seconds = places.map(|place| at[place]);
+        if order == 2 {
+            seconds[3] = seconds[2] - 1.0;
+        }
+        let shown = Difference::new(apart, seconds).show(places.map(x));
+        if order == 2 { shown.acceleration } else { shown.jerk }
+    }
+
+    proptest! {
+        #[test]
+        fn a_difference_over_a_distance_is_a_mean_of_those_from_frame_to_frame_none_of_which_weighs_more_than_is_allowed_for(
+            millihertz in prop_oneof![1_000..1_000_000_u32, 400_000..1_000_000_u32], start in 0..100_000_u64,
+        ) {
+            let rate = Rate::from_hz(f64::from(millihertz) * 1e-3);
+            let spacing = Spacing::at_rate(rate.hz());
+            let most = 2.0 / f64::from(u32::try_from(spacing.n).expect("1 to 20"));
+            for (apart, order) in [(spacing.n, 2), (spacing.m, 2), (spacing.n, 3), (spacing.m, 3)] {
+                let mut times = Times::new(rate);
+                let mut at = vec![0.0];
+                for frame in 0..order * apart {
+                    at.push(at[frame] + f64::from(times.of(start + frame as u64)) * 1e-3);
+                }
+                let mut sum = 0.0;
+                for first in 0..=at.len() - 1 - order {
+                    // Of such a curve one difference from frame to frame alone is not 0: that of the poses from `first` on.
+                    let (b, c) = (at[first + 1], at[first + order - 1]);
+                    let bent = |k: usize| match order {
+                        _ if k < first + order => 0.0,
+                        2 => at[k] - b,
+                        _ => (at[k] - b) * (at[k] - c),
+                    };
+                    let few: Vec<f64> = at[first..=first + order].to_vec();
+                    let one = over(1, order, &few, |k| bent(first + k));
+                    let weight = over(apart, order, &at, bent) / one;
+                    prop_assert!((-1e-6..=most).contains(&weight), "{weight} at {first}");
+                    sum += weight;
+                }
+                prop_assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+            }
+        }
     }
 }

@@ -55,6 +55,7 @@ impl Difference {
     /// What poses show, newest first.
     #[inline]
     pub(super) fn show(&self, x: [f64; 4]) -> Shown {
+        // Reciprocals are kept: of frames with even Times they are the same each tick.
         let slope = (x[0] - x[1]) * self.slopes[0];
         let before = (x[1] - x[2]) * self.slopes[1];
         let earliest = (x[2] - x[3]) * self.slopes[2];

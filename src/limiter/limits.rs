@@ -3,6 +3,7 @@
 use super::history::Shown;
 use crate::motion::Limits;
 
+// For rounding in sums of the same differences (docs/limiter.md, section 1).
 /// What the measure allows over the limits.
 pub(super) const SLACK: f64 = 1.001;
 
@@ -19,6 +20,7 @@ pub(super) struct AxisLimits {
 impl AxisLimits {
     /// For frames of that period.
     pub(super) fn new(limits: Limits, period: f64) -> Self {
+        // Never less than 20 ms x A, so that it is in the way of nothing that acceleration allows (docs/limiter.md, section 1).
         let Limits { velocity, acceleration, jerk } = limits;
         Self { velocity, acceleration, jerk, step: 4.0 * acceleration * period.max(0.005) }
     }

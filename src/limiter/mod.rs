@@ -254,6 +254,7 @@ impl Limiter {
             let (velocity, acceleration) = difference.newest(shown);
             let acceleration = acceleration.clamp(-limits.acceleration, limits.acceleration);
             let state = AxisState { position: next.position, velocity, acceleration };
+            // No way peaks lower than braking with everything (docs/limiter.md, section 4).
             Halt::least_past(state, limits, 1.0) <= ROOM_SLACK
         })
     }
@@ -277,6 +278,7 @@ impl Limiter {
 
     /// Goes onto a way to rest: the one kept from the tick before, or one that is looked for now.
     fn brake(&mut self, axis: usize, frame: &Frame) -> f64 {
+        // All of this way was laid against the measure with the Times of these very frames (docs/limiter.md, section 4).
         let begins_here = |&(index, _): &(u64, Halt)| index + 1 == frame.index;
         if let Some((_, brake)) = self.axes[axis].way_out.take_if(|way| begins_here(way)) {
             let position = brake.position(frame.seconds);

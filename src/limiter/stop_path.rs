@@ -6,8 +6,10 @@ use super::limits::AxisLimits;
 use super::times::Times;
 use crate::motion::{AxisState, Begun, Halt, Means, Spacing};
 
+// 3 x 27 periods at 1,000 Hz, and the end of that.
 /// Poses that a difference can span, without the newest.
 const PAST: usize = 82;
+// Half a second at 1,000 Hz; a longer way is judged again on each of its frames (docs/limiter.md, section 4).
 /// Frames that are looked ahead at the most.
 const AHEAD: usize = 512;
 
@@ -88,6 +90,7 @@ impl<'a> StopPath<'a> {
 
     /// A way to rest within the limits, and its place among the ways; `first` is tried before all others.
     pub(super) fn way(&mut self, first: usize) -> Option<(Halt, usize)> {
+        // A guess is judged by the measure alone, so a bad one costs time and no limit (docs/limiter.md, section 4).
         let order = std::iter::once(first).chain((0..WAYS).filter(|&way| way != first));
         for way in order {
             if let Some(brake) = self.brake(way)
@@ -113,6 +116,7 @@ impl<'a> StopPath<'a> {
     }
 
     fn brake(&self, way: usize) -> Option<Halt> {
+        // Way 0 is the brake that the fast path has already proved from a pose that is calm.
         let share = SHARES[way % SHARES.len()];
         let (kind, rest) = (way / OF_A_KIND, way % OF_A_KIND / SHARES.len());
         let (part, cubic) = (PARTS[rest % PARTS.len()], rest < PARTS.len());
@@ -162,6 +166,7 @@ impl<'a> StopPath<'a> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "held inside the room")]
     fn frames_ahead(&self, brake: &Halt) -> usize {
         let until_rest = (brake.seconds() / self.period).ceil().min(frames(AHEAD)) as usize;
+        // Until no difference has a pose from before the rest in it.
         (until_rest + 3 * self.spacing.m + 1).min(AHEAD)
     }
 
@@ -185,4 +190,62 @@ impl<'a> StopPath<'a> {
 #[expect(clippy::cast_precision_loss, reason = "some hundreds")]
 fn frames(count: usize) -> f64 {
     count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::time::Duration;
+
+    use proptest::prelude::*;
+
+    use super::super::{Limiter, Provenance};
+    use super::*;
+    use crate::motion::{MAX_AXES, SeatType, Slot, Window};
+    use crate::time::Rate;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn after_a_pose_that_is_calm_the_first_of_all_ways_to_rest_keeps_the_limits(
+            hz in prop::sample::select(vec![25.0, 50.0, 72.0, 100.0, 144.0, 333.0, 600.0, 666.667, 999.0, 1000.0]),
+            waves in [(0.1..6.0_f64, 0.0..1.0_f64, 0.0..1.0_f64), (0.1..15.0, 0.0..1.0, 0.0..0.3)],
+            share in 0.4..1.3_f64, edge in 0.5..1.0_f64,
+        ) {
+            let rate = Rate::from_hz(hz);
+            let window = Window::new(vec![Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0)]);
+            let limits = window.slots()[0].limits;
+            // The waves together are to need that share of the limits, and swing up to the end of the stroke.
+            let power = |order: i32| -> f64 { waves.iter().map(|(hz, _, part)| part * (TAU * hz).powi(order)).sum() };
+            let scale = (limits.velocity / power(1)).min(limits.acceleration / power(2)).min(limits.jerk / power(3));
+            let scale = (share * scale).min(0.5 / power(0));
+            let wave = |at: f64| -> f64 { waves.iter().map(|(hz, turn, part)| part * (TAU * (hz * at + turn)).sin()).sum() };
+            let middle = (edge - scale * power(0)).max(scale * power(0));
+            let place = |at: f64| middle + scale * wave(at);
+
+            let mut limiter = Limiter::new(&window, rate);
+            let (mut pose, mut times, mut at) = ([0.0; MAX_AXES], Times::new(rate), 0.0);
+            pose[0] = place(0.0);
+            limiter.is_seeded = true;
+            limiter.rest_in(pose);
+            let mut calm = 0;
+            for frame in (0..).take_while(|frame| rate.offset(*frame) < Duration::from_secs(4)) {
+                at += f64::from(times.of(frame)) * 1e-3;
+                pose[0] = place(at);
+                limiter.fast_path.begin(f64::from(rate.time_ms(frame)) * 1e-3);
+                let is_calm = limiter.following && limiter.fast_path.clone().take_calm(&pose);
+                limiter.admit(&mut pose, frame, Provenance::Anyhow);
+                if is_calm {
+                    calm += 1;
+                    let (history, limits) = (&limiter.history, &limiter.axes[0].limits);
+                    let mut outlook = StopPath::new(history, 0, limits, times, rate.time_ms(frame + 1), None);
+                    let way = outlook.brake(0).expect("a way that is not aimed is always there");
+                    let worst = outlook.worst(&way, f64::INFINITY);
+                    prop_assert!(worst <= PLANNED, "frame {frame}: {worst}");
+                }
+            }
+            prop_assert!(calm > 0 || share > 0.8, "no pose was calm");
+        }
+    }
 }

@@ -26,6 +26,7 @@ impl Times {
     }
 
     fn seek(&mut self, frame: u64) {
+        // In whole numbers: a sum of seconds would drift against the Times that are sent.
         let over =
             (u128::from(frame) * 1_000_000 + u128::from(self.millihertz / 2)) % u128::from(self.millihertz);
         self.over = u64::try_from(over).expect("less than what it was divided by");

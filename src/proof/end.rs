@@ -14,6 +14,7 @@ use super::sweep::sweep;
 use super::{Quantity, SLACK};
 use crate::motion::{AxisState, Halt, Limits};
 
+// 2 % of the slew, and the slack on top (docs/limiter.md, section 5).
 /// The most that show time may run faster than the clock, as a factor: the last pose may be met with that much more speed.
 pub const HURRY: f64 = 1.021;
 /// What of acceleration and jerk has to be enough to stay inside the stroke: moves that go on from the last pose are
@@ -57,6 +58,7 @@ pub(super) fn no_rest(pieces: &Pieces, allowed: &Allowed, stencils: &Stencils) -
         return None;
     }
     let limits = allowed.limits;
+    // The stroke has to suffice at any pace; for roughness the clock's counts, which pace is back at before the end.
     let hurried = from.at_pace(HURRY);
     let acceleration = hurried.acceleration.clamp(-limits.acceleration, limits.acceleration);
     let missing = Halt::least_past(AxisState { acceleration, ..hurried }, limits, ROOM_SHARE);

@@ -14,6 +14,7 @@ use crate::motion::{MAX_AXES, SeatType};
 use crate::time::ShowTime;
 use crate::timeline::{HELD_BACK, Timeline};
 
+// Half of the measure's slack.
 /// What is left below a limit that was met, so that no rounding on the way to a file takes it over.
 const ROUNDING: f64 = 0.9995;
 /// How often the amplitude is lowered again: where a curve is held at the stroke's end, what is broken does not shrink in

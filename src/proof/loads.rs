@@ -67,6 +67,7 @@ fn fill(pieces: &Pieces, stencils: &[Stencil], order: usize, light: f64, span: i
         let Some(last) = sweep.last() else { continue };
         for run in sweep.runs(order, last) {
             let (from, until) = (run.from + middle, run.until + middle);
+            // By the stretch of it that is met with least, so that none is told as more (docs/limiter.md, section 5).
             if run.bound > light.max(sweep.sink.ignores(from, until) * (1.0 + TOLERANCE)) {
                 sweep.cells(&run);
             } else {

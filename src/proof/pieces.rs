@@ -6,6 +6,7 @@ use crate::cue::Unit;
 use crate::motion::{AxisState, Halt, Slot};
 use crate::timeline::{AxisExtremes, Cubic, Extreme, Timeline};
 
+// Few enough that bounds stay close, many enough that most of a cue costs a sixteenth.
 /// So many cubics share one set of bounds.
 const BLOCK: usize = 16;
 
@@ -35,6 +36,7 @@ pub(super) struct Block {
 impl Block {
     /// What this run and a later one do at most; the place is that of this one.
     pub(super) fn and(self, other: &Self) -> Self {
+        // A difference over both is a mean of what they do, plus their jumps (docs/limiter.md, section 2).
         Self {
             span: common(self.span, other.span),
             pieces: self.pieces,

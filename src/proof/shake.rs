@@ -44,6 +44,7 @@ struct Swing {
 impl Swing {
     /// Velocity and acceleration of an amplitude of 1.
     fn per_amplitude(&self) -> [f64; 2] {
+        // Derivatives of A sin (2 pi f t).
         let turns = TAU * self.hz;
         [turns, turns * turns]
     }

@@ -96,6 +96,7 @@ impl Stencil {
         let gap = self.offsets.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(MS);
         let gap = seconds(gap);
         let [position, slope, bend] = jumps;
+        // The greatest value, slope and bend of a B-spline whose shortest gap that is (docs/limiter.md, section 2).
         let of_jumps = match self.offsets.len() {
             2 => position / gap,
             3 => slope / gap + position / (gap * gap),
@@ -128,6 +129,7 @@ fn arrangements(rate: Rate, counts: &[u64]) -> Vec<Vec<i64>> {
     const PER_PERIOD: u64 = 1_000_000;
     let millihertz = rate_millihertz(rate);
     let grain = gcd(PER_PERIOD, millihertz);
+    // A node moves on by a millisecond where its remainder wraps: no more arrangements than nodes (docs/limiter.md, section 5).
     // The sum after k frames is (k x 1,000,000 + half) / millihertz, rounded down. All that counts is what remains.
     let (half, remains) = (millihertz / 2, |count: u64| count * PER_PERIOD % millihertz);
     let turns = counts.iter().map(|&count| (millihertz - remains(count)) % millihertz);

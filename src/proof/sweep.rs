@@ -8,6 +8,7 @@ use crate::timeline::Cubic;
 /// Stretches over a limit with less than this between them are one, nanoseconds.
 const ONE_STRETCH: i64 = 100_000_000;
 
+// Velocity's bound is close anyway (docs/limiter.md, section 5).
 /// How much the greatest size may be overstated, by order: what is surely no worse than that is not looked at.
 const TOLERANCE: [f64; 3] = [0.002, 0.02, 0.02];
 
@@ -144,6 +145,7 @@ impl Sweep<'_, Over> {
         }
         let mut passed_over = 0.0_f64;
         for run in runs {
+            // Never above the threshold unlooked at: over a limit is only what was met (docs/limiter.md, section 5).
             let passes = self.sink.swept.worst * (1.0 + TOLERANCE[order - 1]);
             if run.bound > self.sink.threshold.min(passes) {
                 self.cells(&run);
@@ -298,5 +300,135 @@ impl<T: Sink> Sweep<'_, T> {
             *cursor = self.pieces.index(last + offset);
         }
         self.cell(last, last, &cursors[..nodes]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use proptest::prelude::*;
+
+    use super::super::loads::Loads;
+    use super::super::stencil::Stencils;
+    use super::*;
+    use crate::cue::{Source, read};
+    use crate::motion::{Limits, SeatType, Slot};
+    use crate::time::Rate;
+    use crate::timeline::Timeline;
+
+    /// The greatest size in each stretch of so many nanoseconds, every cell looked at in 128 places.
+    struct All {
+        span: i64,
+        most: Vec<f64>,
+    }
+
+    impl Sink for All {
+        fn ignores(&self, _: i64, _: i64) -> f64 {
+            -1.0
+        }
+
+        fn take(&mut self, from: i64, until: i64, cubic: Cubic) {
+            for u in (0..=128).map(|part| f64::from(part) / 128.0) {
+                let at = usize::try_from(between(from, until, u) / self.span).unwrap_or(0);
+                let last = self.most.len() - 1;
+                let most = &mut self.most[at.min(last)];
+                *most = most.max(cubic.at(u).abs());
+            }
+        }
+    }
+
+    fn all(pieces: &Pieces, stencils: &[Stencil], span: i64) -> Vec<f64> {
+        let stretches = usize::try_from(pieces.end() / span).unwrap_or(0) + 1;
+        let mut all = All { span, most: vec![0.0; stretches] };
+        for stencil in stencils {
+            let mut sweep = Sweep { pieces, stencil, sink: &mut all };
+            let Some(last) = sweep.last() else { continue };
+            sweep.cells_between(pieces.list()[0].start, last);
+            sweep.at_the_end(last);
+        }
+        all.most
+    }
+
+    fn timeline(interpolation: &str, rows: &[(u32, f64)]) -> Timeline {
+        let mut text = format!("# interpolation: {interpolation}\ntime_ms,a1\n");
+        let mut time = 0;
+        for (wait, value) in rows {
+            writeln!(text, "{time},{value}").expect("a String takes what is written to it");
+            time += wait;
+        }
+        Timeline::new(
+            read(Path::new("test.csv"), text.as_bytes(), &Source::Native).expect("the cue is sound"),
+        )
+    }
+
+    /// Rows of a swell with something rough on top, evenly spaced or not: runs that are passed over and runs that are not.
+    fn rows() -> impl Strategy<Value = Vec<(u32, f64)>> {
+        let regular = prop::option::of(prop::sample::select(vec![2_u32, 5, 10, 20]));
+        let rough = prop::collection::vec((2_u32..40, 0.0..1.0_f64), 40..160);
+        (regular, rough, 0.0..0.2_f64, 0.02..0.4_f64).prop_map(|(regular, rough, roughness, turn)| {
+            let swell = |row: f64| 0.5 + 0.3 * (row * turn).sin();
+            let place = |(row, (wait, value)): (u32, (u32, f64))| {
+                (
+                    regular.unwrap_or(wait),
+                    swell(f64::from(row)) * (1.0 - roughness) + roughness * value * value,
+                )
+            };
+            (0..).zip(rough).map(place).collect()
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn what_is_passed_over_is_never_more_and_overstates_the_greatest_size_by_its_tolerance_at_the_most(
+            interpolation in prop::sample::select(vec!["spline", "monotone", "linear", "hold"]),
+            hz in prop::sample::select(vec![24.0, 50.0, 72.0, 100.0, 144.0, 600.0, 1000.0]),
+            rows in rows(), over in 0.5..2.0_f64,
+        ) {
+            let timeline = timeline(interpolation, &rows);
+            let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
+            let pieces = Pieces::new(&timeline, 0, &slot);
+            let stencils = Stencils::at(Rate::from_hz(hz));
+            for (stencils, order) in
+                [(&stencils.velocity, 1), (&stencils.step, 2), (&stencils.acceleration, 2), (&stencils.jerk, 3)]
+            {
+                let most = all(&pieces, stencils, i64::MAX)[0];
+                let swept = sweep(&pieces, stencils, order, over * most);
+                // 1e-3: the places between those that were looked at.
+                let tolerance = 1.0 + TOLERANCE[order - 1] + 1e-3;
+                prop_assert!(swept.worst >= most * (1.0 - 1e-9), "order {order}: {} under {most}", swept.worst);
+                prop_assert!(swept.worst <= most * tolerance, "order {order}: {} over {most}", swept.worst);
+                prop_assert_eq!(swept.over.is_empty(), over > 1.0 || most == 0.0, "order {}", order);
+            }
+        }
+
+        #[test]
+        fn the_load_of_each_stretch_is_never_less_than_what_is_met_there_and_hardly_more(
+            interpolation in prop::sample::select(vec!["spline", "monotone", "linear"]),
+            hz in prop::sample::select(vec![50.0, 100.0, 144.0, 1000.0]),
+            rows in rows(),
+        ) {
+            const SPAN: i64 = 100_000_000;
+            let timeline = timeline(interpolation, &rows);
+            let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
+            let (pieces, rate, light) = (Pieces::new(&timeline, 0, &slot), Rate::from_hz(hz), 0.2);
+            let stencils = Stencils::at(rate);
+            let loads = Loads::over(&pieces, slot.limits, &stencils, rate, SPAN, light);
+            let Limits { velocity, jerk, .. } = slot.limits;
+            for (stencils, met, limit) in
+                [(&stencils.velocity, &loads.velocity, velocity), (&stencils.jerk, &loads.jerk, jerk)]
+            {
+                let all = all(&pieces, stencils, SPAN);
+                let greatest = all.iter().copied().fold(0.0, f64::max);
+                for (met, all) in met.iter().zip(all) {
+                    let met = f64::from(*met);
+                    prop_assert!(met >= all * (1.0 - 1e-9), "{met} under {all}");
+                    prop_assert!(met <= (1.022 * greatest).max(light * limit), "{met} over {greatest}");
+                }
+            }
+        }
     }
 }

@@ -62,16 +62,15 @@ impl Beats {
         due
     }
 
-    /// Asks a controller; says whether the kernel took it.
-    pub(super) fn send(&self, controller: usize, sender: &Sender) -> bool {
+    /// Asks a controller; says for which register, where the kernel took it.
+    pub(super) fn send(&self, controller: usize, sender: &Sender) -> Option<u16> {
         let Heart { code, axes, inputs, .. } = self.hearts[controller];
         let inputs =
             inputs.then_some(ReadRequest { channel: 0, accept: code, reply: code, start: INPUTS, num: 1 });
         let reads = || position_reads(axes, code, code).chain(inputs);
-        let read = reads().nth(self.turn % reads().count().max(1));
-        read.is_some_and(|read| {
-            !matches!(sender.send(controller, read.emit(&mut [0; MAX_LEN])), Delivery::Failed(_))
-        })
+        let read = reads().nth(self.turn % reads().count().max(1))?;
+        let delivery = sender.send(controller, read.emit(&mut [0; MAX_LEN]));
+        (!matches!(delivery, Delivery::Failed(_))).then_some(read.start)
     }
 
     /// Asks a controller where all of its axes are; says in how many datagrams.

@@ -18,13 +18,28 @@ pub struct Places {
     lanes: Vec<Place>,
     /// Whether frames went out in the tick before.
     moved: bool,
-    /// Since when a motion waits for all seats to be read once more, and when that was asked for last.
-    waits: Option<(MonoTime, MonoTime)>,
+    /// When it looked last.
+    looked: MonoTime,
+    /// A motion waits for all seats to be read once more.
+    waits: Option<Wait>,
+    /// After how long without a tick a seat may have been moved meanwhile.
+    asleep: Duration,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Wait {
+    since: MonoTime,
+    /// When that was asked for last.
+    asked: MonoTime,
+    /// Whether nothing has begun yet: else the film runs on meanwhile.
+    begins: bool,
 }
 
 /// How often seats are read that a motion waits for, and for how long it waits.
 const READ_EVERY: Duration = Duration::from_millis(110);
 const WAITS_FOR: Duration = Duration::from_millis(400);
+/// A seat to which no frame went for so long may have been moved by hand.
+const ASLEEP: Duration = Duration::from_millis(250);
 
 #[derive(Debug)]
 struct Place {
@@ -41,7 +56,13 @@ impl Places {
             belief: Belief::new(&lane.window, rate.period(), lane.ack_every > 0),
             longest_ms: lane.longest_ms,
         };
-        Self { lanes: lanes.iter().map(place).collect(), moved: false, waits: None }
+        Self {
+            lanes: lanes.iter().map(place).collect(),
+            moved: false,
+            looked: MonoTime::default(),
+            waits: None,
+            asleep: ASLEEP.max(3 * rate.period()),
+        }
     }
 
     /// What is known of a lane's seat.
@@ -65,6 +86,10 @@ impl Places {
 
     /// Takes up what the ack thread has seen, once a tick; `moving` says whether frames go out.
     pub fn look(&mut self, engine: &mut Engine, mail: &Mail, now: MonoTime, moving: bool) {
+        let since = std::mem::replace(&mut self.looked, now);
+        if moving && self.moved && now.since(since) > self.asleep && mail.live().has_reader() {
+            self.lose_sight(engine, mail, now);
+        }
         for lane in 0..self.lanes.len() {
             if self.take_evidence(lane, mail, now) {
                 engine.go_blind(lane);
@@ -76,10 +101,26 @@ impl Places {
             }
             if let Some(known) = belief.pose(now) {
                 engine.found(lane, &known, belief.near());
-            } else if is_unseen && moving {
+            } else if is_unseen && moving && self.waits.is_none() {
                 engine.fall_out(lane);
             }
         }
+    }
+
+    /// The tick thread was held up for so long that seats may have been moved meanwhile: each is read before a frame goes to it
+    /// again.
+    #[cold]
+    fn lose_sight(&mut self, engine: &mut Engine, mail: &Mail, now: MonoTime) {
+        for (lane, place) in self.lanes.iter_mut().enumerate() {
+            place.belief.forget();
+            engine.lose_sight(lane);
+        }
+        self.wait(mail, now, false);
+    }
+
+    fn wait(&mut self, mail: &Mail, now: MonoTime, begins: bool) {
+        self.waits = Some(Wait { since: now, asked: now, begins });
+        mail.live().want(now);
     }
 
     /// Whether a motion may go on. One that begins waits until all seats were read since it was asked for, some milliseconds; a seat
@@ -93,27 +134,25 @@ impl Places {
     ) -> bool {
         let moved = std::mem::replace(&mut self.moved, moving);
         if moving && !moved && mail.live().has_reader() {
-            self.waits = Some((now, now));
-            mail.live().want(now);
+            self.wait(mail, now, true);
         }
-        let Some((since, asked)) = self.waits.filter(|_| moving) else {
+        let Some(Wait { since, asked, begins }) = self.waits.filter(|_| moving) else {
             self.waits = None;
             return true;
         };
-        let is_open = |(_, place): &(usize, &Place)| !place.belief.is_known_since(since, now);
-        let is_over = now.since(since) >= WAITS_FOR;
-        let mut open =
-            self.lanes.iter().enumerate().filter(is_open).filter(|(lane, _)| engine.takes_part(*lane));
-        if !is_over && open.next().is_some() {
+        let is_open = |(lane, place): (usize, &Place)| {
+            engine.takes_part(lane) && !place.belief.is_known_since(since, now)
+        };
+        if now.since(since) < WAITS_FOR && self.lanes.iter().enumerate().any(is_open) {
             if now.since(asked) >= READ_EVERY {
-                self.waits = Some((since, now));
+                self.waits = Some(Wait { asked: now, since, begins });
                 mail.live().want(now);
             }
-            return false;
+            return !begins;
         }
         self.waits = None;
-        for lane in 0..self.lanes.len() {
-            if is_over && engine.takes_part(lane) && !self.lanes[lane].belief.is_known_since(since, now) {
+        for (lane, Place { belief, .. }) in self.lanes.iter().enumerate() {
+            if engine.takes_part(lane) && !belief.is_known_since(since, now) {
                 engine.fall_out(lane);
             }
         }

@@ -1,18 +1,27 @@
 //! What a controller tells of where its axes are, from whichever register or report, put together into readings of the
 //! seat. Ack thread; pure: told the time; allocates nothing.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
 use crate::belief::{Reading, Source};
 use crate::motion::{MAX_AXES, Pulses, SeatType, in_stroke};
 use crate::time::MonoTime;
-use crate::wire::PerAxis;
+use crate::wire::{AXES_PER_BLOCK, DP_POSITIONS, PerAxis};
 
 /// How far apart two answers may see an axis at rest, in strokes.
 const STILL: f64 = 0.001;
 /// For how long an axis has to be seen in one place to be at rest there. What comes in one burst proves nothing.
 const REST: Duration = Duration::from_millis(100);
+/// So many answers have to. One may be an older one that the network repeats in place of another that it holds back.
+const TIMES: u32 = 3;
+/// The same while the network repeats answers: one of them may be from before a move, and so may the next.
+const REST_REPEATED: Duration = Duration::from_millis(500);
+/// An answer that comes later than this is none; so long after an answer was repeated others may be.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+/// Requests that may be open at a time; of more the older ones count.
+const OPEN: usize = 8;
 /// Answers further apart say nothing of what was between them.
 const APART: Duration = Duration::from_millis(1_200);
 /// How far outside its stroke an axis may be told and be at the end of it: rounding, and what a drive at rest swings by.
@@ -22,9 +31,14 @@ const OUTSIDE: f64 = 0.002;
 #[derive(Debug, Clone, Copy)]
 struct Told {
     fraction: f64,
+    /// When it was read at the earliest.
     at: MonoTime,
-    /// In which place it has been since when.
+    /// In which place it has been, and when it was read there first, at the latest.
     since: (f64, MonoTime),
+    /// Whether it was elsewhere before.
+    moved: bool,
+    /// How many answers have found it there.
+    times: u32,
 }
 
 /// The axes of one controller.
@@ -44,15 +58,25 @@ pub(super) struct Positions {
     /// Whether it was homed, and no frame went to it since: all its axes are at 0.
     home: bool,
     by: Source,
+    /// When each block of axes was asked for that was not answered yet, oldest first. Answers do not say what they answer: each
+    /// is taken for that to the oldest request, and can be no older than that.
+    asked: [VecDeque<MonoTime>; BLOCKS],
+    /// When the newest answer was made, at the earliest.
+    answered: MonoTime,
+    /// Until when answers may be repeated.
+    repeats_until: MonoTime,
 }
 
 impl Positions {
-    pub(super) const fn new(seat: Arc<SeatType>, first_slot: usize) -> Self {
+    pub(super) fn new(seat: Arc<SeatType>, first_slot: usize) -> Self {
         let told = [None; MAX_AXES];
         Self {
             seat,
             first_slot,
             told,
+            asked: std::array::from_fn(|_| VecDeque::with_capacity(OPEN)),
+            answered: MonoTime::default(),
+            repeats_until: MonoTime::default(),
             outside: None,
             ordered: false,
             ambiguous: 0,
@@ -61,14 +85,59 @@ impl Positions {
         }
     }
 
-    /// Hears where axes are, from `first` on. A report tells of those alone that have no register: it comes unasked, past frames
-    /// that are held back on their way, while an answer comes after all that was sent before what it answers.
-    pub(super) fn hear(&mut self, first: usize, positions: &[Pulses], at: MonoTime, by: Source) {
-        for (axis, pulses) in (first..self.seat.axes).zip(positions) {
-            if by == Source::Report && axis < REGISTERS {
-                self.mind_order(axis, *pulses, by);
-                continue;
+    /// Notes that it is asked for the block of axes that begins with that register, if one does.
+    pub(super) fn on_asked(&mut self, register: u16, at: MonoTime) {
+        if let Some(first) = DP_POSITIONS.iter().position(|start| *start == register) {
+            let asked = self.open(first, at);
+            if asked.len() < OPEN {
+                asked.push_back(at);
             }
+        }
+    }
+
+    /// Notes that it is asked for all of them.
+    pub(super) fn on_all_asked(&mut self, at: MonoTime) {
+        for first in (0..self.seat.axes.min(REGISTERS)).step_by(AXES_PER_BLOCK) {
+            self.on_asked(DP_POSITIONS[first], at);
+        }
+    }
+
+    /// The requests for a block of axes to which an answer may still come.
+    fn open(&mut self, first: usize, at: MonoTime) -> &mut VecDeque<MonoTime> {
+        let asked = &mut self.asked[first / AXES_PER_BLOCK];
+        while asked.front().is_some_and(|asked| at.since(*asked) > ANSWERED_WITHIN) {
+            asked.pop_front();
+        }
+        asked
+    }
+
+    /// Hears an answer: where axes are, from `first` on. One that nobody waits for tells of no place; says whether somebody did.
+    pub(super) fn answer(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
+        let Some(made) = self.open(first, at).pop_front() else { return false };
+        self.answered = self.answered.max(made);
+        self.hear(first, positions, made, at, Source::Registers);
+        true
+    }
+
+    /// The network repeats answers: for a while each may be from before a move.
+    pub(super) fn on_repeated(&mut self, at: MonoTime) {
+        self.repeats_until = at + ANSWERED_WITHIN;
+    }
+
+    /// Hears a report: it tells of those axes alone that have no register, since it comes unasked, past frames that are held back on
+    /// their way. What comes after an answer was made after it.
+    pub(super) fn report(&mut self, positions: &[Pulses], at: MonoTime) {
+        for (axis, pulses) in positions.iter().enumerate().take(self.seat.axes.min(REGISTERS)) {
+            self.mind_order(axis, *pulses, Source::Report);
+        }
+        if let Some(others) = positions.get(REGISTERS..) {
+            self.hear(REGISTERS, others, self.answered, at, Source::Report);
+        }
+    }
+
+    /// Hears where axes were between `made` and `at`.
+    fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
+        for (axis, pulses) in (first..self.seat.axes).zip(positions) {
             self.by = by;
             let fraction = self.seat.fraction(*pulses);
             let is_outside = !(-OUTSIDE..=1.0 + OUTSIDE).contains(&fraction);
@@ -80,9 +149,13 @@ impl Positions {
             self.outside = self.outside.filter(|(other, _)| *other != axis);
             self.mind_order(axis, *pulses, by);
             let fraction = fraction.clamp(0.0, 1.0);
-            let stays = |told: Told| at.since(told.at) <= APART && (told.since.0 - fraction).abs() <= STILL;
-            let since = self.told[axis].filter(|told| stays(*told)).map_or((fraction, at), |told| told.since);
-            self.told[axis] = Some(Told { fraction, at, since });
+            let stays = |told: Told| made.since(told.at) <= APART && (told.since.0 - fraction).abs() <= STILL;
+            let before = self.told[axis];
+            let (since, moved, times) = match before {
+                Some(told) if stays(told) => (told.since, told.moved, told.times.saturating_add(1)),
+                _ => ((fraction, at), before.is_some(), 1),
+            };
+            self.told[axis] = Some(Told { fraction, at: made, since, moved, times });
         }
     }
 
@@ -128,17 +201,21 @@ impl Positions {
 
     /// The seat as it was told last; none while an axis that tells its position has not.
     pub(super) fn reading(&self, now: MonoTime) -> Option<Reading> {
-        let mut reading = Reading { pose: [0.0; MAX_AXES], slots: 0, at: now, rests: true, by: self.by };
+        let (pose, by) = ([0.0; MAX_AXES], self.by);
+        let mut reading = Reading { pose, slots: 0, at: now, rests: true, moves: false, by };
         if self.is_ambiguous() {
             return None;
         }
+        let rest = if now < self.repeats_until { REST_REPEATED } else { REST };
         for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
             let slot = self.first_slot + axis;
             match self.told[axis] {
                 Some(told) => {
                     reading.pose[slot] = told.fraction;
                     reading.at = reading.at.min(told.at);
-                    reading.rests &= told.at.since(told.since.1) >= REST;
+                    let rests = told.times >= TIMES && told.at.since(told.since.1) >= rest;
+                    reading.rests &= rests;
+                    reading.moves |= told.moved && !rests;
                 }
                 None if axis < REGISTERS => return None,
                 // There is no register for it.
@@ -151,8 +228,9 @@ impl Positions {
     }
 }
 
-/// Axes that have position registers.
-const REGISTERS: usize = 6;
+/// Axes that have position registers, and how many blocks of them.
+const REGISTERS: usize = DP_POSITIONS.len();
+const BLOCKS: usize = REGISTERS.div_ceil(AXES_PER_BLOCK);
 
 #[cfg(test)]
 mod tests {
@@ -162,25 +240,35 @@ mod tests {
         MonoTime::from_nanos(ms * 1_000_000)
     }
 
+    /// It is asked, and answers at once.
+    fn look(positions: &mut Positions, first: usize, told: &[Pulses], at: u64) {
+        for (index, block) in told.chunks(AXES_PER_BLOCK).enumerate() {
+            positions.on_asked(DP_POSITIONS[first + index * AXES_PER_BLOCK], ms(at));
+            positions.answer(first + index * AXES_PER_BLOCK, block, ms(at));
+        }
+    }
+
     fn seat(axes: usize) -> Positions {
         Positions::new(Arc::new(SeatType::bench3(axes)), 0)
     }
 
     #[test]
-    fn a_seat_rests_where_answers_over_a_tenth_of_a_second_see_it() {
+    fn a_seat_rests_where_three_answers_over_a_tenth_of_a_second_see_it() {
         let mut positions = seat(1);
         let looks = [
             (0, 30_000, false),   // the first
             (200, 32_000, false), // it moves
             (201, 32_000, false), // of the same burst
+            (202, 32_000, false),
             (401, 32_000, true),
             (601, 32_100, true),
             (801, 35_000, false),
             (5_000, 35_000, false), // what was between nobody knows
-            (5_200, 35_000, true),
+            (5_200, 35_000, false), // one of the two may be an older one
+            (5_400, 35_000, true),
         ];
         for (at, pulses, rests) in looks {
-            positions.hear(0, &[Pulses(pulses)], ms(at), Source::Registers);
+            look(&mut positions, 0, &[Pulses(pulses)], at);
             assert_eq!(positions.reading(ms(at)).map(|reading| reading.rests), Some(rests), "at {at} ms");
         }
     }
@@ -188,9 +276,9 @@ mod tests {
     #[test]
     fn a_seat_of_six_axes_is_read_once_both_halves_are_and_is_as_old_as_the_older() {
         let mut positions = seat(6);
-        positions.hear(3, &[Pulses(4), Pulses(5), Pulses(6)], ms(10), Source::Registers);
+        look(&mut positions, 3, &[Pulses(4), Pulses(5), Pulses(6)], 10);
         assert_eq!(positions.reading(ms(10)), None);
-        positions.hear(0, &[Pulses(1), Pulses(2), Pulses(3)], ms(260), Source::Registers);
+        look(&mut positions, 0, &[Pulses(1), Pulses(2), Pulses(3)], 260);
         let reading = positions.reading(ms(260)).unwrap();
         assert_eq!((reading.slots, reading.at), (0b11_1111, ms(10)));
         assert!((reading.pose[5] - 6.0 / 300_000.0).abs() < 1e-12);
@@ -199,28 +287,66 @@ mod tests {
     #[test]
     fn axes_without_a_register_are_known_from_a_report_or_right_after_homing_alone() {
         let mut positions = seat(8);
-        positions.hear(0, &[Pulses(0); 6], ms(0), Source::Registers);
+        look(&mut positions, 0, &[Pulses(0); 6], 0);
         assert_eq!(positions.reading(ms(0)).unwrap().slots, 0b11_1111);
         positions.on_homed();
-        positions.hear(0, &[Pulses(0); 6], ms(100), Source::Registers);
+        look(&mut positions, 0, &[Pulses(0); 6], 100);
         let homed = positions.reading(ms(100)).unwrap();
         assert_eq!((homed.slots, homed.by), (0xff, Source::Homing));
         positions.on_sent();
         assert_eq!(positions.reading(ms(100)), None, "frames have led them since");
-        positions.hear(0, &[Pulses(0); 6], ms(150), Source::Registers);
+        look(&mut positions, 0, &[Pulses(0); 6], 150);
         assert_eq!(positions.reading(ms(150)).unwrap().slots, 0b11_1111);
-        positions.hear(0, &[Pulses(9); 8], ms(200), Source::Report);
+        positions.report(&[Pulses(9); 8], ms(200));
         assert_eq!(positions.reading(ms(200)).unwrap().slots, 0xff);
+    }
+
+    #[test]
+    fn an_answer_is_no_older_than_the_oldest_request_that_is_open_whichever_it_answers() {
+        let mut positions = seat(1);
+        look(&mut positions, 0, &[Pulses(7)], 0);
+        positions.on_asked(DP_POSITIONS[0], ms(250)); // held back on its way
+        positions.on_asked(DP_POSITIONS[0], ms(500));
+        positions.answer(0, &[Pulses(7)], ms(501));
+        assert_eq!(positions.reading(ms(501)).unwrap().at, ms(250));
+        positions.answer(0, &[Pulses(7)], ms(502));
+        assert_eq!(positions.reading(ms(502)).unwrap().at, ms(500));
+        // One is lost: after a second nobody waits for its answer.
+        positions.on_asked(DP_POSITIONS[0], ms(600));
+        positions.on_asked(DP_POSITIONS[0], ms(1_650));
+        positions.answer(0, &[Pulses(7)], ms(1_651));
+        assert_eq!(positions.reading(ms(1_651)).unwrap().at, ms(1_650));
+    }
+
+    #[test]
+    fn an_answer_that_nobody_waits_for_tells_no_place_and_a_seat_is_looked_at_for_longer_then() {
+        let mut positions = seat(1);
+        look(&mut positions, 0, &[Pulses(7)], 0);
+        assert!(!positions.answer(0, &[Pulses(90_000)], ms(90)));
+        positions.on_repeated(ms(90));
+        assert_eq!(positions.told().unwrap()[0], Pulses(7));
+        for (at, rests) in [(200, false), (450, false), (501, true)] {
+            look(&mut positions, 0, &[Pulses(7)], at);
+            assert_eq!(positions.reading(ms(at)).unwrap().rests, rests, "at {at} ms");
+        }
+    }
+
+    #[test]
+    fn a_report_is_as_old_as_the_answer_before_it() {
+        let mut positions = seat(8);
+        look(&mut positions, 0, &[Pulses(0); 6], 100);
+        positions.report(&[Pulses(0); 8], ms(900));
+        assert_eq!(positions.reading(ms(900)).unwrap().at, ms(100));
     }
 
     #[test]
     fn a_position_outside_the_stroke_is_none_and_is_named() {
         let mut positions = seat(2);
-        positions.hear(0, &[Pulses(-20), Pulses(300_050)], ms(0), Source::Registers);
+        look(&mut positions, 0, &[Pulses(-20), Pulses(300_050)], 0);
         assert_eq!(positions.reading(ms(0)).unwrap().pose[..2], [0.0, 1.0], "rounding is not outside");
-        positions.hear(0, &[Pulses(-20_000), Pulses(7)], ms(1), Source::Registers);
+        look(&mut positions, 0, &[Pulses(-20_000), Pulses(7)], 1);
         assert_eq!((positions.reading(ms(1)), positions.outside()), (None, Some((0, Pulses(-20_000)))));
-        positions.hear(0, &[Pulses(0)], ms(2), Source::Registers);
+        look(&mut positions, 0, &[Pulses(0)], 2);
         assert_eq!(positions.outside(), None);
     }
 
@@ -230,23 +356,23 @@ mod tests {
         // 1 pulse, or 32.8 mm.
         let ambiguous = || {
             let mut positions = seat(2);
-            positions.hear(0, &[Pulses(1), Pulses(0)], ms(0), Source::Registers);
+            look(&mut positions, 0, &[Pulses(1), Pulses(0)], 0);
             assert!(positions.reading(ms(0)).is_none() && positions.is_ambiguous());
             positions
         };
         let mut told = ambiguous();
-        told.hear(0, &[Pulses(1), Pulses(45_000)], ms(1), Source::Registers);
-        told.hear(0, &[Pulses(1), Pulses(0)], ms(2), Source::Registers);
+        look(&mut told, 0, &[Pulses(1), Pulses(45_000)], 1);
+        look(&mut told, 0, &[Pulses(1), Pulses(0)], 2);
         assert!(told.reading(ms(2)).is_some(), "its other axis has told");
         let mut reported = ambiguous();
-        reported.hear(0, &[Pulses(1), Pulses(0)], ms(1), Source::Report);
+        reported.report(&[Pulses(1), Pulses(0)], ms(1));
         assert!(reported.reading(ms(1)).is_some());
         let mut homed = ambiguous();
         homed.on_homed();
-        homed.hear(0, &[Pulses(1), Pulses(0)], ms(1), Source::Registers);
+        look(&mut homed, 0, &[Pulses(1), Pulses(0)], 1);
         assert!(homed.reading(ms(1)).is_some());
         let mut at_zero = seat(2);
-        at_zero.hear(0, &[Pulses(0), Pulses(0)], ms(0), Source::Registers);
+        look(&mut at_zero, 0, &[Pulses(0), Pulses(0)], 0);
         assert!(at_zero.reading(ms(0)).is_some(), "both orders say the same");
     }
 }

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Identity, Sighting};
-use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
+use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::{Delivery, Sender};
 use crate::observe::{Look, StopSign};
 use crate::wire::{
-    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, PerAxis, ReadRequest, RegisterReply, ReplyCode, Words,
-    WriteRequest, position_reads, positions,
+    Access, Code, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, Words, WriteRequest,
+    position_reads,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -57,8 +57,6 @@ pub(super) struct Looker {
     counting: bool,
     count: Option<u16>,
     seen: Seen,
-    /// The positions of the last answer, from which axis on, until they are taken.
-    told: Option<(usize, PerAxis<Pulses>)>,
 }
 
 /// What it has told since it was asked last.
@@ -91,7 +89,6 @@ impl Looker {
             seat: Arc::clone(&controller.seat),
             first_slot: controller.first_slot(),
             park: lane.window.park(),
-            told: None,
             estop_inputs: controller.estop_inputs,
             calm: 0,
             held: None,
@@ -196,23 +193,15 @@ impl Looker {
             (MONITORS, PACKETS) => self.seen.packets = word(0),
             (MONITORS, INPUTS) => self.seen.inputs = word(0),
             (MONITORS, RESET) => self.seen.homed = word(0).map(|state| state == RESET_DONE),
-            (MONITORS, start) => return self.hear_positions(start, &reply),
+            (MONITORS, start) => {
+                let Some(first) = DP_POSITIONS.iter().position(|register| *register == start) else {
+                    return false;
+                };
+                self.seen.axes |= ((1 << (reply.num / 2)) - 1) << first;
+            }
             _ => return false,
         }
         true
-    }
-
-    fn hear_positions(&mut self, start: u16, reply: &RegisterReply<'_>) -> bool {
-        let Some(first) = DP_POSITIONS.iter().position(|register| *register == start) else { return false };
-        let told = positions(reply.values(self.dialect), self.dialect);
-        self.seen.axes |= ((1 << told.len()) - 1) << first;
-        self.told = Some((first, told));
-        true
-    }
-
-    /// The positions that the answer told which was just heard, and the first of their axes.
-    pub(super) const fn take_positions(&mut self) -> Option<(usize, PerAxis<Pulses>)> {
-        self.told.take()
     }
 
     /// Hears its packet counter, where that alone was asked for.
@@ -326,6 +315,7 @@ mod tests {
     use crate::config::from_to_args;
     use crate::cue::{Source, read};
     use crate::fanout::{Manner, lanes};
+    use crate::motion::Pulses;
     use crate::timeline::Timeline;
     use crate::wire::position_words;
 
@@ -367,10 +357,8 @@ mod tests {
         assert!(looker.take().is_none(), "its inputs are to come");
         look(&mut looker, ReplyCode::Running, 0);
         let sighting = looker.take().unwrap();
-        let (first, told) = looker.take_positions().unwrap();
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 1 };
         assert_eq!(sighting, Sighting { identity, error: 0, alarm: 0, packets: Some(77), homed: true });
-        assert_eq!((first, &told[..]), (0, &[Pulses(75_000)][..]));
         assert!(looker.take().is_none());
     }
 

@@ -14,7 +14,6 @@ use super::positions::Positions;
 use super::sight::Looker;
 use super::standby::{Seen, Standby};
 use super::table::{Row, Turns};
-use crate::belief::Source;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Change, HealthState, HealthTable, Notice};
@@ -198,9 +197,6 @@ impl Watch {
         if let Some(packets) = looker.take_count() {
             self.health.on_count(controller, packets);
         }
-        if let Some((first, positions)) = looker.take_positions() {
-            self.on_positions(controller, first, &positions, at, Source::Registers);
-        }
         if is_answer || awaited {
             self.health.on_answer(controller, at);
         }
@@ -211,10 +207,19 @@ impl Watch {
         is_answer || awaited
     }
 
-    /// Where some axes of a seat are: what is known by now of all of them is for the tick thread, too.
-    fn on_positions(&mut self, controller: usize, first: usize, told: &[Pulses], at: MonoTime, by: Source) {
-        let positions = &mut self.positions[controller];
-        positions.hear(first, told, at, by);
+    /// A seat answers where some of its axes are. What nobody asked for here may be the answer to what the control plane asked;
+    /// else it was repeated on its way.
+    fn on_answer(&mut self, controller: usize, first: usize, told: &[Pulses], at: MonoTime) {
+        if self.positions[controller].answer(first, told, at) {
+            self.on_positions(controller, at);
+        } else if !self.is_asked_otherwise() {
+            self.positions[controller].on_repeated(at);
+        }
+    }
+
+    /// What is known by now of where a seat is, is for the tick thread, too.
+    fn on_positions(&mut self, controller: usize, at: MonoTime) {
+        let positions = &self.positions[controller];
         self.health.on_outside(controller, positions.outside());
         self.health.on_ambiguous(controller, positions.is_ambiguous());
         if let (Some(reading), Some(evidence)) = (positions.reading(at), self.live.evidence(controller)) {
@@ -270,7 +275,7 @@ impl Watch {
         at: MonoTime,
     ) -> Option<PerAxis<Pulses>> {
         let (first, told) = self.beats.hear(controller, octets)?;
-        self.on_positions(controller, first, &told, at, Source::Registers);
+        self.on_answer(controller, first, &told, at);
         self.health.on_status(controller, at);
         self.mind_rest(controller, at);
         self.positions[controller].told()
@@ -337,7 +342,8 @@ impl Watch {
             if let Some(told) = state.measured.filter(|told| told.at == at && at > self.reported[controller])
             {
                 self.reported[controller] = at;
-                self.on_positions(controller, 0, &told.value, at, Source::Report);
+                self.positions[controller].report(&told.value, at);
+                self.on_positions(controller, at);
             }
         }
         self.look_anew(now);
@@ -368,6 +374,7 @@ impl Watch {
             Notice::Read(controller) => {
                 self.darken(controller);
                 let datagrams = self.lookers[controller].ask(controller, &self.sender);
+                self.positions[controller].on_all_asked(self.looked);
                 self.health.on_read_sent(controller, datagrams);
             }
             Notice::Group(change) => {
@@ -482,6 +489,7 @@ impl Watch {
         for controller in 0..self.lookers.len() {
             if self.stands(controller).may_move() {
                 let sent = self.beats.send_all(controller, &self.sender);
+                self.positions[controller].on_all_asked(self.looked);
                 self.health.on_other_sent(controller, sent);
             }
         }
@@ -499,7 +507,10 @@ impl Watch {
             return;
         }
         for controller in 0..self.lookers.len() {
-            if self.stands(controller).may_move() && self.beats.send(controller, &self.sender) {
+            if self.stands(controller).may_move()
+                && let Some(register) = self.beats.send(controller, &self.sender)
+            {
+                self.positions[controller].on_asked(register, now);
                 self.health.on_beat_sent(controller, now);
             }
         }

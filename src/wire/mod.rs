@@ -26,7 +26,9 @@ pub use header::{Code, Dialect, Header, ReplyCode};
 pub use imax::{ImaxMotion, ImaxRegisters};
 pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_slots, motion_len};
 pub use per_axis::PerAxis;
-pub use position::{DP_INPUTS, DP_POSITIONS, position, position_reads, position_words, positions};
+pub use position::{
+    AXES_PER_BLOCK, DP_INPUTS, DP_POSITIONS, position, position_reads, position_words, positions,
+};
 pub use register::{Access, ReadRequest, RegisterReply, Space, WriteRequest};
 pub use report::{DPFE, Report};
 pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};

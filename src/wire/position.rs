@@ -11,7 +11,7 @@ pub const DP_POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 pub const DP_INPUTS: u16 = 0x5e;
 
 /// Axes of one block of position registers.
-const AXES_PER_BLOCK: usize = 3;
+pub const AXES_PER_BLOCK: usize = 3;
 
 /// The reads that tell the position of axes 1 to `axes`: DP06.. for axes 1 to 3, and DP21.. for 4 to 6 where there are
 /// as many. The words of each answer go to [`positions`].

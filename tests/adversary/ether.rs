@@ -149,7 +149,13 @@ impl Ether {
     pub(crate) fn turns(&self, seat: usize, weather: Weather, ms: u64) {
         let now = self.ns();
         let line = &mut self.world().lines[seat];
-        line.weather.retain(|(until, _)| *until > now);
+        // What comes in another order by less than is admitted, and is late or lost besides, may be so by more.
+        if weather == Weather::Shuffled && line.there.back().is_some_and(|last| last.at > now + MS) {
+            return;
+        }
+        line.weather.retain(|(until, other)| {
+            *until > now && *other != Weather::Shuffled && weather != Weather::Shuffled
+        });
         line.weather.push((now + ms * MS, weather));
     }
 }

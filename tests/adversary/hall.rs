@@ -376,7 +376,11 @@ impl Hall<'_, '_> {
             Thread::Planner => &[2],
             Thread::All => &[0, 1, 2],
         };
-        which.iter().for_each(|index| self.still[*index] = until);
+        which.iter().for_each(|index| self.still[*index] = self.still[*index].max(until));
+        if matches!(thread, Thread::Acks | Thread::All) {
+            let now = self.ether.ns();
+            self.ether.world().lines.iter_mut().for_each(|line| line.seat.untold = (now, until));
+        }
         if thread == Thread::All && ms > ASLEEP_MS && matches!(self.state, State::Playing(_)) {
             self.ether.world().asked = false;
         }

@@ -52,8 +52,10 @@ impl fmt::Display for Breach {
 }
 
 /// How far apart two frames may have been sent that are executed one after the other, where what was in between is admitted.
-pub(crate) fn admitted_ms(period_ms: f64, jitter_ms: f64) -> f64 {
-    ADMITTED_MS + 2.0 * period_ms + jitter_ms
+/// It is twice as much where nobody told the hall which frames had come.
+pub(crate) fn admitted_ms(period_ms: f64, jitter_ms: f64, is_untold: bool) -> f64 {
+    let lost = if is_untold { 2.0 * ADMITTED_MS } else { ADMITTED_MS };
+    lost + 2.0 * period_ms + jitter_ms
 }
 
 /// One move of one frame, as the seat executes it.
@@ -67,12 +69,10 @@ pub(crate) struct Executed {
     pub(crate) time_ms: f64,
     /// From the sending of the frame that was executed before to that of this one.
     pub(crate) apart_ms: f64,
-    /// From one frame to the next, as the hall sends.
-    pub(crate) period_ms: f64,
     /// Whether the network brought frames closer together than they were sent.
     pub(crate) bunched: bool,
-    /// How much later than they were sent datagrams may be noticed.
-    pub(crate) jitter_ms: f64,
+    /// How far apart they may have been sent.
+    pub(crate) admitted_ms: f64,
     /// Whether somebody had asked for motion when it was sent.
     pub(crate) asked: bool,
 }
@@ -80,7 +80,7 @@ pub(crate) struct Executed {
 impl Executed {
     /// The first axis that goes too far, how far, mm, and in which way.
     pub(crate) fn verdict(&self, mm_s: f64) -> Option<(usize, f64, How)> {
-        let admitted = self.apart_ms <= admitted_ms(self.period_ms, self.jitter_ms);
+        let admitted = self.apart_ms <= self.admitted_ms;
         // What was lost for a moment is made up for in one frame; what came in a heap is executed in haste, where the seat is
         // set to.
         let time = if self.bunched { self.time_ms } else { self.ms };

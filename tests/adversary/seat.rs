@@ -23,6 +23,8 @@ const JOG_MM_S: f64 = 40.0;
 const LED: u64 = 150 * MS;
 /// How long frames count as bunched after two of them came closer together than they were sent.
 const BUNCHED: u64 = 500 * MS;
+/// What README admits that may be lost.
+const ADMITTED: u64 = 50 * MS;
 /// Registers of the axes' positions.
 const POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 
@@ -97,6 +99,10 @@ pub(crate) struct Seat {
     executed: Option<u64>,
     came: Option<(u64, u64)>,
     bunched_until: u64,
+    /// Whether its queue has not run empty since frames came bunched.
+    heaped: bool,
+    /// From when to when nobody told the hall which frames had come.
+    pub(crate) untold: (u64, u64),
     packets: u16,
     pub(crate) homed: bool,
     dead_until: u64,
@@ -126,6 +132,8 @@ impl Seat {
             executed: None,
             came: None,
             bunched_until: 0,
+            heaped: false,
+            untold: (0, 0),
             packets: 17,
             homed: true,
             dead_until: 0,
@@ -238,7 +246,7 @@ impl Seat {
     fn begin_next(&mut self, now: u64) {
         let waiting = self.queue.len();
         let Some(command) = self.queue.pop_front() else { return };
-        let bunched = now < self.bunched_until;
+        let bunched = self.heaped || now < self.bunched_until;
         let hurries = self.settings.hurry && waiting > PATIENT;
         self.hurried += u32::from(hurries && !bunched);
         let takes = (if hurries { command.time_ns / 2 } else { command.time_ns }).max(1);
@@ -252,9 +260,8 @@ impl Seat {
             ms: takes as f64 / MS as f64,
             time_ms: command.time_ns as f64 / MS as f64,
             apart_ms: self.apart_ms(&command),
-            period_ms: self.settings.period_ms,
             bunched: bunched || self.settings.jitter_ms > 0.0,
-            jitter_ms: self.settings.jitter_ms,
+            admitted_ms: self.admitted_ms(&command),
             asked: command.asked,
         };
         self.judge(&executed, command.number, now);
@@ -265,13 +272,20 @@ impl Seat {
     /// From the sending of the frame after which this one comes: of that which was executed before or, where that is long ago,
     /// of the first of a motion that was lost since.
     fn apart_ms(&self, command: &Command) -> f64 {
-        let Settings { period_ms, jitter_ms, .. } = self.settings;
         let ms = |ns: u64| ns as f64 / MS as f64;
         let of_executed = self.executed.map_or(f64::INFINITY, |sent| ms(sent.abs_diff(command.sent_ns)));
-        if of_executed <= admitted_ms(period_ms, jitter_ms) {
+        if of_executed <= self.admitted_ms(command) {
             return of_executed;
         }
-        ms(command.sent_ns - command.lost_since) + period_ms
+        ms(command.sent_ns - command.lost_since) + self.settings.period_ms
+    }
+
+    /// How far apart it and the frame before may have been sent.
+    fn admitted_ms(&self, command: &Command) -> f64 {
+        let Settings { period_ms, jitter_ms, .. } = self.settings;
+        let (from, until) = self.untold;
+        let is_untold = (from..until + ADMITTED).contains(&command.sent_ns);
+        admitted_ms(period_ms, jitter_ms, is_untold)
     }
 
     fn judge(&mut self, executed: &Executed, frame: u32, at_ns: u64) {
@@ -322,9 +336,10 @@ impl Seat {
         if let Some((came, sent_before)) = self.came.replace((at, sent)) {
             let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
             if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
-                self.bunched_until = at + BUNCHED;
+                (self.bunched_until, self.heaped) = (at + BUNCHED, true);
             }
         }
+        self.heaped &= self.moving.is_some() || at < self.bunched_until;
         if self.jogged {
             self.hold(at);
         }
@@ -346,7 +361,7 @@ impl Seat {
         });
         if self.moving.is_none() {
             self.begin_next(at);
-        } else if at >= self.bunched_until {
+        } else if !self.heaped {
             let ahead: u64 = self.queue.iter().rev().skip(1).map(|command| command.time_ns).sum();
             let end = self.moving.map_or(at, |current| current.end);
             self.waited_ns = self.waited_ns.max(ahead + end.saturating_sub(at));
