@@ -233,7 +233,7 @@ fn damage_is_named_with_its_place() {
     assert_eq!(told(&file), "byte 24: a packet of 4294967295 bytes; at most 262144 are possible");
     let start = [section(BIG), interface(BIG, 0, &[])].concat();
     let stray = [start.clone(), enhanced(BIG, 3, [0, 0], b"")].concat();
-    assert_eq!(told(&stray), "byte 48: a packet of interface 3, of 1 described");
+    assert_eq!(told(&stray), "byte 48: packet refers to interface 3; 1 described");
     let odd = [start.clone(), put(BIG, &[6, 33])].concat();
     assert_eq!(told(&odd), "byte 48: a block of 33 bytes, where only multiples of 4 are possible");
     let mut liar = [start.clone(), enhanced(BIG, 0, [0, 0], b"")].concat();

@@ -243,7 +243,7 @@ mod tests {
 message    motion with vibration, relative time
 function   0x1901
 direction  host to controller
-bytes     46
+bytes      46
 accept     ffff: every station
 reply      0000: nobody answers
 channel    0: 3 axes
