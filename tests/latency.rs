@@ -100,7 +100,7 @@ fn a_seat_away_from_park_is_held_where_it_stands_by_every_frame() {
     send_to(&sim.addresses[0], PLACES);
     let report = latency_to(&[&sim.addresses[0]], &[]).report_of(0);
     let sent = count(&report["report"]["controllers"][0]["sent"]);
-    assert!(sent > 0 && count(&report["report"]["controllers"][0]["homing"]) == 0, "{report}");
+    assert!(sent > 0 && count(&report["report"]["controllers"][0]["park_frames"]) == 0, "{report}");
     let seen = sim.end();
     assert_eq!(seen.motion() as u64, 1 + sent);
     for row in &seen.rows[1..] {

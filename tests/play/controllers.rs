@@ -52,7 +52,7 @@ fn a_mute_controller_is_homed_and_unavailable() {
     let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]).report_of(69);
     let one = first(&report);
     assert_eq!(
-        (&one["homing"], &one["lost"], &one["port_closed"]),
+        (&one["park_frames"], &one["lost"], &one["port_closed"]),
         (&1.into(), &one["sent"], &0.into()),
         "{one}"
     );

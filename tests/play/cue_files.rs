@@ -165,7 +165,7 @@ fn a_seat_that_is_not_asked_is_brought_to_its_own_park_pose_and_told_where_that_
     let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
     let run = kinocue(&["play", cue, "--config", config, "--json", "--no-acks"]);
     let report = run.report_of(0);
-    let slow = [0, 1].map(|index| report["controllers"][index]["homing"].as_u64());
+    let slow = [0, 1].map(|index| report["controllers"][index]["park_frames"].as_u64());
     assert_eq!(slow, [Some(1); 2], "where they are nobody asked");
     let notes: Vec<&str> = run.stderr.lines().filter(|line| line.contains("PA0b")).collect();
     assert!(matches!(notes[..], [note] if note.contains("A1") && note.contains("200 mm")), "{notes:?}");

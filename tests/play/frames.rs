@@ -72,7 +72,7 @@ fn ten_and_twelve_axes_go_in_one_frame_each_to_seats_that_are_homed_first() {
         assert_eq!(seen.rows[0].commanded.len(), axes);
         assert_eq!(seen.rows[0].time_ms, 3000, "axes past the sixth cannot tell where they are");
     }
-    assert_eq!(report["controllers"][0]["homing"], 1);
+    assert_eq!(report["controllers"][0]["park_frames"], 1);
 }
 
 #[test]
