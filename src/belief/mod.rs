@@ -219,8 +219,8 @@ impl Belief {
     }
 
     /// Takes a reading of where the seat is. One from before the last frame was over says nothing. One that finds it where it
-    /// was left confirms that; else it has to have found the seat at rest, or nobody knows any more where it is. Of axes that a
-    /// reading does not tell, as much is known as before.
+    /// was left confirms that; else it has to have found the seat at rest, or nobody knows any more where it is. Axes that a
+    /// reading does not tell are where they were if those that it tells are.
     fn measure(&mut self, reading: &Reading, now: MonoTime) {
         if self.busy_until > MonoTime::default() && reading.at < self.busy_until + SETTLE {
             return;
@@ -238,7 +238,7 @@ impl Belief {
         }
         let mut pose = *self.spans.last();
         (0..MAX_AXES).filter(|slot| told >> slot & 1 == 1).for_each(|slot| pose[slot] = reading.pose[slot]);
-        self.within = told | if is_a_point { self.within } else { 0 };
+        self.within = told | if agrees { self.within } else { 0 };
         self.spans = Spans::at(pose);
         self.known = Known::Measured(reading.at, reading.by);
         self.gap &= self.within != self.own;

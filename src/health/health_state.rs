@@ -106,6 +106,13 @@ pub enum Why {
     Refuses(usize),
     /// This controller answers with registers of 32 bits.
     Wide(usize),
+    /// This controller drives more axes than its seat type has (PA02): frames would lead those, too.
+    MoreAxes {
+        /// Which.
+        controller: usize,
+        /// How many it drives.
+        drives: u16,
+    },
     /// This controller has rebooted: its packet counter began anew.
     Rebooted(usize),
     /// This controller got more datagrams than were sent from here, and more than it can have got since a reboot.
@@ -132,6 +139,7 @@ impl Why {
             | Self::Unsteady(controller)
             | Self::Unread(controller)
             | Self::Ambiguous(controller)
+            | Self::MoreAxes { controller, .. }
             | Self::Outside { controller, .. }
             | Self::EmergencyStop(controller)
             | Self::HeldUntilReset(controller)

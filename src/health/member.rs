@@ -261,6 +261,11 @@ impl Member {
         }
     }
 
+    /// It drives more axes than its seat type has.
+    pub(super) fn on_more_axes(&mut self, drives: u16) {
+        self.ail(Why::MoreAxes { controller: self.controller, drives });
+    }
+
     /// It answers with registers that nobody here can read.
     pub(super) fn on_wide_registers(&mut self) {
         self.first_error.get_or_insert(Why::Wide(self.controller));

@@ -178,6 +178,11 @@ impl HealthTable {
         self.members[controller].on_sighting(sighting, at);
     }
 
+    /// A controller drives more axes than its seat type has, and frames have places for them.
+    pub fn on_more_axes(&mut self, controller: usize, drives: u16) {
+        self.members[controller].on_more_axes(drives);
+    }
+
     /// The packet counter of a controller, which was read while frames go there. To be told before the sending of all that it
     /// may have counted was.
     pub fn on_count(&mut self, controller: usize, packets: u16) {

@@ -58,6 +58,9 @@ impl Why {
                 "this IMAX answers as its manual has it and no other that is known: take it out, and send a capture \
                  (`kinocue decode --dialect imax`) to whoever looks after this program",
             ),
+            Self::MoreAxes { .. } => Some(
+                "set PA02 to the axes of the seat, or give the seat a type with as many; with the seats parked or stopped, clear",
+            ),
             _ => None,
         }
     }
@@ -103,6 +106,9 @@ impl fmt::Display for Why {
                 return write!(f, "it reports that something is wrong (0x1001): DP{register:02x} is {value}");
             }
             Self::Refuses(_) => "it refuses frames",
+            Self::MoreAxes { drives, .. } => {
+                return write!(f, "PA02 = {drives}: it drives more axes than its seat type has, and frames would lead them");
+            }
             Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
             Self::OtherMaster(_) => {

@@ -55,7 +55,7 @@ pub(super) struct Positions {
     ordered: bool,
     /// The axes whose last position would be another one inside the stroke in the other order, a bit each.
     ambiguous: u16,
-    /// Whether it was homed, and no frame went to it since: all its axes are at 0.
+    /// Whether it was homed, no frame went to it since, and none was found elsewhere: all its axes are at 0.
     home: bool,
     by: Source,
     /// When each block of axes was asked for that was not answered yet, oldest first. Answers do not say what they answer: each
@@ -128,7 +128,7 @@ impl Positions {
     /// their way. What comes after an answer was made after it.
     pub(super) fn report(&mut self, positions: &[Pulses], at: MonoTime) {
         for (axis, pulses) in positions.iter().enumerate().take(self.seat.axes.min(REGISTERS)) {
-            self.mind_order(axis, *pulses, Source::Report);
+            self.hold_against(axis, *pulses);
         }
         if let Some(others) = positions.get(REGISTERS..) {
             self.hear(REGISTERS, others, self.answered, at, Source::Report);
@@ -147,8 +147,11 @@ impl Positions {
                 continue;
             }
             self.outside = self.outside.filter(|(other, _)| *other != axis);
-            self.mind_order(axis, *pulses, by);
+            if by == Source::Registers {
+                self.mind_order(axis, *pulses);
+            }
             let fraction = fraction.clamp(0.0, 1.0);
+            self.home &= fraction <= STILL;
             let stays = |told: Told| made.since(told.at) <= APART && (told.since.0 - fraction).abs() <= STILL;
             let before = self.told[axis];
             let (since, moved, times) = match before {
@@ -159,16 +162,24 @@ impl Positions {
         }
     }
 
-    /// A position that only its own order puts inside the stroke settles the order for the whole controller; so does a report,
-    /// which has no words, and a seat that is known to be at 0.
-    fn mind_order(&mut self, axis: usize, pulses: Pulses, by: Source) {
-        let other = Pulses(pulses.0.cast_unsigned().rotate_left(16).cast_signed());
-        let stroke = self.seat.stroke_pulses();
-        let is_open = by == Source::Registers && other != pulses && in_stroke(other, stroke);
+    /// A position that only its own order puts inside the stroke settles the order for the whole controller; so does a seat that is
+    /// known to be at 0.
+    fn mind_order(&mut self, axis: usize, pulses: Pulses) {
+        let other = other_order(pulses);
+        let is_open = other != pulses && in_stroke(other, self.seat.stroke_pulses());
         let bit = 1 << axis;
         self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
         let near_zero = self.home && pulses.0.unsigned_abs() < 1 << 15;
-        self.ordered |= by == Source::Report || near_zero || (other != pulses && !is_open);
+        self.ordered |= near_zero || (other != pulses && !is_open);
+    }
+
+    /// A report has no words: one that tells the place that the registers told, and not what they would tell in the other order,
+    /// settles it as well.
+    fn hold_against(&mut self, axis: usize, reported: Pulses) {
+        let Some(told) = self.told[axis] else { return };
+        let told = self.seat.pulses(told.fraction);
+        let apart = |one: Pulses| (self.seat.fraction(one) - self.seat.fraction(reported)).abs();
+        self.ordered |= apart(told) <= STILL && apart(other_order(told)) > STILL;
     }
 
     /// Whether it tells two places for some axis, and nothing says which of them is true.
@@ -226,6 +237,11 @@ impl Positions {
         }
         Some(reading)
     }
+}
+
+/// The position that the same two words tell in the other order.
+const fn other_order(pulses: Pulses) -> Pulses {
+    Pulses(pulses.0.cast_unsigned().rotate_left(16).cast_signed())
 }
 
 /// Axes that have position registers, and how many blocks of them.
@@ -367,6 +383,13 @@ mod tests {
         let mut reported = ambiguous();
         reported.report(&[Pulses(1), Pulses(0)], ms(1));
         assert!(reported.reading(ms(1)).is_some());
+        let mut reversed = ambiguous();
+        reversed.report(&[Pulses(1 << 16), Pulses(0)], ms(1));
+        look(&mut reversed, 0, &[Pulses(1), Pulses(0)], 2);
+        assert!(
+            reversed.reading(ms(2)).is_none(),
+            "the report says that the registers come the other way round"
+        );
         let mut homed = ambiguous();
         homed.on_homed();
         look(&mut homed, 0, &[Pulses(1), Pulses(0)], 1);

@@ -11,7 +11,7 @@ use crate::net::{Delivery, Sender};
 use crate::observe::{Look, StopSign};
 use crate::wire::{
     Access, Code, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, Words, WriteRequest,
-    position_reads,
+    motion_channel_and_slots, position_reads,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -47,6 +47,8 @@ pub(super) struct Looker {
     /// The place of its first own axis in a frame.
     first_slot: usize,
     park: Pose,
+    /// Axes for which its frames have places.
+    places: usize,
     /// Inputs of which any one means an emergency stop.
     estop_inputs: u16,
     /// Looks in a row without a sign of an emergency stop.
@@ -89,6 +91,7 @@ impl Looker {
             seat: Arc::clone(&controller.seat),
             first_slot: controller.first_slot(),
             park: lane.window.park(),
+            places: motion_channel_and_slots(lane.window.slots().len()).1,
             estop_inputs: controller.estop_inputs,
             calm: 0,
             held: None,
@@ -231,6 +234,11 @@ impl Looker {
         };
         let identity = Identity { version, minor_version, work_mode, axes: of_frame };
         Some(Sighting { identity, error, alarm, packets, homed })
+    }
+
+    /// Whether frames would lead axes of a controller that its seat type does not have: it takes as many as it drives (PA02).
+    pub(super) fn leads_more_axes(&self, drives: u16) -> bool {
+        usize::from(drives).min(self.places - self.first_slot) > self.seat.axes
     }
 
     /// What it reads that tells of an emergency stop, each by its first register: by the reply code, or by the inputs.
@@ -493,6 +501,15 @@ mod tests {
         let mut looker = Looker { estop_inputs: 1, ..looker() };
         let looks = [0, 0, 1, 0].map(|inputs| look(&mut looker, ReplyCode::Running, inputs));
         assert_eq!(looks, [Unsure, Over, Asked, Unsure]);
+    }
+
+    #[test]
+    fn axes_that_a_controller_drives_beside_those_of_its_seat_are_led_where_its_frames_have_places_for_them()
+    {
+        let looker = looker(); // one axis, in frames of three
+        assert_eq!([1, 2, 3, 12].map(|drives| looker.leads_more_axes(drives)), [false, true, true, true]);
+        let looker = Looker { places: 1, ..looker };
+        assert!(!looker.leads_more_axes(12));
     }
 
     #[test]

@@ -233,6 +233,9 @@ impl Watch {
         let Some(reading) = self.positions[controller].reading(at) else { return };
         let looker = &mut self.lookers[controller];
         let Some(sighting) = looker.take() else { return };
+        if looker.leads_more_axes(sighting.identity.axes) {
+            self.health.on_more_axes(controller, sighting.identity.axes);
+        }
         if reading.rests || !standing.is_looked_at() {
             self.health.on_sighting(controller, &sighting, at);
             if let Some(standby) = &mut self.standby {

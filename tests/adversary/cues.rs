@@ -7,9 +7,10 @@ use kinocue::app::staged::headroom;
 use kinocue::config::{Config, LossPolicy, from_to_args};
 use kinocue::cue::{self, Source};
 use kinocue::engine::Headroom;
+use kinocue::motion::Pose;
 use kinocue::time::Rate;
 use kinocue::timeline::Timeline;
-use kinocue::wire::Timing;
+use kinocue::wire::{Dialect, Timing};
 
 /// Seats of a hall, how fast it sends, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,9 +19,26 @@ pub(crate) struct Kind {
     pub(crate) hz: f64,
     pub(crate) timing: Timing,
     pub(crate) policy: LossPolicy,
+    pub(crate) dialect: Dialect,
+    /// The most axes of a seat that the hall drives.
+    drives: usize,
+    /// Where all axes rest, of the stroke.
+    park: f64,
+    /// How far the cues go, of what they do otherwise.
+    far: f64,
 }
 
-const PLAIN: Kind = Kind { axes: &[3], hz: 100.0, timing: Timing::Relative, policy: LossPolicy::Continue };
+const PLAIN: Kind = Kind {
+    axes: &[3],
+    hz: 100.0,
+    timing: Timing::Relative,
+    policy: LossPolicy::Continue,
+    dialect: Dialect::Smc,
+    drives: 12,
+    park: 0.0,
+    far: 1.0,
+};
+const MBOX: Kind = Kind { dialect: Dialect::Mbox, ..PLAIN };
 
 /// Every kind that there is.
 pub(crate) const KINDS: [Kind; 8] = [
@@ -32,6 +50,53 @@ pub(crate) const KINDS: [Kind; 8] = [
     Kind { axes: &[3], hz: 200.0, ..PLAIN },
     Kind { axes: &[3, 3], hz: 50.0, policy: LossPolicy::Park, ..PLAIN },
     Kind { axes: &[1], hz: 1_000.0, ..PLAIN },
+];
+
+/// Halls of IMAX and MBOX controllers.
+pub(crate) const MBOXES: [Kind; 5] = [
+    MBOX,
+    Kind { axes: &[6], ..MBOX },
+    Kind { axes: &[3, 3], hz: 50.0, ..MBOX },
+    Kind { axes: &[6], timing: Timing::Absolute, hz: 50.0, ..MBOX },
+    Kind { axes: &[3], hz: 200.0, policy: LossPolicy::Park, ..MBOX },
+];
+
+const HIGH: Kind = Kind { park: 0.3, far: 0.5, ..PLAIN };
+
+/// What configurations the same seats may have, one after the other; what a hall does not drive has no place in its frames.
+pub(crate) const RELOADED: [[Kind; 4]; 4] = [
+    [
+        PLAIN,
+        HIGH,
+        Kind { hz: 50.0, far: 0.7, ..PLAIN },
+        Kind { hz: 200.0, timing: Timing::Absolute, park: 0.1, ..PLAIN },
+    ],
+    [
+        Kind { axes: &[6], ..PLAIN },
+        Kind { axes: &[6], drives: 3, ..HIGH },
+        Kind { axes: &[6], hz: 50.0, far: 0.7, ..PLAIN },
+        Kind { axes: &[6], timing: Timing::Absolute, park: 0.5, far: 0.5, ..PLAIN },
+    ],
+    [
+        Kind { axes: &[8], hz: 50.0, ..PLAIN },
+        Kind { axes: &[8], drives: 6, ..HIGH },
+        Kind { axes: &[8], drives: 3, ..PLAIN },
+        Kind { axes: &[8], park: 0.2, far: 0.5, ..PLAIN },
+    ],
+    [
+        Kind { axes: &[3, 6], hz: 50.0, ..PLAIN },
+        Kind { axes: &[3, 6], drives: 3, ..HIGH },
+        Kind { axes: &[3, 6], hz: 200.0, policy: LossPolicy::Park, ..PLAIN },
+        Kind { axes: &[3, 6], park: 0.2, far: 0.5, ..PLAIN },
+    ],
+];
+
+/// The same of halls that drive fewer axes than their seats have, by frames that have places for more.
+pub(crate) const FEWER: [[Kind; 2]; 4] = [
+    [PLAIN, Kind { drives: 1, hz: 50.0, ..PLAIN }],
+    [Kind { axes: &[6], ..PLAIN }, Kind { axes: &[6], drives: 4, ..HIGH }],
+    [Kind { axes: &[6], timing: Timing::Absolute, ..PLAIN }, Kind { axes: &[6], drives: 5, ..PLAIN }],
+    [Kind { axes: &[8], hz: 50.0, ..PLAIN }, Kind { axes: &[8], drives: 7, ..HIGH }],
 ];
 
 /// A cue that is ready to be staged.
@@ -50,30 +115,45 @@ impl Kind {
     }
 
     fn config(&self) -> Config {
-        let to = |(index, axes): (usize, &usize)| format!("127.0.1.{}:7408,axes={axes}", index + 1);
+        let dialect = if self.dialect == Dialect::Mbox { ",dialect=mbox" } else { "" };
+        let to = |(index, axes): (usize, &usize)| {
+            let driven = self.drives.min(*axes);
+            format!("127.0.1.{}:7408,axes={driven}{dialect}", index + 1)
+        };
         let tos: Vec<String> = self.axes.iter().enumerate().map(to).collect();
         let mut config = from_to_args(&tos, &[], self.most()).expect("the addresses are sound");
         config.show.rate_hz = self.hz;
         config.show.timing = self.timing;
         config.show.loss_policy = self.policy;
+        for controller in &mut config.controllers {
+            let seat = Arc::make_mut(&mut controller.seat);
+            let rests: Pose = std::array::from_fn(|axis| if axis < seat.axes { self.park } else { 0.0 });
+            (seat.park, seat.neutral) = (rests, rests);
+            // Its replies tell nothing of an emergency stop.
+            controller.estop_inputs = u16::from(self.dialect == Dialect::Mbox);
+        }
+        config.seats = config.controllers.iter().map(|controller| Arc::clone(&controller.seat)).collect();
         config
     }
 
     fn most(&self) -> usize {
-        self.axes.iter().copied().max().unwrap_or(1)
+        self.axes.iter().map(|axes| self.drives.min(*axes)).max().unwrap_or(1)
     }
 
     /// What there is for halls of this kind; made once.
     pub(crate) fn book(&self) -> &'static Book {
-        static BOOKS: [OnceLock<Book>; KINDS.len()] = [const { OnceLock::new() }; KINDS.len()];
-        let index = KINDS.iter().position(|kind| kind == self).expect("it is one of them");
+        const ALL: usize = KINDS.len() + MBOXES.len() + 24;
+        static BOOKS: [OnceLock<Book>; ALL] = [const { OnceLock::new() }; ALL];
+        let mut all =
+            KINDS.iter().chain(&MBOXES).chain(RELOADED.iter().flatten()).chain(FEWER.iter().flatten());
+        let index = all.position(|kind| kind == self).expect("it is one of them");
         BOOKS[index].get_or_init(|| {
             let config = self.config();
-            let axes = self.most();
+            let (axes, far) = (self.most(), self.far);
             let texts = [
-                swing(axes, 0.8, 40.0, 75.0),
-                swing(axes.min(3), 0.5, 50.0, 70.0),
-                swing(axes, 0.3, 20.0, 120.0),
+                swing(axes, 0.8, 40.0 * far, 75.0),
+                swing(axes.min(3), 0.5, 50.0 * far, 70.0),
+                swing(axes, 0.3, 20.0 * far, 120.0),
             ];
             let ready = |text: &String| {
                 let cue = cue::read(Path::new("ride.csv"), text.as_bytes(), &Source::Native);

@@ -8,7 +8,8 @@ use kinocue::net::{Delivery, Network, Origin, SendFault};
 use kinocue::time::{Clock, MonoTime};
 
 use super::dice::Dice;
-use super::seat::{Arrival, MS, Seat, Settings};
+use super::master::{Master, UNKNOWN};
+use super::seat::{Arrival, MS, REGISTERS, Seat, Settings};
 use super::words::{self, Heard};
 
 /// What befalls the datagrams of a seat for a while.
@@ -63,13 +64,16 @@ pub(crate) struct Line {
     /// When the newest was to be sent; and the first of those since the last that will arrive.
     newest: u64,
     lost_since: Option<u64>,
+    master: Option<Master>,
 }
 
 impl Line {
-    /// Somebody jogs an axis: nobody does while frames come, or have just been asked for.
+    /// Somebody jogs an axis: nobody does while frames come, or have just been asked for; nor one of which nothing tells, unless
+    /// the seat has to be homed.
     fn jog(&mut self, axis: usize, mm: f64, now: u64, asked_at: u64) -> bool {
         let quiet = now > self.newest + JUST && now > asked_at + JUST;
-        quiet && self.there.is_empty() && self.seat.jog(axis, mm, now)
+        let is_told = axis < REGISTERS || self.seat.settings.report_ms > 0 || !self.seat.homed;
+        quiet && is_told && self.there.is_empty() && self.seat.jog(axis, mm, now)
     }
 
     fn is(&self, now: u64, weather: Weather) -> Option<u64> {
@@ -110,6 +114,7 @@ impl Ether {
             frames: 0,
             newest: 0,
             lost_since: None,
+            master: None,
         };
         let lines = seats.iter().enumerate().map(line).collect();
         let world = World { lines, dice: Dice::new(!seed), asked: false, asked_at: 0, frames: None };
@@ -137,12 +142,44 @@ impl Ether {
         world.lines[seat].jog(axis, mm, now, world.asked_at)
     }
 
+    /// Takes a datagram that was sent at that instant.
+    pub(crate) fn take_in(&self, lane: usize, datagram: &[u8], sent: u64) -> Delivery {
+        let now = self.ns();
+        let World { lines, dice, asked, frames, .. } = &mut *self.world();
+        let delivery = lines[lane].take(datagram, (now, sent), *asked, dice);
+        if let (Some(frames), Heard::Motion(frame)) = (frames, words::hear(datagram)) {
+            let places: Vec<i32> = frame.positions[..frame.axes].iter().map(|at| at / 200).collect();
+            let (at, number, ms) = (now as f64 * 1e-9, frame.number, frame.time_ms);
+            frames.push(format!(
+                "{at:8.4} s: seat {}: frame {number}, {ms} ms to {places:?} tenths of a mm, {delivery:?}",
+                lane + 1
+            ));
+        }
+        delivery
+    }
+
     /// What has come back from a seat.
     pub(crate) fn take_back(&self, seat: usize) -> Option<Vec<u8>> {
         let now = self.ns();
         let back = &mut self.world().lines[seat].back;
         let came = back.front().is_some_and(|packet| packet.at <= now);
         if came { back.pop_front().map(|packet| packet.octets) } else { None }
+    }
+
+    /// Another master sends to a seat.
+    pub(crate) fn intrude(&self, seat: usize, master: Master) {
+        self.world().lines[seat].master = Some(master);
+    }
+
+    /// Two seats exchange their addresses; what is on its way to them is lost.
+    pub(crate) fn exchange(&self) {
+        let [one, other] = &mut self.world().lines[..] else { panic!("two are exchanged") };
+        std::mem::swap(&mut one.seat, &mut other.seat);
+        std::mem::swap(&mut one.seat.settings.address, &mut other.seat.settings.address);
+        for line in [one, other] {
+            line.there.clear();
+            line.back.clear();
+        }
     }
 
     /// It becomes so for a while.
@@ -163,9 +200,10 @@ impl Ether {
 impl World {
     /// Brings what has arrived at the seats by then, and has them answer.
     fn deliver(&mut self, now: u64) {
-        let Self { lines, dice, .. } = self;
-        for (index, line) in lines.iter_mut().enumerate() {
+        let Self { lines, dice, asked_at, .. } = self;
+        for line in lines.iter_mut() {
             while line.there.front().is_some_and(|packet| packet.at <= now) {
+                line.intrude(line.there[0].at, *asked_at);
                 let Some(Packet { at, sent, lost_since, asked, octets }) = line.there.pop_front() else {
                     break;
                 };
@@ -173,8 +211,9 @@ impl World {
                     line.answer(reply, at, dice);
                 }
             }
+            line.intrude(now, *asked_at);
             line.seat.advance(now);
-            if let Some(report) = line.seat.report(index as u16 + 1, now) {
+            if let Some(report) = line.seat.report(now) {
                 line.answer(report, now, dice);
             }
         }
@@ -187,6 +226,14 @@ fn flight(dice: &mut Dice) -> u64 {
 }
 
 impl Line {
+    /// What another master has sent by then arrives.
+    fn intrude(&mut self, now: u64, asked_at: u64) {
+        let Some(master) = &mut self.master else { return };
+        let moves_until = (self.newest + JUST).max(asked_at + JUST);
+        master.send(&mut self.seat, now, moves_until);
+        self.master.take_if(|master| master.is_over());
+    }
+
     fn answer(&mut self, octets: Vec<u8>, at: u64, dice: &mut Dice) {
         let hoarse = self.until(at, |what| matches!(what, Weather::Hoarse(_)));
         let lost = matches!(hoarse, Some((_, Weather::Hoarse(times))) if dice.one_in(times));
@@ -214,10 +261,13 @@ impl Line {
         insert(&mut self.back, Packet { at: arrives, sent: at, lost_since: at, asked: false, octets });
     }
 
-    fn take(&mut self, octets: &[u8], now: u64, asked: bool, dice: &mut Dice) -> Delivery {
+    fn take(&mut self, octets: &[u8], (now, sent): (u64, u64), asked: bool, dice: &mut Dice) -> Delivery {
         let moves = matches!(octets.get(4), Some(0x13 | 0x14 | 0x18 | 0x19));
-        let lost_since = if moves { *self.lost_since.get_or_insert(now) } else { now };
+        let lost_since = if moves { *self.lost_since.get_or_insert(sent) } else { sent };
         if moves {
+            if now > self.newest + JUST && self.seat.is_just_disturbed(now) {
+                self.seat.excuse(now + UNKNOWN);
+            }
             self.newest = now;
         }
         if self.is(now, Weather::Refused).is_some() {
@@ -240,9 +290,9 @@ impl Line {
         if let Some((_, Weather::Late(ms))) = self.until(now, |what| matches!(what, Weather::Late(_))) {
             at += dice.range(0, ms * MS);
         }
-        let packet = Packet { at, sent: now, lost_since, asked, octets };
+        let packet = Packet { at, sent, lost_since, asked, octets };
         if held == 0 && self.is(now, Weather::Shuffled).is_some() {
-            let later = now + dice.range(1, 40) * MS;
+            let later = now.max(sent + dice.range(1, 40) * MS);
             if dice.one_in(6) {
                 insert(&mut self.there, Packet { at: later, ..packet.clone() });
             } else if dice.one_in(6) {
@@ -270,18 +320,7 @@ impl Network for Ether {
     }
 
     fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
-        let now = self.ns();
-        let World { lines, dice, asked, frames, .. } = &mut *self.world();
-        let delivery = lines[lane].take(datagram, now, *asked, dice);
-        if let (Some(frames), Heard::Motion(frame)) = (frames, words::hear(datagram)) {
-            let places: Vec<i32> = frame.positions[..frame.axes].iter().map(|at| at / 200).collect();
-            let (at, number, ms) = (now as f64 * 1e-9, frame.number, frame.time_ms);
-            frames.push(format!(
-                "{at:8.4} s: seat {}: frame {number}, {ms} ms to {places:?} tenths of a mm, {delivery:?}",
-                lane + 1
-            ));
-        }
-        delivery
+        self.take_in(lane, datagram, self.ns())
     }
 
     fn drain(&self, on: &mut dyn FnMut(Origin, &[u8], MonoTime)) -> MonoTime {

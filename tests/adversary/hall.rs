@@ -7,6 +7,7 @@ use kinocue::net::{DrainGrid, over};
 use kinocue::rt::{Command, Line, News, Order, Ticked};
 use kinocue::state::{Event, Readiness, State, Transition, Trouble};
 use kinocue::time::{MonoTime, Rate, ShowTime};
+use kinocue::wire::Dialect;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -68,6 +69,8 @@ pub(crate) struct Hall<'h, 'l> {
     pub(crate) state: State,
     since: u64,
     homing: Option<Homing>,
+    /// Orders to home that each seat had heard before the last homing.
+    homings: Vec<u32>,
     ready: bool,
     show_over: bool,
     pub(crate) closed: bool,
@@ -83,6 +86,7 @@ pub(crate) fn open<T>(
     lead: impl FnOnce(&mut Hall<'_, '_>) -> T,
 ) -> (T, Numbers) {
     let book = kind.book();
+    ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
     let halves = over(Arc::new(ether.clone()));
     let runtime = Runtime::over(Arc::clone(&book.config), crashed, numbers, &Arc::default(), halves)
         .expect("the hall opens");
@@ -111,6 +115,7 @@ pub(crate) fn open<T>(
             state: State::Boot,
             since: ether.ns(),
             homing: None,
+            homings: Vec::new(),
             ready: false,
             show_over: false,
             closed: false,
@@ -125,7 +130,10 @@ pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
     let seat = |(index, axes): (usize, &usize)| Settings {
         axes: *axes,
         mm_s: 240.0,
-        high_first: false,
+        mbox: kind.dialect == Dialect::Mbox,
+        lies: false,
+        // As its manual has it.
+        high_first: kind.dialect == Dialect::Mbox,
         hurry: true,
         cut_ms: 3_000,
         stop_mode: 0,
@@ -233,10 +241,15 @@ impl Hall<'_, '_> {
     fn see_to_homing(&mut self) {
         let now = self.ether.ns();
         let lanes: Vec<usize> = (0..self.kind.axes.len()).filter(|lane| self.takes_part(*lane)).collect();
-        let is_open = |lane: &&usize| !self.ether.world().lines[**lane].seat.homed;
+        // One whose order was lost is as it was before, home or not.
+        let is_open = |lane: &&usize| {
+            let (seat, before) = (&self.ether.world().lines[**lane].seat, self.homings.get(**lane));
+            !seat.homed || before == Some(&seat.homings)
+        };
         let open: Vec<usize> = lanes.iter().filter(is_open).copied().collect();
         match self.homing {
             Some(Homing::UnderWay { told: 0 }) => {
+                self.homings = self.ether.world().lines.iter().map(|line| line.seat.homings).collect();
                 lanes.into_iter().for_each(|lane| self.tell_home(lane));
                 self.homing = Some(Homing::UnderWay { told: now });
             }

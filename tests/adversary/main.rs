@@ -25,13 +25,16 @@ mod process;
 #[path = "../common/serving.rs"]
 mod serving;
 
+mod bent;
 mod chance;
 mod cues;
 mod dice;
 mod ether;
 mod hall;
 mod judge;
+mod master;
 mod named;
+mod odd;
 mod person;
 mod plays;
 mod processes;

@@ -3,6 +3,7 @@
 use kinocue::engine::Mix;
 use kinocue::state::{State, Transition};
 
+use super::bent::Bent;
 use super::dice::Dice;
 use super::ether::{Ether, Weather};
 use super::hall::{Hall, Thread};
@@ -24,12 +25,14 @@ pub(crate) struct Person {
     pub(crate) deeds: u64,
     ends: u64,
     pressed: [bool; 4],
+    /// What else happens, beside what always may.
+    bent: Option<Bent>,
 }
 
 impl Person {
     /// One who goes away at `ends`, ns.
-    pub(crate) const fn new(seed: u64, deeds: u64, ends: u64) -> Self {
-        Self { dice: Dice::new(seed), deeds, ends, pressed: [false; 4] }
+    pub(crate) const fn new(seed: u64, deeds: u64, ends: u64, bent: Option<Bent>) -> Self {
+        Self { dice: Dice::new(seed), deeds, ends, pressed: [false; 4], bent }
     }
 
     /// Leads a hall until it closes.
@@ -59,6 +62,11 @@ impl Person {
     }
 
     fn act(&mut self, hall: &mut Hall<'_, '_>) {
+        if let Some(bent) = self.bent
+            && self.dice.one_in(bent.times())
+        {
+            return bent.act(hall, &mut self.dice);
+        }
         match self.dice.range(0, 10) {
             0..=4 => self.ask(hall),
             5..=7 => self.weather(hall),
@@ -188,6 +196,9 @@ impl Person {
                     // Some stand a little outside of their stroke.
                     line.seat.put(axis, self.dice.range(0, 165) as f64 - 10.0);
                 }
+            }
+            if let Some(bent) = self.bent {
+                bent.furnish(&mut line.seat.settings);
             }
         }
     }

@@ -1,9 +1,12 @@
 //! That the seats do what the manuals say, and that the judge sees what it is there to see.
 
+use kinocue::wire::{Code, Status};
+
 use super::cues::KINDS;
 use super::hall::seats;
 use super::judge::{How, PULSES_PER_MM};
 use super::seat::{Arrival, MS, Seat, Settings};
+use super::words::{self, Heard};
 
 /// When the first frame comes.
 const BEGIN: u64 = 5_000 * MS;
@@ -119,4 +122,52 @@ fn a_seat_whose_power_went_counts_from_where_it_stands() {
     assert_eq!(reply[16..20], [0; 4]);
     assert_eq!(mm(&mut seat, 1_900).round() as i32, 100);
     assert!(!seat.homed);
+}
+
+#[test]
+fn a_report_is_of_the_station_that_its_address_says_and_is_heard_as_that() {
+    let mut seat = seat(|seat| (seat.report_ms, seat.address.0) = (100, [127, 0, 1, 7]));
+    let report = Status::parse(&seat.report(BEGIN).expect("it is time for one")).expect("it is one").station;
+    assert_eq!(report, Code::station([127, 0, 1, 7]));
+}
+
+#[test]
+fn what_another_master_moves_is_not_judged_and_what_the_hall_moves_after_it_is_once_it_may_know_of_that() {
+    for (excused_ms, breaches) in [(0, 1), (400, 0)] {
+        let mut seat = seat(|_| {});
+        hears(&mut seat, &frame(0x1401, 1, 10, 2.0), 0);
+        let Heard::Motion(other) = words::hear(&frame(0x1401, 1, 10, 100.0)) else { panic!("it is motion") };
+        seat.hear_other(&other, BEGIN + 200 * MS);
+        seat.excuse(BEGIN + excused_ms * MS);
+        assert_eq!((mm(&mut seat, 250).round() as i32, seat.breaches.len()), (100, 0));
+        hears(&mut seat, &frame(0x1401, 2, 10, 2.0), 300);
+        assert_eq!((mm(&mut seat, 400).round() as i32, seat.breaches.len()), (2, breaches));
+    }
+}
+
+#[test]
+fn a_pressed_mbox_refuses_frames_as_an_error_and_answers_the_rest_as_if_nothing_were() {
+    let mut seat = seat(|seat| seat.mbox = true);
+    seat.press(true, BEGIN);
+    let refused = hears(&mut seat, &frame(0x1401, 2, 10, 30.0), 1_000).expect("it answers");
+    assert_eq!(refused[4..8], [0x14, 3, 0, 0]);
+    let count = [0x55, 0xaa, 0, 0, 0x11, 1, 0, 0, 0xff, 0xff, 0xff, 0xff, 0, 0x34, 0, 1];
+    let answer = hears(&mut seat, &count, 1_100).expect("it answers");
+    assert_eq!((answer[5], &answer[16..18]), (2, &[0, 0][..]));
+}
+
+#[test]
+fn a_seat_that_lies_says_that_it_knows_its_zero_and_one_that_is_behind_says_where_it_was() {
+    let read = |start| [0x55, 0xaa, 0, 0, 0x11, 1, 0, 0, 0xff, 0xff, 0xff, 0xff, 0, start, 0, 2];
+    let word = |octets: &[u8], at| i32::from(words::u16_at(octets, at));
+    for (lies, reset) in [(false, 0), (true, 2)] {
+        let mut seat = seat(|seat| seat.lies = lies);
+        seat.reboot(BEGIN, 100 * MS);
+        assert_eq!(word(&hears(&mut seat, &read(0xf0), 200).expect("it answers"), 16), reset);
+    }
+    let mut seat = seat(|_| {});
+    seat.freeze(BEGIN, BEGIN + 100 * MS);
+    hears(&mut seat, &frame(0x1401, 1, 50, 5.0), 0);
+    let told = [60, 120].map(|ms| word(&hears(&mut seat, &read(0x06), ms).expect("it answers"), 16));
+    assert_eq!(told, [0, 10_000]);
 }

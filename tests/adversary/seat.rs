@@ -25,8 +25,13 @@ const LED: u64 = 150 * MS;
 const BUNCHED: u64 = 500 * MS;
 /// What README admits that may be lost.
 const ADMITTED: u64 = 50 * MS;
-/// Registers of the axes' positions.
-const POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
+/// Frames of another master further apart are of two.
+const BOUT: u64 = 1_000 * MS;
+/// For how long a seat is looked at before it counts as at rest.
+const UNSEEN: u64 = 150 * MS;
+/// Axes that have registers of their positions, and the first of the two of each.
+pub(crate) const REGISTERS: usize = 6;
+const POSITIONS: [u16; REGISTERS] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 
 /// How its controller is set.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +39,10 @@ pub(crate) struct Settings {
     pub(crate) axes: usize,
     /// What its type allows, mm/s; its own cap is off, so that it hides nothing.
     pub(crate) mm_s: f64,
+    /// Whether it is an IMAX or MBOX.
+    pub(crate) mbox: bool,
+    /// Whether it says that it knows its zero though it does not (DPF0).
+    pub(crate) lies: bool,
     /// Whether the upper word of a position comes first.
     pub(crate) high_first: bool,
     /// PA06.
@@ -62,6 +71,8 @@ struct Command {
     lost_since: u64,
     asked: bool,
     number: u32,
+    /// Whether another master sent it.
+    foreign: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -105,12 +116,21 @@ pub(crate) struct Seat {
     pub(crate) untold: (u64, u64),
     packets: u16,
     pub(crate) homed: bool,
+    /// Orders to home that it has heard.
+    pub(crate) homings: u32,
     dead_until: u64,
     rebooting: bool,
     /// The button, and since when it is so; and whether the controller has seen it.
     button: (bool, u64),
     pub(crate) stopped: bool,
     next_report: u64,
+    /// Until when it answers with the place that it had then.
+    stale: Option<(u64, [f64; 12])>,
+    /// When the first and the last frame came of another master that sends for a while.
+    foreign: Option<(u64, u64)>,
+    /// Until when a hall may not know of them, and whether they have left it more to do than it has time.
+    excused_until: u64,
+    crowded: bool,
     /// Moves that were hurried though the network brought them as they were sent; and the longest wait in the queue.
     pub(crate) hurried: u32,
     pub(crate) waited_ns: u64,
@@ -136,11 +156,16 @@ impl Seat {
             untold: (0, 0),
             packets: 17,
             homed: true,
+            homings: 0,
             dead_until: 0,
             rebooting: false,
             button: (false, 0),
             stopped: false,
             next_report: 0,
+            stale: None,
+            foreign: None,
+            excused_until: 0,
+            crowded: false,
             hurried: 0,
             waited_ns: 0,
             fastest: 0.0,
@@ -255,6 +280,12 @@ impl Seat {
         for (axis, to) in to.iter_mut().enumerate().take(axes) {
             *to = command.to[axis] + self.zero[axis];
         }
+        let sent_before = self.foreign.is_some_and(|(first, _)| command.sent_ns < first);
+        self.crowded = now < self.excused_until || sent_before || (self.crowded && waiting > PATIENT);
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
+        if command.foreign {
+            return;
+        }
         let executed = Executed {
             far: std::array::from_fn(|axis| to[axis] - self.rest[axis]),
             ms: takes as f64 / MS as f64,
@@ -264,9 +295,10 @@ impl Seat {
             admitted_ms: self.admitted_ms(&command),
             asked: command.asked,
         };
-        self.judge(&executed, command.number, now);
+        if !self.crowded {
+            self.judge(&executed, command.number, now);
+        }
         self.executed = Some(command.sent_ns);
-        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
     }
 
     /// From the sending of the frame after which this one comes: of that which was executed before or, where that is long ago,
@@ -304,12 +336,17 @@ impl Seat {
             return None;
         }
         self.packets = self.packets.wrapping_add(1);
-        let x = if self.stopped { 4 } else { 2 };
+        let mbox = self.settings.mbox;
+        let x = if self.stopped && !mbox { 4 } else { 2 };
         let inputs = u16::from(self.button.0);
         let reply = match words::hear(octets) {
             Heard::Motion(frame) => {
                 self.on_motion(&frame, arrival);
-                words::motion_reply(octets, x, 0, inputs)
+                if mbox && self.stopped {
+                    words::motion_reply(octets, 3, words::u16_at(octets, 6), inputs)
+                } else {
+                    words::motion_reply(octets, x, 0, inputs)
+                }
             }
             Heard::Read { channel, start, num } => {
                 let words: Vec<u16> = (start..start.saturating_add(num))
@@ -320,6 +357,7 @@ impl Seat {
             Heard::Write { channel, start, value } => {
                 if (channel, start, value) == (2, 0, 0) {
                     let zero = [0.0; 12];
+                    self.homings += 1;
                     (self.zero, self.homed, self.stopped) = (zero, false, self.button.0);
                     (self.last_absolute, self.executed) = (None, None);
                     self.go(zero, OWN_MM_S, arrival.at, true);
@@ -331,8 +369,34 @@ impl Seat {
         words::wants_reply(octets).then_some(reply)
     }
 
+    /// Hears a frame that another master sends; what its moves look like is not judged.
+    pub(crate) fn hear_other(&mut self, frame: &Frame, at: u64) {
+        self.advance(at);
+        if !self.rebooting {
+            self.packets = self.packets.wrapping_add(1);
+            let goes_on = self.foreign.filter(|(_, last)| at < last + BOUT);
+            self.foreign = Some((goes_on.map_or(at, |(first, _)| first), at));
+            self.take(frame, Arrival { at, sent: at, lost_since: at, asked: true }, true);
+        }
+    }
+
+    /// Up to then nobody can know that another master sends to it.
+    pub(crate) fn excuse(&mut self, until: u64) {
+        self.excused_until = self.excused_until.max(until);
+    }
+
+    /// Whether another master began to send too short a time ago for anybody to see that the seat does not rest.
+    pub(crate) fn is_just_disturbed(&self, now: u64) -> bool {
+        self.foreign.is_some_and(|(first, _)| now < first + UNSEEN)
+    }
+
+    /// Answers with the place that it has now, wherever it goes, until then.
+    pub(crate) fn freeze(&mut self, now: u64, until: u64) {
+        self.stale = Some((until, self.place(now)));
+    }
+
     fn on_motion(&mut self, frame: &Frame, arrival: Arrival) {
-        let Arrival { at, sent, lost_since, asked } = arrival;
+        let Arrival { at, sent, .. } = arrival;
         if let Some((came, sent_before)) = self.came.replace((at, sent)) {
             let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
             if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
@@ -340,6 +404,11 @@ impl Seat {
             }
         }
         self.heaped &= self.moving.is_some() || at < self.bunched_until;
+        self.take(frame, arrival, false);
+    }
+
+    fn take(&mut self, frame: &Frame, arrival: Arrival, foreign: bool) {
+        let Arrival { at, sent, lost_since, asked } = arrival;
         if self.jogged {
             self.hold(at);
         }
@@ -358,6 +427,7 @@ impl Seat {
             lost_since,
             asked,
             number,
+            foreign,
         });
         if self.moving.is_none() {
             self.begin_next(at);
@@ -386,7 +456,14 @@ impl Seat {
 
     /// Where its controller says that an axis stands.
     fn told(&self, axis: usize, now: u64) -> i32 {
-        (self.place(now)[axis] - self.zero[axis]).round() as i32
+        let place =
+            self.stale.filter(|(until, _)| now < *until).map_or_else(|| self.place(now), |(_, was)| was);
+        (place[axis] - self.zero[axis]).round() as i32
+    }
+
+    /// The same of all axes, pulses.
+    pub(crate) fn told_place(&self, now: u64) -> [f64; 12] {
+        std::array::from_fn(|axis| f64::from(self.told(axis, now)))
     }
 
     fn register(&self, channel: u16, at: u16, now: u64) -> u16 {
@@ -401,11 +478,13 @@ impl Seat {
             let upper = (at == POSITIONS[axis]) == self.settings.high_first;
             return if upper { (position >> 16) as u16 } else { position as u16 };
         }
+        let homes = self.moving.is_some_and(|current| current.homes);
         match at {
+            0x34 if self.settings.mbox => 0,
             0x34 => self.packets,
-            0xf0 if self.homed => 2,
-            0xf0 => u16::from(self.moving.is_some_and(|current| current.homes)),
-            0xfe => 1,
+            0xf0 if self.homed || (self.settings.lies && !homes) => 2,
+            0xf0 => u16::from(homes),
+            0xfe => u16::from(!self.settings.mbox),
             0xff => 3,
             _ => 0,
         }
@@ -442,12 +521,14 @@ impl Seat {
     }
 
     /// A status report, when it is time for one.
-    pub(crate) fn report(&mut self, id: u16, now: u64) -> Option<Vec<u8>> {
+    pub(crate) fn report(&mut self, now: u64) -> Option<Vec<u8>> {
         if self.settings.report_ms == 0 || self.rebooting || now < self.next_report {
             return None;
         }
         self.next_report = now + u64::from(self.settings.report_ms) * MS;
         let positions: Vec<i32> = (0..self.settings.axes).map(|axis| self.told(axis, now)).collect();
+        let ([.., column, row], _) = self.settings.address;
+        let id = u16::from_be_bytes([column, row]);
         Some(words::report(id, &positions, u16::from(self.button.0)))
     }
 }

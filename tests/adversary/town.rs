@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use kinocue::net::Network as _;
-use kinocue::sys::clock::Monotonic;
+use kinocue::sys::batch::{Batch, stamp_arrivals};
+use kinocue::sys::clock::{Monotonic, wall_now_ns};
 use kinocue::time::{Clock as _, nanos};
 
 use super::ether::Ether;
@@ -60,18 +60,22 @@ impl Drop for Town {
     }
 }
 
-/// One seat, until all is over.
+/// One seat, until all is over. What the kernel stamped tells when a datagram was sent, however late this thread is.
 fn live(ether: &Ether, index: usize, socket: &UdpSocket, over: &AtomicBool) {
     let (began, zero) = (Monotonic.now(), ether.ns());
     let now = || zero + nanos(Monotonic.now().since(began));
     socket.set_read_timeout(Some(LOOK)).expect("it is longer than nothing");
-    let (mut octets, mut host) = ([0; 2_048], None);
+    stamp_arrivals(socket).expect("the kernel stamps");
+    let (mut batch, mut host) = (Batch::new(), None);
     while !over.load(Ordering::Acquire) {
         // Nothing came, or who is gone is gone.
-        if let Ok((len, from)) = socket.recv_from(&mut octets) {
-            host = Some(from);
-            ether.pass_to(now());
-            let _ = ether.send(index, &octets[..len]);
+        if socket.peek_from(&mut [0]).is_ok() && batch.receive(socket).is_ok() {
+            for datagram in batch.datagrams() {
+                let ago = datagram.stamp_ns.map_or(0, |stamp| wall_now_ns().saturating_sub(stamp));
+                host = Some(datagram.from);
+                ether.pass_to(now());
+                let _ = ether.take_in(index, datagram.octets, now().saturating_sub(ago));
+            }
         }
         ether.pass_to(now());
         while let Some(reply) = ether.take_back(index) {

@@ -78,7 +78,8 @@ mod tests {
         let lost = row(HealthState::Lost, Why::Silent(1));
         let told = said(lost);
         assert!(
-            told.len() == 1 && told[0].starts_with("A2: lost: no ack and no report for too long; next: check")
+            told.len() == 1
+                && told[0].starts_with("A2: lost: no ack and no report for too long; next: check")
         );
         assert_eq!(said(lost), [""; 0]);
         let told = said(row(HealthState::Rejoining, Why::SeenAgain));
