@@ -8,7 +8,6 @@
 
 mod common {
     pub(crate) mod spread;
-    pub(crate) mod stage;
 }
 mod senders {
     pub(super) mod again;

@@ -1,4 +1,4 @@
-//! The limiter: what it costs where it lets all pass, and whether anything gets past it that should not, or is held that
+//! The last limiter: what it costs where it lets all pass, and whether anything gets past it that should not, or is held that
 //! should pass.
 //!
 //! `cargo bench --bench limiter -- [--sequences N] [--from N] [--sound N] [--rounds N] [--quick]`
@@ -6,21 +6,12 @@
 mod common {
     pub(crate) mod spread;
 }
-mod asked {
-    pub(crate) mod chance;
-    pub(crate) mod judge;
-    pub(crate) mod sound;
-    pub(crate) mod trial;
-    pub(crate) mod wild;
-}
 
 use std::hint::black_box;
 use std::time::Duration;
 
-use asked::sound::{self, Sound};
-use asked::trial::{Trial, standing};
-use asked::wild::{self, Wild};
 use common::spread::{Spread, verdict};
+use kinocue::harness::asked::{Sound, Trial, Wild, sound, standing, wild};
 use kinocue::limiter::{Admitted, Limiter, Provenance};
 use kinocue::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
 use kinocue::sys::clock::Monotonic;

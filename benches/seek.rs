@@ -5,7 +5,6 @@
 
 mod common {
     pub(crate) mod spread;
-    pub(crate) mod stage;
 }
 
 use std::hint::black_box;
@@ -13,7 +12,7 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
-use common::stage::{ride, stage};
+use kinocue::harness::{ride, stage};
 use kinocue::plan::{Curve, From, LaneScene, Place, Request, Scene, To};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::Clock as _;

@@ -9,7 +9,6 @@
 
 mod common {
     pub(crate) mod spread;
-    pub(crate) mod stage;
 }
 #[expect(dead_code, reason = "of the senders, only the controllers that answer them are wanted here")]
 mod senders {

@@ -5,7 +5,6 @@
 
 mod common {
     pub(crate) mod spread;
-    pub(crate) mod stage;
 }
 
 use std::hint::black_box;
@@ -14,9 +13,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
-use common::stage::{ride, stage};
 use kinocue::belief::{Evidence, Reading, Taken};
 use kinocue::engine::Step;
+use kinocue::harness::{ride, stage};
 use kinocue::motion::MAX_AXES;
 use kinocue::net::Delivery;
 use kinocue::rt::{Live, Places, mailboxes};

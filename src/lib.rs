@@ -68,6 +68,9 @@ pub mod doctor;
 pub mod latency;
 pub mod sim;
 
+#[cfg(feature = "harness")]
+pub mod harness;
+
 pub mod app;
 pub mod cli;
 pub mod sys;

@@ -22,6 +22,7 @@ def output(*command):
 
 def place(root, pattern, target, mode):
     """Copies what a pattern finds: into a folder where the target ends with a slash, else under that name."""
+    pattern = pattern.replace("target/release/", "target/dist/")  # cargo-deb means the built profile by the former
     sources = sorted(glob.glob(pattern))
     if not sources:
         sys.exit(f"deb.py: {pattern}: no such file; build it first (systemd/build-deb.sh)")

@@ -4,7 +4,7 @@
 # does, pulls a plug, stops, crashes, upgrades, and holds all of it against the frames that passed. Prints a table; ends with 1
 # where a line of it failed, with 77 where it cannot be tried. Takes three minutes, and the page in chromium where there is one.
 #
-#   systemd/walk.sh [--no-build | PACKAGE.deb]      --no-build takes target/release/kinocue as it is
+#   systemd/walk.sh [--no-build | PACKAGE.deb]      --no-build takes target/dist/kinocue as it is
 #
 # Needs python3 (3.11 or later) beside what container.sh needs. WALK_KEEP=FOLDER keeps the capture and what was said there.
 set -euo pipefail

@@ -1,20 +1,18 @@
 //! A hall that lives on between shows, in virtual time: what is loaded in one state is played from another, and the seats go
 //! on from where they are.
 
-mod common;
-
 use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use common::{ORIGIN, swell};
 use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
 use kinocue::engine::Show;
 use kinocue::fanout::Manner;
+use kinocue::harness::{ORIGIN, swell};
 use kinocue::motion::{MAX_AXES, Pose};
 use kinocue::net::Delivery;
 use kinocue::rt::{

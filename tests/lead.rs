@@ -1,12 +1,10 @@
 //! Shows that are led by hand, in virtual time: pause, stop, seek, levels, trim, seats out and in, controllers lost and
 //! back. Whatever is done, what is sent stays within the limits of the seats.
 
-mod common;
-
 use std::time::Duration;
 
-use common::{Event, Frame, Played, Virtual, Worst, swell};
 use kinocue::engine::{Ending, Mix, Unplanned};
+use kinocue::harness::{Event, Frame, Played, Virtual, Worst, swell};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
 use kinocue::state::{self, Cause, Refusal, State, Transition, Trouble, Why};

@@ -1,16 +1,14 @@
 //! Cues that use all of their limits, by chance: they pass `check`, end in motion or at rest, near the ends of the stroke or
 //! not, and are stopped anywhere, led to their end, held up by stalls or trimmed. What is sent keeps the limits, in virtual time.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use common::{Event, Played, Virtual, Worst};
 use kinocue::cue::{self, Source};
 use kinocue::engine::Ending;
+use kinocue::harness::{Event, Played, Virtual, Worst};
 use kinocue::motion::SeatType;
 use kinocue::proof::{Digest, Proof, Terms, prove};
 use kinocue::time::Rate;

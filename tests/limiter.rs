@@ -1,23 +1,10 @@
-//! The limiter under arbitrary requests: what it sends keeps the limits, and what keeps the limits it sends unchanged. Judged from
+//! The last limiter, asked for anything: what it sends keeps the limits, and what keeps the limits it sends unchanged. Judged from
 //! the definition of the measure, not by the limiter's own sums; `benches/limiter.rs` does the same for a million sequences.
 
-#[path = "../benches/asked/chance.rs"]
-mod chance;
-#[path = "../benches/asked/judge.rs"]
-mod judge;
-#[path = "../benches/asked/sound.rs"]
-mod sound;
-#[path = "../benches/asked/trial.rs"]
-mod trial;
-#[path = "../benches/asked/wild.rs"]
-mod wild;
-
+use kinocue::harness::asked::{self, Sound, Trial, Wild, sound, wild, window};
 use kinocue::limiter::{Admitted, Limit, Limiter, Provenance};
 use kinocue::motion::{Limits, MAX_AXES, Measure, Pose, SeatType, Spacing, Window};
 use kinocue::time::{Rate, ShowTime};
-use sound::Sound;
-use trial::{Trial, window};
-use wild::Wild;
 
 #[test]
 fn whatever_is_asked_for_what_is_sent_keeps_the_limits() {
@@ -63,7 +50,7 @@ fn bench() -> Window {
 
 /// A limiter at 100 Hz that stands in the middle of the stroke.
 fn standing() -> Limiter {
-    trial::standing(&bench(), Rate::from_hz(100.0), at(0.5))
+    asked::standing(&bench(), Rate::from_hz(100.0), at(0.5))
 }
 
 /// What it sends from frame `from` on when it is asked for these.
@@ -119,7 +106,7 @@ fn after_a_rest_what_was_before_is_forgotten() {
     let stands = limiter.sent()[0];
     limiter.rest();
     assert_eq!(sent(&mut limiter, 60, [stands; 100]), [stands; 100], "it stands where it was");
-    limiter.restart(&trial::read(&bench(), at(0.25)));
+    limiter.restart(&asked::read(&bench(), at(0.25)));
     assert_eq!(sent(&mut limiter, 160, [0.25; 100]), [0.25; 100]);
 }
 

@@ -4,7 +4,6 @@
 //! The log is judged by the Time that each straight line took, one after the other: how long the simulator or the show
 //! was held up by a busy machine between two lines is the machine's doing, and says nothing of either.
 
-mod common;
 #[expect(dead_code, reason = "shows that are led by hand need a part of it")]
 #[path = "common/process.rs"]
 mod process;
@@ -14,12 +13,12 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use common::{Worst, swell, worst_of_lines};
 use kinocue::app::{Control, Play, PlayHandle, Played};
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Mix, Show};
 use kinocue::fanout::Manner;
+use kinocue::harness::{Worst, swell, worst_of_lines};
 use kinocue::motion::SeatType;
 use kinocue::rt::{Command, News};
 use kinocue::state::{PlayMode, Refusal, State, Transition, Why};

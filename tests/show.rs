@@ -1,11 +1,9 @@
 //! Whole shows in virtual time: a cue goes in, datagrams come out.
 
-mod common;
-
 use std::time::Duration;
 
-use common::{Event, Played, Virtual, Worst, swell};
 use kinocue::engine::Ending;
+use kinocue::harness::{Event, Played, Virtual, Worst, swell};
 use kinocue::time::ShowTime;
 use kinocue::timeline::Hint;
 use kinocue::wire::Timing;

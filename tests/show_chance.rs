@@ -1,13 +1,11 @@
 //! Shows by chance: any gentle cue, any rate, gaps, stalls, a slow planner and a stop, in virtual time. Whatever happens, the
 //! seat is never asked for more than its limits.
 
-mod common;
-
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use common::{Event, Played, Virtual, Worst};
 use kinocue::engine::{Ending, Mix};
+use kinocue::harness::{Event, Played, Virtual, Worst};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::Alarm;
 use kinocue::state::{self, Transition};
@@ -79,8 +77,8 @@ fn lead() -> impl Strategy<Value = Event> {
 fn worst(played: &Played) -> Worst {
     let mm = played.positions_mm(0, 0);
     let period = played.rate.period();
-    let tick = |frame: &common::Frame| {
-        (frame.at.since(common::ORIGIN) + Duration::from_nanos(50)).div_duration_f64(period).floor()
+    let tick = |frame: &kinocue::harness::Frame| {
+        (frame.at.since(kinocue::harness::ORIGIN) + Duration::from_nanos(50)).div_duration_f64(period).floor()
     };
     let is_gap = |first: usize| {
         let missed = tick(&played.frames[first]) - tick(&played.frames[first - 1]) - 1.0;

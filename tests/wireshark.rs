@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "whatever fails here fails the test")]
 
-mod common;
 #[path = "common/pcap.rs"]
 mod pcap;
 #[path = "common/programs.rs"]
@@ -14,7 +13,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Duration;
 
-use common::Virtual;
+use kinocue::harness::Virtual;
 use kinocue::motion::Pulses;
 use kinocue::sim::{Controller, Setup};
 use kinocue::wire::{
@@ -359,7 +358,7 @@ fn damaged_messages_are_refused_at_the_same_byte_for_the_same_reason() {
 /// A show of a second with the answers of a virtual controller, between these ports: on the way the emergency stop is
 /// pressed, and at the end registers are read and written.
 fn exchange(host: SocketAddrV4, seat: SocketAddrV4) -> (Pcap, Vec<Vec<u8>>) {
-    let played = Virtual::new(common::swell(3, 1, 20.0, 1.0)).play();
+    let played = Virtual::new(kinocue::harness::swell(3, 1, 20.0, 1.0)).play();
     let frames: Vec<_> = played.lane(0).map(|frame| (frame.at, frame.bytes.clone())).collect();
     let (start, end, pressed) = (frames[0].0, frames[frames.len() - 1].0, frames.len() / 2);
     let all = Code::ALL;

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use kinocue::belief::Reading;
 use kinocue::fanout::Lane;
+use kinocue::harness::{ride, stage};
 use kinocue::motion::MAX_AXES;
 use kinocue::net::{DrainGrid, Ports, Sender};
 use kinocue::rt::{
@@ -20,7 +21,6 @@ use kinocue::time::{Clock, MonoTime, TickGrid};
 use kinocue::tracker::histogram;
 
 use super::outcome::{Outcome, Quantiles, each};
-use crate::common::stage::{ride, stage};
 
 /// From here to tick 0: time to start the threads.
 const RUN_UP: Duration = Duration::from_millis(20);

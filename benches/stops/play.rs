@@ -7,6 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use kinocue::belief::Reading;
+use kinocue::harness::{ride, stage};
 use kinocue::motion::MAX_AXES;
 use kinocue::net::{DrainGrid, Ports};
 use kinocue::rt::{
@@ -18,7 +19,6 @@ use kinocue::time::{Clock as _, MonoTime, TickGrid};
 
 use super::flood::{self, Flood};
 use super::watch::{Seen, Watch};
-use crate::common::stage::{ride, stage};
 
 /// From here to tick 0: time to start the threads.
 const RUN_UP: Duration = Duration::from_millis(20);

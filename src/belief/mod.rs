@@ -346,8 +346,9 @@ impl Belief {
         self.tally.late += u64::from(behind > lasts.max(self.period));
         self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
         self.busy_until = self.busy_until.max(at) + lasts;
-        self.refused_since = None;
-        self.spans.push(frame, asked, pose, at);
+        // What was refused before it is missing as well, until it is acked.
+        let since = self.refused_since.take().unwrap_or(at);
+        self.spans.push(frame, asked, pose, since);
         if !matches!(self.known, Known::Commanded(_)) {
             self.known = Known::Commanded(at);
         }

@@ -58,6 +58,7 @@ impl Spans {
         self.count == 0
     }
 
+    /// A frame was sent at `at`, or was to be sent since then.
     pub(super) fn push(&mut self, frame: FrameNo, asked: bool, pose: &Pose, at: MonoTime) {
         let is_full = self.count == SPANS;
         if self.count == 0 || (!is_full && at.since(self.spans[self.count - 1].at) >= SPAN) {

@@ -231,3 +231,18 @@ fn a_reading_is_taken_whole_or_not_at_all() {
     [3, 5, 4].into_iter().for_each(|frame| evidence.on_ack(FrameNo(frame)));
     assert_eq!(evidence.acked(), Some(FrameNo(5)), "the newest");
 }
+
+#[test]
+fn what_the_kernel_refused_and_what_was_lost_behind_it_are_one_gap() {
+    let mut bench = Bench::found(0.0);
+    bench.send(0.001, 10, 0);
+    bench.ack(1);
+    assert!(!bench.look(10));
+    for tick in 1..=3 {
+        bench.belief.refused(ms(10 * tick));
+        assert!(!bench.look(10 * tick + 5));
+    }
+    bench.send(0.002, 10, 40);
+    assert!(!bench.look(60), "its ack may still come");
+    assert!(bench.look(61), "the kernel took none from 10 ms on, and no ack came since");
+}

@@ -104,7 +104,13 @@ pub(crate) fn histories(first: u64, count: u64, bent: Option<Bent>) -> Vec<Past>
     });
     let each = frames.into_inner() / count.max(1);
     println!("{each} frames in each");
-    assert!(each >= if bent.is_none() { 50 } else { 25 }, "{each} frames in a history: nothing was played");
+    let least = match bent {
+        None => 50,
+        // Seats with axes that the hall knows nothing of are sent nothing.
+        Some(Bent::Fewer) => 0,
+        Some(_) => 25,
+    };
+    assert!(each >= least, "{each} frames in a history: nothing was played");
     bad
 }
 
@@ -130,26 +136,19 @@ fn assert_none(first: u64, count: u64, admitted: f64) {
     if let Some(farthest) = farthest {
         println!("{} of {count}, in {unasked} of them unasked; the farthest {farthest}", bad.len());
     }
-    let unknown: Vec<u64> = bad.iter().map(|past| past.seed).filter(|seed| !OPEN.contains(seed)).collect();
     assert!(
-        unknown.len() as f64 <= admitted * count as f64,
-        "{} of {count} histories beside those that are open; KINOCUE_HISTORIES=1 KINOCUE_SEED={} tells the first",
-        unknown.len(),
-        unknown[0]
+        bad.len() as f64 <= admitted * count as f64,
+        "{} of {count} histories; KINOCUE_HISTORIES=1 KINOCUE_SEED={} tells the first",
+        bad.len(),
+        bad[0].seed
     );
 }
 
-/// What is open yet, of the histories from the fixed seed: no other may break the judge. Most jog an axis past the sixth, of which
-/// nothing tells; the others hear an answer that the network repeats long after it was true.
-const OPEN: [u64; 12] = [
-    12_000_192, 12_000_374, 12_001_005, 12_001_577, 12_001_755, 12_002_153, 12_002_400, 12_002_656,
-    12_003_251, 12_003_605, 12_004_552, 12_004_750,
-];
-/// The share of histories of any seed that is open yet.
-const OPEN_SHARE: f64 = 0.006;
+/// The share of histories of any seed that is open yet: some of the many millions break the judge.
+const OPEN_SHARE: f64 = 0.000_2;
 
 #[test]
-fn no_history_but_those_that_are_open_moves_a_seat_faster_than_its_type_allows_or_unasked() {
+fn no_history_moves_a_seat_faster_than_its_type_allows_or_unasked() {
     match (setting("KINOCUE_SEED"), setting("KINOCUE_HISTORIES").unwrap_or(5_000)) {
         (Some(seed), 1) => tell(seed, None),
         (Some(seed), count) => assert_none(seed, count, OPEN_SHARE),
@@ -158,7 +157,7 @@ fn no_history_but_those_that_are_open_moves_a_seat_faster_than_its_type_allows_o
 }
 
 #[test]
-fn nor_do_more_than_six_in_a_thousand_that_were_drawn_anew() {
+fn nor_do_more_than_one_in_five_thousand_that_were_drawn_anew() {
     let count = setting("KINOCUE_HISTORIES").unwrap_or(5_000);
     if setting("KINOCUE_SEED").is_some() {
         return; // the other one plays them

@@ -32,11 +32,10 @@ fn assert_no_more(bent: Bent, open: usize, share: f64) {
     );
 }
 
-// Open: of axes past the sixth whose controller sends no reports nobody believes more than before when the other axes are found
-// moved; and where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits.
+// Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits.
 #[test]
 fn no_more_histories_than_are_open_move_a_seat_too_fast_while_another_master_sends_to_it() {
-    assert_no_more(Bent::Master, 2, 0.005);
+    assert_no_more(Bent::Master, 0, 0.005);
 }
 
 #[test]
@@ -49,11 +48,9 @@ fn none_does_whose_hall_opens_anew_with_another_configuration() {
     assert_no_more(Bent::Reload, 0, 0.0);
 }
 
-// Open: frames have 3, 6, 10 or 12 places, and nobody but preflight compares the axes of a controller (PA02) with those of its
-// seat type: on the way to park those that the hall does not drive go to 0 within one frame.
 #[test]
-fn no_more_than_are_open_do_whose_hall_takes_its_seats_to_have_fewer_axes_than_they_have() {
-    assert_no_more(Bent::Fewer, 29, 0.09);
+fn none_does_whose_hall_takes_its_seats_to_have_fewer_axes_than_they_have() {
+    assert_no_more(Bent::Fewer, 0, 0.0);
 }
 
 #[test]
@@ -70,5 +67,5 @@ fn none_does_whose_controllers_say_after_a_reboot_that_they_know_their_zero() {
 // 60 ms are too old.
 #[test]
 fn no_more_than_are_open_do_whose_controllers_answer_with_where_they_were_up_to_60_ms_before() {
-    assert_no_more(Bent::Stale, 2, 0.005);
+    assert_no_more(Bent::Stale, 4, 0.02);
 }

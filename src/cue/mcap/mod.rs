@@ -5,6 +5,7 @@ mod read;
 mod record;
 mod walk;
 mod write;
+mod zstd;
 
 pub(super) use read::read;
 pub use read::recover;

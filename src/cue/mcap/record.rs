@@ -11,6 +11,7 @@ use super::super::fault::Place;
 use super::super::limits::MAX_FILE;
 use super::super::problem::Problem;
 use super::walk::Walk;
+use super::zstd::Zstd;
 use crate::plain::escaped;
 
 /// The longest record that is taken into memory; indexes of foreign writers can be some MB.
@@ -46,6 +47,7 @@ fn each_of(
         .with_check_finishes_after_end_magic(true)
         .with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);
+    reader.add_decompressor(Zstd::new()).map_err(|error| problem(&error, 0, false))?;
     // No byte is read before it is asked for, so that the walk is where the reader is.
     let mut input = BufReader::with_capacity(READ, input);
     let (mut unpacked, mut begun) = (0_u64, false);

@@ -398,3 +398,49 @@ fn rows_that_repeat_for_an_hour_are_no_bomb() {
         assert_eq!(load(&bytes).unwrap().rows(), cue.rows(), "{chunk_size} in {} bytes", bytes.len());
     }
 }
+
+/// A frame of zstd (RFC 8878) that holds these bytes, in blocks of at most so many.
+fn frame(bytes: &[u8], longest: usize, checksum: bool) -> Vec<u8> {
+    let mut packed = [&[0x28, 0xb5, 0x2f, 0xfd, u8::from(checksum) << 2][..], &[0]].concat(); // a window of 1 KiB
+    let blocks = bytes.len().div_ceil(longest);
+    for (n, block) in bytes.chunks(longest).enumerate() {
+        let repeated = block.iter().all(|byte| *byte == block[0]);
+        let (kind, content) = if repeated { (1, &block[..1]) } else { (0, block) };
+        let header = u32::from(n + 1 == blocks) | kind << 1 | u32::try_from(block.len()).unwrap() << 3;
+        packed.extend_from_slice(&header.to_le_bytes()[..3]);
+        packed.extend_from_slice(content);
+    }
+    if checksum {
+        packed.extend_from_slice(&[0; 4]); // nobody looks: the chunk has a checksum of its own
+    }
+    packed
+}
+
+#[test]
+fn a_chunk_may_be_of_several_zstd_frames_with_some_between_that_hold_nothing() {
+    let text = |text: &str| [&u32::try_from(text.len()).unwrap().to_le_bytes(), text.as_bytes()].concat();
+    let pairs: Vec<u8> = FRACTION.iter().flat_map(|(key, value)| [text(key), text(value)].concat()).collect();
+    let length = u32::try_from(pairs.len()).unwrap().to_le_bytes();
+    let metadata = record(0x0c, &[&text("kinocue")[..], &length, &pairs].concat());
+    let channel = [&1_u16.to_le_bytes()[..], &[0; 2], &text("/cue/axes"), &text("json"), &[0; 4]].concat();
+    let row = |at: u64, json: &str| {
+        let at = at.to_le_bytes();
+        record(0x05, &[&1_u16.to_le_bytes()[..], &[0; 4], &at, &at, json.as_bytes()].concat())
+    };
+    let spaces = " ".repeat(4000);
+    let rows = [row(0, &format!("{{\"a\":{spaces}[0,0.5]}}")), row(10, "{\"a\":[1,1]}")].concat();
+    let records = [record(0x04, &channel), rows].concat();
+    let nothing = [&[0x50, 0x2a, 0x4d, 0x18, 5, 0, 0, 0][..], &[9; 5]].concat();
+    for (longest, checksum) in [(7, false), (7, true), (1024, false), (1024, true)] {
+        let (front, back) = records.split_at(2000);
+        let frames = [frame(front, longest, checksum), nothing.clone(), frame(back, longest, !checksum)];
+        let packed = [&nothing[..], &frames.concat()].concat();
+        let chunk = |packed: &[u8]| chunk("zstd", records.len() as u64, packed);
+        let cue = load(&file_of(&[&metadata, &chunk(&packed)], 0, 0)).unwrap();
+        assert_eq!(cue.positions(), &[0.0, 0.5, 1.0, 1.0], "blocks of {longest}, checksum {checksum}");
+        for length in 0..packed.len() - 10 {
+            let told = load(&file_of(&[&metadata, &chunk(&packed[..length])], 0, 0)).unwrap_err().to_string();
+            assert!(told.contains("damaged"), "{length}: {told}");
+        }
+    }
+}

@@ -52,8 +52,7 @@ impl<W: Write + Seek> Messages<W> {
     fn begin(cue: &Cue, out: W) -> Result<Self, McapError> {
         let mut writer = WriteOptions::new()
             .library(concat!("kinocue ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Zstd))
-            .compression_threads(0) // its default is a pool of threads
+            .compression(Some(Compression::Lz4))
             .chunk_size(Some(CHUNK))
             .create(out)?;
         // Before the messages, so that a file that is cut short still says what its numbers are.

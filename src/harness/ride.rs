@@ -1,25 +1,25 @@
-//! A play of a six-axis ride to any number of controllers, ready to run, as `kinocue play` makes it.
+//! Cues of waves, and a play of a six-axis ride to any number of controllers, ready to run, as `kinocue play` makes it.
 
 use std::fmt::Write as _;
 use std::net::SocketAddrV4;
 use std::path::Path;
 
-use kinocue::app::StagedShow;
-use kinocue::config::from_to_args;
-use kinocue::cue::{Source, read};
-use kinocue::engine::Show;
-use kinocue::fanout::Manner;
-use kinocue::observe::Watched;
-use kinocue::time::{Rate, ShowTime};
-use kinocue::timeline::Timeline;
-use kinocue::wire::Timing;
+use crate::app::StagedShow;
+use crate::config::from_to_args;
+use crate::cue::{Source, read};
+use crate::engine::Show;
+use crate::fanout::Manner;
+use crate::observe::Watched;
+use crate::time::{Rate, ShowTime};
+use crate::timeline::Timeline;
+use crate::wire::Timing;
 
 /// Axes of the ride and of every controller.
 const AXES: u8 = 6;
 
 /// A ride that many times a second to six axes at each of the addresses, and what has to be known of who is there; `silent` asks
 /// for no replies.
-pub(crate) fn stage(
+pub fn stage(
     timeline: Timeline,
     rate_hz: f64,
     to: &[SocketAddrV4],
@@ -36,7 +36,7 @@ pub(crate) fn stage(
 
 /// A ride of waves, a row every 10 ms, that begins and ends at rest at `from` (fraction of the stroke) on every axis; from
 /// 0, which is the park pose, no join leads onto it. `effects` are columns of effects, which are on throughout.
-pub(crate) fn ride(seconds: u32, from: f64, effects: &[&str]) -> Timeline {
+pub fn ride(seconds: u32, from: f64, effects: &[&str]) -> Timeline {
     let mut text = String::from("time_ms,a1,a2,a3,a4,a5,a6");
     effects.iter().for_each(|effect| text.extend([",fx_", effect]));
     text.push('\n');
@@ -53,4 +53,21 @@ pub(crate) fn ride(seconds: u32, from: f64, effects: &[&str]) -> Timeline {
     }
     let cue = read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).expect("the ride is well formed");
     Timeline::new(cue)
+}
+
+/// A cue of sines about the middle of the stroke, rows 20 ms apart: `mm` of swing at `hz` on each of `axes` axes.
+pub fn swell(axes: u32, seconds: u32, mm: f64, hz: f64) -> String {
+    let mut text = "time_ms".to_owned();
+    (1..=axes).for_each(|axis| write!(text, ",a{axis}").expect("a String takes what is written to it"));
+    for row in 0..=50 * seconds {
+        let t = f64::from(row) * 0.02;
+        write!(text, "\n{}", row * 20).expect("a String takes what is written to it");
+        for axis in 0..axes {
+            let turn = t * hz + f64::from(axis) / f64::from(axes);
+            write!(text, ",{:.6}", 0.5 + mm / 150.0 * (turn * std::f64::consts::TAU).sin())
+                .expect("a String takes what is written to it");
+        }
+    }
+    text.push('\n');
+    text
 }

@@ -1,33 +1,31 @@
 //! A whole show in virtual time: a clock that jumps from deadline to deadline, a planner that answers between ticks, and
 //! a link that keeps every datagram.
 
-#![allow(dead_code, unreachable_pub, reason = "each test file uses its own part")]
-
 use std::cell::{Cell, RefCell};
-use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kinocue::app::StagedShow;
-use kinocue::belief::Reading;
-use kinocue::config::{Config, from_to_args};
-use kinocue::cue::{self, Source};
-use kinocue::engine::{Mix, Show};
-use kinocue::fanout::Manner;
-use kinocue::limiter::Counts;
-use kinocue::motion::{MAX_AXES, Measure, Pose, SeatType, Spacing};
-use kinocue::net::Delivery;
-use kinocue::rt::{
-    Alarm, Answer, Command, Conductor, Desk, Ended, FrameSink, Live, MailEnds, News, Places, PlanLoop,
-    Planning, Task, TickLoop, mailboxes,
-};
-use kinocue::state::Transition;
-use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
-use kinocue::timeline::Timeline;
-use kinocue::wire::{MotionRequest, Timing};
 use rtrb::Producer;
+
+use super::{Frame, Played};
+use crate::app::StagedShow;
+use crate::belief::Reading;
+use crate::config::{Config, from_to_args};
+use crate::cue::{self, Source};
+use crate::engine::{Mix, Show};
+use crate::fanout::Manner;
+use crate::motion::{MAX_AXES, Pose, SeatType};
+use crate::net::Delivery;
+use crate::rt::{
+    Alarm, Answer, Command, Conductor, Desk, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
+    TickLoop, mailboxes,
+};
+use crate::state::Transition;
+use crate::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
+use crate::timeline::Timeline;
+use crate::wire::{MotionRequest, Timing};
 
 /// When tick 0 is due.
 pub const ORIGIN: MonoTime = MonoTime::from_nanos(1_000_000_000);
@@ -330,164 +328,4 @@ impl FrameSink for Link<'_> {
         self.frames.push(Frame { lane, at: self.now.get(), request, bytes: datagram.to_vec() });
         Delivery::Sent
     }
-}
-
-/// A frame as it left.
-#[derive(Debug, Clone)]
-pub struct Frame {
-    pub lane: usize,
-    pub at: MonoTime,
-    pub request: MotionRequest,
-    pub bytes: Vec<u8>,
-}
-
-/// A show that was played.
-pub struct Played {
-    pub ended: Ended,
-    pub frames: Vec<Frame>,
-    /// The events of the script, and when each came.
-    pub happened: Vec<(MonoTime, Event)>,
-    /// What the hall made known.
-    pub news: Vec<News>,
-    /// What the limiter had to do, lane by lane.
-    pub clamps: Vec<Counts>,
-    /// How long the first join takes.
-    pub join: ShowTime,
-    pub timeline: Arc<Timeline>,
-    pub rate: Rate,
-}
-
-/// The worst that a seat was made to do, each over its limit.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Worst {
-    pub velocity: f64,
-    pub acceleration: f64,
-    pub jerk: f64,
-    pub step: f64,
-}
-
-impl Worst {
-    /// The worse of the two, part by part.
-    pub fn max(self, other: Self) -> Self {
-        Self {
-            velocity: self.velocity.max(other.velocity),
-            acceleration: self.acceleration.max(other.acceleration),
-            jerk: self.jerk.max(other.jerk),
-            step: self.step.max(other.step),
-        }
-    }
-}
-
-impl Played {
-    /// The frames of one lane.
-    pub fn lane(&self, lane: usize) -> impl Iterator<Item = &Frame> {
-        self.frames.iter().filter(move |frame| frame.lane == lane)
-    }
-
-    /// The positions of one axis of one lane, frame by frame, mm.
-    pub fn positions_mm(&self, lane: usize, axis: usize) -> Vec<f64> {
-        let per_pulse = 150.0 / SeatType::bench3(1).stroke_pulses();
-        self.lane(lane).map(|frame| f64::from(frame.request.positions[axis].0) * per_pulse).collect()
-    }
-
-    /// What the frames make the first lane do from rest in its park pose.
-    pub fn worst(&self) -> Worst {
-        self.worst_of(0, 0..self.lane(0).count(), |_| 0.0)
-    }
-
-    /// What the frames before `end` make the first lane do from rest in its park pose.
-    pub fn worst_until(&self, end: usize) -> Worst {
-        self.worst_of(0, 0..end, |_| 0.0)
-    }
-
-    /// What the frames from `first` to before `end` make the first lane do, if it was at rest in the pose of the first.
-    pub fn worst_from_rest(&self, first: usize, end: usize) -> Worst {
-        self.worst_of(0, first..end, |mm| mm)
-    }
-
-    /// The same of its first axis, if that was at rest `mm` up.
-    pub fn worst_from_rest_at(&self, mm: f64, first: usize, end: usize) -> Worst {
-        self.worst_of_axis(0, 0, first..end, |_| mm)
-    }
-
-    /// What its frames of those numbers make a lane do, if it was at rest in the pose of the first.
-    pub fn worst_of_lane(&self, lane: usize, frames: Range<usize>) -> Worst {
-        self.worst_of(lane, frames, |mm| mm)
-    }
-
-    /// By the measure of what is sent, over the limits of the bench seat; before the first frame the seat rested where
-    /// `before` puts it.
-    fn worst_of(&self, lane: usize, frames: Range<usize>, before: impl Fn(f64) -> f64) -> Worst {
-        let axes = 0..self.frames[0].request.positions.len();
-        let worst = axes.map(|axis| self.worst_of_axis(lane, axis, frames.clone(), &before));
-        worst.fold(Worst::default(), Worst::max)
-    }
-
-    fn worst_of_axis(
-        &self,
-        lane: usize,
-        axis: usize,
-        frames: Range<usize>,
-        before: impl Fn(f64) -> f64,
-    ) -> Worst {
-        let sent: Vec<&Frame> = self.lane(lane).collect();
-        let mm = self.positions_mm(lane, axis);
-        let time = |frame: usize| Duration::from_millis(u64::from(self.time_ms(sent[frame], frame)));
-        let lines = frames.clone().map(|frame| {
-            let first = frame == frames.start;
-            (if first { self.rate.period() } else { time(frame) }, mm[frame])
-        });
-        worst_of_lines(self.rate, before(mm[frames.start]), lines)
-    }
-
-    /// How long a frame gives its seat.
-    fn time_ms(&self, frame: &Frame, index: usize) -> u32 {
-        match frame.request.timing {
-            Timing::Relative => frame.request.time_ms,
-            Timing::Absolute => self.rate.time_ms(index as u64),
-        }
-    }
-}
-
-/// What straight lines make an axis of the bench seat do, from rest `before` mm up: each takes that long, and ends that
-/// many mm up. By the measure of what is sent at that rate.
-pub fn worst_of_lines(rate: Rate, before: f64, lines: impl IntoIterator<Item = (Duration, f64)>) -> Worst {
-    let seat = SeatType::bench3(1);
-    let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / rate.hz()).max(0.005);
-    let mut worst = Worst::default();
-    let mut measure = Measure::new(Spacing::at_rate(rate.hz()));
-    let mut at = ShowTime::ZERO;
-    measure.push(at, before);
-    for _ in 1..100 {
-        at += rate.period();
-        measure.push(at, before);
-    }
-    for (span, mm) in lines {
-        at += span;
-        let seen = measure.push(at, mm);
-        worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
-        worst.acceleration =
-            worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
-        worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
-        worst.step = worst.step.max(seen.step.value.abs() / step);
-    }
-    worst
-}
-
-/// A cue of sines about the middle of the stroke, rows 20 ms apart: `mm` of swing at `hz` on each of `axes` axes.
-pub fn swell(axes: u32, seconds: u32, mm: f64, hz: f64) -> String {
-    use std::fmt::Write as _;
-    let mut text = "time_ms".to_owned();
-    (1..=axes).for_each(|axis| write!(text, ",a{axis}").expect("a String takes what is written to it"));
-    for row in 0..=50 * seconds {
-        let t = f64::from(row) * 0.02;
-        write!(text, "\n{}", row * 20).expect("a String takes what is written to it");
-        for axis in 0..axes {
-            let turn = t * hz + f64::from(axis) / f64::from(axes);
-            write!(text, ",{:.6}", 0.5 + mm / 150.0 * (turn * std::f64::consts::TAU).sin())
-                .expect("a String takes what is written to it");
-        }
-    }
-    text.push('\n');
-    text
 }

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use super::chance::Chance;
 use super::judge::Judge;
-use kinocue::cue::{Source, read};
-use kinocue::motion::{Limits, SeatType};
-use kinocue::time::{Rate, ShowTime};
-use kinocue::timeline::{Hint, Timeline};
+use crate::cue::{Source, read};
+use crate::motion::{Limits, SeatType};
+use crate::time::{Rate, ShowTime};
+use crate::timeline::{Hint, Timeline};
 
 /// Rates that are tried more often than others.
 const RATES: [f64; 8] = [50.0, 60.0, 100.0, 120.0, 200.0, 333.0, 500.0, 1000.0];
@@ -19,23 +19,22 @@ const SECONDS: u32 = 3;
 const REST_MS: u32 = 400;
 
 /// The sorts of motion, by name.
-pub(crate) const SORTS: [&str; 6] =
-    ["spline", "monotone", "linear", "waves", "from end to end", "jerk by chance"];
+pub const SORTS: [&str; 6] = ["spline", "monotone", "linear", "waves", "from end to end", "jerk by chance"];
 
 /// A motion that keeps the limits.
-pub(crate) struct Sound {
-    pub(crate) rate: Rate,
-    pub(crate) limits: Limits,
-    pub(crate) start: f64,
-    pub(crate) sort: usize,
+pub struct Sound {
+    pub rate: Rate,
+    pub limits: Limits,
+    pub start: f64,
+    pub sort: usize,
     /// Greatest share of a limit.
-    pub(crate) share: f64,
-    pub(crate) frames: Vec<(f64, u32)>,
+    pub share: f64,
+    pub frames: Vec<(f64, u32)>,
 }
 
 impl Sound {
     /// Motion number `seed`.
-    pub(crate) fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let mut chance = Chance::new(seed);
         let hz = if chance.once_in(4) { chance.between(50.0, 1000.0) } else { chance.one_of(&RATES) };
         let rate = Rate::from_hz(hz);

@@ -1,10 +1,10 @@
 //! Chance that can be had again: from a seed, and no other way.
 
 /// A small generator of numbers by chance (splitmix64).
-pub(crate) struct Chance(u64);
+pub struct Chance(u64);
 
 impl Chance {
-    pub(crate) const fn new(seed: u64) -> Self {
+    pub const fn new(seed: u64) -> Self {
         Self(seed)
     }
 
@@ -18,33 +18,33 @@ impl Chance {
 
     /// Anything from `low` to `high`.
     #[expect(clippy::cast_precision_loss, reason = "53 bits")]
-    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
     /// Anything from `low` to `high`, every order of size as likely.
-    pub(crate) fn of_any_size(&mut self, low: f64, high: f64) -> f64 {
+    pub fn of_any_size(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
 
     /// A whole number below `count`.
     #[expect(clippy::cast_possible_truncation, reason = "below a count that fits")]
-    pub(crate) fn below(&mut self, count: usize) -> usize {
+    pub fn below(&mut self, count: usize) -> usize {
         (self.next() % count as u64) as usize
     }
 
     /// True once in `count` times.
-    pub(crate) fn once_in(&mut self, count: usize) -> bool {
+    pub fn once_in(&mut self, count: usize) -> bool {
         self.below(count) == 0
     }
 
     /// One of these.
-    pub(crate) fn one_of<T: Copy>(&mut self, these: &[T]) -> T {
+    pub fn one_of<T: Copy>(&mut self, these: &[T]) -> T {
         these[self.below(these.len())]
     }
 
     /// -1 or 1.
-    pub(crate) fn sign(&mut self) -> f64 {
+    pub fn sign(&mut self) -> f64 {
         self.one_of(&[-1.0, 1.0])
     }
 }

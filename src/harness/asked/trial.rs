@@ -3,23 +3,23 @@
 use super::judge::Judge;
 use super::sound::Sound;
 use super::wild::Wild;
-use kinocue::belief::{KnownPose, Reading};
-use kinocue::limiter::{Counts, Limiter, Provenance};
-use kinocue::motion::{Limits, MAX_AXES, Pose, SeatType, Slot, Window};
-use kinocue::time::{MonoTime, Rate};
+use crate::belief::{KnownPose, Reading};
+use crate::limiter::{Counts, Limiter, Provenance};
+use crate::motion::{Limits, MAX_AXES, Pose, SeatType, Slot, Window};
+use crate::time::{MonoTime, Rate};
 
 /// What a sequence made of a limiter.
-pub(crate) struct Trial {
+pub struct Trial {
     /// Greatest share of a limit in what was sent; infinite outside the stroke.
-    pub(crate) share: f64,
+    pub share: f64,
     /// Whether all was sent as it was asked for, bit for bit.
-    pub(crate) unchanged: bool,
-    pub(crate) counts: Counts,
+    pub unchanged: bool,
+    pub counts: Counts,
 }
 
 impl Trial {
     /// A sequence of anything.
-    pub(crate) fn of_wild(wild: &mut Wild) -> Self {
+    pub fn of_wild(wild: &mut Wild) -> Self {
         let mut limiter = standing(&window(wild.limits), wild.rate, first(wild.start));
         let mut judge = Judge::new(wild.limits, wild.rate.hz(), wild.start);
         let (mut share, mut unchanged, mut ms) = (0.0_f64, true, 0);
@@ -36,7 +36,7 @@ impl Trial {
     }
 
     /// A motion that keeps the limits.
-    pub(crate) fn of_sound(sound: &Sound) -> Self {
+    pub fn of_sound(sound: &Sound) -> Self {
         let mut limiter = standing(&window(sound.limits), sound.rate, first(sound.start));
         let mut sent = sound.frames.clone();
         for (index, (position, _)) in (0..).zip(&mut sent) {
@@ -51,7 +51,7 @@ impl Trial {
     }
 
     /// Whether a limit was broken: by more than the thousandth that the measure allows, and what rounding takes.
-    pub(crate) fn is_broken(&self) -> bool {
+    pub fn is_broken(&self) -> bool {
         self.share > 1.001 * 1.000_001
     }
 }
@@ -63,19 +63,19 @@ fn first(position: f64) -> Pose {
 }
 
 /// A frame of one axis with those limits.
-pub(crate) fn window(limits: Limits) -> Window {
+pub fn window(limits: Limits) -> Window {
     let mut slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
     slot.limits = limits;
     Window::new(vec![slot])
 }
 
 /// What a reading of a seat at rest in that pose makes known.
-pub(crate) fn read(window: &Window, pose: Pose) -> KnownPose {
+pub fn read(window: &Window, pose: Pose) -> KnownPose {
     KnownPose::of(&Reading::at_rest(pose, MonoTime::default()), window).expect("it tells of every axis")
 }
 
 /// The limiter of a lane that was read at rest in that pose.
-pub(crate) fn standing(window: &Window, rate: Rate, pose: Pose) -> Limiter {
+pub fn standing(window: &Window, rate: Rate, pose: Pose) -> Limiter {
     let mut limiter = Limiter::new(window, rate);
     limiter.restart(&read(window, pose));
     limiter

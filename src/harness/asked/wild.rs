@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 
 use super::chance::Chance;
 use super::judge::Judge;
-use kinocue::motion::{Limits, SeatType};
-use kinocue::time::Rate;
+use crate::motion::{Limits, SeatType};
+use crate::time::Rate;
 
 /// Rates that are tried more often than others.
 const RATES: [f64; 10] = [50.0, 60.0, 100.0, 120.0, 200.0, 250.0, 333.0, 500.0, 700.0, 1000.0];
 
 /// The sorts of orders, by name.
-pub(crate) const SORTS: [&str; 13] = [
+pub const SORTS: [&str; 13] = [
     "steps",
     "noise",
     "no numbers",
@@ -28,12 +28,12 @@ pub(crate) const SORTS: [&str; 13] = [
 ];
 
 /// A sequence of orders to one axis at rest.
-pub(crate) struct Wild {
-    pub(crate) rate: Rate,
-    pub(crate) limits: Limits,
-    pub(crate) start: f64,
-    pub(crate) frames: usize,
-    pub(crate) sort: usize,
+pub struct Wild {
+    pub rate: Rate,
+    pub limits: Limits,
+    pub start: f64,
+    pub frames: usize,
+    pub sort: usize,
     waves: [(f64, f64, f64); 3],
     centre: f64,
     size: f64,
@@ -42,12 +42,12 @@ pub(crate) struct Wild {
     wiggle: f64,
     state: [f64; 4],
     left: usize,
-    pub(crate) chance: Chance,
+    pub chance: Chance,
 }
 
 impl Wild {
     /// Sequence number `seed`.
-    pub(crate) fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         let mut chance = Chance::new(seed);
         let hz = if chance.once_in(4) { chance.between(50.0, 1000.0) } else { chance.one_of(&RATES) };
         let rate = Rate::from_hz(hz);
@@ -94,7 +94,7 @@ impl Wild {
     }
 
     /// Order number `k`, due `t` after the start, a frame of `time_ms` after the last; `judge` knows what was sent before.
-    pub(crate) fn next(&mut self, k: usize, t: f64, time_ms: u32, judge: &mut Judge) -> f64 {
+    pub fn next(&mut self, k: usize, t: f64, time_ms: u32, judge: &mut Judge) -> f64 {
         let wave = self.wave(t);
         let seconds = f64::from(time_ms) * 1e-3;
         match self.sort {

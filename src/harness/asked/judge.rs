@@ -1,10 +1,10 @@
 //! Judges what was sent, from the definition of the measure alone, frame by frame and with all its multiplications.
 
-use kinocue::motion::Limits;
-use kinocue::time::Rate;
+use crate::motion::Limits;
+use crate::time::Rate;
 
 /// What frames of a rate make of an axis that stood still before.
-pub(crate) struct Judge {
+pub struct Judge {
     limits: Limits,
     step: f64,
     apart: [usize; 2],
@@ -14,18 +14,18 @@ pub(crate) struct Judge {
 
 /// The worst that an axis was made to do, each over its limit.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Worst {
-    pub(crate) velocity: f64,
-    pub(crate) step: f64,
-    pub(crate) acceleration: f64,
-    pub(crate) jerk: f64,
+pub struct Worst {
+    pub velocity: f64,
+    pub step: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
     /// How far outside the stroke; infinite where a position is no number.
-    pub(crate) outside: f64,
+    pub outside: f64,
 }
 
 impl Worst {
     /// The greatest share of a limit.
-    pub(crate) fn share(&self) -> f64 {
+    pub fn share(&self) -> f64 {
         let most = self.velocity.max(self.step).max(self.acceleration).max(self.jerk);
         if self.outside > 0.0 { f64::INFINITY } else { most }
     }
@@ -42,7 +42,7 @@ impl Worst {
 impl Judge {
     /// An axis at rest at `start` before the first frame.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 20, 1 to 1,000")]
-    pub(crate) fn new(limits: Limits, rate_hz: f64, start: f64) -> Self {
+    pub fn new(limits: Limits, rate_hz: f64, start: f64) -> Self {
         let n = ((0.020 * rate_hz + 0.5).floor() as usize).max(1);
         let m = (13 * n / 10 + 1..)
             .find(|m| (2..=n).all(|f| !n.is_multiple_of(f) || !m.is_multiple_of(f)))
@@ -59,7 +59,7 @@ impl Judge {
     }
 
     /// Takes the next position and says what it shows.
-    pub(crate) fn push(&mut self, position: f64, time_ms: u32) -> Worst {
+    pub fn push(&mut self, position: f64, time_ms: u32) -> Worst {
         let at = self.at_ms.last().expect("it stood before") + i64::from(time_ms);
         self.at_ms.push(at);
         self.sent.push(position);
@@ -67,7 +67,7 @@ impl Judge {
     }
 
     /// The worst of all frames so far, were their positions these.
-    pub(crate) fn worst(limits: Limits, rate_hz: f64, start: f64, frames: &[(f64, u32)]) -> Worst {
+    pub fn worst(limits: Limits, rate_hz: f64, start: f64, frames: &[(f64, u32)]) -> Worst {
         let mut judge = Self::new(limits, rate_hz, start);
         let mut worst = Worst::default();
         for &(position, time_ms) in frames {
@@ -109,7 +109,7 @@ impl Judge {
     }
 
     /// The interval that the next position may lie in.
-    pub(crate) fn room(&mut self, time_ms: u32) -> (f64, f64) {
+    pub fn room(&mut self, time_ms: u32) -> (f64, f64) {
         let mut room = (0.0_f64, 1.0_f64);
         let at = self.at_ms.last().expect("it stood before") + i64::from(time_ms);
         let last = self.sent[self.sent.len() - 1];

@@ -1,0 +1,17 @@
+//! What tests and benches share of the inside: a hall in virtual time, rides, sequences for the limiter, and judges of what was sent.
+//! Built with feature `harness` alone, which the crate's own tests and benches ask for.
+
+#![expect(
+    missing_docs,
+    clippy::missing_panics_doc,
+    reason = "whoever uses it has it before the eyes, and a test may panic"
+)]
+
+pub mod asked;
+mod hall;
+mod played;
+mod ride;
+
+pub use hall::{Event, ORIGIN, Virtual, read_at_rest};
+pub use played::{Frame, Played, Worst, worst_of_lines};
+pub use ride::{ride, stage, swell};

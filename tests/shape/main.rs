@@ -1,0 +1,65 @@
+//! The shape of the code in figures, each held to what it was: whoever makes one worse is told, whoever makes it better notes the
+//! new one here. `cargo test --test shape -- --nocapture` prints them all with their targets and the worst place of each.
+
+mod circles;
+mod counts;
+mod repeats;
+mod source;
+
+use source::File;
+
+/// Whether less or more of something is better.
+#[derive(Clone, Copy, PartialEq)]
+enum Better {
+    Less,
+    More,
+}
+
+use Better::{Less, More};
+
+type Row = (&'static str, fn(&[File]) -> (f64, String), Better, f64, f64);
+
+/// What is counted, how, which way is better, what it was when it was noted last, and the target.
+const ROWS: &[Row] = &[
+    ("methods on one type", counts::methods_of_one_type, Less, 114.0, 25.0),
+    ("bool fields in one struct", counts::bools_of_one_struct, Less, 14.0, 3.0),
+    ("enums with the words of the hall's state", counts::encodings_of_state, Less, 2.0, 1.0),
+    ("compositions", counts::compositions, Less, 2.0, 1.0),
+    ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 154.0, 30.0),
+    ("uses of one type name", counts::uses_of_one_type_name, Less, 13.0, 2.0),
+    ("polled said-once flags", counts::flags_told_once, Less, 16.0, 0.0),
+    ("polling sleeps in the supervisor", counts::sleeps_of_the_supervisor, Less, 2.0, 0.0),
+    ("circles within rooms", circles::within_rooms, Less, 4.0, 0.0),
+    ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 263.0, 170.0),
+    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 19.0, 2.0),
+    ("lines of code", counts::lines_of_code, Less, 48_059.0, 39_800.0),
+    ("public items and fields", counts::public_items, Less, 2_856.0, 400.0),
+    ("lines of the longest function", counts::longest_function, Less, 57.0, 48.0),
+    ("lines of the longest file", counts::longest_file, Less, 596.0, 390.0),
+    ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.4, 3.0),
+    ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
+];
+
+/// Whether one figure is worse than another.
+fn is_worse(now: f64, than: f64, better: Better) -> bool {
+    if better == Less { now > than } else { now < than }
+}
+
+#[test]
+#[expect(clippy::print_stdout, reason = "the table is for who asks to see it")]
+fn no_figure_of_the_shape_is_worse_than_it_was() {
+    let files = source::read();
+    assert!(files.len() > 100, "the sources were found");
+    let mut worse = Vec::new();
+    println!("{:<51}{:>9}{:>9}{:>9}", "", "now", "noted", "target");
+    for (what, count, better, noted, target) in ROWS {
+        let (now, place) = count(&files);
+        let met = if is_worse(now, *target, *better) { "" } else { "met" };
+        println!("{what:<51}{now:>9}{noted:>9}{target:>9}  {met:<4}{place}");
+        if is_worse(now, *noted, *better) {
+            worse.push(format!("{what}: {now}, was {noted}; target {target}; {place}"));
+        }
+    }
+    assert!(worse.is_empty(), "worse than before (tests/shape/main.rs):\n{}", worse.join("\n"));
+}
