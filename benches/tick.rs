@@ -125,8 +125,8 @@ fn round(links: &[Link]) -> Round {
             for (index, lane) in lanes.iter_mut().enumerate() {
                 let beat = places.admit(index, &mut engine, &beat, at).expect("every lane takes part");
                 let pose = engine.pose(index);
-                let (stamped, octets) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
-                black_box(octets);
+                let (stamped, bytes) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
+                black_box(bytes);
                 let taken = Taken { frame: stamped.frame, asked: true, pose, lasts_ms: beat.lasts_ms, at };
                 places.sent(index, &taken, Delivery::Sent);
             }

@@ -36,7 +36,7 @@ impl Severity {
 pub enum Family {
     /// Whether it answers, and how fast.
     Answers,
-    /// Whether it is the controller it should be.
+    /// True if it is the controller it should be.
     Identity,
     /// The way to it and back.
     Network,
@@ -319,20 +319,20 @@ checks! {
 }
 
 impl Check {
-    /// Whether a configuration may accept it for good: a setting that was found and understood, but not that a
+    /// True if a configuration may accept it for good: a setting that was found and understood, but not that a
     /// controller is silent or in trouble at present, and nothing that is only told.
     #[must_use]
     pub const fn can_be_accepted(self) -> bool {
         !self.is_unknown() && !self.is_present() && !matches!(self.severity(), Severity::Info)
     }
 
-    /// Whether it means that something is not known.
+    /// True if it means that something is not known.
     #[must_use]
     pub const fn is_unknown(self) -> bool {
         matches!(self, Self::NoAnswer | Self::RegisterUnread | Self::Route)
     }
 
-    /// Whether it is about this moment, and no setting.
+    /// True if it is about this moment, and no setting.
     #[must_use]
     pub const fn is_present(self) -> bool {
         matches!(self, Self::EmergencyStopActive | Self::ActiveError | Self::BeltsOpen | Self::Position)
@@ -372,7 +372,7 @@ mod tests {
     fn each_check_has_a_name_of_its_own_in_kebab_case() {
         for (index, check) in Check::ALL.iter().enumerate() {
             assert_eq!(check.id().parse(), Ok(*check));
-            assert!(check.id().bytes().all(|octet| octet.is_ascii_lowercase() || octet == b'-'), "{check}");
+            assert!(check.id().bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-'), "{check}");
             assert!(Check::ALL[..index].iter().all(|before| before.id() != check.id()), "{check}");
         }
         assert_eq!("estop".parse::<Check>(), Err(UnknownCheck));

@@ -6,7 +6,7 @@
 //!              +------------------- v ------------------------------+
 //!              | tick thread, fixed rate, up to 1 kHz               |
 //!              |   engine   clock -> tick -> playhead -> Pose       |
-//!  control --> |   fanout   Pose -> + axis offset -> octets -> net  | --> controllers
+//!  control --> |   fanout   Pose -> + axis offset -> bytes -> net  | --> controllers
 //!              +--------------------|-------------------------------+          |
 //!                                   v Sent, TickReport                        acks
 //!       report, progress <----- tracker (latency, loss, silence) <---- net <---+
@@ -36,7 +36,7 @@ pub mod proof;
 pub mod belief;
 pub mod engine;
 pub mod fanout;
-pub mod gate;
+pub mod limiter;
 pub mod plan;
 pub mod rt;
 pub mod state;
@@ -49,7 +49,7 @@ pub mod tracker;
 pub mod device;
 pub mod preflight;
 
-pub mod hall;
+pub mod control;
 pub mod journal;
 pub mod library;
 pub mod playlist;

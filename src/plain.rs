@@ -4,11 +4,11 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-/// The longest name of a file that is shown whole, octets: no path may be longer.
+/// The longest name of a file that is shown whole, bytes: no path may be longer.
 const PATH_LEN: usize = 4_096;
 
 /// The text with its control characters, and those that change the direction of writing, escaped as Rust writes them, and
-/// cut after `limit` octets: whatever a file, a network or a person gives makes one line, and looks like what it is.
+/// cut after `limit` bytes: whatever a file, a network or a person gives makes one line, and looks like what it is.
 #[must_use]
 pub fn escaped(text: &str, limit: usize) -> Cow<'_, str> {
     if text.len() <= limit && !text.contains(misleads) {
@@ -61,7 +61,7 @@ fn with(text: &str, put: impl Fn(char, &mut String)) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Whether a character makes text look like something else: it ends the line, moves the cursor, or turns what follows around
+/// True if a character makes text look like something else: it ends the line, moves the cursor, or turns what follows around
 /// (Unicode Standard Annex 9, explicit directional formatting characters; line and paragraph separators).
 fn misleads(c: char) -> bool {
     c.is_control()

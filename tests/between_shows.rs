@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
@@ -19,7 +19,7 @@ use kinocue::rt::{
     Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, Places, PlanLoop, Planning,
     TickLoop, mailboxes,
 };
-use kinocue::state::{Event, Finding, Readiness, Request, Ride, State};
+use kinocue::state::{Event, Finding, PlayMode, Readiness, State, Transition};
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
@@ -32,7 +32,7 @@ enum Deed {
     /// The same, made for that trim.
     LoadTrimmed(i32),
     Trim(i32),
-    Ask(Request),
+    Ask(Transition),
     Tell(Event),
     See(Alarm),
     /// A controller takes part again: its seat was read at rest in that pose.
@@ -52,18 +52,18 @@ const fn found(homed: bool, at_park: bool) -> Deed {
 }
 
 /// Four seconds for one seat of one axis.
-fn staged() -> Staged {
+fn staged() -> StagedShow {
     staged_at(ShowTime::ZERO)
 }
 
-fn staged_at(start: ShowTime) -> Staged {
+fn staged_at(start: ShowTime) -> StagedShow {
     let text = swell(1, 4, 30.0, 0.2);
     let timeline = Timeline::new(
         cue::read(Path::new("ride.csv"), text.as_bytes(), &Source::Native).expect("the cue is sound"),
     );
     let config = from_to_args(&["127.0.0.1:7408".to_owned()], &[], 1).expect("the address is sound");
     let show = Show { rate: Rate::from_hz(100.0), timing: Timing::Relative, start, plays: 1 };
-    Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false }).expect("there is a join")
+    StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false }).expect("there is a join")
 }
 
 /// A clock that jumps, with what happens at each tick of that number.
@@ -212,7 +212,7 @@ fn live_through(script: &[(u64, Deed)], end: u64) -> (Vec<(u64, i32)>, Vec<State
 #[track_caller]
 fn assert_played(script: &[(u64, Deed)], go: u64) {
     let (frames, states) = live_through(script, go + 1_500);
-    assert!(states.contains(&State::Playing(Ride::Following)), "{states:?}");
+    assert!(states.contains(&State::Playing(PlayMode::Following)), "{states:?}");
     assert_eq!(states.last(), Some(&State::Parked), "{states:?}");
     let (first, _) = frames.iter().find(|(tick, _)| *tick > go).expect("frames go out");
     assert!(*first <= go + 2, "the first frame came at tick {first}");
@@ -223,8 +223,9 @@ fn assert_played(script: &[(u64, Deed)], go: u64) {
 
 #[test]
 fn a_cue_that_was_loaded_before_the_seats_were_found_is_played() {
-    let script = [(1, Load), (2, READY), (5, Found(PARKED)), (6, found(true, true)), (9, Ask(Request::Arm))];
-    assert_played(&[&script[..], &[(10, Ask(Request::Go))]].concat(), 10);
+    let script =
+        [(1, Load), (2, READY), (5, Found(PARKED)), (6, found(true, true)), (9, Ask(Transition::Arm))];
+    assert_played(&[&script[..], &[(10, Ask(Transition::Go))]].concat(), 10);
 }
 
 #[test]
@@ -236,11 +237,11 @@ fn a_cue_that_was_loaded_before_the_seats_homed_is_played_from_where_they_are_th
         (2, found(false, true)),
         (3, Load),
         (4, READY),
-        (5, Ask(Request::HomeAndArm)),
+        (5, Ask(Transition::HomeAndArm)),
         (50, See(Alarm::Leave(0))),
         (60, Found(home)),
         (70, Tell(Event::Homed)),
-        (80, Ask(Request::Go)),
+        (80, Ask(Transition::Go)),
     ];
     assert_played(&script, 80);
 }
@@ -254,10 +255,10 @@ fn a_seat_that_was_moved_while_the_hall_was_armed_joins_from_where_it_was_found(
         (2, found(true, true)),
         (3, Load),
         (4, READY),
-        (5, Ask(Request::Arm)),
+        (5, Ask(Transition::Arm)),
         (20, See(Alarm::Leave(0))),
         (40, Found(elsewhere)),
-        (60, Ask(Request::Go)),
+        (60, Ask(Transition::Go)),
     ];
     assert_played(&script, 60);
     let (frames, _) = live_through(&script, 200);
@@ -274,12 +275,12 @@ fn a_hall_that_was_stopped_cleared_and_homed_plays_what_was_loaded_meanwhile() {
         (4, READY),
         (5, Stop),
         (6, Load),
-        (7, Ask(Request::Clear)),
+        (7, Ask(Transition::Clear)),
         (8, Tell(Event::PositionsRead)),
-        (9, Ask(Request::Home)),
+        (9, Ask(Transition::Home)),
         (50, Tell(Event::Homed)),
-        (60, Ask(Request::Arm)),
-        (61, Ask(Request::Go)),
+        (60, Ask(Transition::Arm)),
+        (61, Ask(Transition::Go)),
     ];
     assert_played(&script, 61);
 }
@@ -294,7 +295,7 @@ fn up(height: f64) -> Pose {
 /// Parked by a show, or before any, with a seat that comes back up at tick 20 and is asked to park at tick 100.
 fn astray(before: &[(u64, Deed)]) -> Vec<(u64, Deed)> {
     let found = [(1, Found(PARKED)), (2, found(true, true))];
-    let back = [(19, See(Alarm::Leave(0))), (20, Found(up(0.3))), (100, Ask(Request::Park))];
+    let back = [(19, See(Alarm::Leave(0))), (20, Found(up(0.3))), (100, Ask(Transition::Park))];
     [&found[..], before, &back[..]].concat()
 }
 
@@ -315,13 +316,14 @@ fn a_seat_that_came_back_up_between_shows_is_parked_slowly_once_a_person_asks() 
 
 #[test]
 fn a_seat_that_was_parked_between_shows_plays_the_next_one() {
-    let script = [&astray(&[(3, Load), (4, READY)])[..], &[(600, Load), (601, Ask(Request::Arm))]].concat();
-    assert_played(&[&script[..], &[(610, Ask(Request::Go))]].concat(), 610);
+    let script =
+        [&astray(&[(3, Load), (4, READY)])[..], &[(600, Load), (601, Ask(Transition::Arm))]].concat();
+    assert_played(&[&script[..], &[(610, Ask(Transition::Go))]].concat(), 610);
 }
 
 #[test]
 fn a_seat_that_comes_up_again_is_parked_again_though_nothing_was_loaded_since() {
-    let again = [(700, Found(up(0.1))), (710, Ask(Request::Park))];
+    let again = [(700, Found(up(0.1))), (710, Ask(Transition::Park))];
     let (frames, states) = live_through(&[&astray(&[])[..], &again].concat(), 1_000);
     assert_eq!(states.iter().filter(|state| **state == State::Parking).count(), 2, "{states:?}");
     let (_, from) = frames.iter().find(|(tick, _)| *tick > 700).expect("frames go out");
@@ -332,7 +334,7 @@ fn a_seat_that_comes_up_again_is_parked_again_though_nothing_was_loaded_since() 
 #[test]
 fn a_park_of_seats_that_are_all_at_park_sends_nothing() {
     for before in [&[(3, Load), (4, READY)][..], &[]] {
-        let found = [(1, Found(PARKED)), (2, found(true, true)), (100, Ask(Request::Park))];
+        let found = [(1, Found(PARKED)), (2, found(true, true)), (100, Ask(Transition::Park))];
         let (frames, states) = live_through(&[&found[..], before].concat(), 200);
         assert_eq!((frames, states), (vec![], vec![State::Boot, State::Parked]));
     }
@@ -342,10 +344,10 @@ fn a_park_of_seats_that_are_all_at_park_sends_nothing() {
 fn a_seat_that_is_stopped_before_it_sets_out_to_park_stays_where_it_is() {
     let script = [
         (101, Stop),
-        (110, Ask(Request::Clear)),
+        (110, Ask(Transition::Clear)),
         (111, Tell(Event::PositionsRead)),
         // Had it set out, it would be half-way by now, as far as the engine knows.
-        (190, Ask(Request::Park)),
+        (190, Ask(Transition::Park)),
     ];
     let (frames, states) = live_through(&[&astray(&[])[..], &script].concat(), 700);
     assert_eq!(states.last(), Some(&State::Parked), "{states:?}");
@@ -358,7 +360,9 @@ fn whoever_hears_nothing_for_a_while_still_hears_where_the_hall_stands() {
     let mut script = vec![(1, found(true, true)), (2, Load), (3, READY)];
     // More news than find room.
     script.extend(
-        (0..100).flat_map(|turn| [(10 + 2 * turn, Ask(Request::Arm)), (11 + 2 * turn, Ask(Request::Disarm))]),
+        (0..100).flat_map(|turn| {
+            [(10 + 2 * turn, Ask(Transition::Arm)), (11 + 2 * turn, Ask(Transition::Disarm))]
+        }),
     );
     script.extend([(220, Stop), (230, Hear)]);
     let (_, states) = live_through(&script, 240);
@@ -368,7 +372,7 @@ fn whoever_hears_nothing_for_a_while_still_hears_where_the_hall_stands() {
 /// Two shows, one after the other, each loaded by `load`: the positions of the second one while it follows the cue, by how many
 /// ticks after its go they came.
 fn second_show(load: Deed, trim_ms: i32) -> Vec<(u64, i32)> {
-    let show = |go: u64| [(go - 3, load), (go - 1, Ask(Request::Arm)), (go, Ask(Request::Go))];
+    let show = |go: u64| [(go - 3, load), (go - 1, Ask(Transition::Arm)), (go, Ask(Transition::Go))];
     let begin = [(1, Found(PARKED)), (2, Trim(trim_ms)), (3, found(true, true)), (4, READY), (1_900, Hear)];
     let (frames, _) = live_through(&[&begin[..], &show(10), &show(2_000)].concat(), 3_900);
     frames.into_iter().filter_map(|(tick, pulses)| Some((tick.checked_sub(2_000)?, pulses))).collect()

@@ -24,7 +24,7 @@ impl Run {
 fn kinocue(args: &[&str]) -> Run {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
     let output = command.current_dir(env!("CARGO_MANIFEST_DIR")).args(args).output().expect("kinocue runs");
-    let text = |octets| String::from_utf8(octets).expect("UTF-8");
+    let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 

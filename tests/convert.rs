@@ -39,7 +39,7 @@ fn a_cue_comes_back_from_mcap_as_it_was() {
 }
 
 #[test]
-fn rows_and_octets_are_imported() {
+fn rows_and_bytes_are_imported() {
     let folder = folder_with("r.csv", "line,time_ms,x,y\n1,1000,0,10\n2,500,150,20\n");
     let (code, _) =
         convert(folder.path(), &["r.csv", "o.csv", "--from", "rows", "--units", "mm", "--title", "T"]);

@@ -32,12 +32,9 @@ fn name(timeline: &Timeline) -> String {
 
 #[test]
 fn the_files_are_what_the_generator_makes() {
-    for (name, octets) in files::all() {
-        assert!(
-            fs::read(folder().join(name)).unwrap() == octets,
-            "{name}: run cargo run --example make_cues"
-        );
-        assert!(octets.len() < 300_000, "{name}: {} octets", octets.len());
+    for (name, bytes) in files::all() {
+        assert!(fs::read(folder().join(name)).unwrap() == bytes, "{name}: run cargo run --example make_cues");
+        assert!(bytes.len() < 300_000, "{name}: {} bytes", bytes.len());
     }
 }
 

@@ -41,7 +41,7 @@ fn decode(args: &[&str], stdin: &[u8]) -> Ran {
     }
 }
 
-fn octets(hex: &str) -> Vec<u8> {
+fn bytes(hex: &str) -> Vec<u8> {
     (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
 }
 
@@ -60,13 +60,13 @@ fn at(ms: u64) -> Duration {
 /// A frame, its reply, a truncated write, and packets of every other sort.
 fn capture() -> Pcap {
     let mut pcap = Pcap::new();
-    pcap.datagram(at(0), host(), seat(), &octets(FRAME));
-    pcap.datagram(at(2), seat(), host(), &octets(ACK));
-    pcap.datagram(at(20), host(), seat(), &octets(TRUNCATED));
+    pcap.datagram(at(0), host(), seat(), &bytes(FRAME));
+    pcap.datagram(at(2), seat(), host(), &bytes(ACK));
+    pcap.datagram(at(20), host(), seat(), &bytes(TRUNCATED));
     let stranger = "10.0.0.1:53".parse().unwrap();
     pcap.datagram(at(21), stranger, "10.0.0.2:5353".parse().unwrap(), b"who is there");
-    pcap.datagram(at(22), stranger, "10.0.0.2:7402".parse().unwrap(), &octets(READ));
-    pcap.packet(at(30), &ethernet(host(), seat(), &octets(FRAME), 0), 60);
+    pcap.datagram(at(22), stranger, "10.0.0.2:7402".parse().unwrap(), &bytes(READ));
+    pcap.packet(at(30), &ethernet(host(), seat(), &bytes(FRAME), 0), 60);
     pcap.packet(at(31), &ethernet(host(), seat(), &[0; 40], 0x2000), usize::MAX);
     pcap.packet(at(32), &[0; 60], usize::MAX);
     pcap
@@ -92,7 +92,7 @@ fn a_malformed_message_says_where_and_why_and_the_next_is_told_all_the_same() {
     let ran = decode(&[TRUNCATED, READ], b"");
     assert_eq!(ran.code, 65);
     assert!(
-        ran.out.starts_with("malformed: octet 18: ends after 18 octets; this message takes 20: 55aa"),
+        ran.out.starts_with("malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa"),
         "{}",
         ran.out
     );
@@ -100,7 +100,7 @@ fn a_malformed_message_says_where_and_why_and_the_next_is_told_all_the_same() {
     let ran = decode(&[TRUNCATED, READ, "--json"], b"");
     assert_eq!(ran.code, 65);
     let lines = ran.json();
-    assert_eq!((&lines[0]["malformed"]["octet"], &lines[1]["function"]), (&json!(18), &json!("0x1101")));
+    assert_eq!((&lines[0]["malformed"]["byte"], &lines[1]["function"]), (&json!(18), &json!("0x1101")));
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn a_missing_file_and_a_folder_are_no_input() {
 
 #[test]
 fn a_capture_is_told_a_line_for_each_message_and_counted() {
-    let (_folder, path) = file("show.pcap", capture().octets());
+    let (_folder, path) = file("show.pcap", capture().bytes());
     let ran = decode(&[path.to_str().unwrap()], b"");
     assert_eq!((ran.code, ran.err.as_str()), (65, ""));
     assert_eq!(
@@ -133,9 +133,9 @@ fn a_capture_is_told_a_line_for_each_message_and_counted() {
         "\
     0.000000  192.168.15.101:8410 -> 192.168.15.201:7408  motion, relative time: frame 7, in 50 ms, positions 1 -2 3, outputs Y02 Y12
     0.002000  192.168.15.201:7408 -> 192.168.15.101:8410  reply to motion, relative time: received, running normally, frame 7, in 50 ms, positions 1 0 0, inputs X01
-    0.020000  192.168.15.101:8410 -> 192.168.15.201:7408  malformed: octet 18: ends after 18 octets; this message takes 20: 55aa000012010001ffffffff002000020001
-    0.030000  192.168.15.101:8410 -> 192.168.15.201:7408  cut: the capture kept 18 of 38 octets
-    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from octet 0 of it on; not put together
+    0.020000  192.168.15.101:8410 -> 192.168.15.201:7408  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa000012010001ffffffff002000020001
+    0.030000  192.168.15.101:8410 -> 192.168.15.201:7408  cut: the capture kept 18 of 38 bytes
+    0.031000  192.168.15.101:8410 -> 192.168.15.201:7408  fragment: from byte 0 of it on; not put together
 
 2 messages in 0.032 s from 2023-11-14 22:13:20 UTC
        1  0x1401 motion, relative time
@@ -151,7 +151,7 @@ fn a_capture_is_told_a_line_for_each_message_and_counted() {
 
 #[test]
 fn ports_may_be_chosen_and_all_ports_are_told_by_how_a_message_opens() {
-    let (_folder, path) = file("show.pcap", capture().octets());
+    let (_folder, path) = file("show.pcap", capture().bytes());
     let path = path.to_str().unwrap();
     let ran = decode(&[path, "--port", "7402"], b"");
     assert_eq!(ran.code, 0, "{}", ran.out);
@@ -163,7 +163,7 @@ fn ports_may_be_chosen_and_all_ports_are_told_by_how_a_message_opens() {
 
 #[test]
 fn verbose_tells_all_fields_of_a_capture() {
-    let (_folder, path) = file("show.pcap", capture().octets());
+    let (_folder, path) = file("show.pcap", capture().bytes());
     let ran = decode(&[path.to_str().unwrap(), "--verbose"], b"");
     assert!(
         ran.out.contains("192.168.15.201:7408 -> 192.168.15.101:8410\nmessage    reply to motion"),
@@ -175,7 +175,7 @@ fn verbose_tells_all_fields_of_a_capture() {
 
 #[test]
 fn json_names_packet_time_and_ends_of_each_message_and_ends_with_the_counts() {
-    let ran = decode(&["--json"], capture().octets());
+    let ran = decode(&["--json"], capture().bytes());
     let lines = ran.json();
     assert_eq!((ran.code, lines.len()), (65, 6));
     let frame = &lines[0];
@@ -183,8 +183,8 @@ fn json_names_packet_time_and_ends_of_each_message_and_ends_with_the_counts() {
     assert_eq!(frame["time_ns"], 1_700_000_000_000_000_000_u64);
     assert_eq!(frame["source"], "192.168.15.101:8410");
     assert_eq!(frame["positions"], json!([1, -2, 3]));
-    assert_eq!(lines[2]["malformed"]["octet"], 18);
-    assert_eq!(lines[3]["cut"], json!({ "kept": 18, "octets": 38 }));
+    assert_eq!(lines[2]["malformed"]["byte"], 18);
+    assert_eq!(lines[3]["cut"], json!({ "kept": 18, "bytes": 38 }));
     assert_eq!(lines[5]["summary"]["messages"], json!({ "0x1401": 1, "0x1402": 1 }));
 }
 
@@ -199,7 +199,7 @@ fn lines_of_hex_are_a_message_each_and_bad_ones_are_counted() {
 line 1  read registers: PA02
 line 3  reply to read registers: received, running normally, PA02 = 6
 line 4  not hex: 'n' after 0 hex digits is no hex digit; give the message as 0-9 and a-f
-line 5  malformed: octet 18: ends after 18 octets; this message takes 20: 55aa000012010001ffffffff002000020001
+line 5  malformed: byte 18: ends after 18 bytes; this message takes 20: 55aa000012010001ffffffff002000020001
 
 2 messages
        1  0x1101 read registers
@@ -215,10 +215,10 @@ line 5  malformed: octet 18: ends after 18 octets; this message takes 20: 55aa00
 #[test]
 fn a_capture_cut_off_is_told_as_far_as_it_goes() {
     let whole = capture();
-    let ran = decode(&["-"], &whole.octets()[..150]);
+    let ran = decode(&["-"], &whole.bytes()[..150]);
     assert_eq!(ran.code, 65);
     assert!(ran.out.contains("frame 7") && ran.out.contains("1 message "), "{}", ran.out);
-    assert!(ran.err.contains("standard input: octet 150: the capture ends inside a packet"), "{}", ran.err);
+    assert!(ran.err.contains("standard input: byte 150: the capture ends inside a packet"), "{}", ran.err);
 }
 
 #[test]

@@ -14,7 +14,7 @@ struct Run {
 fn kinocue(args: &[&str]) -> Run {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
     let output = command.current_dir(env!("CARGO_MANIFEST_DIR")).args(args).output().expect("kinocue runs");
-    let text = |octets| String::from_utf8(octets).expect("UTF-8");
+    let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 
@@ -93,9 +93,9 @@ fn coarse_bytes_are_smoothed_without_a_shift_in_time() {
     let folder = tempfile::tempdir().unwrap();
     // A slow swing to 40 mm and back at 20 bytes a second: steps of more than half a millimetre.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 68")]
-    let octet = |row: u32| (34.0 * (1.0 - (f64::from(row) * 0.031_415_926).cos())).round() as u8;
-    let octets: Vec<u8> = (0..=200).map(octet).collect();
-    let raw = write(folder.path(), "ride.bin", octets);
+    let byte = |row: u32| (34.0 * (1.0 - (f64::from(row) * 0.031_415_926).cos())).round() as u8;
+    let bytes: Vec<u8> = (0..=200).map(byte).collect();
+    let raw = write(folder.path(), "ride.bin", bytes);
     let cue = path(folder.path(), "ride.csv");
     assert_eq!(
         kinocue(&["convert", &raw, &cue, "--from", "u8", "--axes", "1", "--rate", "20"]).code,

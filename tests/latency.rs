@@ -63,10 +63,10 @@ fn without_controllers_it_measures_virtual_ones_of_its_own_and_keeps_every_time(
 /// Asks a virtual controller where its first axis stands.
 fn place(controller: &UdpSocket) -> i32 {
     let ask = ReadRequest { channel: 0, accept: Code::ALL, reply: Code::ALL, start: 0x06, num: 2 };
-    let mut octets = [0; MAX_LEN];
+    let mut bytes = [0; MAX_LEN];
     controller.send(ask.emit(&mut [0; MAX_LEN])).expect("loopback takes it");
-    let len = controller.recv(&mut octets).expect("it answers");
-    let words: Vec<u16> = RegisterReply::parse(&octets[..len]).expect("an answer").data.iter().collect();
+    let len = controller.recv(&mut bytes).expect("it answers");
+    let words: Vec<u16> = RegisterReply::parse(&bytes[..len]).expect("an answer").data.iter().collect();
     position([words[0], words[1]], Dialect::Smc).0
 }
 
@@ -100,7 +100,7 @@ fn a_seat_away_from_park_is_held_where_it_stands_by_every_frame() {
     send_to(&sim.addresses[0], PLACES);
     let report = latency_to(&[&sim.addresses[0]], &[]).report_of(0);
     let sent = count(&report["report"]["controllers"][0]["sent"]);
-    assert!(sent > 0 && count(&report["report"]["controllers"][0]["homing"]) == 0, "{report}");
+    assert!(sent > 0 && count(&report["report"]["controllers"][0]["park_frames"]) == 0, "{report}");
     let seen = sim.end();
     assert_eq!(seen.motion() as u64, 1 + sent);
     for row in &seen.rows[1..] {
@@ -141,14 +141,14 @@ fn a_silent_controller_is_left_out_and_the_others_are_measured() {
 /// A controller of three axes at rest that says of its `nth` reading, from 0, that axis 1 stands at `place(nth)`; until it
 /// is sent an empty datagram. Returns the frames that it got.
 fn fickle(socket: &UdpSocket, place: impl Fn(usize) -> i32, readings: &AtomicUsize) -> usize {
-    let (mut octets, mut frames) = ([0; MAX_LEN], 0);
+    let (mut bytes, mut frames) = ([0; MAX_LEN], 0);
     loop {
-        let (len, from) = socket.recv_from(&mut octets).expect("loopback works");
+        let (len, from) = socket.recv_from(&mut bytes).expect("loopback works");
         if len == 0 {
             return frames;
         }
-        frames += usize::from(MotionRequest::parse(&octets[..len]).is_ok());
-        let Ok(ReadRequest { channel, start, num, .. }) = ReadRequest::parse(&octets[..len]) else {
+        frames += usize::from(MotionRequest::parse(&bytes[..len]).is_ok());
+        let Ok(ReadRequest { channel, start, num, .. }) = ReadRequest::parse(&bytes[..len]) else {
             continue;
         };
         let mut words = vec![0; usize::from(num)];

@@ -7,7 +7,7 @@ use kinocue::engine::{Ending, Mix, Unplanned};
 use kinocue::harness::{Event, Frame, Played, Virtual, Worst, swell};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
-use kinocue::state::{self, Cause, Refusal, Request, State, Trouble, Why};
+use kinocue::state::{self, Cause, Refusal, State, Transition, Trouble, Why};
 use kinocue::time::ShowTime;
 use kinocue::timeline::Hint;
 use kinocue::wire;
@@ -97,7 +97,8 @@ fn the_first_frame_after_a_stop_is_slower_than_the_one_before() {
 #[test]
 fn a_pause_holds_the_seats_with_ten_frames_a_second_and_resume_joins_the_film_where_it_waited() {
     let smooth = ride().play();
-    let played = ride().with(600, Event::Ask(Request::Pause)).with(1_000, Event::Ask(Request::Resume)).play();
+    let played =
+        ride().with(600, Event::Ask(Transition::Pause)).with(1_000, Event::Ask(Transition::Resume)).play();
     assert_eq!(played.ended.ending, Ending::Completed);
     assert_within(played.worst());
     let slowing = moving(&played, 600);
@@ -150,9 +151,9 @@ fn a_seek_joins_the_cue_elsewhere_from_the_moving_seat() {
 fn a_seek_in_a_pause_moves_nothing_until_resume() {
     let target = ShowTime::from_millis(15_000);
     let played = ride()
-        .with(600, Event::Ask(Request::Pause))
+        .with(600, Event::Ask(Transition::Pause))
         .with(700, Event::Seek(target))
-        .with(800, Event::Ask(Request::Resume))
+        .with(800, Event::Ask(Transition::Resume))
         .play();
     assert_within(played.worst());
     let frames = played.lane(0).count();
@@ -163,14 +164,14 @@ fn a_seek_in_a_pause_moves_nothing_until_resume() {
 fn a_park_out_of_a_pause_and_a_stop_out_of_a_park_are_gentle() {
     for stop_at in [700, 702, 710, 750, 800] {
         let played = ride()
-            .with(600, Event::Ask(Request::Pause))
-            .with(690, Event::Ask(Request::Park))
+            .with(600, Event::Ask(Transition::Pause))
+            .with(690, Event::Ask(Transition::Park))
             .with(stop_at, Event::Stop)
-            .with(stop_at + 90, Event::Ask(Request::Park))
-            .with(stop_at + 100, Event::Ask(Request::Clear))
-            .with(stop_at + 110, Event::Ask(Request::Park))
+            .with(stop_at + 90, Event::Ask(Transition::Park))
+            .with(stop_at + 100, Event::Ask(Transition::Clear))
+            .with(stop_at + 110, Event::Ask(Transition::Park))
             .with(stop_at + 120, Event::Alarm(Alarm::Event(state::Event::PositionsRead)))
-            .with(stop_at + 130, Event::Ask(Request::Park))
+            .with(stop_at + 130, Event::Ask(Transition::Park))
             .play();
         let refused: Vec<Why> = played.news.iter().filter_map(refusal).map(|refusal| refusal.why).collect();
         assert_eq!(
@@ -185,7 +186,7 @@ fn a_park_out_of_a_pause_and_a_stop_out_of_a_park_are_gentle() {
 
 #[test]
 fn a_stop_a_pause_and_a_park_take_effects_and_vibration_away_at_once() {
-    for event in [Event::Stop, Event::Ask(Request::Pause)] {
+    for event in [Event::Stop, Event::Ask(Transition::Pause)] {
         let played = ride_with_effects().with(600, event).with(800, Event::Leave).play();
         assert_eq!(played.frames[599].request.outputs, 1);
         assert_eq!(played.frames[600].request.outputs, 0);
@@ -219,7 +220,7 @@ fn a_level_that_changes_all_the_time_keeps_the_limits_also_where_the_show_is_sto
     assert_within(show.play().worst());
     for at in [700, 713, 1_111, 1_500] {
         let seek = Event::Seek(ShowTime::from_millis(4_000));
-        for event in [Event::Stop, Event::Leave, Event::Ask(Request::Pause), seek] {
+        for event in [Event::Stop, Event::Leave, Event::Ask(Transition::Pause), seek] {
             let show = Virtual { script: show.script.clone(), ..Virtual::new(show.cue.clone()) };
             let played = show.with(at, event).with(at + 500, Event::Leave).play();
             assert_within(played.worst());
@@ -246,8 +247,8 @@ fn two_seats() -> Virtual {
     Virtual { to: to.to_vec(), ..ride() }
 }
 
-fn octets(played: &Played, lane: usize) -> Vec<Vec<u8>> {
-    played.lane(lane).map(|frame| frame.octets.clone()).collect()
+fn bytes(played: &Played, lane: usize) -> Vec<Vec<u8>> {
+    played.lane(lane).map(|frame| frame.bytes.clone()).collect()
 }
 
 #[test]
@@ -257,7 +258,7 @@ fn a_seat_that_is_switched_off_parks_softly_and_on_joins_again_while_the_other_g
     let played = two_seats().with(400, Event::Mix(1, off)).with(1_200, Event::Mix(1, Mix::FULL)).play();
     assert_within(played.worst());
     assert_within(played.worst_of_lane(1, 0..played.lane(1).count()));
-    assert_eq!(octets(&played, 0), octets(&smooth, 0));
+    assert_eq!(bytes(&played, 0), bytes(&smooth, 0));
     let second: Vec<i32> = played.lane(1).map(pulses).collect();
     assert_eq!(second[1_100], 0, "parked");
     assert_eq!(second[1_600], pulses(&smooth.lane(1).nth(1_600).unwrap().clone()), "with the cue again");
@@ -271,8 +272,8 @@ fn a_seat_that_is_off_stays_parked_through_pauses_seeks_loops_and_the_end() {
     let off = Mix { on: false, ..Mix::FULL };
     let mut show = two_seats()
         .with(200, Event::Mix(1, off))
-        .with(900, Event::Ask(Request::Pause))
-        .with(1_000, Event::Ask(Request::Resume))
+        .with(900, Event::Ask(Transition::Pause))
+        .with(1_000, Event::Ask(Transition::Resume))
         .with(1_300, Event::Seek(ShowTime::from_millis(16_000)));
     show.plays = 2;
     let played = show.play();
@@ -286,7 +287,7 @@ fn a_seat_that_is_off_stays_parked_through_pauses_seeks_loops_and_the_end() {
 fn a_lost_controller_is_brought_to_rest_told_so_three_times_and_gets_nothing_until_it_is_back() {
     let smooth = two_seats().play();
     let played = two_seats().with(500, Event::Alarm(Alarm::Leave(1))).play();
-    assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
+    assert_eq!(bytes(&played, 0), bytes(&smooth, 0), "the other plays on");
     let count = played.lane(1).count();
     assert!((503..=530).contains(&count), "{count} frames");
     assert_within(played.worst_of_lane(1, 0..count));
@@ -321,7 +322,7 @@ fn a_controller_that_is_heard_again_while_it_is_brought_to_rest_joins_from_where
             .with(back, Event::Found(1, [0.5; MAX_AXES]))
             .with(600, Event::FoundThere(1))
             .play();
-        assert_eq!(octets(&played, 0), octets(&smooth, 0), "the other plays on");
+        assert_eq!(bytes(&played, 0), bytes(&smooth, 0), "the other plays on");
         let count = played.lane(1).count();
         assert_within(played.worst_of_lane(1, 0..count));
         assert!(count < played.lane(0).count(), "{back}: it was away");
@@ -373,7 +374,7 @@ fn a_seek_to_which_no_move_leads_is_told_and_the_show_goes_on_where_it_is() {
     let seek = Event::Seek(ShowTime::from_millis(15_000));
     let played = ride().with(500, Event::Refuse).with(500, seek).play();
     assert_eq!(played.news.iter().filter_map(unplanned).collect::<Vec<_>>(), [Unplanned::Seek]);
-    assert_eq!(octets(&played, 0), octets(&smooth, 0));
+    assert_eq!(bytes(&played, 0), bytes(&smooth, 0));
 }
 
 #[test]
@@ -449,7 +450,7 @@ fn states(played: &Played) -> Vec<State> {
 fn a_planner_that_gives_no_way_to_park_leaves_the_seat_at_rest_within_two_seconds_until_it_does() {
     let played = ride()
         .with(400, Event::SlowPlanner(1_000_000))
-        .with(500, Event::Ask(Request::Park))
+        .with(500, Event::Ask(Transition::Park))
         .with(1_500, Event::SlowPlanner(0))
         .play();
     assert_within(played.worst());
@@ -477,8 +478,10 @@ fn a_tick_thread_that_was_held_itself_does_not_take_that_for_a_deaf_one() {
 
 #[test]
 fn after_a_sleep_of_seconds_the_seat_stays_where_it_was_until_a_person_resumes() {
-    let played =
-        ride().with(500, Event::Late(Duration::from_secs(3))).with(900, Event::Ask(Request::Resume)).play();
+    let played = ride()
+        .with(500, Event::Late(Duration::from_secs(3)))
+        .with(900, Event::Ask(Transition::Resume))
+        .play();
     assert!(states(&played).contains(&State::Paused));
     assert_within(played.worst_from_rest(500, played.frames.len()));
     let woken = played.frames[499].at + Duration::from_secs(3);

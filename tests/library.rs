@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use kinocue::hall::{Code, Problem};
+use kinocue::control::{Code, Problem};
 use kinocue::library::{Bounds, CueInfo, Hall, Library, Proved};
 use kinocue::playlist::Playlist;
 use tempfile::TempDir;
@@ -41,9 +41,9 @@ impl Fixture {
         Self { dir, library }
     }
 
-    fn upload(&self, id: &str, octets: &[u8]) -> Result<CueInfo, Problem> {
+    fn upload(&self, id: &str, bytes: &[u8]) -> Result<CueInfo, Problem> {
         let mut upload = self.library.begin(&id.parse().expect("an id"))?;
-        for part in octets.chunks(1000) {
+        for part in bytes.chunks(1000) {
             upload.write(part)?;
         }
         upload.finish()
@@ -143,15 +143,15 @@ fn a_hall_with_faults_proves_nothing() {
     assert!(fixture.files().is_empty());
 }
 
-/// A chunk of 60 MiB, of which so many octets do not pack.
+/// A chunk of 60 MiB, of which so many bytes do not pack.
 fn bomb(noise: usize) -> Vec<u8> {
     let mut message = vec![b' '; 60 << 20];
     let mut seed = 1_u32;
-    for octet in &mut message[..noise] {
+    for byte in &mut message[..noise] {
         seed ^= seed << 13;
         seed ^= seed >> 17;
         seed ^= seed << 5;
-        *octet = seed.to_le_bytes()[1];
+        *byte = seed.to_le_bytes()[1];
     }
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new()
@@ -175,14 +175,14 @@ fn a_bomb_is_refused_within_its_bounds() {
     // What packs better than any cue is not even unpacked.
     let problem = fixture.upload("bomb", &bomb(0)).unwrap_err();
     assert!(problem.faults[0].contains("damaged: a chunk of "), "{problem}");
-    let octets = bomb(1 << 20);
-    assert!(octets.len() < 2 << 20, "{} octets", octets.len());
-    let problem = fixture.upload("bomb", &octets).unwrap_err();
+    let bytes = bomb(1 << 20);
+    assert!(bytes.len() < 2 << 20, "{} bytes", bytes.len());
+    let problem = fixture.upload("bomb", &bytes).unwrap_err();
     assert_eq!(problem.code, Code::Check);
     assert!(problem.detail.contains("signal 6; it may take 48 MiB of memory"), "{problem}");
     assert_eq!(fixture.files(), ["ride.csv"]);
     let roomy = Fixture::new();
-    let problem = roomy.upload("bomb", &octets).unwrap_err();
+    let problem = roomy.upload("bomb", &bytes).unwrap_err();
     assert!(problem.faults[0].contains("65536"), "with room it is a message that is too long: {problem}");
 }
 

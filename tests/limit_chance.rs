@@ -129,7 +129,7 @@ proptest! {
         let played = show.play();
         prop_assert!(is_within(worst(&played)), "{:?} {:?}", worst(&played), played.clamps[0]);
         prop_assert_eq!(played.clamps[0].beyond, 0);
-        prop_assert_eq!(played.clamps[0].worst, None, "the gate has nothing to do");
+        prop_assert_eq!(played.clamps[0].worst, None, "the limiter has nothing to do");
         prop_assert!(played.ended.ending == Ending::Completed);
     }
 
@@ -158,7 +158,7 @@ proptest! {
             .with(wake_up(1.6 + share, rate), Event::Trim(trim));
         let played = show.play();
         prop_assert!(is_within(worst(&played)), "{:?} {:?}", worst(&played), played.clamps[0]);
-        prop_assert_eq!(played.clamps[0].worst, None, "the gate has nothing to do");
+        prop_assert_eq!(played.clamps[0].worst, None, "the limiter has nothing to do");
         prop_assert!(played.ended.ending == Ending::Completed);
     }
 }

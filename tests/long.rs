@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
@@ -57,7 +57,7 @@ impl Run {
         let config = from_to_args(&["127.0.0.1:7408".to_owned()], &[], 1).expect("the address is sound");
         let rate = Rate::from_hz(f64::from(self.rate_hz));
         let show = Show { rate, timing: self.timing, start: ShowTime::ZERO, plays: 0 };
-        let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false })
+        let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false })
             .expect("there is a join");
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();

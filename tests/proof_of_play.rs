@@ -19,7 +19,7 @@ struct Run {
 fn report(args: &[&str]) -> Run {
     let output =
         Command::new(env!("CARGO_BIN_EXE_kinocue")).arg("report").args(args).output().expect("kinocue runs");
-    let text = |octets| String::from_utf8(octets).expect("UTF-8");
+    let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 

@@ -59,7 +59,7 @@ const NASTY: [&[u8]; 28] = [
 #[derive(Debug, Clone)]
 enum Damage {
     Put(usize),
-    Octet(u8),
+    Byte(u8),
     Cut(usize),
     Twice(usize),
     End,
@@ -68,7 +68,7 @@ enum Damage {
 fn damages() -> impl Strategy<Value = Vec<(f64, Damage)>> {
     let damage = prop_oneof![
         6 => (0..NASTY.len()).prop_map(Damage::Put),
-        4 => any::<u8>().prop_map(Damage::Octet),
+        4 => any::<u8>().prop_map(Damage::Byte),
         3 => (1_usize..40).prop_map(Damage::Cut),
         3 => (1_usize..200).prop_map(Damage::Twice),
         1 => Just(Damage::End),
@@ -83,22 +83,22 @@ fn damages() -> impl Strategy<Value = Vec<(f64, Damage)>> {
     reason = "a place"
 )]
 fn damaged(whole: &[u8], damages: &[(f64, Damage)]) -> Vec<u8> {
-    let mut octets = whole.to_vec();
+    let mut bytes = whole.to_vec();
     for (share, damage) in damages {
-        let at = (octets.len() as f64 * share) as usize;
-        let end = |most: usize| (at + most).min(octets.len());
+        let at = (bytes.len() as f64 * share) as usize;
+        let end = |most: usize| (at + most).min(bytes.len());
         match damage {
-            Damage::Put(which) => drop(octets.splice(at..at, NASTY[*which].iter().copied())),
-            Damage::Octet(octet) => octets.iter_mut().skip(at).take(1).for_each(|there| *there = *octet),
-            Damage::Cut(most) => drop(octets.drain(at..end(*most))),
+            Damage::Put(which) => drop(bytes.splice(at..at, NASTY[*which].iter().copied())),
+            Damage::Byte(byte) => bytes.iter_mut().skip(at).take(1).for_each(|there| *there = *byte),
+            Damage::Cut(most) => drop(bytes.drain(at..end(*most))),
             Damage::Twice(most) => {
-                let again = octets[at..end(*most)].to_vec();
-                octets.splice(at..at, again);
+                let again = bytes[at..end(*most)].to_vec();
+                bytes.splice(at..at, again);
             }
-            Damage::End => octets.truncate(at),
+            Damage::End => bytes.truncate(at),
         }
     }
-    octets
+    bytes
 }
 
 /// Whether a text is one to show: short lines of characters that a terminal does not obey.
@@ -122,8 +122,8 @@ fn assert_sound(cue: &Cue) {
 #[test]
 fn what_is_damaged_here_is_whole_before() {
     assert_read(cue::read(Path::new("t.csv"), CUE.as_bytes(), &Source::Native));
-    for octets in [mcap(), bare_mcap()] {
-        assert!(cue::read(Path::new("t.mcap"), octets.as_slice(), &Source::Native).is_ok());
+    for bytes in [mcap(), bare_mcap()] {
+        assert!(cue::read(Path::new("t.mcap"), bytes.as_slice(), &Source::Native).is_ok());
     }
     assert!(Playlist::parse(Path::new("d.toml"), DAY).is_ok() && settings::parse(SETTINGS).is_ok());
 }
@@ -198,8 +198,8 @@ proptest! {
 
     #[test]
     fn a_damaged_csv_is_a_sound_cue_or_faults_in_plain_words(damages in damages()) {
-        let octets = damaged(CUE.as_bytes(), &damages);
-        assert_read(cue::read(Path::new("t.csv"), octets.as_slice(), &Source::Native));
+        let bytes = damaged(CUE.as_bytes(), &damages);
+        assert_read(cue::read(Path::new("t.csv"), bytes.as_slice(), &Source::Native));
     }
 
     #[test]
@@ -211,9 +211,9 @@ proptest! {
 
     #[test]
     fn a_damaged_mcap_is_a_sound_cue_or_faults_in_plain_words(damages in damages(), packed in any::<bool>()) {
-        let octets = damaged(&if packed { mcap() } else { bare_mcap() }, &damages);
-        assert_read(cue::read(Path::new("t.mcap"), octets.as_slice(), &Source::Native));
-        assert_read(cue::recover(Path::new("t.mcap"), octets.as_slice()).map(|(cue, _)| cue));
+        let bytes = damaged(&if packed { mcap() } else { bare_mcap() }, &damages);
+        assert_read(cue::read(Path::new("t.mcap"), bytes.as_slice(), &Source::Native));
+        assert_read(cue::recover(Path::new("t.mcap"), bytes.as_slice()).map(|(cue, _)| cue));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use kinocue::app::{Control, Play, Played, Reins};
+use kinocue::app::{Control, Play, PlayHandle, Played};
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
 use kinocue::engine::{Mix, Show};
@@ -21,7 +21,7 @@ use kinocue::fanout::Manner;
 use kinocue::harness::{Worst, swell, worst_of_lines};
 use kinocue::motion::SeatType;
 use kinocue::rt::{Command, News};
-use kinocue::state::{Refusal, Request, Ride, State, Why};
+use kinocue::state::{PlayMode, Refusal, State, Transition, Why};
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock as _, Rate, ShowTime};
 use kinocue::timeline::Timeline;
@@ -33,12 +33,12 @@ use tempfile::NamedTempFile;
 const PATIENCE: Duration = Duration::from_secs(30);
 /// How often it is looked for.
 const LOOK: Duration = Duration::from_millis(1);
-const FOLLOWING: State = State::Playing(Ride::Following);
+const FOLLOWING: State = State::Playing(PlayMode::Following);
 
 /// Leads a show from a thread of its own; however that ends, the show does too.
 struct Leader {
     control: Control,
-    reins: Reins,
+    handle: PlayHandle,
     /// What was refused while other news was waited for.
     refused: Vec<Refusal>,
 }
@@ -50,7 +50,7 @@ impl Drop for Leader {
 }
 
 impl Leader {
-    fn ask(&mut self, request: Request) {
+    fn ask(&mut self, request: Transition) {
         self.command(Command::Request(request));
     }
 
@@ -60,10 +60,10 @@ impl Leader {
 
     /// What is waited for afterwards has to be new: a machine that was held up makes news of its own.
     fn command(&mut self, command: Command) {
-        while let Ok(news) = self.reins.news.pop() {
+        while let Ok(news) = self.handle.news.pop() {
             self.keep_refusal(news);
         }
-        self.reins.commands.push(command).expect("there is room");
+        self.handle.commands.push(command).expect("there is room");
     }
 
     fn keep_refusal(&mut self, news: News) {
@@ -87,7 +87,7 @@ impl Leader {
     fn wait_for(&mut self, wanted: State) {
         self.wait_until(&format!("{wanted:?}"), |leader| {
             loop {
-                match leader.reins.news.pop().ok()? {
+                match leader.handle.news.pop().ok()? {
                     News::Entered { state, .. } if state == wanted => return Some(()),
                     news => leader.keep_refusal(news),
                 }
@@ -110,10 +110,10 @@ impl Leader {
     /// Everything but the end: a pause, a seek each way, levels, a trim, and a seat that is off for a while.
     fn lead(&mut self, rate_hz: u32) {
         self.wait_for(FOLLOWING);
-        self.ask(Request::Pause);
+        self.ask(Transition::Pause);
         self.wait_for(State::Paused);
         self.wait_for_ticks(u64::from(rate_hz) / 8 + 1); // decelerated, and some hold frames
-        self.ask(Request::Resume);
+        self.ask(Transition::Resume);
         self.wait_for(FOLLOWING);
         self.seek(11);
         self.control.desk.set(1, Mix { on: false, ..Mix::FULL });
@@ -132,8 +132,8 @@ impl Leader {
     fn stop(&mut self) -> Why {
         self.control.desk.stop();
         self.wait_for(State::Stopped);
-        self.ask(Request::Resume);
-        self.wait_until("the refusal", |leader| match leader.reins.news.pop().ok()? {
+        self.ask(Transition::Resume);
+        self.wait_until("the refusal", |leader| match leader.handle.news.pop().ok()? {
             News::Refused(refusal) => Some(refusal.why),
             News::Entered { .. } | News::Taken | News::NotLoaded(_) | News::Unplanned(_) => None,
         })
@@ -174,8 +174,8 @@ impl Real {
         let play = Play::new(config, timeline, show, manner).expect("the show is gentle");
         let control = play.control().clone();
         std::thread::scope(|scope| {
-            let attend = |reins| {
-                let mut leader = Leader { control, reins, refused: Vec::new() };
+            let attend = |handle| {
+                let mut leader = Leader { control, handle, refused: Vec::new() };
                 scope.spawn(move || {
                     lead(&mut leader);
                     assert_eq!(leader.refused, [], "nothing was refused on the way");

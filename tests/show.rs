@@ -33,7 +33,7 @@ fn a_show_joins_the_cue_follows_it_parks_and_closes_with_three_hold_frames() {
     assert_eq!(played.ended.missed, 0);
     assert_gentle(&played);
     let frames: Vec<_> = played.lane(0).collect();
-    assert!(frames.iter().all(|frame| frame.request.time_ms == 10 && frame.octets[4..6] == [0x14, 0x01]));
+    assert!(frames.iter().all(|frame| frame.request.time_ms == 10 && frame.bytes[4..6] == [0x14, 0x01]));
     assert!(frames.iter().zip(1..).all(|(frame, number)| frame.request.frame.0 == number));
     // From the end of the join to the end of the cue, frame k carries the cue one period after its tick.
     let joined = usize::try_from(played.join.as_nanos() / 10_000_000).unwrap() + 1;
@@ -59,16 +59,16 @@ fn a_cue_that_starts_and_ends_at_rest_in_the_park_pose_is_played_row_by_row() {
     assert_gentle(&played);
 }
 
-/// Octets that leave for a cue of two axes with vibration and an effect; written once by this test and read by a person.
+/// Bytes that leave for a cue of two axes with vibration and an effect; written once by this test and read by a person.
 const GOLDEN: &str = include_str!("golden/show.hex");
 
 #[test]
-fn the_octets_of_a_small_show_are_those_on_record() {
+fn the_bytes_of_a_small_show_are_those_on_record() {
     let cue = "time_ms,a1,a2,v2_hz,v2_amp,fx_water\n0,0,0,0,0,0\n200,0,0,0,0,0\n400,0.01,0.005,20,0.002,1\n\
                600,0.02,0.005,20,0.002,1\n800,0.01,0,0,0,0\n1000,0,0,0,0,0\n1200,0,0,0,0,0\n";
     let played = Virtual::new(cue).at_rate(20.0).play();
-    let hex = |octets: &[u8]| octets.iter().map(|octet| format!("{octet:02x}")).collect::<String>();
-    let sent: Vec<String> = played.frames.iter().map(|frame| hex(&frame.octets)).collect();
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let sent: Vec<String> = played.frames.iter().map(|frame| hex(&frame.bytes)).collect();
     let recorded: Vec<&str> = GOLDEN.lines().filter(|line| !line.starts_with('#')).collect();
     assert_eq!(sent, recorded, "sent:\n{}", sent.join("\n"));
 }

@@ -8,7 +8,7 @@ use kinocue::engine::{Ending, Mix};
 use kinocue::harness::{Event, Played, Virtual, Worst};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::Alarm;
-use kinocue::state::{self, Request};
+use kinocue::state::{self, Transition};
 use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::Timing;
 use proptest::prelude::*;
@@ -62,9 +62,9 @@ fn event() -> impl Strategy<Value = Event> {
 fn lead() -> impl Strategy<Value = Event> {
     prop_oneof![
         1 => Just(Event::Stop),
-        2 => Just(Event::Ask(Request::Pause)),
-        3 => Just(Event::Ask(Request::Resume)),
-        1 => Just(Event::Ask(Request::Park)),
+        2 => Just(Event::Ask(Transition::Pause)),
+        3 => Just(Event::Ask(Transition::Resume)),
+        1 => Just(Event::Ask(Transition::Park)),
         3 => (0..14_000_i64).prop_map(|ms| Event::Seek(ShowTime::from_millis(ms))),
         3 => (-600..600_i32).prop_map(Event::Trim),
         4 => (0.0..1.0_f64).prop_map(|motion| Event::Mix(0, Mix { motion, ..Mix::FULL })),
@@ -144,7 +144,7 @@ proptest! {
             return Ok(());
         }
         prop_assert!(is_within(worst(&played)), "{:?}", worst(&played));
-        prop_assert_eq!(played.clamps[0].worst, None, "the gate has nothing to do");
+        prop_assert_eq!(played.clamps[0].worst, None, "the limiter has nothing to do");
         prop_assert!(played.ended.ending != Ending::Fault);
         let last = played.frames.last().expect("there are frames");
         prop_assert_eq!((last.request.positions[0].0, last.request.outputs), (0, 0), "it ends parked");
@@ -173,18 +173,18 @@ proptest! {
         // Whatever state that left it in, a person clears it, and parks.
         let read = Event::Alarm(Alarm::Event(state::Event::PositionsRead));
         show = show
-            .with(wake_up(&waves, rate, 1.31), Event::Ask(Request::Park))
-            .with(wake_up(&waves, rate, 1.4), Event::Ask(Request::Clear))
+            .with(wake_up(&waves, rate, 1.31), Event::Ask(Transition::Park))
+            .with(wake_up(&waves, rate, 1.4), Event::Ask(Transition::Clear))
             .with(wake_up(&waves, rate, 1.45), read)
-            .with(wake_up(&waves, rate, 1.5), Event::Ask(Request::Park))
-            .with(wake_up(&waves, rate, 1.8), Event::Ask(Request::Resume))
-            .with(wake_up(&waves, rate, 1.9), Event::Ask(Request::Park));
+            .with(wake_up(&waves, rate, 1.5), Event::Ask(Transition::Park))
+            .with(wake_up(&waves, rate, 1.8), Event::Ask(Transition::Resume))
+            .with(wake_up(&waves, rate, 1.9), Event::Ask(Transition::Park));
         let played = show.play();
         if played.frames.is_empty() {
             return Ok(());
         }
         prop_assert!(is_within(worst(&played)), "{:?}", worst(&played));
-        prop_assert_eq!(played.clamps[0].worst, None, "the gate has nothing to do");
+        prop_assert_eq!(played.clamps[0].worst, None, "the limiter has nothing to do");
         prop_assert!(played.ended.ending != Ending::Fault);
         let last = played.frames.last().expect("there are frames");
         prop_assert_eq!(last.request.outputs, 0);

@@ -330,17 +330,17 @@ fn the_program_follows_its_script() {
     }
 }
 
-/// Octets that open as a request does and go on by chance.
+/// Bytes that open as a request does and go on by chance.
 fn request() -> impl Strategy<Value = Vec<u8>> {
     let family = prop::sample::select(&[0x11_u8, 0x12, 0x13, 0x14, 0x18, 0x19, 0x21, 0x22][..]);
     let rest = proptest::collection::vec(prop_oneof![0..4_u8, any::<u8>()], 0..120);
     (family, 0..4_u8, any::<bool>(), rest).prop_map(|(family, channel, answered, rest)| {
         let confirm = if family > 0x20 { [0x33, 0xcc] } else { [0x55, 0xaa] };
         let reply = if answered { 0xff } else { 0 };
-        let mut octets = confirm.to_vec();
-        octets.extend([0, 0, family, 1, 0, channel, 0xff, 0xff, reply, reply]);
-        octets.extend(rest);
-        octets
+        let mut bytes = confirm.to_vec();
+        bytes.extend([0, 0, family, 1, 0, channel, 0xff, 0xff, reply, reply]);
+        bytes.extend(rest);
+        bytes
     })
 }
 
@@ -368,13 +368,13 @@ proptest! {
         let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 7408);
         let mut controller = Controller::new(&Setup::default().safe(from), address, MonoTime::default());
         let (mut at_ms, mut answers) = (0, 0);
-        for (octets, after_ms) in &datagrams {
+        for (bytes, after_ms) in &datagrams {
             at_ms += after_ms;
             let at = MonoTime::from_nanos(at_ms * 1_000_000);
             let mut buf = [0xa5; MAX_LEN];
-            let handled = controller.on_datagram(from, octets, at, &mut buf);
+            let handled = controller.on_datagram(from, bytes, at, &mut buf);
             answers += u64::from(handled.reply.is_some());
-            controller.act(&ACTIONS[octets.len() % ACTIONS.len()], at);
+            controller.act(&ACTIONS[bytes.len() % ACTIONS.len()], at);
             let _ = controller.report(at, &mut buf);
         }
         let counts = controller.counts();

@@ -1,4 +1,4 @@
-//! The protocol against chance: what was written is read again, and no octets whatever make a parser panic.
+//! The protocol against chance: what was written is read again, and no bytes whatever make a parser panic.
 
 use kinocue::motion::Pulses;
 use kinocue::wire::{
@@ -18,7 +18,7 @@ fn code() -> impl Strategy<Value = Code> {
 }
 
 fn reply_code() -> impl Strategy<Value = ReplyCode> {
-    (2..=5_u8).prop_map(|x| ReplyCode::from_octet(x).expect("2 to 5 are codes"))
+    (2..=5_u8).prop_map(|x| ReplyCode::from_byte(x).expect("2 to 5 are codes"))
 }
 
 fn per_axis<T: Copy + Default + std::fmt::Debug>(
@@ -112,20 +112,20 @@ proptest! {
 
     #[test]
     fn what_was_written_is_read_again(message in prop_oneof![motion(), motion_reply(), status()]) {
-        let octets = emitted(&message);
-        prop_assert_eq!(Message::parse(&octets), Ok(message));
+        let bytes = emitted(&message);
+        prop_assert_eq!(Message::parse(&bytes), Ok(message));
     }
 
     #[test]
-    fn surplus_octets_after_a_frame_change_nothing(
+    fn surplus_bytes_after_a_frame_change_nothing(
         message in motion().prop_filter("2 takes its axes from the length", |message| {
             !matches!(message, Message::Motion(motion) if motion.channel == 2)
         }),
         surplus in proptest::collection::vec(any::<u8>(), 0..64),
     ) {
-        let mut octets = emitted(&message);
-        octets.extend(surplus);
-        prop_assert_eq!(Message::parse(&octets), Ok(message));
+        let mut bytes = emitted(&message);
+        bytes.extend(surplus);
+        prop_assert_eq!(Message::parse(&bytes), Ok(message));
     }
 
     #[test]
@@ -150,18 +150,18 @@ proptest! {
             Message::ServoReply(ServoReply { access, code, servo: slot, error, start, num, data: words }),
             Message::Report(Report { channel, accept, reply, start, data: words }),
         ] {
-            let octets = emitted(&message);
-            prop_assert_eq!(Message::parse(&octets), Ok(message));
+            let bytes = emitted(&message);
+            prop_assert_eq!(Message::parse(&bytes), Ok(message));
         }
     }
 }
 
-/// Reads octets in every way there is.
-fn read_all_ways(octets: &[u8]) {
-    let _ = Message::parse(octets);
-    let _ = MotionReply::parse(octets);
-    let _ = ImaxMotion::parse(octets);
-    if let Ok(reply) = ImaxRegisters::parse(octets) {
+/// Reads bytes in every way there is.
+fn read_all_ways(bytes: &[u8]) {
+    let _ = Message::parse(bytes);
+    let _ = MotionReply::parse(bytes);
+    let _ = ImaxMotion::parse(bytes);
+    if let Ok(reply) = ImaxRegisters::parse(bytes) {
         let _ = reply.values().count();
     }
 }
@@ -170,22 +170,22 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2_000))]
 
     #[test]
-    fn no_octets_whatever_are_too_much(octets in proptest::collection::vec(any::<u8>(), 0..=2048)) {
-        read_all_ways(&octets);
+    fn no_bytes_whatever_are_too_much(bytes in proptest::collection::vec(any::<u8>(), 0..=2048)) {
+        read_all_ways(&bytes);
     }
 
     #[test]
-    fn no_octets_after_a_true_opening_are_too_much(
+    fn no_bytes_after_a_true_opening_are_too_much(
         family in prop::sample::select(&[0x10, 0x11, 0x12, 0x13, 0x14, 0x18, 0x19, 0x21, 0x22, 0x31][..]),
         x in 0..=6_u8,
         slot in prop_oneof![0..16_u16, any::<u16>()],
         rest in proptest::collection::vec(any::<u8>(), 0..=2040),
     ) {
         let confirm: u16 = if matches!(family, 0x21 | 0x22 | 0x31) { 0x33cc } else { 0x55aa };
-        let mut octets = confirm.to_be_bytes().to_vec();
-        octets.extend([0, 0, family, x]);
-        octets.extend(slot.to_be_bytes());
-        octets.extend(rest);
-        read_all_ways(&octets);
+        let mut bytes = confirm.to_be_bytes().to_vec();
+        bytes.extend([0, 0, family, x]);
+        bytes.extend(slot.to_be_bytes());
+        bytes.extend(rest);
+        read_all_ways(&bytes);
     }
 }

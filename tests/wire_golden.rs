@@ -1,4 +1,4 @@
-//! The protocol against octets from the manuals and from public programs, both ways.
+//! The protocol against bytes from the manuals and from public programs, both ways.
 
 use kinocue::motion::Pulses;
 use kinocue::wire::{
@@ -72,7 +72,7 @@ impl Fields {
     }
 
     fn code(&self) -> ReplyCode {
-        ReplyCode::from_octet(self.x).expect("the golden file gives a reply its x")
+        ReplyCode::from_byte(self.x).expect("the golden file gives a reply its x")
     }
 
     fn motion(&self, timing: Timing, vibrating: bool) -> Message<'_> {
@@ -176,15 +176,15 @@ fn golden() -> Vec<Vector> {
     golden.vectors
 }
 
-fn octets(hex: &str) -> Vec<u8> {
+fn bytes(hex: &str) -> Vec<u8> {
     (0..hex.len())
         .step_by(2)
         .map(|at| u8::from_str_radix(&hex[at..at + 2], 16).expect("the golden file is hex"))
         .collect()
 }
 
-fn hex(octets: &[u8]) -> String {
-    octets.iter().map(|octet| format!("{octet:02x}")).collect()
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn emitted(message: &Message<'_>, port: VibrationPort) -> Vec<u8> {
@@ -197,17 +197,17 @@ fn emitted(message: &Message<'_>, port: VibrationPort) -> Vec<u8> {
 }
 
 #[test]
-fn golden_octets_say_what_they_should_and_are_written_the_same() {
+fn golden_bytes_say_what_they_should_and_are_written_the_same() {
     let mut kinds = std::collections::BTreeSet::new();
     for vector in golden().iter().filter(|v| v.kind != "malformed" && v.dialect != "imax") {
         let (name, fields) = (&vector.name, &vector.fields);
-        let octets = octets(&vector.hex);
+        let bytes = bytes(&vector.hex);
         let message = fields.message(&vector.kind);
-        assert_eq!(Message::parse_as(vector.port(), &octets), Ok(message), "{name}");
+        assert_eq!(Message::parse_as(vector.port(), &bytes), Ok(message), "{name}");
         assert_eq!(hex(&emitted(&message, vector.port())) + &fields.tail, vector.hex, "{name}");
         kinds.insert(vector.kind.clone());
     }
-    assert_eq!(kinds.len(), 18, "every kind of message has its octets: {kinds:?}");
+    assert_eq!(kinds.len(), 18, "every kind of message has its bytes: {kinds:?}");
 }
 
 #[test]
@@ -238,10 +238,10 @@ fn a_host_writes_the_golden_frames_with_extend_zero() {
 }
 
 #[test]
-fn malformed_octets_are_refused_for_their_own_fault() {
+fn malformed_bytes_are_refused_for_their_own_fault() {
     for vector in golden().iter().filter(|v| v.kind == "malformed") {
-        let octets = octets(&vector.hex);
-        let error = Message::parse(&octets).unwrap_err();
+        let bytes = bytes(&vector.hex);
+        let error = Message::parse(&bytes).unwrap_err();
         let reason = match error {
             WireError::Short { .. } => "short",
             WireError::Confirm { .. } => "confirm",
@@ -250,7 +250,7 @@ fn malformed_octets_are_refused_for_their_own_fault() {
             _ => "other",
         };
         assert_eq!(reason, vector.fields.reason, "{}: {error}", vector.name);
-        assert!(error.offset() <= octets.len(), "{}: {error}", vector.name);
+        assert!(error.offset() <= bytes.len(), "{}: {error}", vector.name);
     }
 }
 
@@ -259,19 +259,19 @@ fn the_literal_imax_layout_is_read() {
     let mut seen = 0;
     for vector in golden().iter().filter(|v| v.dialect == "imax") {
         let (name, fields) = (&vector.name, &vector.fields);
-        let octets = octets(&vector.hex);
+        let bytes = bytes(&vector.hex);
         seen += 1;
         if vector.kind == "reg_read_reply" {
-            let reply = ImaxRegisters::parse(&octets).unwrap();
+            let reply = ImaxRegisters::parse(&bytes).unwrap();
             assert_eq!(reply.values().collect::<Vec<_>>(), [3, 0], "{name}");
             assert!(reply.is_wide(), "{name}");
-            let need = octets.len() - 4;
-            let surplus = WireError::Surplus { len: octets.len(), need };
-            assert_eq!(Message::parse(&octets), Err(surplus), "{name}: nobody reads it as words of 16 bits");
+            let need = bytes.len() - 4;
+            let surplus = WireError::Surplus { len: bytes.len(), need };
+            assert_eq!(Message::parse(&bytes), Err(surplus), "{name}: nobody reads it as words of 16 bits");
             continue;
         }
-        let motion = ImaxMotion::parse(&octets).unwrap();
-        assert_eq!(motion.code, ReplyCode::from_octet(fields.x), "{name}");
+        let motion = ImaxMotion::parse(&bytes).unwrap();
+        assert_eq!(motion.code, ReplyCode::from_byte(fields.x), "{name}");
         assert_eq!(motion.timing, Timing::Relative, "{name}");
         assert_eq!((motion.channel, motion.time_ms), (fields.channel, fields.time), "{name}");
         assert_eq!(motion.positions, fields.positions(), "{name}");
@@ -283,28 +283,28 @@ fn the_literal_imax_layout_is_read() {
 #[test]
 fn the_ack_path_takes_all_replies_to_motion_and_nothing_else() {
     for vector in golden().iter().filter(|v| v.dialect != "imax") {
-        let octets = octets(&vector.hex);
-        let is_reply = matches!(Message::parse_as(vector.port(), &octets), Ok(Message::MotionReply(_)));
-        let parsed = MotionReply::parse_as(vector.port(), &octets);
+        let bytes = bytes(&vector.hex);
+        let is_reply = matches!(Message::parse_as(vector.port(), &bytes), Ok(Message::MotionReply(_)));
+        let parsed = MotionReply::parse_as(vector.port(), &bytes);
         assert_eq!(parsed.is_ok(), is_reply, "{}", vector.name);
     }
 }
 
 #[test]
 fn a_channel_that_means_no_axes_is_refused_where_it_stands() {
-    let mut frame = octets(&golden()[0].hex);
+    let mut frame = bytes(&golden()[0].hex);
     frame[7] = 13;
     let error = Message::parse(&frame).unwrap_err();
     assert_eq!(error, WireError::Axes { at: 6, found: 13 });
-    assert_eq!(error.to_string(), "octet 6: 13 names no number of axes; 3 to 12 axes are possible");
+    assert_eq!(error.to_string(), "byte 6: 13 names no number of axes; 3 to 12 axes are possible");
 }
 
 #[test]
 fn every_length_of_every_golden_message_is_taken_or_refused() {
     for vector in golden() {
-        let octets = octets(&vector.hex);
-        for len in 0..=octets.len() {
-            if let Err(error) = Message::parse(&octets[..len]) {
+        let bytes = bytes(&vector.hex);
+        for len in 0..=bytes.len() {
+            if let Err(error) = Message::parse(&bytes[..len]) {
                 assert!(error.offset() <= len, "{} cut to {len}: {error}", vector.name);
             }
         }

@@ -52,7 +52,7 @@ const FIELDS: [&str; 27] = [
     "kinocue.force",
     "kinocue.servo.error",
     "kinocue.surplus",
-    "kinocue.malformed.octet",
+    "kinocue.malformed.byte",
     "kinocue.malformed.why",
     "kinocue.cut",
 ];
@@ -75,7 +75,7 @@ fn tshark_runs() -> bool {
 fn tshark(capture: &Pcap, args: &[&str]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("capture.pcap");
-    std::fs::write(&path, capture.octets()).unwrap();
+    std::fs::write(&path, capture.bytes()).unwrap();
     let output = Command::new("tshark")
         .env("HOME", folder.path()) // nobody's own settings and plug-ins
         .env_remove("XDG_CONFIG_HOME")
@@ -100,22 +100,22 @@ fn dissected(capture: &Pcap) -> Vec<Fields> {
 }
 
 /// What the parser says of a datagram, in the dissector's fields.
-fn parsed(octets: &[u8]) -> Fields {
+fn parsed(bytes: &[u8]) -> Fields {
     let mut fields = Fields::new();
-    if octets.len() >= 6 {
-        fields.insert("kinocue.function", format!("0x{}", hex(&octets[4..6])));
+    if bytes.len() >= 6 {
+        fields.insert("kinocue.function", format!("0x{}", hex(&bytes[4..6])));
     }
-    let message = match Message::parse(octets) {
+    let message = match Message::parse(bytes) {
         Ok(message) => message,
         Err(error) => {
-            fields.insert("kinocue.malformed.octet", error.offset().to_string());
+            fields.insert("kinocue.malformed.byte", error.offset().to_string());
             fields.insert("kinocue.malformed.why", why(error));
             return fields;
         }
     };
-    let layout = put(&mut fields, octets, &message);
-    if octets.len() > layout {
-        fields.insert("kinocue.surplus", hex(&octets[layout..]));
+    let layout = put(&mut fields, bytes, &message);
+    if bytes.len() > layout {
+        fields.insert("kinocue.surplus", hex(&bytes[layout..]));
     }
     fields
 }
@@ -125,8 +125,8 @@ fn why(error: WireError) -> String {
     error.to_string().split_once(": ").unwrap().1.to_owned()
 }
 
-/// The fields of a message; gives the octets of its layout.
-fn put(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> usize {
+/// The fields of a message; gives the bytes of its layout.
+fn put(fields: &mut Fields, bytes: &[u8], message: &Message<'_>) -> usize {
     match message {
         Message::Motion(motion) => {
             codes(fields, motion.accept, motion.reply);
@@ -137,7 +137,7 @@ fn put(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> usize {
             motion.layout_len(VibrationPort::Two)
         }
         Message::MotionReply(reply) => {
-            answer(fields, octets, reply.code, ("kinocue.channel", reply.channel), reply.error);
+            answer(fields, bytes, reply.code, ("kinocue.channel", reply.channel), reply.error);
             fields.insert("kinocue.input", format!("0x{:04x}", reply.inputs));
             body(fields, reply.frame.0, reply.time_ms, &reply.positions);
             tail(fields, reply.extend, reply.vibration.as_deref());
@@ -145,13 +145,13 @@ fn put(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> usize {
         }
         Message::Status(status) => {
             put_status(fields, status);
-            octets.len()
+            bytes.len()
         }
-        _ => put_registers(fields, octets, message),
+        _ => put_registers(fields, bytes, message),
     }
 }
 
-fn put_registers(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> usize {
+fn put_registers(fields: &mut Fields, bytes: &[u8], message: &Message<'_>) -> usize {
     let data = Words::EMPTY;
     let (start, num, data) = match message {
         Message::Read(read) => {
@@ -165,7 +165,7 @@ fn put_registers(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> u
             (write.start, write.data.len(), write.data)
         }
         Message::RegisterReply(reply) => {
-            answer(fields, octets, reply.code, ("kinocue.channel", reply.channel), reply.error);
+            answer(fields, bytes, reply.code, ("kinocue.channel", reply.channel), reply.error);
             (reply.start, usize::from(reply.num), reply.data)
         }
         Message::ServoRead(read) => {
@@ -179,7 +179,7 @@ fn put_registers(fields: &mut Fields, octets: &[u8], message: &Message<'_>) -> u
             (write.start, write.data.len(), write.data)
         }
         Message::ServoReply(reply) => {
-            answer(fields, octets, reply.code, ("kinocue.servo", reply.servo), reply.error);
+            answer(fields, bytes, reply.code, ("kinocue.servo", reply.servo), reply.error);
             (reply.start, usize::from(reply.num), reply.data)
         }
         Message::Report(report) => {
@@ -214,7 +214,7 @@ fn codes(fields: &mut Fields, accept: Code, reply: Code) {
 /// The header of a reply, whose codes the parser does not keep.
 fn answer(
     fields: &mut Fields,
-    octets: &[u8],
+    bytes: &[u8],
     code: ReplyCode,
     (slot, running): (&'static str, u16),
     error: u16,
@@ -224,8 +224,8 @@ fn answer(
         ReplyCode::Running => fields.insert(slot, running.to_string()),
         _ => fields.insert("kinocue.error", error.to_string()),
     };
-    fields.insert("kinocue.accept", format!("0x{}", hex(&octets[8..10])));
-    fields.insert("kinocue.reply", format!("0x{}", hex(&octets[10..12])));
+    fields.insert("kinocue.accept", format!("0x{}", hex(&bytes[8..10])));
+    fields.insert("kinocue.reply", format!("0x{}", hex(&bytes[10..12])));
 }
 
 fn body(fields: &mut Fields, frame: u32, time_ms: u32, positions: &[Pulses]) {
@@ -251,8 +251,8 @@ fn list<T: ToString>(fields: &mut Fields, name: &'static str, values: impl Itera
     }
 }
 
-fn hex(octets: &[u8]) -> String {
-    octets.iter().map(|octet| format!("{octet:02x}")).collect()
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Frequencies to four places; versions of tshark print different numbers of digits.
@@ -270,8 +270,8 @@ fn rounded(mut fields: Fields) -> Fields {
 fn assert_agreed(capture: &Pcap, datagrams: &[Vec<u8>]) {
     let dissected = dissected(capture);
     assert_eq!(dissected.len(), datagrams.len());
-    for (octets, fields) in datagrams.iter().zip(dissected) {
-        assert_eq!(rounded(fields), rounded(parsed(octets)), "{}", hex(octets));
+    for (bytes, fields) in datagrams.iter().zip(dissected) {
+        assert_eq!(rounded(fields), rounded(parsed(bytes)), "{}", hex(bytes));
     }
 }
 
@@ -286,8 +286,8 @@ fn seat() -> SocketAddrV4 {
 /// A capture of datagrams, a millisecond apart.
 fn captured(datagrams: &[Vec<u8>]) -> Pcap {
     let mut pcap = Pcap::new();
-    for (ms, octets) in (0..).zip(datagrams) {
-        pcap.datagram(Duration::from_millis(ms), host(), seat(), octets);
+    for (ms, bytes) in (0..).zip(datagrams) {
+        pcap.datagram(Duration::from_millis(ms), host(), seat(), bytes);
     }
     pcap
 }
@@ -302,13 +302,13 @@ struct Vector {
     hex: String,
 }
 
-/// The octets of the golden file, good and malformed ones.
+/// The bytes of the golden file, good and malformed ones.
 fn golden() -> Vec<Vec<u8>> {
     let golden: Golden = serde_json::from_str(include_str!("golden/wire.json")).unwrap();
-    let octets = |hex: &str| {
+    let bytes = |hex: &str| {
         (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
     };
-    golden.vectors.iter().map(|vector| octets(&vector.hex)).collect()
+    golden.vectors.iter().map(|vector| bytes(&vector.hex)).collect()
 }
 
 /// Replies to reads of the monitor registers, with positions among them, and one with a whole table.
@@ -335,16 +335,16 @@ fn golden_messages_are_dissected_as_they_are_parsed() {
 }
 
 #[test]
-fn damaged_messages_are_refused_at_the_same_octet_for_the_same_reason() {
+fn damaged_messages_are_refused_at_the_same_byte_for_the_same_reason() {
     if !tshark_runs() {
         return;
     }
     let mut datagrams = std::collections::BTreeSet::new();
-    for octets in golden() {
-        datagrams.extend((1..octets.len()).map(|len| octets[..len].to_vec()));
-        for at in 0..octets.len().min(16) {
+    for bytes in golden() {
+        datagrams.extend((1..bytes.len()).map(|len| bytes[..len].to_vec()));
+        for at in 0..bytes.len().min(16) {
             for to in [0, 1, 3, 6, 13, 0xff] {
-                let mut changed = octets.clone();
+                let mut changed = bytes.clone();
                 changed[at] = to;
                 datagrams.insert(changed);
             }
@@ -359,7 +359,7 @@ fn damaged_messages_are_refused_at_the_same_octet_for_the_same_reason() {
 /// pressed, and at the end registers are read and written.
 fn exchange(host: SocketAddrV4, seat: SocketAddrV4) -> (Pcap, Vec<Vec<u8>>) {
     let played = Virtual::new(kinocue::harness::swell(3, 1, 20.0, 1.0)).play();
-    let frames: Vec<_> = played.lane(0).map(|frame| (frame.at, frame.octets.clone())).collect();
+    let frames: Vec<_> = played.lane(0).map(|frame| (frame.at, frame.bytes.clone())).collect();
     let (start, end, pressed) = (frames[0].0, frames[frames.len() - 1].0, frames.len() / 2);
     let all = Code::ALL;
     let read = ReadRequest { channel: 0, accept: all, reply: all, start: 0x06, num: 6 };
@@ -372,15 +372,15 @@ fn exchange(host: SocketAddrV4, seat: SocketAddrV4) -> (Pcap, Vec<Vec<u8>>) {
     let setup = Setup { host_port: host.port(), parameters, ..Setup::default() };
     let mut controller = Controller::new(&setup, seat, start);
     let (mut pcap, mut datagrams, mut buf) = (Pcap::new(), Vec::new(), [0; MAX_LEN]);
-    for (index, (at, octets)) in frames.into_iter().chain(registers).enumerate() {
+    for (index, (at, bytes)) in frames.into_iter().chain(registers).enumerate() {
         if index == pressed {
             controller.set_switches(1, at);
         }
         let since = at.since(start);
-        pcap.datagram(since, host, seat, &octets);
-        let reply = controller.on_datagram(host, &octets, at, &mut buf).reply.expect("it answers");
+        pcap.datagram(since, host, seat, &bytes);
+        let reply = controller.on_datagram(host, &bytes, at, &mut buf).reply.expect("it answers");
         pcap.datagram(since + Duration::from_micros(300), seat, host, reply);
-        datagrams.extend([octets, reply.to_vec()]);
+        datagrams.extend([bytes, reply.to_vec()]);
     }
     (pcap, datagrams)
 }
@@ -392,7 +392,7 @@ fn a_show_and_its_replies_are_dissected_whole_on_any_port() {
     }
     let (pcap, datagrams) = exchange(host(), seat());
     for code in [ReplyCode::Running, ReplyCode::EmergencyStop] {
-        let answered = datagrams.iter().filter(|octets| octets[4..6] == [0x14, code as u8]).count();
+        let answered = datagrams.iter().filter(|bytes| bytes[4..6] == [0x14, code as u8]).count();
         assert!(answered > 50, "{answered} answers with {code:?}");
     }
     assert_agreed(&pcap, &datagrams);
@@ -407,7 +407,7 @@ fn a_reply_names_the_packet_that_it_answers_and_the_time_it_took() {
     }
     let everyone = "192.168.15.255:7408".parse().unwrap();
     let golden = golden();
-    let find = |function: [u8; 2]| golden.iter().find(|octets| octets[4..6] == function).unwrap();
+    let find = |function: [u8; 2]| golden.iter().find(|bytes| bytes[4..6] == function).unwrap();
     let (request, mut reply) = (find([0x14, 1]), find([0x14, 2]).clone());
     reply[12..16].copy_from_slice(&request[12..16]);
     let mut pcap = Pcap::new();
@@ -439,8 +439,8 @@ fn what_only_looks_like_a_message_on_another_port_is_left_alone() {
         b"\x55\xaa\x00\x00\x14\x06\x00\x00\x00\x00\x00\x00",
         b"\x55\xaa",
     ];
-    for octets in openings {
-        pcap.datagram(Duration::ZERO, from, to, octets);
+    for bytes in openings {
+        pcap.datagram(Duration::ZERO, from, to, bytes);
     }
     assert!(dissected(&pcap).iter().all(Fields::is_empty));
 }
@@ -479,9 +479,9 @@ fn the_info_column_says_what_decode_says_in_both_dialects_and_with_both_ports_of
     ];
     for (args, preference, port) in readings {
         let mut datagrams = [golden(), monitored()].concat();
-        datagrams.retain(|octets| Message::parse_as(port, octets).is_ok());
+        datagrams.retain(|bytes| Message::parse_as(port, bytes).is_ok());
         let capture = captured(&datagrams);
-        std::fs::write(&path, capture.octets()).unwrap();
+        std::fs::write(&path, capture.bytes()).unwrap();
         let infos = tshark(&capture, &["-o", preference, "-e", "_ws.col.Info"]);
         let words = decoded(&path, &args);
         assert_eq!(infos.len(), words.len());

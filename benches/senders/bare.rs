@@ -158,7 +158,7 @@ impl Link {
         let Ok(count) = batch.receive(socket) else { return 0 };
         let (wall_ns, now) = (wall_now_ns(), Monotonic.now());
         for datagram in batch.datagrams() {
-            let Ok(reply) = MotionReply::parse(datagram.octets) else { continue };
+            let Ok(reply) = MotionReply::parse(datagram.bytes) else { continue };
             received.acked += 1;
             let tick = usize::try_from(reply.frame.0.saturating_sub(1)).expect("an index");
             if index == tick % self.sockets.len() {

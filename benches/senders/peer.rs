@@ -43,10 +43,10 @@ pub(crate) fn run(count: usize) {
 
 /// Answers one frame; if there are more, the socket stays ready.
 fn answer(socket: &UdpSocket) {
-    let mut octets = [0; MAX_LEN];
+    let mut bytes = [0; MAX_LEN];
     // An error is an earlier answer's, to a sender that has ended.
-    let Ok((len, from)) = socket.recv_from(&mut octets) else { return };
-    let Ok(frame) = MotionRequest::parse(&octets[..len]) else { return };
+    let Ok((len, from)) = socket.recv_from(&mut bytes) else { return };
+    let Ok(frame) = MotionRequest::parse(&bytes[..len]) else { return };
     let MotionRequest { timing, channel, frame, time_ms, positions, extend, vibration, .. } = frame;
     let code = ReplyCode::Running;
     let (error, inputs) = (0, 0);

@@ -6,7 +6,7 @@ use std::thread::{Scope, ScopedJoinHandle};
 
 use kinocue::engine::Mix;
 use kinocue::rt::{Command, Desk};
-use kinocue::state::Request;
+use kinocue::state::Transition;
 use kinocue::time::ShowTime;
 use rtrb::Producer;
 
@@ -54,8 +54,8 @@ fn command(mut commands: Producer<Command>, done: &AtomicBool) -> Flood {
     while !done.load(Ordering::Acquire) {
         let command = match flood.taken {
             taken if taken % SEEK_EVERY == 1 => Command::Seek(seek_to(taken)),
-            taken if taken % 2 == 0 => Command::Request(Request::Go),
-            _ => Command::Request(Request::Resume),
+            taken if taken % 2 == 0 => Command::Request(Transition::Go),
+            _ => Command::Request(Transition::Resume),
         };
         match commands.push(command) {
             Ok(()) => flood.taken += 1,

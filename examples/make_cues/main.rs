@@ -10,9 +10,9 @@ mod shapes;
 
 fn main() -> io::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("cues");
-    for (name, octets) in files::all() {
+    for (name, bytes) in files::all() {
         let path = folder.join(name);
-        fs::write(&path, octets)?;
+        fs::write(&path, bytes)?;
         println!("{}", path.display());
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Who may come in over TCP: the names that this server answers to, the pages that may ask it, and the tokens.
+//! Access over TCP: the accepted host names, the accepted origins of pages, and the tokens.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -9,7 +9,7 @@ use subtle::{Choice, ConstantTimeEq as _};
 
 use super::tries::Tries;
 use crate::config;
-use crate::hall::{Code, Problem, Role, Surface, Who};
+use crate::control::{Code, Problem, Role, Surface, Who};
 use crate::time::MonoTime;
 
 /// The longest token that is hashed.
@@ -34,7 +34,7 @@ impl Access {
         Self { hosts, origins, open_role: config.open_role, tokens: config.tokens.clone() }
     }
 
-    /// Whether a request was meant for this server: a page of another one that resolves its own name to our address is not
+    /// True if a request was meant for this server: a page of another one that resolves its own name to our address is not
     /// let in (DNS rebinding).
     pub(super) fn check_host(&self, headers: &HeaderMap, uri: &Uri) -> Result<(), Problem> {
         let host = one(headers, &HOST)?.unwrap_or_default();
@@ -47,7 +47,7 @@ impl Access {
         Err(Problem::new(Code::Origin, detail, "ask it by a name of hosts in [api], or list this one there"))
     }
 
-    /// Whether the page that asks, if a page asks, is one of this server's.
+    /// True if the page that asks, if a page asks, is one of this server's.
     pub(super) fn check_origin(&self, headers: &HeaderMap) -> Result<(), Problem> {
         let Some(origin) = one(headers, &ORIGIN)? else { return Ok(()) };
         if self.origins.iter().any(|known| known.eq_ignore_ascii_case(origin)) {
@@ -68,7 +68,7 @@ impl Access {
         let Some(authorization) = one(headers, &AUTHORIZATION)? else {
             let role = self.open_role.ok_or_else(|| {
                 let remedy = "send the header Authorization: Bearer TOKEN; `kinocue token` makes one";
-                Problem::new(Code::Token, "this server wants a token", remedy)
+                Problem::new(Code::Token, "this server requires a token", remedy)
             })?;
             return Ok(Who { role, surface: Surface::Http, name: address.to_string() });
         };

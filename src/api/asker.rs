@@ -1,4 +1,4 @@
-//! A request to change something: who asks, when they asked, and the way to the hall.
+//! A request that changes something: its sender, its time, and the handle of the hall.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use hyper::body::Bytes;
 use super::access::one;
 use super::problem::{bad_value, panicked};
 use super::shared::Shared;
-use crate::hall::{Ask, Code, FRESH, Problem, Role, Status, Surface, Who};
+use crate::control::{Code, Command, FRESH, Problem, Role, Status, Surface, Who};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, MonoTime};
 
@@ -52,10 +52,10 @@ impl FromRequestParts<Arc<Shared>> for Asker {
 
 impl Asker {
     /// Asks, and replies with the state that it led to.
-    pub(super) async fn ask(self, ask: Ask) -> Result<StatusReply, Problem> {
+    pub(super) async fn ask(self, ask: Command) -> Result<StatusReply, Problem> {
         self.allow(&ask)?;
         let asked_at = self.asked_at(&ask, Monotonic.now())?;
-        let status = if ask == Ask::Stop {
+        let status = if ask == Command::Stop {
             self.stop().await
         } else {
             self.shared.handle.post_asked(self.who, ask, asked_at)?.answer().await?
@@ -63,15 +63,15 @@ impl Asker {
         Ok(StatusReply(self.shared.write(&status)))
     }
 
-    /// Whether they are an engineer, who may change the library.
+    /// True if they are an engineer, who may change the library.
     pub(super) fn engineer(&self) -> Result<(), Problem> {
         self.least(Role::Engineer, "changing the library")
     }
 
     /// Over TCP arming needs an engineer: whoever arms sees the seats.
-    fn allow(&self, ask: &Ask) -> Result<(), Problem> {
+    fn allow(&self, ask: &Command) -> Result<(), Problem> {
         let local = self.who.surface == Surface::Socket;
-        let arms = matches!(ask, Ask::Arm { .. });
+        let arms = matches!(ask, Command::Arm { .. });
         if arms && !local { self.least(Role::Engineer, "arming over TCP") } else { Ok(()) }
     }
 
@@ -85,12 +85,12 @@ impl Asker {
     }
 
     /// When it was asked, by our own clock; now, where nobody said and it does not matter.
-    fn asked_at(&self, ask: &Ask, now: MonoTime) -> Result<MonoTime, Problem> {
+    fn asked_at(&self, ask: &Command, now: MonoTime) -> Result<MonoTime, Problem> {
         if !ask.goes_stale() {
             return Ok(now);
         }
         let Some(age_ms) = self.age_ms.clone()? else {
-            if matches!(ask, Ask::Go | Ask::GoFrom(_)) && self.who.surface != Surface::Socket {
+            if matches!(ask, Command::Go | Command::GoFrom(_)) && self.who.surface != Surface::Socket {
                 let remedy = format!("send the header {SENT}, unix milliseconds, with a go");
                 return Err(bad_value("nobody can tell how old this go is", remedy));
             }
@@ -115,7 +115,7 @@ impl Asker {
     async fn stop(&self) -> Arc<Status> {
         let handle = &self.shared.handle;
         handle.stop();
-        if let Ok(posted) = handle.post(self.who.clone(), Ask::Stop)
+        if let Ok(posted) = handle.post(self.who.clone(), Command::Stop)
             && let Ok(Ok(status)) = tokio::time::timeout(STOP_PATIENCE, posted.answer()).await
         {
             return status;

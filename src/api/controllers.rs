@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Name, Nothing, OrNothing};
 use super::shared::Shared;
-use crate::hall::{Ask, Code, ControllerStatus, Problem, Status};
+use crate::control::{Code, Command, ControllerStatus, Problem, Status};
 
 /// Why it is taken out.
 #[derive(Debug, Default, Deserialize, ToSchema)]
@@ -51,7 +51,7 @@ pub(super) async fn one(
     params(("name" = String, Path, description = "Its name")), responses((status = 200, body = Status))
 )]
 pub(super) async fn enable(asker: Asker, Name(name): Name, _: Nothing) -> Result<StatusReply, Problem> {
-    asker.ask(Ask::Enable(name)).await
+    asker.ask(Command::Enable(name)).await
 }
 
 /// Takes the group of a controller out: its seat parks. It stays out over a restart, until somebody takes it in.
@@ -64,5 +64,5 @@ pub(super) async fn disable(
     Name(name): Name,
     OrNothing(Disable { why }): OrNothing<Disable>,
 ) -> Result<StatusReply, Problem> {
-    asker.ask(Ask::Disable { name, why }).await
+    asker.ask(Command::Disable { name, why }).await
 }

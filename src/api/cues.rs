@@ -21,7 +21,7 @@ use super::asker::Asker;
 use super::input::{Id, check_length};
 use super::problem::bad_value;
 use super::shared::{Shared, turn};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::library::{CueId, CueInfo, CurveData, Library, MAX_POINTS};
 
 /// Pieces that wait for the disk at the most.
@@ -97,7 +97,7 @@ pub(super) async fn curve(
 /// takes the place of the one with that id; one that does not pass is refused with every fault. For engineers.
 #[utoipa::path(
     put, path = "/api/v1/cues/{id}", tag = "library", params(("id" = String, Path, description = "Its id")),
-    request_body(content = Vec<u8>, content_type = "application/octet-stream"),
+    request_body(content = Vec<u8>, content_type = "application/byte-stream"),
     responses((status = 200, body = CueInfo))
 )]
 pub(super) async fn upload(
@@ -108,7 +108,7 @@ pub(super) async fn upload(
 ) -> Result<JsonReply<CueInfo>, Problem> {
     asker.engineer()?;
     no_form(&request)?;
-    check_length(request.headers(), shared.library.max_octets())?;
+    check_length(request.headers(), shared.library.max_bytes())?;
     let (to, pieces) = mpsc::channel(PIECES);
     let library = shared.library.clone();
     let fed =
@@ -120,7 +120,7 @@ pub(super) async fn upload(
 
 /// A piece of an upload.
 enum Piece {
-    Octets(Bytes),
+    Bytes(Bytes),
     /// That was all of it.
     End,
 }
@@ -130,7 +130,7 @@ async fn feed(mut body: Body, to: mpsc::Sender<Piece>) -> Result<(), Problem> {
     loop {
         let piece = match timeout(STALL, body.frame()).await {
             Ok(Some(Ok(frame))) => match frame.into_data() {
-                Ok(octets) => Piece::Octets(octets),
+                Ok(bytes) => Piece::Bytes(bytes),
                 Err(_) => continue, // trailers
             },
             Ok(Some(Err(_))) => return Err(cut_short()),
@@ -149,7 +149,7 @@ fn take_in(library: &Library, id: &CueId, mut pieces: mpsc::Receiver<Piece>) -> 
     let mut upload = library.begin(id)?;
     loop {
         match pieces.blocking_recv() {
-            Some(Piece::Octets(octets)) => upload.write(&octets)?,
+            Some(Piece::Bytes(bytes)) => upload.write(&bytes)?,
             Some(Piece::End) => return upload.finish(),
             None => return Err(cut_short()),
         }
@@ -170,7 +170,7 @@ fn no_form(request: &Request) -> Result<(), Problem> {
             Err(Problem::new(
                 Code::Media,
                 detail,
-                "send the file as application/octet-stream, as curl -T does",
+                "send the file as application/byte-stream, as curl -T does",
             ))
         }
     }

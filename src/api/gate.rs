@@ -1,4 +1,4 @@
-//! The gate that every request passes: is it meant for us, who asks, may they look, did it come before. Refusals leave it as
+//! Admission of every request: is it meant for us, who sends it, with which role, did it come before. Refusals leave it as
 //! problems, and every reply with the headers that keep pages of others out.
 
 use std::panic::AssertUnwindSafe;
@@ -22,7 +22,7 @@ use super::problem::{bad_value, panicked, render};
 use super::rest::Rest;
 use super::shared::Shared;
 use super::show::STOP;
-use crate::hall::{Code, Place, Problem, Surface, Who};
+use crate::control::{Code, Place, Problem, Surface, Who};
 use crate::log::{Line, Priority};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
@@ -77,7 +77,7 @@ async fn pass(shared: &Shared, mut request: Request, next: Next) -> Response {
     render(response, Some(&shared.handle.status()))
 }
 
-/// Who asks; none where it does not matter.
+/// Who asks; `None` if it does not matter.
 fn admit(shared: &Shared, request: &Request) -> Result<Option<Who>, Problem> {
     let (headers, path) = (request.headers(), request.uri().path());
     shared.access.check_origin(headers)?;

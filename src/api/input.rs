@@ -12,10 +12,10 @@ use hyper::body::Bytes;
 use serde::de::DeserializeOwned;
 
 use super::problem::bad_value;
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::library;
 
-/// The longest body outside of uploads, octets.
+/// The longest body outside of uploads, bytes.
 pub(super) const MAX_BODY: usize = 64 << 10;
 /// How long a body may take to come.
 const BODY_TIME: Duration = Duration::from_secs(10);
@@ -114,7 +114,7 @@ pub(super) fn id(text: &str) -> Result<library::Id, Problem> {
     text.parse().map_err(|error: library::IdError| bad_value(error.to_string(), "name it as the lists do"))
 }
 
-/// The body, of at most [`MAX_BODY`] octets.
+/// The body, of at most [`MAX_BODY`] bytes.
 async fn whole(headers: &HeaderMap, body: Body) -> Result<Bytes, Problem> {
     check_length(headers, MAX_BODY as u64)?;
     match tokio::time::timeout(BODY_TIME, Limited::new(body, MAX_BODY).collect()).await {
@@ -136,7 +136,7 @@ pub(super) fn check_length(headers: &HeaderMap, most: u64) -> Result<(), Problem
 
 /// A body that is longer than may be.
 pub(super) fn too_long(most: u64) -> Problem {
-    Problem::new(Code::Size, format!("the body is longer than {most} octets"), "send a shorter one")
+    Problem::new(Code::Size, format!("the body is longer than {most} bytes"), "send a shorter one")
 }
 
 fn json_only(headers: &HeaderMap) -> Result<(), Problem> {

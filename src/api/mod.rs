@@ -1,4 +1,4 @@
-//! The HTTP API: requests in, asks of the hall out, and back as JSON. One thread of its own with a runtime; nothing of it
+//! The HTTP API: requests in, commands to the hall out, and back as JSON. One thread of its own with a runtime; nothing of it
 //! reaches the tick thread but through [`Handle`]. The stop socket has a thread without a runtime besides.
 //!
 //! - **Who**: whoever may open the control socket is engineer, named as the kernel names them. Over TCP, which is off unless
@@ -19,7 +19,7 @@ use tokio::runtime::{self, Runtime};
 use tokio::sync::{mpsc, watch};
 
 use crate::config;
-use crate::hall::Handle;
+use crate::control::Handle;
 use crate::library::Library;
 use crate::log::Log;
 use crate::playlist::Shelf;
@@ -63,7 +63,7 @@ const BLOCKING: usize = 8;
 /// How long what is under way may go on when the server ends.
 const LAST_WORDS: Duration = Duration::from_secs(2);
 
-/// The console: the content type and the octets of what is at a path, `/` for its page; none where there is nothing.
+/// The console: the content type and the bytes of what is at a path, `/` for its page; `None` if there is nothing.
 pub type Pages = fn(path: &str) -> Option<(&'static str, &'static [u8])>;
 
 /// What the API serves, and where.

@@ -12,15 +12,15 @@ use hyper::body::Bytes;
 use tokio::sync::OnceCell;
 
 use super::problem::bad_value;
-use crate::hall::Problem;
+use crate::control::Problem;
 use crate::time::MonoTime;
 
 /// The longest key.
 const MAX_KEY: usize = 64;
 /// Keys that are remembered.
 const KEYS: usize = 1024;
-/// Octets of replies that are remembered; of more the oldest are forgotten with their keys.
-const OCTETS: usize = 16 << 20;
+/// Bytes of replies that are remembered; of more the oldest are forgotten with their keys.
+const BYTES: usize = 16 << 20;
 /// How long a key is remembered.
 const AGE: Duration = Duration::from_secs(600);
 
@@ -59,7 +59,7 @@ impl Once {
         request: &str,
         now: MonoTime,
     ) -> Result<First, Problem> {
-        if key.is_empty() || key.len() > MAX_KEY || !key.bytes().all(|octet| octet.is_ascii_graphic()) {
+        if key.is_empty() || key.len() > MAX_KEY || !key.bytes().all(|byte| byte.is_ascii_graphic()) {
             let remedy = format!("1 to {MAX_KEY} characters of ASCII, another for each request");
             return Err(bad_value(format!("{key:?} is no Idempotency-Key"), remedy));
         }
@@ -91,12 +91,12 @@ impl Once {
 /// Makes room for one more.
 fn forget(kept: &mut VecDeque<Kept>, now: MonoTime) {
     let size = |kept: &Kept| kept.first.get().map_or(0, |reply| reply.body.len());
-    let mut octets: usize = kept.iter().map(size).sum();
+    let mut bytes: usize = kept.iter().map(size).sum();
     while let Some(oldest) = kept.front() {
-        if now.since(oldest.since) < AGE && kept.len() < KEYS && octets <= OCTETS {
+        if now.since(oldest.since) < AGE && kept.len() < KEYS && bytes <= BYTES {
             break;
         }
-        octets -= size(oldest);
+        bytes -= size(oldest);
         kept.pop_front();
     }
 }
@@ -111,7 +111,7 @@ impl Reply {
         Self { status: parts.status, content_type, body }
     }
 
-    /// Whether it says that nothing was done for now, and to try again.
+    /// True if it says that nothing was done for now, and to try again.
     pub(super) fn is_busy(&self) -> bool {
         self.status == StatusCode::TOO_MANY_REQUESTS
     }
@@ -130,14 +130,14 @@ impl Reply {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hall::Code;
+    use crate::control::Code;
 
     fn at(seconds: u64) -> MonoTime {
         MonoTime::from_nanos(0) + Duration::from_secs(seconds)
     }
 
-    fn reply(octets: usize) -> Reply {
-        Reply { status: StatusCode::OK, content_type: None, body: vec![b'x'; octets].into() }
+    fn reply(bytes: usize) -> Reply {
+        Reply { status: StatusCode::OK, content_type: None, body: vec![b'x'; bytes].into() }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::io::Read as _;
 use std::net::IpAddr;
 use std::sync::Arc;
 
-use crate::hall::{Role, Surface, Who};
+use crate::control::{Role, Surface, Who};
 
 /// Of the table of users no more is read.
 const MAX_USERS_LEN: u64 = 1 << 20;

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Json, id};
 use super::shared::Shared;
-use crate::hall::{Ask, Problem, Status};
+use crate::control::{Command, Problem, Status};
 use crate::playlist::PlaylistInfo;
 
 /// Which playlist.
@@ -46,10 +46,10 @@ pub(super) async fn all(State(shared): State<Arc<Shared>>) -> Result<JsonReply<V
 )]
 pub(super) async fn choose(asker: Asker, Json(choice): Json<Choice>) -> Result<StatusReply, Problem> {
     let id = choice.id.map(|text| id(&text)).transpose()?.map(|id| id.to_string());
-    asker.ask(Ask::Playlist { id }).await
+    asker.ask(Command::Playlist { id }).await
 }
 
-/// Makes an entry of the playlist the next to be played.
+/// Selects the playlist entry to play next.
 #[utoipa::path(
     post, path = "/api/v1/playlist/select", tag = "playlist", request_body = Select,
     responses((status = 200, body = Status))
@@ -58,5 +58,5 @@ pub(super) async fn select(
     asker: Asker,
     Json(Select { entry }): Json<Select>,
 ) -> Result<StatusReply, Problem> {
-    asker.ask(Ask::Select { entry }).await
+    asker.ask(Command::Select { entry }).await
 }

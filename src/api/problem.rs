@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::hall::{Code, Problem, Status};
+use crate::control::{Code, Problem, Status};
 
 /// The type of a problem's body.
 pub(super) const PROBLEM_JSON: &str = "application/problem+json";
@@ -45,7 +45,7 @@ pub(super) struct Hall<'p> {
     cause: &'p str,
     /// What a person does next.
     next: &'p str,
-    /// Where in the cue the film is, s; null where none is loaded.
+    /// Where in the cue the film is, s; null if none is loaded.
     position_s: Option<f64>,
 }
 

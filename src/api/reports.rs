@@ -1,4 +1,4 @@
-//! `/api/v1/reports/{day}`: what was played on a day, and what was asked. Read and written on a thread for that, sent piece by
+//! `/api/v1/reports/{day}`: the shows and commands of a day. Read and written on a thread for that, sent piece by
 //! piece, one at a time: a great day takes no more memory than a small one, and nobody else's time.
 
 use std::io::{self, BufWriter, Write};
@@ -19,18 +19,18 @@ use super::input::Name;
 use super::pieces::Pieces;
 use super::problem::bad_value;
 use super::shared::{Shared, turn};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::journal::{self, Most, Report};
 
 /// The newest of a day, and no more.
 const MOST: Most = Most { shows: 500, actions: 5_000 };
-/// Octets of a piece, and how many wait for whoever reads them.
+/// Bytes of a piece, and how many wait for whoever reads them.
 const PIECE: usize = 64 << 10;
 const WAITING: usize = 2;
 /// How long somebody may take to read a report, so that the next one gets a turn.
 const READING: Duration = Duration::from_secs(30);
 
-/// The report of a day, by the clock of the hall; empty where nothing was played. Of a day with more than 500 shows or 5,000
+/// The report of a day, by the clock of the hall; empty if nothing was played. Of a day with more than 500 shows or 5,000
 /// things that were asked, the newest; `kinocue report` has all. One at a time.
 #[utoipa::path(
     get, path = "/api/v1/reports/{day}", tag = "library",
@@ -72,9 +72,9 @@ pub(super) async fn one(State(shared): State<Arc<Shared>>, Name(day): Name) -> R
 struct Out(mpsc::Sender<Bytes>);
 
 impl Write for Out {
-    fn write(&mut self, octets: &[u8]) -> io::Result<usize> {
-        let sent = self.0.blocking_send(Bytes::copy_from_slice(octets));
-        sent.map(|()| octets.len()).map_err(|_| io::ErrorKind::BrokenPipe.into())
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let sent = self.0.blocking_send(Bytes::copy_from_slice(bytes));
+        sent.map(|()| bytes.len()).map_err(|_| io::ErrorKind::BrokenPipe.into())
     }
 
     fn flush(&mut self) -> io::Result<()> {

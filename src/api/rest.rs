@@ -1,4 +1,4 @@
-//! The rest of a request's body. Much is answered before its body is read, a stop above all; where octets of it were left in
+//! The rest of a request's body. Much is answered before its body is read, a stop above all; where bytes of it were left in
 //! the socket at its end, the system would take back the answer that is on its way.
 
 use std::pin::Pin;
@@ -36,10 +36,10 @@ impl Rest {
     /// Reads what is left, no more than a body may be long, and waits for it no longer than a moment.
     pub(super) async fn read_out(mut self) {
         let read = async {
-            let mut octets = 0;
+            let mut bytes = 0;
             while let Some(Ok(frame)) = self.frame().await {
-                octets += frame.data_ref().map_or(0, Bytes::len);
-                if octets > MAX_BODY {
+                bytes += frame.data_ref().map_or(0, Bytes::len);
+                if bytes > MAX_BODY {
                     break;
                 }
             }

@@ -15,7 +15,7 @@ use utoipa_axum::routes;
 use super::problem::{Body, PROBLEM_JSON};
 use super::shared::Shared;
 use super::{controllers, cues, gate, playlist, reports, service, settings, show, status};
-use crate::hall::Code;
+use crate::control::Code;
 
 /// What can be said of the whole.
 #[derive(utoipa::OpenApi)]

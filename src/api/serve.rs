@@ -16,7 +16,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::guarded::Guarded;
 use super::peer::Peer;
-use crate::hall::{Place, Places};
+use crate::control::{Place, Places};
 use crate::log::{Line, Log, Priority};
 
 /// Connections over TCP.
@@ -25,7 +25,7 @@ const TCP: usize = 256;
 const LOCAL: usize = 64;
 /// How long the head of a request may take to come; a connection that is kept waits no longer for its next one either.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// The longest head of a request, and how much of a reply waits to be sent, octets.
+/// The longest head of a request, and how much of a reply waits to be sent, bytes.
 const BUFFER: usize = 64 << 10;
 /// The most headers.
 const HEADERS: usize = 64;
@@ -37,7 +37,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(super) struct Hall {
     /// The routes.
     pub(super) router: axum::Router,
-    /// Whether the server ends.
+    /// True if the server ends.
     pub(super) closing: watch::Receiver<bool>,
     /// Held by whatever still serves.
     pub(super) alive: mpsc::Sender<Infallible>,

@@ -1,4 +1,4 @@
-//! What other programs ask of the service: is it well, is it ready, its figures, its description; and the console's page.
+//! Endpoints for other programs: health, readiness, metrics, description; and the console's page.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 
 use super::problem::nothing_there;
 use super::shared::Shared;
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::metrics;
 use crate::state::State as HallState;
 use crate::sys::clock::Monotonic;
@@ -28,7 +28,7 @@ pub(super) struct Well {
     state: &'static str,
 }
 
-/// Whether the process lives and its tick thread ticks; 503 if not.
+/// True if the process lives and its tick thread ticks; 503 if not.
 #[utoipa::path(get, path = "/healthz", tag = "service", responses((status = 200, body = Well)))]
 pub(super) async fn health(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Well>, Problem> {
     if shared.pulse.beats(Monotonic.now()) {
@@ -38,7 +38,7 @@ pub(super) async fn health(State(shared): State<Arc<Shared>>) -> Result<JsonRepl
     Err(Problem::new(Code::Timeout, "the tick counter stands still", remedy))
 }
 
-/// Whether all controllers have been asked once, so that there is a hall to speak of; 503 if not.
+/// True if all controllers have been asked once, so that there is a hall to speak of; 503 if not.
 #[utoipa::path(get, path = "/readyz", tag = "service", responses((status = 200, body = Well)))]
 pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Well>, Problem> {
     let status = shared.handle.status();
@@ -77,8 +77,8 @@ pub(super) async fn page(
     uri: Uri,
 ) -> Result<Response, Problem> {
     let page = (shared.pages)(uri.path()).filter(|_| method == Method::GET || method == Method::HEAD);
-    let (content_type, octets) = page.ok_or_else(|| nothing_there(uri.path()))?;
-    Ok(([(CONTENT_TYPE, HeaderValue::from_static(content_type))], octets).into_response())
+    let (content_type, bytes) = page.ok_or_else(|| nothing_there(uri.path()))?;
+    Ok(([(CONTENT_TYPE, HeaderValue::from_static(content_type))], bytes).into_response())
 }
 
 /// A path that is there, asked by a method that it does not take.

@@ -1,4 +1,4 @@
-//! What is set rather than done: trim, levels, presets; and what is asked of the hall as a whole.
+//! Settings (trim, levels, presets), and commands to the hall as a whole.
 
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Json, Name, Nothing};
 use super::problem::bad_value;
-use crate::hall::{Ask, LevelsChange, Problem, Status};
+use crate::control::{Command, LevelsChange, Problem, Status};
 
 type Reply = Result<StatusReply, Problem>;
 
@@ -35,7 +35,7 @@ pub(super) struct Test {
     put, path = "/api/v1/trim", tag = "settings", request_body = Trim, responses((status = 200, body = Status))
 )]
 pub(super) async fn trim(asker: Asker, Json(Trim { offset_s }): Json<Trim>) -> Reply {
-    asker.ask(Ask::Trim(trim_ms(offset_s)?)).await
+    asker.ask(Command::Trim(trim_ms(offset_s)?)).await
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "500 at the most")]
@@ -53,7 +53,7 @@ fn trim_ms(offset_s: f64) -> Result<i32, Problem> {
 )]
 pub(super) async fn levels(asker: Asker, Json(change): Json<LevelsChange>) -> Reply {
     check_levels(&change)?;
-    asker.ask(Ask::Levels(change)).await
+    asker.ask(Command::Levels(change)).await
 }
 
 fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
@@ -69,19 +69,19 @@ fn check_levels(change: &LevelsChange) -> Result<(), Problem> {
     Err(bad_value(faults.join(", "), "levels are from 0, nothing, to 1, all of it").with(faults))
 }
 
-/// Sets levels and effects as a preset of the configuration says.
+/// Applies a preset of the configuration: levels and effects.
 #[utoipa::path(
     post, path = "/api/v1/presets/{name}", tag = "settings", params(("name" = String, Path, description = "Its name")),
     responses((status = 200, body = Status))
 )]
 pub(super) async fn preset(asker: Asker, Name(name): Name, _: Nothing) -> Reply {
-    asker.ask(Ask::Preset(name)).await
+    asker.ask(Command::Preset(name)).await
 }
 
 /// Asks all controllers for their registers and judges them.
 #[utoipa::path(post, path = "/api/v1/preflight", tag = "hall", responses((status = 200, body = Status)))]
 pub(super) async fn preflight(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Preflight).await
+    asker.ask(Command::Preflight).await
 }
 
 /// Moves each axis and effect of empty, armed seats slowly in turn.
@@ -89,13 +89,13 @@ pub(super) async fn preflight(asker: Asker, _: Nothing) -> Reply {
     post, path = "/api/v1/test", tag = "hall", request_body = Test, responses((status = 200, body = Status))
 )]
 pub(super) async fn test(asker: Asker, Json(Test { rows }): Json<Test>) -> Reply {
-    asker.ask(Ask::Test { rows }).await
+    asker.ask(Command::Test { rows }).await
 }
 
 /// Reads the configuration anew, where nothing is armed. The table `[api]` stays as it was until the service starts again.
 #[utoipa::path(post, path = "/api/v1/reload", tag = "hall", responses((status = 200, body = Status)))]
 pub(super) async fn reload(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Reload).await
+    asker.ask(Command::Reload).await
 }
 
 #[cfg(test)]

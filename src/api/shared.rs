@@ -14,7 +14,7 @@ use super::once::Once;
 use super::problem::panicked;
 use super::streams::Streams;
 use super::tries::Tries;
-use crate::hall::{Code, Handle, Problem, Status};
+use crate::control::{Code, Handle, Problem, Status};
 use crate::library::Library;
 use crate::log::Log;
 use crate::playlist::Shelf;
@@ -46,7 +46,7 @@ pub(super) struct Shared {
     pub(super) reports: Arc<Semaphore>,
     /// Held by whoever has a curve drawn.
     pub(super) curves: Arc<Semaphore>,
-    /// Whether the server ends.
+    /// True if the server ends.
     pub(super) closing: watch::Receiver<bool>,
     /// The description of all this, JSON.
     pub(super) document: Bytes,
@@ -60,7 +60,7 @@ pub(super) struct Shared {
     pub(super) pages: Pages,
     /// Where it is said who was turned away.
     pub(super) log: Log,
-    /// Whether the tick thread ticks.
+    /// True if the tick thread ticks.
     pub(super) pulse: Pulse,
     /// The newest status that was written, and its JSON.
     pub(super) written: Mutex<Option<(Arc<Status>, Bytes)>>,
@@ -132,12 +132,12 @@ impl Pulse {
         }
     }
 
-    /// Whether it has moved of late.
+    /// True if it has moved of late.
     pub(super) fn beats(&self, now: MonoTime) -> bool {
         self.still(now) < STILL
     }
 
-    /// For how long a counter that has moved before stands still; none where that is not long.
+    /// For how long a counter that has moved before stands still; `None` if that is not long.
     pub(super) fn stopped(&self, now: MonoTime) -> Option<Duration> {
         let has_moved = self.moved_ns.load(Ordering::Relaxed) > 0;
         Some(self.still(now)).filter(|still| has_moved && *still >= STILL)

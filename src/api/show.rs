@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::asker::{Asker, StatusReply};
 use super::input::{Json, Nothing, OrNothing, id};
 use super::problem::bad_value;
-use crate::hall::{Ask, Problem, Status};
+use crate::control::{Command, Problem, Status};
 use crate::time::ShowTime;
 
 /// Where a stop is asked: nothing that comes with it, and is not as it should be, is a reason not to stop.
@@ -51,7 +51,7 @@ pub(super) struct Seek {
 /// Homes all controllers, with nobody on the seats.
 #[utoipa::path(post, path = "/api/v1/show/home", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn home(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Home).await
+    asker.ask(Command::Home).await
 }
 
 /// Loads a cue of the library.
@@ -60,7 +60,7 @@ pub(super) async fn home(asker: Asker, _: Nothing) -> Reply {
 )]
 pub(super) async fn load(asker: Asker, Json(load): Json<Load>) -> Reply {
     let cue = id(&load.cue)?.to_string();
-    asker.ask(Ask::Load { cue }).await
+    asker.ask(Command::Load { cue }).await
 }
 
 /// Gets ready to go. Over TCP for engineers. Where `arm_homes` of the status is true the seats home first.
@@ -68,13 +68,13 @@ pub(super) async fn load(asker: Asker, Json(load): Json<Load>) -> Reply {
     post, path = "/api/v1/show/arm", tag = "show", request_body = Option<Arm>, responses((status = 200, body = Status))
 )]
 pub(super) async fn arm(asker: Asker, OrNothing(Arm { seats_empty }): OrNothing<Arm>) -> Reply {
-    asker.ask(Ask::Arm { seats_empty }).await
+    asker.ask(Command::Arm { seats_empty }).await
 }
 
 /// Stands down.
 #[utoipa::path(post, path = "/api/v1/show/disarm", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn disarm(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Disarm).await
+    asker.ask(Command::Disarm).await
 }
 
 /// Starts what is loaded and armed. Over TCP X-Kinocue-Sent has to say when it was asked; one that is older than 2 s is refused.
@@ -83,29 +83,29 @@ pub(super) async fn disarm(asker: Asker, _: Nothing) -> Reply {
 )]
 pub(super) async fn go(asker: Asker, OrNothing(Go { from_s }): OrNothing<Go>) -> Reply {
     match from_s {
-        None => asker.ask(Ask::Go).await,
-        Some(from_s) => asker.ask(Ask::GoFrom(film("from_s", from_s)?)).await,
+        None => asker.ask(Command::Go).await,
+        Some(from_s) => asker.ask(Command::GoFrom(film("from_s", from_s)?)).await,
     }
 }
 
 /// Holds; the film waits.
 #[utoipa::path(post, path = "/api/v1/show/pause", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn pause(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Pause).await
+    asker.ask(Command::Pause).await
 }
 
 /// Goes on.
 #[utoipa::path(post, path = "/api/v1/show/resume", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn resume(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Resume).await
+    asker.ask(Command::Resume).await
 }
 
-/// Goes on elsewhere in the cue.
+/// Jumps to another position in the cue.
 #[utoipa::path(
     post, path = "/api/v1/show/seek", tag = "show", request_body = Seek, responses((status = 200, body = Status))
 )]
 pub(super) async fn seek(asker: Asker, Json(Seek { position_s }): Json<Seek>) -> Reply {
-    asker.ask(Ask::Seek(film("position_s", position_s)?)).await
+    asker.ask(Command::Seek(film("position_s", position_s)?)).await
 }
 
 /// A time of the film.
@@ -120,17 +120,17 @@ fn film(key: &str, seconds: f64) -> Result<ShowTime, Problem> {
 /// Brings the seats to rest at once. Not a safety device: the emergency stop is hard-wired.
 #[utoipa::path(post, path = "/api/v1/show/stop", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn stop(asker: Asker) -> Reply {
-    asker.ask(Ask::Stop).await // whatever its body is
+    asker.ask(Command::Stop).await // whatever its body is
 }
 
 /// Brings the seats to their park poses.
 #[utoipa::path(post, path = "/api/v1/show/park", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn park(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Park).await
+    asker.ask(Command::Park).await
 }
 
 /// Leaves a stop or a fault.
 #[utoipa::path(post, path = "/api/v1/show/clear", tag = "show", responses((status = 200, body = Status)))]
 pub(super) async fn clear(asker: Asker, _: Nothing) -> Reply {
-    asker.ask(Ask::Clear).await
+    asker.ask(Command::Clear).await
 }

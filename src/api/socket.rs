@@ -77,7 +77,7 @@ fn make_room(path: &Path) -> Result<(), ApiError> {
     }
 }
 
-/// Whether the other end goes away until then: a child that this or a dead process has just forked holds all its sockets for
+/// True if the other end goes away until then: a child that this or a dead process has just forked holds all its sockets for
 /// an instant, until it executes its program, and serves none.
 fn hangs_up(stream: &UnixStream, until: MonoTime) -> bool {
     let left = Timespec::try_from(until.since(Monotonic.now())).expect("a moment fits");

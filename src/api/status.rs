@@ -17,7 +17,7 @@ use super::asker::StatusReply;
 use super::pieces::Pieces;
 use super::shared::Shared;
 use super::streams::Stream;
-use crate::hall::{Code, Problem, Status, Who};
+use crate::control::{Code, Problem, Status, Who};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 

@@ -14,7 +14,7 @@ use rustix::net::sockopt::socket_peercred;
 
 use super::socket::{self, SocketFile};
 use super::{ApiError, peer};
-use crate::hall::Handle;
+use crate::control::Handle;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -88,7 +88,7 @@ impl StopDesk {
         }
     }
 
-    /// Waits until there is something to do; says whether that is to end, none where the system would not wait.
+    /// Waits until there is something to do; says whether that is to end, `None` if the system would not wait.
     fn wait(&self) -> Option<bool> {
         let now = Monotonic.now();
         let ends = self.peers.iter().map(|caller| caller.until).chain(self.pause_until).min();
@@ -134,11 +134,11 @@ impl StopDesk {
 impl Caller {
     /// Takes in what is there; whether more is to come.
     fn listen(&mut self, handle: &Handle) -> bool {
-        let mut octets = [0; LINE];
+        let mut bytes = [0; LINE];
         loop {
-            match self.stream.read(&mut octets) {
+            match self.stream.read(&mut bytes) {
                 Ok(0) => break,
-                Ok(read) => self.line.extend_from_slice(&octets[..read]),
+                Ok(read) => self.line.extend_from_slice(&bytes[..read]),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return true,
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 Err(_) => return false,
@@ -160,7 +160,7 @@ impl Caller {
     }
 
     fn is_stop(&self) -> bool {
-        let line = self.line.split(|&octet| octet == b'\n').next().unwrap_or_default();
+        let line = self.line.split(|&byte| byte == b'\n').next().unwrap_or_default();
         line.trim_ascii().eq_ignore_ascii_case(b"stop")
     }
 
@@ -180,7 +180,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::hall::{Ask, Inbox, Role, Status, handle};
+    use crate::control::{Command, Inbox, Role, Status, handle};
     use crate::rt::Desk;
 
     struct Hall {
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(say(&hall.path, "stop\n"), "stopping\n");
         assert!(hall.desk.take_stop());
         let noted = hall.inbox.next(Duration::ZERO).unwrap().desired;
-        assert_eq!((noted.ask, noted.who.role), (Ask::Stop, Role::Engineer));
+        assert_eq!((noted.ask, noted.who.role), (Command::Stop, Role::Engineer));
         assert_eq!(noted.who.name, peer::user(rustix::process::getuid().as_raw()));
         assert_eq!(say(&hall.path, " STOP\r\n"), "stopping\n");
         assert_eq!(say(&hall.path, "stop"), "stopping\n", "a line without its end");

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
 
-use crate::hall::{Code, Problem, Surface, Who};
+use crate::control::{Code, Problem, Surface, Who};
 
 /// How many are pushed to at a time over TCP, and over the control socket.
 const MOST: (usize, usize) = (32, 16);
@@ -34,7 +34,7 @@ impl Streams {
     /// A place for `who`.
     ///
     /// # Errors
-    /// Where there is none, and nobody whose role is less.
+    /// If there is none, and nobody whose role is less.
     pub(super) fn take(&self, who: &Who) -> Result<Stream, Problem> {
         let mut watching = lock(&self.0);
         let count = |is: &dyn Fn(&Who) -> bool| watching.iter().filter(|one| is(&one.who)).count();
@@ -83,7 +83,7 @@ mod tests {
     use std::task::{Context, Waker};
 
     use super::*;
-    use crate::hall::Role;
+    use crate::control::Role;
 
     fn who(role: Role, name: &str) -> Who {
         Who { role, surface: Surface::Http, name: name.to_owned() }

@@ -1,11 +1,11 @@
-//! Wrong tokens, counted by address, so that whoever goes on guessing is told to wait. A right token is never kept waiting.
+//! Counts wrong tokens by address, so that guessing has to wait. A valid token never waits.
 
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::hall::network;
+use crate::control::network;
 use crate::time::MonoTime;
 
 /// Wrong tries of one address within [`WINDOW`]; after that it is told to wait.
@@ -26,7 +26,7 @@ struct Wrong {
 }
 
 impl Tries {
-    /// How long that address is told to wait; none where it is not.
+    /// How long that address is told to wait; `None` if it is not.
     pub(super) fn wait(&self, address: IpAddr, now: MonoTime) -> Option<Duration> {
         let table = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let wrong = table.get(&network(address)).filter(|wrong| wrong.tries >= MOST)?;

@@ -71,8 +71,8 @@ impl<C: Clock> Company<'_, C> {
             }
             let until = self.clock.now() + WAIT;
             let told = std::cell::RefCell::new(&mut counts);
-            let mut take = |lane: usize, octets: &[u8]| {
-                let count = count_of(octets);
+            let mut take = |lane: usize, bytes: &[u8]| {
+                let count = count_of(bytes);
                 let mut told = told.borrow_mut();
                 told[lane].told = told[lane].told.or(count);
                 count.is_some()
@@ -110,8 +110,8 @@ impl<C: Clock> Company<'_, C> {
 }
 
 /// The count that an answer tells; with x over 2 it does not say its channel.
-fn count_of(octets: &[u8]) -> Option<u16> {
-    let reply = RegisterReply::parse(octets).ok()?;
+fn count_of(bytes: &[u8]) -> Option<u16> {
+    let reply = RegisterReply::parse(bytes).ok()?;
     let is_ours = reply.access == Access::Read
         && (reply.start, reply.num) == (PACKETS, 1)
         && (reply.channel == 0 || reply.code != ReplyCode::Running);

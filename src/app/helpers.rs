@@ -18,7 +18,7 @@ pub(super) type Ticks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Sender>;
 
 /// What ends the threads.
 #[derive(Debug, Default)]
-pub(super) struct Over {
+pub(super) struct EndFlags {
     acks: AtomicBool,
     plans: AtomicBool,
 }
@@ -26,7 +26,7 @@ pub(super) struct Over {
 /// The ack thread and the planner's.
 #[derive(Debug)]
 pub(super) struct Helpers<'scope> {
-    over: &'scope Over,
+    over: &'scope EndFlags,
     acks: ScopedJoinHandle<'scope, Accounts>,
     planner: ScopedJoinHandle<'scope, Vec<PlanError>>,
 }
@@ -38,7 +38,7 @@ impl<'scope> Helpers<'scope> {
     /// That of the system where it starts no further thread; none is left then.
     pub(super) fn start(
         scope: &'scope Scope<'scope, '_>,
-        over: &'scope Over,
+        over: &'scope EndFlags,
         granted: &RealTime,
         mut acks: AckLoop,
         drains: DrainGrid,
@@ -67,7 +67,7 @@ impl<'scope> Helpers<'scope> {
     /// Ends them, the tick loop having ended, and closes the accounts.
     ///
     /// # Panics
-    /// Where one of them panicked.
+    /// If one of them panicked.
     pub(super) fn end(self, ticks: &Ticks<'_>, ended: Ended, granted: RealTime, origin: MonoTime) -> Run {
         self.over.acks.store(true, Ordering::Release);
         self.over.plans.store(true, Ordering::Release);

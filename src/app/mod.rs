@@ -2,21 +2,21 @@
 
 mod company;
 mod helpers;
-pub mod house;
-pub mod keeper;
 mod play;
 mod prepare;
 mod report;
 mod run;
+pub mod runtime;
 pub mod serve;
 mod stage;
 pub mod staged;
 mod sum_up;
+pub mod supervisor;
 pub mod surfaces;
 
-pub use play::{Control, Play, PlayError, Played, Reins};
+pub use play::{Control, Play, PlayError, PlayHandle, Played};
 pub use report::{
     ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, SpinReport, StateReport,
 };
 pub use run::Run;
-pub use staged::Staged;
+pub use staged::StagedShow;

@@ -12,14 +12,14 @@ use super::company::Company;
 use super::prepare::{Preparation, Unready};
 use super::report::Report;
 use super::stage::Stage;
-use super::staged::Staged;
+use super::staged::StagedShow;
 use super::sum_up::{About, sum_up};
 use crate::belief::{Evidence, FRESH, Reading};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::{Ending, Show};
 use crate::fanout::{Lane, Manner};
-use crate::health::{Groups, Health};
+use crate::health::{Groups, HealthTable};
 use crate::motion::Window;
 use crate::net::{NetError, Ports, Sender};
 use crate::observe::Watched;
@@ -117,11 +117,11 @@ fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
 pub struct Play {
     config: Config,
     manner: Manner,
-    staged: Staged,
+    staged: StagedShow,
     mail: Mail,
     ends: MailEnds,
     control: Control,
-    /// Whether nothing may move.
+    /// True if nothing may move.
     holds: bool,
 }
 
@@ -138,7 +138,7 @@ pub struct Control {
 
 /// What a play is led with.
 #[derive(Debug)]
-pub struct Reins {
+pub struct PlayHandle {
     /// What is asked of the hall.
     pub commands: Producer<Command>,
     /// What the hall does.
@@ -154,10 +154,10 @@ pub struct Played {
     pub refusals: Vec<String>,
     /// What else a person should know, in words.
     pub notes: Vec<String>,
-    /// Controllers that acked nothing, or were lost at the end; none where no replies were asked for.
+    /// Controllers that acked nothing, or were lost at the end; `None` if no replies were asked for.
     pub silent: Vec<String>,
     /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
-    pub astray: Vec<String>,
+    pub off_park: Vec<String>,
 }
 
 impl Play {
@@ -168,7 +168,7 @@ impl Play {
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
         keeps_limits(&config, &timeline, show.rate, manner.level)?;
-        let staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
         Ok(Self::of(config, staged, manner))
     }
 
@@ -180,12 +180,12 @@ impl Play {
     pub fn holding(config: Config, timeline: Timeline, show: Show, silent: bool) -> Result<Self, PlayError> {
         // At level 0 the cue has no part in the pose.
         let manner = Manner { level: 0.0, silent };
-        let mut staged = Staged::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        let mut staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
         staged.lanes.iter_mut().for_each(Lane::hold);
         Ok(Self { holds: true, ..Self::of(config, staged, manner) })
     }
 
-    fn of(config: Config, staged: Staged, manner: Manner) -> Self {
+    fn of(config: Config, staged: StagedShow, manner: Manner) -> Self {
         let live = Arc::new(Live::new(staged.lanes.len()));
         let (mail, ends) = mailboxes(staged.lanes.len(), staged.show.rate, Arc::clone(&live));
         let control = Control { desk: Arc::new(staged.desk()), live, leave: Arc::default() };
@@ -214,8 +214,8 @@ impl Play {
     /// [`PlayError::Unsure`] where a seat to be held may not stand where it should.
     ///
     /// # Panics
-    /// Where one of its threads panicked.
-    pub fn run(mut self, lead: impl FnOnce(Reins) -> bool) -> Result<Played, PlayError> {
+    /// If one of its threads panicked.
+    pub fn run(mut self, lead: impl FnOnce(PlayHandle) -> bool) -> Result<Played, PlayError> {
         let (sender, receiver) = open(&self.config)?.split();
         let show = self.staged.show.clone();
         let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = self.ends;
@@ -258,13 +258,13 @@ impl Play {
             sender,
             mail: self.mail,
         };
-        let attended = lead(Reins { commands, news });
+        let attended = lead(PlayHandle { commands, news });
         let parks: Vec<Window> = stage.lanes.iter().map(|lane| lane.window.clone()).collect();
         let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
         let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
         let mut played = sum_up(about, &self.config.controllers, &prepared, &run);
         if run.ended.ending == Ending::Completed {
-            played.astray = astray(&self.config, &parks, &self.control.live, run.closed_at);
+            played.off_park = off_park(&self.config, &parks, &self.control.live, run.closed_at);
         }
         Ok(played)
     }
@@ -288,7 +288,7 @@ fn look_for_others(
 }
 
 /// The seats that told, after the last frame, that they are not at park.
-fn astray(config: &Config, windows: &[Window], live: &Live, now: MonoTime) -> Vec<String> {
+fn off_park(config: &Config, windows: &[Window], live: &Live, now: MonoTime) -> Vec<String> {
     let is_up = |lane: &usize| {
         let window = &windows[*lane];
         let reading = live.evidence(*lane).and_then(Evidence::reading);
@@ -325,14 +325,14 @@ fn open(config: &Config) -> Result<Ports, PlayError> {
 fn watch(
     config: &Config,
     manner: Manner,
-    staged: &Staged,
+    staged: &StagedShow,
     sender: &Sender,
     alarms: Producer<Alarm>,
     live: &Arc<Live>,
 ) -> Watch {
     let groups = Groups::of(&config.controllers);
     let (policy, ack_every) = (config.show.loss_policy, manner.ack_every(config));
-    let health = Health::new(groups, policy, ack_every, staged.show.rate.period());
+    let health = HealthTable::new(groups, policy, ack_every, staged.show.rate.period());
     Watch::new(health, &config.controllers, &staged.lanes, sender.clone(), alarms, Arc::clone(live))
 }
 

@@ -1,5 +1,5 @@
-//! Before tick 0: reads where every seat stands, so that it joins from there. A seat of which not all axes tell is brought to
-//! park by one frame that is slow enough from anywhere in the stroke, and has to be acked where acks are asked for.
+//! Before tick 0: reads the position of every seat, so that it joins from there. A seat that does not report all its axes is brought to
+//! park by one frame that is slow enough from anywhere in the stroke, and has to be acked if acks are on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,7 @@ use crate::belief::Taken;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
-use crate::plan::homing_time;
+use crate::plan::slow_park_time;
 use crate::rt::{AckLoop, Live, Phase, Places, Sent};
 use crate::time::{Clock, MonoTime};
 use crate::wire::{MAX_LEN, position_reads};
@@ -30,7 +30,7 @@ const SETTLE: Duration = Duration::from_millis(20);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Prepared {
     /// Slow frames, by controller.
-    pub(super) homing: Vec<u64>,
+    pub(super) park_frames: Vec<u64>,
     /// Controllers whose way to park may have been faster than 50 mm/s, because PA0b cuts a longer Time.
     pub(super) hurried: Vec<usize>,
 }
@@ -38,7 +38,7 @@ pub(super) struct Prepared {
 impl Prepared {
     /// Nothing done for so many controllers.
     pub(super) fn nothing(controllers: usize) -> Self {
-        Self { homing: vec![0; controllers], hurried: Vec::new() }
+        Self { park_frames: vec![0; controllers], hurried: Vec::new() }
     }
 }
 
@@ -103,14 +103,14 @@ impl<C: Clock> Preparation<'_, C> {
         lanes.map(|lane| self.controllers[lane].name.clone()).collect()
     }
 
-    /// Whether a seat told of all its axes, and whether it was at rest; none where it told nothing.
+    /// Whether a seat told of all its axes, and whether it was at rest; `None` if it told nothing.
     fn reading(&self, lane: usize) -> Option<(bool, bool)> {
         let (_, reading) = self.live.evidence(lane)?.reading()?;
         let own = self.lanes[lane].window.own();
         Some((reading.slots & own == own, reading.rests))
     }
 
-    /// Whether a seat tells that it stands at park, to a pulse.
+    /// True if a seat tells that it stands at park, to a pulse.
     fn is_at_park(&self, lane: usize) -> bool {
         let reading = self.live.evidence(lane).and_then(|evidence| evidence.reading());
         let window = &self.lanes[lane].window;
@@ -173,23 +173,23 @@ impl<C: Clock> Preparation<'_, C> {
         unsure
     }
 
-    /// Whether the last frame to a lane was acked, or asked for no ack.
+    /// True if the last frame to a lane was acked, or asked for no ack.
     fn is_acked(&self, lane: usize) -> bool {
         let last = self.lanes[lane].last_frame();
         let acked = self.live.evidence(lane).and_then(|evidence| evidence.acked());
         self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(last) >= 0)
     }
 
-    /// When it arrives; none where no Time that the controller executes is long enough.
+    /// When it arrives; `None` if no Time that the controller executes is long enough.
     fn send_to_park(&mut self, lane: usize, prepared: &mut Prepared) -> Option<MonoTime> {
-        let (time_ms, hurried) = homing_time(self.controllers[lane].seat.stroke_mm);
+        let (time_ms, hurried) = slow_park_time(self.controllers[lane].seat.stroke_mm);
         let time_ms = time_ms.min(self.lanes[lane].longest_ms);
         let (park, at) = (self.lanes[lane].window.park(), self.clock.now());
         if !self.places.belief(lane).allows(&park, time_ms, at) {
             return None;
         }
         let mut buf = [0; MAX_LEN];
-        let (stamped, datagram) = self.lanes[lane].encode_homing(time_ms, &mut buf);
+        let (stamped, datagram) = self.lanes[lane].encode_slow_park(time_ms, &mut buf);
         let of = u16::try_from(lane).expect("fewer controllers than ports");
         self.acks.on_sent(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at });
         if let Delivery::Failed(_) = self.sender.send(lane, datagram) {
@@ -198,7 +198,7 @@ impl<C: Clock> Preparation<'_, C> {
             let (frame, asked) = (stamped.frame, stamped.asked);
             self.places.taken(lane, &Taken { frame, asked, pose: &park, lasts_ms: time_ms, at });
         }
-        prepared.homing[lane] += 1;
+        prepared.park_frames[lane] += 1;
         if hurried {
             prepared.hurried.push(lane);
         }

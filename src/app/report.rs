@@ -12,9 +12,11 @@ use crate::rt::Spun;
 use crate::sys::realtime::RealTime;
 use crate::time::MonoTime;
 
-/// What became of a play. Fields may be added, never changed.
+/// What became of a play. Within one `format` fields are added, never changed.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
+    /// The layout of this document ([`crate::control::FORMAT`]).
+    pub format: u32,
     /// The cue file, as it was named.
     pub cue: String,
     /// `completed`, `stopped` or `fault`.
@@ -48,12 +50,12 @@ pub struct EventReport {
     pub what: String,
 }
 
-/// The last known state of a controller; null where it never told.
+/// The last known state of a controller; null if it never told.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateReport {
     /// Seconds since it was last heard.
     pub heard_s_ago: Option<f64>,
-    /// Whether an emergency stop is in effect.
+    /// True if an emergency stop is in effect.
     pub emergency_stop: bool,
     /// Its error number (chapter 6 of the manuals); 0 for none.
     pub error: Option<u16>,
@@ -93,7 +95,7 @@ impl StateReport {
     }
 }
 
-/// Percentiles in µs; null where nothing was counted.
+/// Percentiles in µs; null if nothing was counted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LatencyReport {
     /// Half of them are no longer.
@@ -128,7 +130,7 @@ pub struct RealTimeReport {
     pub policy: String,
     /// Its priority; 0 for policies without one.
     pub priority: u8,
-    /// Whether memory is locked.
+    /// True if memory is locked.
     pub memory_locked: bool,
     /// How long the tick thread spun before each deadline.
     pub spin_us: SpinReport,
@@ -187,7 +189,7 @@ pub struct ControllerReport {
     /// Not answered within 1 s.
     pub lost: u64,
     /// Slow frames before tick 0, which brought it to its park pose.
-    pub homing: u64,
+    pub park_frames: u64,
     /// Further replies to an answered frame.
     pub duplicate: u64,
     /// Replies after 1 s.
@@ -198,7 +200,7 @@ pub struct ControllerReport {
     pub send_failed: u64,
     /// Reports of the kernel that its port is closed.
     pub port_closed: u64,
-    /// Times that the last gate held its motion back.
+    /// Times that the limiter held its motion back.
     pub clamps: u64,
     /// Frames that were not sent, because from somewhere that its seat might be they would have been too fast.
     pub withheld: u64,
@@ -272,7 +274,7 @@ const COLUMNS: [&str; 17] = [
     "acked",
     "refused",
     "lost",
-    "homing",
+    "park",
     "dup",
     "stale",
     "stray",
@@ -293,7 +295,7 @@ impl ControllerReport {
             self.acked,
             self.refused,
             self.lost,
-            self.homing,
+            self.park_frames,
             self.duplicate,
             self.stale,
             self.stray,

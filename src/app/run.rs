@@ -1,7 +1,7 @@
 //! What the threads of a play or of a hall come back with.
 
 use crate::belief::Tally;
-use crate::gate::Counts;
+use crate::limiter::Counts;
 use crate::plan::PlanError;
 use crate::rt::{Accounts, Ended, Spun};
 use crate::sys::realtime::RealTime;
@@ -20,7 +20,7 @@ pub struct Run {
     pub spun: Spun,
     /// Moves that the planner did not find.
     pub refusals: Vec<PlanError>,
-    /// What the last gate had to do, lane by lane.
+    /// What the limiter had to do, lane by lane.
     pub clamps: Vec<Counts>,
     /// What the check of where seats may be had to do, lane by lane.
     pub tallies: Vec<Tally>,

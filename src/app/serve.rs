@@ -16,28 +16,28 @@ use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use super::house::{Closed, House, HouseError, Numbers, Reins};
-use super::keeper::{Ends, Keeper, Left, Memory, Signals, Voice};
 use super::play::Played;
 use super::prepare::Prepared;
+use super::runtime::{Numbers, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::sum_up::{About, sum_up};
+use super::supervisor::{Carryover, ServiceLog, Signals, Supervisor, SupervisorEnd, SupervisorPorts};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
 use crate::config::Config;
+use crate::control::{Handle, Status, handle};
 use crate::engine::Ending;
-use crate::hall::{Handle, Status, handle};
 use crate::health::Why;
 use crate::journal::{self, Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
-use crate::sd::{self, Feeder};
+use crate::sd::{self, WatchdogThread};
 use crate::settings::SettingsFile;
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate};
 
-/// How long the keeper has to end once its hall has closed; all that it waits for is a disk.
-const KEEPER_ENDS: Duration = Duration::from_secs(10);
+/// How long the supervisor has to end once its hall has closed; all that it waits for is a disk.
+const SUPERVISOR_ENDS: Duration = Duration::from_secs(10);
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]
@@ -56,7 +56,7 @@ pub struct Places {
 pub enum ServeError {
     /// The hall cannot be opened.
     #[error(transparent)]
-    House(#[from] HouseError),
+    Runtime(#[from] RuntimeError),
     /// A surface does not open.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
@@ -72,11 +72,11 @@ pub enum ServeError {
         #[source]
         cause: io::Error,
     },
-    /// The keeper does not end: what it had to write down may be lost.
+    /// The supervisor does not end: what it had to write down may be lost.
     #[error(
-        "the keeper hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost"
+        "the supervisor hangs, and the program ends without it: the seats are parked or at rest; what it had to write down may be lost"
     )]
-    Keeper,
+    Supervisor,
     /// The system gives no signals, or no thread.
     #[error("the system refused: {0}")]
     System(#[source] io::Error),
@@ -94,7 +94,7 @@ impl Mark {
         Ok(mark)
     }
 
-    /// Whether the daemon before left it and did not take it away.
+    /// True if the daemon before left it and did not take it away.
     fn is_there(&self) -> Result<bool, ServeError> {
         self.0.try_exists().map_err(|cause| self.failed(cause))
     }
@@ -137,7 +137,7 @@ pub struct Parts {
 #[derive(Debug)]
 pub struct Served {
     config: Arc<Config>,
-    closed: Box<Closed>,
+    closed: Box<RuntimeEnd>,
     ended: journal::Ending,
 }
 
@@ -168,7 +168,7 @@ impl Served {
 /// [`ServeError`]; nothing has moved then, or all of it is parked or at rest.
 ///
 /// # Panics
-/// Where one of its threads panicked.
+/// If one of its threads panicked.
 pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
     let mark = Mark::of(&parts.places.state)?;
     let crashed = mark.is_there()?;
@@ -192,13 +192,21 @@ fn serve_halls(
     let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut numbers = Numbers::new();
-    let mut house = House::open(Arc::clone(&config), crashed, &numbers, &signals.leave)?;
-    let (handle, inbox, source) = handle(house.desk(), Status::starting(&config.show.name));
-    let voice = Voice::new(log.clone());
+    let mut runtime = Runtime::open(Arc::clone(&config), crashed, &numbers, &signals.leave)?;
+    let (handle, inbox, source) = handle(runtime.desk(), Status::starting(&config.show.name));
+    let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
-    let memory = Memory::of(kept);
-    let mut ends =
-        Ends { inbox, source, config: places.config, began, signals, voice, memory, settings_file };
+    let carryover = Carryover::of(kept);
+    let mut ports = SupervisorPorts {
+        inbox,
+        source,
+        config: places.config,
+        began,
+        signals,
+        service_log,
+        carryover,
+        settings_file,
+    };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
     // Not sooner: a start that is refused has moved nothing, and is no crash.
@@ -206,14 +214,14 @@ fn serve_halls(
     up(handle, surfaces.addresses());
     let mut feeder = None;
     let served = loop {
-        let left = keep(house, ends, library.clone(), journal, &mut feeder)?;
-        (ends, journal) = (left.ends, left.journal);
+        let left = keep(runtime, ports, library.clone(), journal, &mut feeder)?;
+        (ports, journal) = (left.ports, left.journal);
         let Some(next) = left.reload else {
             break Served { config, closed: left.closed, ended: left.ended };
         };
         // Also of controllers that come back with a later configuration.
         numbers.extend(&left.closed.numbers);
-        (house, config) = reopen(next, config, &numbers, &mut ends.memory, &ends.signals.leave)?;
+        (runtime, config) = reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave)?;
     };
     surfaces.close();
     log.close();
@@ -225,39 +233,39 @@ fn reopen(
     next: Arc<Config>,
     before: Arc<Config>,
     numbers: &Numbers,
-    memory: &mut Memory,
+    carryover: &mut Carryover,
     leave: &Arc<AtomicBool>,
-) -> Result<(House, Arc<Config>), HouseError> {
+) -> Result<(Runtime, Arc<Config>), RuntimeError> {
     // The seats are parked or at rest, so nothing tells of a crash.
-    match House::open(Arc::clone(&next), false, numbers, leave) {
-        Ok(house) => Ok((house, next)),
+    match Runtime::open(Arc::clone(&next), false, numbers, leave) {
+        Ok(runtime) => Ok((runtime, next)),
         Err(error) => {
-            memory.note(format!(
+            carryover.note(format!(
                 "the hall does not open with the new configuration, and has the old one: {error}"
             ));
-            Ok((House::open(Arc::clone(&before), false, numbers, leave)?, before))
+            Ok((Runtime::open(Arc::clone(&before), false, numbers, leave)?, before))
         }
     }
 }
 
-/// Runs one hall on this thread, with a keeper beside it.
+/// Runs one hall on this thread, with a supervisor beside it.
 fn keep(
-    house: House,
-    ends: Ends,
+    runtime: Runtime,
+    ports: SupervisorPorts,
     library: Library,
     journal: Journal,
-    feeder: &mut Option<Feeder>,
-) -> Result<Left, ServeError> {
+    feeder: &mut Option<WatchdogThread>,
+) -> Result<SupervisorEnd, ServeError> {
     let (tell, closed) = channel();
     let mut failed = None;
-    ends.memory.set_desk(house.config(), &house.desk());
+    ports.carryover.set_desk(runtime.config(), &runtime.desk());
     let (leaves, left) = channel();
-    let run = house.run(|reins, line| {
-        let leave = Arc::clone(&reins.leave);
+    let run = runtime.run(|handle, line| {
+        let leave = Arc::clone(&handle.leave);
         // The one before it has fed until now, so that nobody takes the time between two halls for a hang.
-        *feeder = feed_watchdog(&reins);
-        let kept = Keeper::new(ends, reins, line, library, journal);
-        let thread = Builder::new().name("keeper".to_owned()).spawn(move || {
+        *feeder = feed_watchdog(&handle);
+        let kept = Supervisor::new(ports, handle, line, library, journal);
+        let thread = Builder::new().name("supervisor".to_owned()).spawn(move || {
             let _ = realtime::normal_priority();
             // Where nobody waits any more, it hung.
             drop(leaves.send(kept.run(&closed)));
@@ -271,15 +279,15 @@ fn keep(
         return Err(ServeError::System(cause));
     }
     drop(tell.send(Box::new(run)));
-    left.recv_timeout(KEEPER_ENDS).map_err(|_| ServeError::Keeper)
+    left.recv_timeout(SUPERVISOR_ENDS).map_err(|_| ServeError::Supervisor)
 }
 
 /// Feeds the watchdog of the service manager, where it has one, while the tick thread of this hall ticks.
-fn feed_watchdog(reins: &Reins) -> Option<Feeder> {
-    let live = Arc::clone(&reins.live);
-    let period = Rate::from_hz(reins.config.show.rate_hz).period();
+fn feed_watchdog(handle: &RuntimeHandle) -> Option<WatchdogThread> {
+    let live = Arc::clone(&handle.live);
+    let period = Rate::from_hz(handle.config.show.rate_hz).period();
     // Where there is no thread for it, the service manager starts the program anew.
-    sd::watchdog().and_then(|interval| Feeder::start(interval, period, move || live.pulse()).ok())
+    sd::watchdog().and_then(|interval| WatchdogThread::start(interval, period, move || live.pulse()).ok())
 }
 
 /// The signals of a service: SIGTERM and SIGINT end it, SIGHUP has it read its configuration anew.
@@ -309,14 +317,17 @@ mod tests {
     fn a_hall_that_does_not_open_with_another_configuration_has_the_old_one_and_says_why() {
         // An address of documentation, which no machine has (RFC 5737).
         let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
-        let mut memory = Memory::default();
+        let mut carryover = Carryover::default();
         let (_house, config) =
-            reopen(next, Arc::clone(&before), &Numbers::new(), &mut memory, &Arc::default()).unwrap();
+            reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &Arc::default()).unwrap();
         assert!(Arc::ptr_eq(&config, &before));
-        assert!(format!("{memory:?}").contains("does not open with the new configuration"), "{memory:?}");
+        assert!(
+            format!("{carryover:?}").contains("does not open with the new configuration"),
+            "{carryover:?}"
+        );
         let next = hall("127.0.0.1:0");
         let (_house, config) =
-            reopen(Arc::clone(&next), before, &Numbers::new(), &mut memory, &Arc::default()).unwrap();
+            reopen(Arc::clone(&next), before, &Numbers::new(), &mut carryover, &Arc::default()).unwrap();
         assert!(Arc::ptr_eq(&config, &next));
     }
 }

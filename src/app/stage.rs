@@ -4,7 +4,7 @@ use std::io;
 use std::thread;
 use std::time::Duration;
 
-use super::helpers::{Helpers, Over};
+use super::helpers::{EndFlags, Helpers};
 use super::play::Control;
 use super::run::Run;
 use crate::engine::Engine;
@@ -20,7 +20,7 @@ const RUN_UP: Duration = Duration::from_millis(20);
 
 /// What the threads of a play share out among themselves.
 pub(super) struct Stage {
-    /// Whether no replies are to come.
+    /// True if no replies are to come.
     pub(super) silent: bool,
     pub(super) rate: Rate,
     /// How long before a deadline the tick thread stops sleeping and spins.
@@ -47,7 +47,7 @@ impl Stage {
         control: &Control,
     ) -> io::Result<Run> {
         let Self { silent, rate, spin, engine, lanes, places, sender, mut mail } = self;
-        let over = Over::default();
+        let over = EndFlags::default();
         let granted = realtime::request();
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;

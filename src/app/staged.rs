@@ -13,7 +13,7 @@ use crate::timeline::{Hint, Timeline};
 
 /// A show with its lanes and its first course; nothing is open yet, and nothing moves.
 #[derive(Debug)]
-pub struct Staged {
+pub struct StagedShow {
     /// What is played.
     pub show: Show,
     /// The cue's curve.
@@ -38,7 +38,7 @@ pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
     Headroom::measure(&windows, timeline, rate)
 }
 
-impl Staged {
+impl StagedShow {
     /// Makes the lanes, and plans the move from the park pose onto the cue. The cue has to fit the hall.
     ///
     /// # Errors
@@ -53,7 +53,7 @@ impl Staged {
     /// The same for a cue whose headroom is known, with what operators want of each seat: one that is out stays in park.
     ///
     /// # Errors
-    /// As [`Staged::new`].
+    /// As [`StagedShow::new`].
     pub fn mixed(
         config: &Config,
         timeline: &Arc<Timeline>,

@@ -1,13 +1,14 @@
-//! What a play comes to: the report, and what a person should hear beside it.
+//! Sums up a play: the report, and notes for the person.
 
 use super::play::Played;
 use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
 use crate::config::Controller;
+use crate::control::FORMAT;
 use crate::engine::Ending;
-use crate::gate::Clamp;
 use crate::health::Groups;
+use crate::limiter::Clamp;
 use crate::time::Rate;
 
 /// What happened to controllers and to groups, in the order of time.
@@ -38,7 +39,7 @@ pub(super) struct About {
     pub(super) rate: Rate,
     /// How it ended.
     pub(super) ending: Ending,
-    /// Whether no frame asked for a reply.
+    /// True if no frame asked for a reply.
     pub(super) silent: bool,
 }
 
@@ -46,6 +47,7 @@ pub(super) struct About {
 pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepared, run: &Run) -> Played {
     let About { cue, rate, ending, silent } = about;
     let report = Report {
+        format: FORMAT,
         cue,
         result: match ending {
             Ending::Completed => "completed",
@@ -71,7 +73,7 @@ pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepar
         refusals: run.granted.refusals.clone(),
         notes: notes(controllers, prepared, run),
         silent: lost.map(|index| controllers[index].name.clone()).collect(),
-        astray: Vec::new(),
+        off_park: Vec::new(),
     }
 }
 
@@ -86,7 +88,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         acked: counts.acked,
         refused: counts.refused(),
         lost: counts.lost,
-        homing: prepared.homing[index],
+        park_frames: prepared.park_frames[index],
         duplicate: counts.duplicate,
         stale: counts.stale,
         stray: counts.stray,
@@ -117,7 +119,7 @@ fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<Stri
         let axis = axis + 1;
         let count = clamps.clamps;
         Some(format!(
-            "{}: the last gate held its motion back {count} times, at the worst from {times:.2} times its limit of {limit} \
+            "{}: the limiter held its motion back {count} times, at the worst from {times:.2} times its limit of {limit} \
              on axis {axis}; check the cue, and tell us if it passes",
             one.name
         ))

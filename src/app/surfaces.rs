@@ -10,7 +10,7 @@ use tokio::sync::watch;
 
 use crate::api::{self, ApiError, Pages, StopSocket, stop_socket};
 use crate::config::Config;
-use crate::hall::Handle;
+use crate::control::Handle;
 use crate::library::Library;
 use crate::log::{Line, Log, Priority};
 use crate::osc::{self, Osc, OscError};

@@ -8,7 +8,7 @@ use super::source::array_at;
 mod field {
     pub(super) const VERSION_AND_LEN: usize = 0; // u8
     pub(super) const TOTAL_LEN: usize = 2; // u16
-    pub(super) const FRAGMENT: usize = 6; // u16: 3 flags, then the offset in units of 8 octets
+    pub(super) const FRAGMENT: usize = 6; // u16: 3 flags, then the offset in units of 8 bytes
     pub(super) const PROTOCOL: usize = 9; // u8
     pub(super) const SOURCE: usize = 12; // u32
     pub(super) const DESTINATION: usize = 16; // u32
@@ -47,12 +47,12 @@ pub struct Datagram<'a> {
     pub destination: SocketAddrV4,
     /// What it carries, as far as it was captured.
     pub payload: &'a [u8],
-    /// Octets that the payload had on the wire; more than were captured where the capture cut it.
+    /// Bytes that the payload had on the wire; more than were captured where the capture cut it.
     pub payload_len: usize,
 }
 
 impl Datagram<'_> {
-    /// Whether the capture kept only a part of it.
+    /// True if the capture kept only a part of it.
     #[must_use]
     pub const fn is_cut(&self) -> bool {
         self.payload.len() < self.payload_len
@@ -68,7 +68,7 @@ pub struct Fragment {
     pub destination: Ipv4Addr,
     /// Source and destination port; only the first part has them.
     pub ports: Option<(u16, u16)>,
-    /// Where it belongs in the whole, octets.
+    /// Where it belongs in the whole, bytes.
     pub offset: u16,
 }
 

@@ -2,24 +2,24 @@
 
 use std::io;
 
-/// Why octets are no capture, or no more of one; places are counted from 0 at the start of the capture.
+/// Why bytes are no capture, or no more of one; places are counted from 0 at the start of the capture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CaptureError {
     /// It opens like no capture.
-    #[error("octet 0: {} opens neither pcap nor pcapng", hex(found))]
+    #[error("byte 0: {} opens neither pcap nor pcapng", hex(found))]
     Magic {
         /// What it opens with.
         found: [u8; 4],
     },
     /// It ends where more must follow, as after a capture that was cut off.
-    #[error("octet {at}: the capture ends inside a packet or header")]
+    #[error("byte {at}: the capture ends inside a packet or header")]
     Ends {
-        /// Octets there are.
+        /// Bytes there are.
         at: u64,
     },
     /// A packet that is longer than any can be.
-    #[error("octet {at}: a packet of {found} octets; at most {max} are possible")]
+    #[error("byte {at}: a packet of {found} bytes; at most {max} are possible")]
     PacketLength {
         /// Where its block begins.
         at: u64,
@@ -29,7 +29,7 @@ pub enum CaptureError {
         max: u32,
     },
     /// A block of pcapng that cannot have this length.
-    #[error("octet {at}: a block of {found} octets, where {why}")]
+    #[error("byte {at}: a block of {found} bytes, where {why}")]
     BlockLength {
         /// Where the block begins.
         at: u64,
@@ -39,7 +39,7 @@ pub enum CaptureError {
         why: &'static str,
     },
     /// A section of pcapng whose byte-order mark is none.
-    #[error("octet {at}: {} is no byte-order mark of pcapng", hex(found))]
+    #[error("byte {at}: {} is no byte-order mark of pcapng", hex(found))]
     ByteOrder {
         /// Where the mark stands.
         at: u64,
@@ -47,7 +47,7 @@ pub enum CaptureError {
         found: [u8; 4],
     },
     /// A packet of an interface that pcapng has not described.
-    #[error("octet {at}: a packet of interface {found}, of {known} described")]
+    #[error("byte {at}: packet refers to interface {found}; {known} described")]
     Interface {
         /// Where its block begins.
         at: u64,
@@ -61,6 +61,6 @@ pub enum CaptureError {
     Io(#[source] io::Error),
 }
 
-fn hex(octets: &[u8; 4]) -> String {
-    format!("{:08x}", u32::from_be_bytes(*octets))
+fn hex(bytes: &[u8; 4]) -> String {
+    format!("{:08x}", u32::from_be_bytes(*bytes))
 }

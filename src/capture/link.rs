@@ -22,7 +22,7 @@ mod ether_type {
     pub(super) const VLAN_OLD: u16 = 0x9100;
 }
 
-/// Octets of a VLAN tag, whose last two say what follows it.
+/// Bytes of a VLAN tag, whose last two say what follows it.
 const VLAN_LEN: usize = 4;
 /// The address family of IPv4, on every system.
 const FAMILY_IPV4: u32 = 2;
@@ -31,22 +31,22 @@ const FAMILY_IPV4: u32 = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct UnknownLink;
 
-/// The IPv4 packet that a captured one carries; none where it carries something else.
-pub(super) fn ipv4(link: u16, octets: &[u8]) -> Result<Option<&[u8]>, UnknownLink> {
+/// The IPv4 packet that a captured one carries; `None` if it carries something else.
+pub(super) fn ipv4(link: u16, bytes: &[u8]) -> Result<Option<&[u8]>, UnknownLink> {
     Ok(match link {
-        link_type::ETHERNET => tagged(octets, 12, 14),
-        link_type::COOKED => tagged(octets, 14, 16),
-        link_type::COOKED_2 => tagged(octets, 0, 20),
-        link_type::NULL | link_type::LOOP => of_family(octets),
-        link_type::RAW | link_type::RAW_BSD | link_type::RAW_OPENBSD | link_type::IPV4 => Some(octets),
+        link_type::ETHERNET => tagged(bytes, 12, 14),
+        link_type::COOKED => tagged(bytes, 14, 16),
+        link_type::COOKED_2 => tagged(bytes, 0, 20),
+        link_type::NULL | link_type::LOOP => of_family(bytes),
+        link_type::RAW | link_type::RAW_BSD | link_type::RAW_OPENBSD | link_type::IPV4 => Some(bytes),
         _ => return Err(UnknownLink),
     })
 }
 
 /// Behind a header that names its content at `name`, and behind VLAN tags from `content` on.
-fn tagged(octets: &[u8], name: usize, content: usize) -> Option<&[u8]> {
-    let mut named = u16::from_be_bytes(array_at(octets, name)?);
-    let mut content = octets.get(content..)?;
+fn tagged(bytes: &[u8], name: usize, content: usize) -> Option<&[u8]> {
+    let mut named = u16::from_be_bytes(array_at(bytes, name)?);
+    let mut content = bytes.get(content..)?;
     while matches!(named, ether_type::VLAN | ether_type::VLAN_SERVICE | ether_type::VLAN_OLD) {
         named = u16::from_be_bytes(array_at(content, 2)?);
         content = content.get(VLAN_LEN..)?;
@@ -55,8 +55,8 @@ fn tagged(octets: &[u8], name: usize, content: usize) -> Option<&[u8]> {
 }
 
 /// Behind an address family, in the order of the machine that captured it.
-fn of_family(octets: &[u8]) -> Option<&[u8]> {
-    let family: [u8; 4] = array_at(octets, 0)?;
+fn of_family(bytes: &[u8]) -> Option<&[u8]> {
+    let family: [u8; 4] = array_at(bytes, 0)?;
     let is_ipv4 = u32::from_be_bytes(family) == FAMILY_IPV4 || u32::from_le_bytes(family) == FAMILY_IPV4;
-    octets.get(4..).filter(|_| is_ipv4)
+    bytes.get(4..).filter(|_| is_ipv4)
 }

@@ -1,5 +1,5 @@
-//! Captures of network traffic: octets of a pcap or pcapng file to packets, and packets to the UDP datagrams in them.
-//! Helper threads; reads as a stream, holds one packet at a time, and takes any octets without a panic.
+//! Captures of network traffic: bytes of a pcap or pcapng file to packets, and packets to the UDP datagrams in them.
+//! Helper threads; reads as a stream, holds one packet at a time, and takes any bytes without a panic.
 //!
 //! Sources are the IETF drafts of both formats (draft-ietf-opsawg-pcap, draft-ietf-opsawg-pcapng) and the list of link
 //! types of tcpdump.org.
@@ -23,13 +23,13 @@ use pcap::Pcap;
 use pcapng::PcapNg;
 use source::Source;
 
-/// The longest packet that is taken, octets: what tcpdump and Wireshark write at most.
+/// The longest packet that is taken, bytes: what tcpdump and Wireshark write at most.
 pub const MAX_PACKET: u32 = 262_144;
 
-/// Octets that tell a capture from anything else.
+/// Bytes that tell a capture from anything else.
 pub const MAGIC_LEN: usize = 4;
 
-/// Whether a file that opens with these octets is a capture.
+/// True if a file that opens with these bytes is a capture.
 #[must_use]
 pub fn is_capture(magic: [u8; MAGIC_LEN]) -> bool {
     magic == pcapng::MAGIC || pcap::Layout::of(magic).is_some()
@@ -40,19 +40,19 @@ pub fn is_capture(magic: [u8; MAGIC_LEN]) -> bool {
 pub struct Packet<'a> {
     /// Counted from 1, as Wireshark does.
     pub number: u64,
-    /// When it was captured, since 1970-01-01 UTC; none where the capture does not say.
+    /// When it was captured, since 1970-01-01 UTC; `None` if the capture does not say.
     pub at: Option<Duration>,
-    /// The link type, which says what its octets begin with.
+    /// The link type, which says what its bytes begin with.
     pub link: u16,
-    /// Its octets, as many as the capture kept.
-    pub octets: &'a [u8],
+    /// Its bytes, as many as the capture kept.
+    pub bytes: &'a [u8],
 }
 
 impl<'a> Packet<'a> {
     /// What it carries.
     #[must_use]
     pub fn content(&self) -> Content<'a> {
-        match link::ipv4(self.link, self.octets) {
+        match link::ipv4(self.link, self.bytes) {
             Ok(Some(packet)) => datagram::content(packet),
             Ok(None) => Content::Other,
             Err(link::UnknownLink) => Content::UnknownLink(self.link),
@@ -94,16 +94,16 @@ impl<R: Read> Capture<R> {
     /// The next packet; none at the end of the capture.
     ///
     /// # Errors
-    /// Where the capture ends inside a packet, where it is damaged, and where reading fails. What is left of it cannot
+    /// If the capture ends inside a packet, where it is damaged, and where reading fails. What is left of it cannot
     /// be read then.
     pub fn packet(&mut self) -> Result<Option<Packet<'_>>, CaptureError> {
         let record = match &mut self.format {
             Format::Pcap(pcap) => pcap.record(&mut self.source)?,
             Format::PcapNg(pcapng) => pcapng.record(&mut self.source)?,
         };
-        let Some(Record { at, link, octets }) = record else { return Ok(None) };
+        let Some(Record { at, link, bytes }) = record else { return Ok(None) };
         self.packets += 1;
-        Ok(Some(Packet { number: self.packets, at, link, octets: &self.source.block()[octets] }))
+        Ok(Some(Packet { number: self.packets, at, link, bytes: &self.source.block()[bytes] }))
     }
 }
 
@@ -112,5 +112,5 @@ impl<R: Read> Capture<R> {
 struct Record {
     at: Option<Duration>,
     link: u16,
-    octets: std::ops::Range<usize>,
+    bytes: std::ops::Range<usize>,
 }

@@ -1,4 +1,4 @@
-//! The classic format: a header for the file, then a header and the octets of each packet.
+//! The classic format: a header for the file, then a header and the bytes of each packet.
 
 use std::io::Read;
 use std::time::Duration;
@@ -12,7 +12,7 @@ mod field {
 
     pub(super) const SECONDS: usize = 0; // u32 since 1970
     pub(super) const FRACTION: usize = 4; // u32, microseconds or nanoseconds
-    pub(super) const KEPT: usize = 8; // u32, octets that follow; then u32, octets that there were
+    pub(super) const KEPT: usize = 8; // u32, bytes that follow; then u32, bytes that there were
     pub(super) const PACKET_LEN: usize = 16;
 }
 
@@ -65,7 +65,7 @@ impl Pcap {
         source.fill(kept)?;
         let fraction_ns = u64::from(value(field::FRACTION)) * u64::from(self.layout.step_ns);
         let time = Duration::from_secs(u64::from(value(field::SECONDS))) + Duration::from_nanos(fraction_ns);
-        Ok(Some(Record { at: Some(time), link: self.link, octets: 0..source.block().len() }))
+        Ok(Some(Record { at: Some(time), link: self.link, bytes: 0..source.block().len() }))
     }
 }
 

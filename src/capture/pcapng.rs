@@ -19,17 +19,17 @@ mod kind {
 }
 
 mod field {
-    pub(super) const LINK: usize = 0; // u16 of an interface; then u16, u32 the most octets of a packet, options
+    pub(super) const LINK: usize = 0; // u16 of an interface; then u16, u32 the most bytes of a packet, options
     pub(super) const SNAP_LEN: usize = 4;
     pub(super) const OPTIONS: usize = 8;
 
     pub(super) const INTERFACE: usize = 0; // u32 of a packet; u16 of an old one, then u16 of drops
     pub(super) const TIME_HIGH: usize = 4; // u32
     pub(super) const TIME_LOW: usize = 8; // u32
-    pub(super) const KEPT: usize = 12; // u32, then u32 octets there were
+    pub(super) const KEPT: usize = 12; // u32, then u32 bytes there were
     pub(super) const DATA: usize = 20;
 
-    pub(super) const SIMPLE_LEN: usize = 0; // u32 octets there were
+    pub(super) const SIMPLE_LEN: usize = 0; // u32 bytes there were
     pub(super) const SIMPLE_DATA: usize = 4;
 }
 
@@ -39,7 +39,7 @@ mod option {
     pub(super) const OFFSET: u16 = 14; // i64, seconds
 }
 
-/// Octets of a block about its content: kind and length before it, the length again after it.
+/// Bytes of a block about its content: kind and length before it, the length again after it.
 const FRAME_LEN: u32 = 12;
 /// The longest block that is read; longer ones, unless they are packets, are passed over.
 const MAX_BLOCK: u32 = MAX_PACKET + 65_536;
@@ -56,7 +56,7 @@ pub(super) struct PcapNg {
 #[derive(Debug, Clone, Copy)]
 struct Interface {
     link: u16,
-    /// The most octets that are kept of a packet; 0 for all.
+    /// The most bytes that are kept of a packet; 0 for all.
     snap_len: u32,
     steps_per_second: u64,
     offset_s: i64,
@@ -101,7 +101,7 @@ impl PcapNg {
         }
     }
 
-    /// Starts a section over: its order of octets, and no interfaces.
+    /// Starts a section over: its order of bytes, and no interfaces.
     fn section<R: Read>(&mut self, source: &mut Source<R>) -> Result<(), CaptureError> {
         let at = source.at() - 4;
         let len = source.array()?;
@@ -123,7 +123,7 @@ impl PcapNg {
         Ok(found)
     }
 
-    /// Reads what a block of `len` octets holds, and its length again.
+    /// Reads what a block of `len` bytes holds, and its length again.
     fn body<R: Read>(&self, at: u64, len: u32, source: &mut Source<R>) -> Result<(), CaptureError> {
         source.fill(len - FRAME_LEN)?;
         let again = self.order.u32(source.array()?);
@@ -165,17 +165,17 @@ impl PcapNg {
                 (there, 0) => there,
                 (there, most) => there.min(most),
             };
-            let octets = packet_range(at, block, field::SIMPLE_DATA, kept)?;
-            return Ok(Record { at: None, link: interface.link, octets });
+            let bytes = packet_range(at, block, field::SIMPLE_DATA, kept)?;
+            return Ok(Record { at: None, link: interface.link, bytes });
         }
         let named = match array_at(block, field::INTERFACE) {
-            Some(octets) if kind == kind::OLD_PACKET => u32::from(self.order.u16(octets)),
+            Some(bytes) if kind == kind::OLD_PACKET => u32::from(self.order.u16(bytes)),
             _ => number(field::INTERFACE)?,
         };
         let interface = self.of(at, named)?;
         let steps = u64::from(number(field::TIME_HIGH)?) << 32 | u64::from(number(field::TIME_LOW)?);
-        let octets = packet_range(at, block, field::DATA, number(field::KEPT)?)?;
-        Ok(Record { at: interface.time(steps), link: interface.link, octets })
+        let bytes = packet_range(at, block, field::DATA, number(field::KEPT)?)?;
+        Ok(Record { at: interface.time(steps), link: interface.link, bytes })
     }
 
     /// The interface that a packet names.
@@ -198,7 +198,7 @@ impl Interface {
                     self.steps_per_second = steps_per_second(resolution).unwrap_or(self.steps_per_second);
                 }
                 (option::OFFSET, _) => {
-                    let offset = array_at(value, 0).map(|octets| order.u64(octets).cast_signed());
+                    let offset = array_at(value, 0).map(|bytes| order.u64(bytes).cast_signed());
                     self.offset_s = offset.unwrap_or(self.offset_s);
                 }
                 _ => {}
@@ -207,7 +207,7 @@ impl Interface {
         }
     }
 
-    /// The time since 1970 that so many steps mean; none where that is before it.
+    /// The time since 1970 that so many steps mean; `None` if that is before it.
     fn time(&self, steps: u64) -> Option<Duration> {
         let seconds =
             u64::try_from(i128::from(steps / self.steps_per_second) + i128::from(self.offset_s)).ok()?;
@@ -217,7 +217,7 @@ impl Interface {
     }
 }
 
-/// 10 or, with the top bit set, 2 to the power of the rest; none where that is more than 64 bits hold.
+/// 10 or, with the top bit set, 2 to the power of the rest; `None` if that is more than 64 bits hold.
 fn steps_per_second(resolution: u8) -> Option<u64> {
     let power = u32::from(resolution & 0x7f);
     if resolution & 0x80 == 0 { 10_u64.checked_pow(power) } else { 2_u64.checked_pow(power) }
@@ -235,10 +235,10 @@ fn check_len(at: u64, found: u32, least: u32) -> Result<(), CaptureError> {
 
 /// A number of a packet's block.
 fn number(order: Order, at: u64, block: &[u8], place: usize) -> Result<u32, CaptureError> {
-    array_at(block, place).map(|octets| order.u32(octets)).ok_or_else(|| short_packet(at, block))
+    array_at(block, place).map(|bytes| order.u32(bytes)).ok_or_else(|| short_packet(at, block))
 }
 
-/// Where `kept` octets from `start` on stand in a packet's block.
+/// Where `kept` bytes from `start` on stand in a packet's block.
 fn packet_range(at: u64, block: &[u8], start: usize, kept: u32) -> Result<Range<usize>, CaptureError> {
     if kept > MAX_PACKET {
         return Err(CaptureError::PacketLength { at, found: kept, max: MAX_PACKET });

@@ -17,7 +17,7 @@ impl<R: Read> Source<R> {
         Self { reader, at: 0, block: Vec::new() }
     }
 
-    /// Octets read so far.
+    /// Bytes read so far.
     pub(super) const fn at(&self) -> u64 {
         self.at
     }
@@ -27,17 +27,17 @@ impl<R: Read> Source<R> {
         &self.block
     }
 
-    /// The next octets.
+    /// The next bytes.
     pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], CaptureError> {
         self.array_or_end()?.ok_or(CaptureError::Ends { at: self.at })
     }
 
-    /// The next octets; none where nothing is left.
+    /// The next bytes; `None` if nothing is left.
     pub(super) fn array_or_end<const N: usize>(&mut self) -> Result<Option<[u8; N]>, CaptureError> {
-        let mut octets = [0; N];
+        let mut bytes = [0; N];
         let mut filled = 0;
         while filled < N {
-            match self.reader.read(&mut octets[filled..]) {
+            match self.reader.read(&mut bytes[filled..]) {
                 Ok(0) => break,
                 Ok(more) => filled += more,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
@@ -48,18 +48,18 @@ impl<R: Read> Source<R> {
         match filled {
             0 => Ok(None),
             _ if filled < N => Err(CaptureError::Ends { at: self.at }),
-            _ => Ok(Some(octets)),
+            _ => Ok(Some(bytes)),
         }
     }
 
-    /// Reads `len` octets into the block.
+    /// Reads `len` bytes into the block.
     pub(super) fn fill(&mut self, len: u32) -> Result<(), CaptureError> {
         self.block.clear();
         let read = self.reader.by_ref().take(u64::from(len)).read_to_end(&mut self.block);
         self.passed(read.map(|read| read as u64), len)
     }
 
-    /// Passes over `len` octets.
+    /// Passes over `len` bytes.
     pub(super) fn skip(&mut self, len: u32) -> Result<(), CaptureError> {
         let read = io::copy(&mut self.reader.by_ref().take(u64::from(len)), &mut io::sink());
         self.passed(read, len)
@@ -72,7 +72,7 @@ impl<R: Read> Source<R> {
     }
 }
 
-/// The order of the octets in a number.
+/// The order of the bytes in a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     Big,
@@ -80,29 +80,29 @@ pub(super) enum Order {
 }
 
 impl Order {
-    pub(super) const fn u16(self, octets: [u8; 2]) -> u16 {
+    pub(super) const fn u16(self, bytes: [u8; 2]) -> u16 {
         match self {
-            Self::Big => u16::from_be_bytes(octets),
-            Self::Little => u16::from_le_bytes(octets),
+            Self::Big => u16::from_be_bytes(bytes),
+            Self::Little => u16::from_le_bytes(bytes),
         }
     }
 
-    pub(super) const fn u32(self, octets: [u8; 4]) -> u32 {
+    pub(super) const fn u32(self, bytes: [u8; 4]) -> u32 {
         match self {
-            Self::Big => u32::from_be_bytes(octets),
-            Self::Little => u32::from_le_bytes(octets),
+            Self::Big => u32::from_be_bytes(bytes),
+            Self::Little => u32::from_le_bytes(bytes),
         }
     }
 
-    pub(super) const fn u64(self, octets: [u8; 8]) -> u64 {
+    pub(super) const fn u64(self, bytes: [u8; 8]) -> u64 {
         match self {
-            Self::Big => u64::from_be_bytes(octets),
-            Self::Little => u64::from_le_bytes(octets),
+            Self::Big => u64::from_be_bytes(bytes),
+            Self::Little => u64::from_le_bytes(bytes),
         }
     }
 }
 
-/// The octets at a place, where there are as many.
-pub(super) fn array_at<const N: usize>(octets: &[u8], at: usize) -> Option<[u8; N]> {
-    octets.get(at..)?.first_chunk().copied()
+/// The bytes at a place, where there are as many.
+pub(super) fn array_at<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
+    bytes.get(at..)?.first_chunk().copied()
 }

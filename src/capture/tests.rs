@@ -5,15 +5,15 @@ use super::*;
 
 /// A UDP datagram in an IPv4 packet, 10.0.0.1:8410 to 10.0.0.2:7408, with the flags and offset of a fragment.
 fn ipv4(payload: &[u8], fragment: u16) -> Vec<u8> {
-    let octets = |n: usize| u16::try_from(n).unwrap().to_be_bytes();
+    let bytes = |n: usize| u16::try_from(n).unwrap().to_be_bytes();
     let mut packet = vec![0x45, 0];
-    packet.extend(octets(28 + payload.len()));
+    packet.extend(bytes(28 + payload.len()));
     packet.extend([0, 0]);
     packet.extend(fragment.to_be_bytes());
     packet.extend([64, 17, 0, 0, 10, 0, 0, 1, 10, 0, 0, 2]);
     packet.extend(8410_u16.to_be_bytes());
     packet.extend(7408_u16.to_be_bytes());
-    packet.extend(octets(8 + payload.len()));
+    packet.extend(bytes(8 + payload.len()));
     packet.extend([0, 0]);
     packet.extend(payload);
     packet
@@ -23,8 +23,8 @@ fn behind(header: &[u8], payload: &[u8]) -> Vec<u8> {
     [header, &ipv4(payload, 0)].concat()
 }
 
-fn content(link: u16, octets: &[u8]) -> Content<'_> {
-    Packet { number: 1, at: None, link, octets }.content()
+fn content(link: u16, bytes: &[u8]) -> Content<'_> {
+    Packet { number: 1, at: None, link, bytes }.content()
 }
 
 /// Numbers in the order of a capture.
@@ -38,10 +38,10 @@ const LITTLE: Order = Order::Little;
 fn pcap(order: Order, magic: u32, packets: &[(u32, u32, &[u8])]) -> Vec<u8> {
     let version = if order == BIG { 0x0002_0004 } else { 0x0004_0002 };
     let mut file = put(order, &[magic, version, 0, 0, 65_535, 101]);
-    for &(seconds, fraction, octets) in packets {
-        let len = u32::try_from(octets.len()).unwrap();
+    for &(seconds, fraction, bytes) in packets {
+        let len = u32::try_from(bytes.len()).unwrap();
         file.extend(put(order, &[seconds, fraction, len, len]));
-        file.extend(octets);
+        file.extend(bytes);
     }
     file
 }
@@ -56,15 +56,15 @@ fn section(order: Order) -> Vec<u8> {
     block(order, 0x0a0d_0d0a, &put(order, &[0x1a2b_3c4d, 1, u32::MAX, u32::MAX]))
 }
 
-/// An interface of raw IP, keeping at most `snap_len` octets.
+/// An interface of raw IP, keeping at most `snap_len` bytes.
 fn interface(order: Order, snap_len: u32, options: &[u8]) -> Vec<u8> {
     let link = if order == BIG { 101 << 16 } else { 101 };
     block(order, 1, &[&put(order, &[link, snap_len])[..], options].concat())
 }
 
-fn enhanced(order: Order, interface: u32, time: [u32; 2], octets: &[u8]) -> Vec<u8> {
-    let len = u32::try_from(octets.len()).unwrap();
-    block(order, 6, &[&put(order, &[interface, time[0], time[1], len, len])[..], octets].concat())
+fn enhanced(order: Order, interface: u32, time: [u32; 2], bytes: &[u8]) -> Vec<u8> {
+    let len = u32::try_from(bytes.len()).unwrap();
+    block(order, 6, &[&put(order, &[interface, time[0], time[1], len, len])[..], bytes].concat())
 }
 
 type Seen = (Option<Duration>, Vec<u8>);
@@ -78,7 +78,7 @@ fn read(file: &[u8]) -> (Vec<Seen>, Result<(), CaptureError>) {
     };
     loop {
         match capture.packet() {
-            Ok(Some(packet)) => seen.push((packet.at, packet.octets.to_vec())),
+            Ok(Some(packet)) => seen.push((packet.at, packet.bytes.to_vec())),
             Ok(None) => return (seen, Ok(())),
             Err(error) => return (seen, Err(error)),
         }
@@ -109,8 +109,8 @@ fn every_link_type_leads_to_the_same_datagram() {
         (276, &cooked_2),
     ];
     for (link, header) in headers {
-        let octets = behind(header, b"frame");
-        let Content::Datagram(datagram) = content(link, &octets) else { panic!("{link}: no datagram") };
+        let bytes = behind(header, b"frame");
+        let Content::Datagram(datagram) = content(link, &bytes) else { panic!("{link}: no datagram") };
         assert_eq!(datagram.payload, b"frame", "{link}");
         assert_eq!(datagram.source, "10.0.0.1:8410".parse().unwrap(), "{link}");
         assert_eq!(datagram.destination, "10.0.0.2:7408".parse().unwrap(), "{link}");
@@ -120,15 +120,15 @@ fn every_link_type_leads_to_the_same_datagram() {
 
 #[test]
 fn what_an_ethernet_frame_is_padded_with_is_not_payload() {
-    let octets = [ipv4(b"ab", 0), vec![0; 30]].concat();
-    let Content::Datagram(datagram) = content(101, &octets) else { panic!("no datagram") };
+    let bytes = [ipv4(b"ab", 0), vec![0; 30]].concat();
+    let Content::Datagram(datagram) = content(101, &bytes) else { panic!("no datagram") };
     assert_eq!((datagram.payload, datagram.is_cut()), (&b"ab"[..], false));
 }
 
 #[test]
 fn a_datagram_that_the_capture_cut_says_how_long_it_was() {
-    let octets = ipv4(&[7; 100], 0);
-    let Content::Datagram(datagram) = content(101, &octets[..68]) else { panic!("no datagram") };
+    let bytes = ipv4(&[7; 100], 0);
+    let Content::Datagram(datagram) = content(101, &bytes[..68]) else { panic!("no datagram") };
     assert_eq!((datagram.payload, datagram.payload_len), (&[7; 40][..], 100));
     assert!(datagram.is_cut());
 }
@@ -153,8 +153,8 @@ fn other_protocols_and_lying_lengths_are_something_else() {
     short_header[0] = 0x44;
     let mut long_datagram = ipv4(b"frame", 0);
     long_datagram[25] += 1;
-    for octets in [tcp, ipv6, short_header, long_datagram, vec![0x45]] {
-        assert_eq!(content(101, &octets), Content::Other, "{octets:02x?}");
+    for bytes in [tcp, ipv6, short_header, long_datagram, vec![0x45]] {
+        assert_eq!(content(101, &bytes), Content::Other, "{bytes:02x?}");
     }
 }
 
@@ -227,25 +227,25 @@ fn a_capture_cut_off_gives_its_whole_packets_first() {
 #[test]
 fn damage_is_named_with_its_place() {
     let told = |file: &[u8]| read(file).1.unwrap_err().to_string();
-    assert_eq!(told(b"GIF89a"), "octet 0: 47494638 opens neither pcap nor pcapng");
+    assert_eq!(told(b"GIF89a"), "byte 0: 47494638 opens neither pcap nor pcapng");
     let mut file = pcap(BIG, 0xa1b2_c3d4, &[(1, 0, b"one")]);
     file[32..36].copy_from_slice(&u32::MAX.to_be_bytes());
-    assert_eq!(told(&file), "octet 24: a packet of 4294967295 octets; at most 262144 are possible");
+    assert_eq!(told(&file), "byte 24: a packet of 4294967295 bytes; at most 262144 are possible");
     let start = [section(BIG), interface(BIG, 0, &[])].concat();
     let stray = [start.clone(), enhanced(BIG, 3, [0, 0], b"")].concat();
-    assert_eq!(told(&stray), "octet 48: a packet of interface 3, of 1 described");
+    assert_eq!(told(&stray), "byte 48: packet refers to interface 3; 1 described");
     let odd = [start.clone(), put(BIG, &[6, 33])].concat();
-    assert_eq!(told(&odd), "octet 48: a block of 33 octets, where only multiples of 4 are possible");
+    assert_eq!(told(&odd), "byte 48: a block of 33 bytes, where only multiples of 4 are possible");
     let mut liar = [start.clone(), enhanced(BIG, 0, [0, 0], b"")].concat();
     *liar.last_mut().unwrap() = 0;
-    assert_eq!(told(&liar), "octet 48: a block of 32 octets, where its end gives another length");
+    assert_eq!(told(&liar), "byte 48: a block of 32 bytes, where its end gives another length");
     let mut marked = section(BIG);
     marked[8] = 0;
-    assert_eq!(told(&marked), "octet 8: 002b3c4d is no byte-order mark of pcapng");
+    assert_eq!(told(&marked), "byte 8: 002b3c4d is no byte-order mark of pcapng");
 }
 
 #[test]
-fn captures_are_told_by_their_first_octets() {
+fn captures_are_told_by_their_first_bytes() {
     assert!(is_capture([0xa1, 0xb2, 0xc3, 0xd4]) && is_capture([0x4d, 0x3c, 0xb2, 0xa1]));
     assert!(is_capture([0x0a, 0x0d, 0x0d, 0x0a]));
     assert!(!is_capture(*b"55aa"));
@@ -255,7 +255,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
     #[test]
-    fn any_octets_after_any_opening_come_to_an_end(
+    fn any_bytes_after_any_opening_come_to_an_end(
         opening in 0..4_usize,
         rest in proptest::collection::vec(any::<u8>(), 0..600),
     ) {
@@ -267,7 +267,7 @@ proptest! {
     }
 
     #[test]
-    fn a_capture_with_any_octet_changed_comes_to_an_end(at in any::<prop::sample::Index>(), to in any::<u8>()) {
+    fn a_capture_with_any_byte_changed_comes_to_an_end(at in any::<prop::sample::Index>(), to in any::<u8>()) {
         let packet = ipv4(b"frame", 0);
         let files = [
             pcap(LITTLE, 0xa1b2_c3d4, &[(1, 0, &packet), (2, 0, &packet)]),
@@ -276,8 +276,8 @@ proptest! {
         for mut file in files {
             let at = at.index(file.len());
             file[at] = to;
-            for (_, octets) in read(&file).0 {
-                content(101, &octets);
+            for (_, bytes) in read(&file).0 {
+                content(101, &bytes);
             }
         }
     }
@@ -285,11 +285,11 @@ proptest! {
     #[test]
     fn any_packet_of_any_link_type_is_taken(
         link in prop::sample::select(&[0, 1, 12, 14, 101, 108, 113, 228, 276, 999_u16][..]),
-        octets in proptest::collection::vec(any::<u8>(), 0..80),
+        bytes in proptest::collection::vec(any::<u8>(), 0..80),
         at in 0..80_usize,
     ) {
-        content(link, &octets);
-        let mut packet = ipv4(&octets, 0);
+        content(link, &bytes);
+        let mut packet = ipv4(&bytes, 0);
         packet.truncate(at);
         content(101, &packet);
     }

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use super::{Exit, Failure, OrExit as _};
 use crate::plain;
 
-/// Whether the person agrees: by the option `flag`, else by a word on the terminal. Without either it is wrong use.
+/// True if the person agrees: by the option `flag`, else by a word on the terminal. Without either it is wrong use.
 pub(super) fn agreed(question: &str, given: bool, flag: &str) -> Result<bool, Failure> {
     if given {
         return Ok(true);

@@ -110,7 +110,7 @@ struct Report {
     /// What was measured, of the cues that can be measured.
     #[serde(skip)]
     tables: String,
-    /// Whether a cue breaks limits.
+    /// True if a cue breaks limits.
     #[serde(skip)]
     unfit: bool,
 }

@@ -4,7 +4,7 @@ use clap::CommandFactory as _;
 
 use super::{Cli, Exit, Failure, print};
 
-/// Prints the completions of a shell.
+/// Prints shell completions.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  kinocue completions bash > ~/.local/share/bash-completion/completions/kinocue"

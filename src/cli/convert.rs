@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::cue::{self, CsvError, Cue, CueFaults, DeclaredUnit, FaultClass, Problem, Source, limits};
 
-/// Turns a cue from one format into another.
+/// Converts a cue from one format to another.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("\
 Examples:
@@ -26,7 +26,7 @@ pub(super) struct Args {
     /// The file to write; its name ends in .csv or .mcap.
     output: PathBuf,
     /// Format of the field to read: rows are line,time_ms,x,y,z,u,v,w, where time_ms is how long a row takes; u8 are
-    /// raw octets, one an axis, 0 to 255 over the stroke.
+    /// raw bytes, one an axis, 0 to 255 over the stroke.
     #[arg(long, value_enum, value_name = "FORMAT")]
     from: Option<Format>,
     /// Unit of the positions in rows: mm, percent, fraction or pulse.
@@ -38,13 +38,13 @@ pub(super) struct Args {
     /// Rows a second in u8.
     #[arg(long, value_name = "HZ", requires = "from", required_if_eq("from", "u8"))]
     rate: Option<f64>,
-    /// Save the complete messages of an MCAP that is cut short or damaged.
+    /// Recover the complete messages of a truncated or damaged MCAP.
     #[arg(long, conflicts_with = "from")]
     recover: bool,
     /// Give the cue this title.
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
-    /// Replace OUTPUT where it exists.
+    /// Overwrite OUTPUT if it exists.
     #[arg(long)]
     force: bool,
 }

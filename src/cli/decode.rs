@@ -9,21 +9,21 @@ use super::{Exit, Failure, OrExit as _, vibration_port};
 use crate::capture::{CaptureError, Datagram, Fragment};
 use crate::wire::VibrationPort;
 
-mod desk;
 mod input;
 mod message;
 mod names;
+mod printer;
 mod sheet;
 mod tally;
 
-use desk::{Desk, Halt, Manner};
 use input::{Input, Stream};
 use message::Reading;
+use printer::{Halt, Manner, Printer};
 
 /// Where controllers (PA14) and hosts (PA24) listen.
 const PORTS: [u16; 2] = [7408, 8410];
 
-/// Puts messages of the protocol in words.
+/// Decodes protocol messages.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -50,11 +50,11 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = Reading::Smc)]
     dialect: Reading,
 
-    /// Octets of Port Out in frames with vibration, and of the inputs in the answers: 2 or 4.
+    /// Bytes of Port Out in frames with vibration, and of the inputs in the answers: 2 or 4.
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 
-    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; may be given several times.
+    /// Of a capture, read the datagrams from or to this port rather than 7408 and 8410; repeatable.
     #[arg(long, value_name = "N", conflicts_with = "all")]
     port: Vec<u16>,
 
@@ -76,26 +76,31 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let manner = Manner { reading: args.dialect, port, json: args.json, full: args.verbose };
     match Input::of(&args.input)? {
         Input::Messages(messages) => {
-            let mut desk = Desk::new(io::stdout().lock(), Manner { full: true, ..manner });
-            let written = desk.messages(&messages);
-            end(written.and_then(|()| desk.finish()))
+            let mut printer = Printer::new(io::stdout().lock(), Manner { full: true, ..manner });
+            let written = printer.messages(&messages);
+            end(written.and_then(|()| printer.finish()))
         }
         Input::File(path) => {
-            let desk = Desk::new(BufWriter::new(io::stdout().lock()), manner);
-            stream(desk, Stream::open(&path)?, args, &path.display().to_string())
+            let printer = Printer::new(BufWriter::new(io::stdout().lock()), manner);
+            stream(printer, Stream::open(&path)?, args, &path.display().to_string())
         }
         // Unlike a file it may come slowly, so that each line is written at once.
         Input::Stdin => {
-            stream(Desk::new(io::stdout().lock(), manner), Stream::stdin()?, args, "standard input")
+            stream(Printer::new(io::stdout().lock(), manner), Stream::stdin()?, args, "standard input")
         }
     }
 }
 
-fn stream(mut desk: Desk<impl Write>, stream: Stream, args: &Args, name: &str) -> Result<Exit, Failure> {
+fn stream(
+    mut printer: Printer<impl Write>,
+    stream: Stream,
+    args: &Args,
+    name: &str,
+) -> Result<Exit, Failure> {
     let filter = Filter { ports: if args.port.is_empty() { &PORTS } else { &args.port }, all: args.all };
     let halted = match stream {
-        Stream::Capture(input) => desk.capture(input, filter),
-        Stream::Lines(input) => desk.lines(input),
+        Stream::Capture(input) => printer.capture(input, filter),
+        Stream::Lines(input) => printer.lines(input),
     };
     let halted = match halted {
         Err(Halt::Output(error)) => return end(Err(error)),
@@ -106,7 +111,7 @@ fn stream(mut desk: Desk<impl Write>, stream: Stream, args: &Args, name: &str) -
         Err(Halt::Capture(error)) => Err(anyhow!("{name}: {error}")).or_exit(Exit::BadCue),
         Ok(()) => Ok(()),
     };
-    let exit = end(desk.summary().and_then(|()| desk.finish()))?;
+    let exit = end(printer.summary().and_then(|()| printer.finish()))?;
     halted.map(|()| exit)
 }
 

@@ -17,10 +17,10 @@ use crate::config::Config;
 use crate::doctor::chart::{buckets, draw};
 use crate::doctor::lateness::{Load, RATE_HZ, Run};
 use crate::doctor::measure::measure;
-use crate::doctor::{Hall, Line, Verdict, judge, look, ready};
+use crate::doctor::{Hall, Line, Verdict, facts, judge, ready};
 use crate::sys::realtime::normal_priority;
 
-/// Tells whether this machine is real-time, and if not, what to change.
+/// Checks if this machine is fit for real-time use, and says what to change if it is not.
 ///
 /// First it looks: each line has what was found, whether that will do, and the exact fix. Then it measures: a bare loop on
 /// the clock and with the scheduling of `play`, 1,000 ticks a second. It changes nothing and sends nothing.
@@ -28,9 +28,9 @@ use crate::sys::realtime::normal_priority;
 #[command(after_help = "\
 Verdicts:
   ok       as it should be
-  warn     a show will run, but less surely than it could
+  warn     a show will run, but with less margin than it could have
   bad      ticks or frames will be lost: the machine is not ready
-  unknown  it could not be seen from here, and is not guessed
+  unknown  it could not be determined from here
 
 Verdicts of a measured run, by how late the loop woke after each tick's deadline:
   warn  one of 100 ticks is more than 10 % of the tick (100 µs) late, or any tick is missed.
@@ -47,7 +47,7 @@ Examples:
   kinocue doctor --config hall.toml --seconds 0  looks only, for the controllers of a hall
   kinocue doctor --json | jq '.lines[] | select(.verdict != \"ok\")'")]
 pub(super) struct Args {
-    /// How long each run takes, in seconds, at most an hour; 0 runs none.
+    /// Duration of each run in seconds, at most an hour; 0 runs none.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=3600))]
     seconds: u64,
 
@@ -55,7 +55,7 @@ pub(super) struct Args {
     #[arg(long)]
     load: bool,
 
-    /// How many controllers it is to play to.
+    /// Number of controllers it is to play to.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "config", value_parser = clap::value_parser!(u32).range(1..=65535))]
     controllers: u32,
 
@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         Some(path) => hall(&load::config(path)?),
         None => Hall { controllers: args.controllers, neighbours: args.controllers },
     };
-    let mut lines = judge(&look(), hall);
+    let mut lines = judge(&facts(), hall);
     let loads: &[Load] = match (args.seconds, args.load) {
         (0, _) => &[],
         (_, false) => &[Load::Idle],

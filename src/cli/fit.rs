@@ -14,7 +14,7 @@ use crate::config::parse_level;
 use crate::proof::{self, Fitted, Manner};
 use crate::timeline::Timeline;
 
-/// Makes a cue keep the limits of its seats.
+/// Fits a cue into the limits of its seats.
 ///
 /// Lowers its amplitude about the neutral pose just as far as needed, and never its time.
 /// A cue that ends in motion, without a way to rest from there, is brought to rest in its last stretch where that changes less.
@@ -46,7 +46,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
 
-    /// Lower each axis by itself; else all are lowered alike, and the seat moves as it was meant to, but less.
+    /// Scale each axis by itself; without it all are scaled alike, and the seat moves as it was meant to, but less.
     #[arg(long)]
     per_axis: bool,
 
@@ -54,7 +54,7 @@ pub(super) struct Args {
     #[arg(long)]
     smooth: bool,
 
-    /// Replace OUT where it exists; never the cue itself.
+    /// Overwrite OUT if it exists; never the cue itself.
     #[arg(long)]
     force: bool,
 
@@ -110,9 +110,9 @@ struct Report {
     level: f64,
     /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
     factors: Vec<f64>,
-    /// The last seconds in which it is brought to rest; null where it needs none.
+    /// The last seconds in which it is brought to rest; null if it needs none.
     eased_s: Option<f64>,
-    /// The low-pass; null where none was used.
+    /// The low-pass; null if none was used.
     cut_off_hz: Option<f64>,
     /// The largest change of a position, its axis and its time.
     change_mm: f64,

@@ -16,7 +16,7 @@ use crate::device::{Outcome, Patience, Request, Talk, table};
 
 /// Homes empty seats.
 ///
-/// Has their controllers find zero (DPF0), and waits until each is there.
+/// Starts the reference search (DPF0) of their controllers, and waits until each is home.
 ///
 /// Without --to and --config the daemon homes all seats of its hall; see `kinocue watch` for how far they are.
 ///
@@ -39,10 +39,10 @@ pub(super) struct Args {
     names: Vec<String>,
     #[command(flatten)]
     targets: TargetArgs,
-    /// Nobody sits on the seats and nothing lies on or under them: do not ask.
+    /// Confirm that nobody sits on the seats and nothing lies on or under them; do not ask.
     #[arg(long)]
     seats_empty: bool,
-    /// How long each may take, seconds, 1 to 3600; the daemon has its own limit.
+    /// Timeout for each controller in seconds, 1 to 3600; the daemon has its own.
     #[arg(long, value_name = "S", default_value_t = 60, value_parser = clap::value_parser!(u64).range(1..=3600))]
     timeout: u64,
     #[command(flatten)]
@@ -59,7 +59,7 @@ struct ControllerReport<'a> {
     name: &'a str,
     address: String,
     home: bool,
-    /// From the order to the end of homing; null where that was not reached.
+    /// From the order to the end of homing; null if that was not reached.
     seconds: Option<f64>,
     fault: Option<String>,
 }

@@ -16,7 +16,7 @@ use crate::timeline::{EffectUse, Held, Hint, Timeline};
 /// How many marks a curve is drawn with.
 const DRAWN: u32 = 64;
 
-/// Shows what a cue holds, and what it asks of a seat.
+/// Shows what a cue contains, and what it demands of a seat.
 ///
 /// Length, axes, effects, and the extremes of each axis with their times.
 #[derive(Debug, clap::Args)]
@@ -101,7 +101,7 @@ struct VibrationReport {
 }
 
 impl VibrationReport {
-    /// Whether another axis vibrates alike.
+    /// True if another axis vibrates alike.
     fn is_as(&self, other: &Self) -> bool {
         let figures = |v: &Self| (v.min_hz, v.max_hz, v.max_amplitude_mm);
         figures(self) == figures(other)

@@ -53,7 +53,7 @@ Exit codes:
   0   measured
   69  a controller did not answer
   75  a seat did not stay where it stood, or the frame port is taken
-  76  a controller refused, or was left out
+  76  a controller refused frames, or was left out
 
 Examples:
   kinocue latency                                                    to four virtual controllers
@@ -80,7 +80,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "HZ", value_parser = parse_rate, default_value = "1000")]
     rate: f64,
 
-    /// How long, in seconds, at most an hour.
+    /// Duration in seconds, at most an hour.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
 
@@ -88,11 +88,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
 
-    /// Ask for a reply in each Nth frame, 1 to 1000 [default: 1, or the configuration's]
+    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
 
-    /// Ask for no replies to frames, and measure lateness alone.
+    /// Request no acks, and measure lateness alone.
     #[arg(long)]
     no_acks: bool,
 
@@ -104,7 +104,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Measure nothing: hold two files of --out against each other.
+    /// Compare two files of --out; measure nothing.
     #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["to", "config", "count", "out"])]
     compare: Vec<PathBuf>,
 
@@ -151,7 +151,7 @@ fn measure(args: &Args, mut config: Config, of_our_own: bool) -> Result<Exit, Fa
     show.bind = args.bind.unwrap_or(show.bind);
     let (config, refused) = standing(config)?;
     if config.controllers.is_empty() {
-        let why = anyhow!("no seat is left to measure with; nothing was sent but questions");
+        let why = anyhow!("no seat left to measure; only reads were sent");
         return Err(why).or_exit(Refused::exit(&refused));
     }
     let about = about(args.rate, config.controllers.len(), of_our_own);

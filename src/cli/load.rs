@@ -30,7 +30,7 @@ pub(super) struct SourceArgs {
     #[arg(long, value_enum, value_name = "FORMAT", requires = "units")]
     from: Option<Import>,
 
-    /// The unit of its positions, which such a file does not say.
+    /// The unit of its positions, which such a file does not state.
     #[arg(long, value_name = "UNIT", requires = "from", value_parser = declared_unit())]
     units: Option<DeclaredUnit>,
 }

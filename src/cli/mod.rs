@@ -127,7 +127,8 @@ fn tell_usage(error: &clap::Error) {
 }
 
 /// Has a panic end the program at once, wherever it happens but where a request is served: what is left of a program without
-/// its tick thread, or its keeper, must not go on as if it were whole. Silence is what the seats stand best.
+/// its tick thread, or its supervisor, must not go on as if it were whole. Without frames the seats stay
+/// put: the safe outcome.
 fn end_on_panic() {
     let tell = panic::take_hook();
     panic::set_hook(Box::new(move |panic| {
@@ -163,9 +164,9 @@ fn run(command: Command) -> Result<Exit, Failure> {
     }
 }
 
-/// Octets of Port Out in vibration frames.
+/// Bytes of Port Out in vibration frames.
 fn vibration_port(text: &str) -> Result<VibrationPort, String> {
-    let port = text.parse().ok().and_then(VibrationPort::of_octets);
+    let port = text.parse().ok().and_then(VibrationPort::of_bytes);
     port.ok_or_else(|| "it is 2 or 4".to_owned())
 }
 

@@ -21,14 +21,14 @@ use crate::time::{Rate, ShowTime, parse_time};
 use crate::timeline::Timeline;
 use crate::wire::Timing;
 
+mod health;
+mod keyboard;
 mod keys;
-mod leader;
+mod messages;
 mod progress;
-mod said;
-mod standings;
 
+use messages::Messages;
 use progress::Progress;
-use said::Said;
 
 const EXAMPLES: [&str; 4] = [
     "kinocue play cues/bench-ride.csv --to 127.0.0.1:7408",
@@ -37,7 +37,7 @@ const EXAMPLES: [&str; 4] = [
     "kinocue play storm.mcap --config hall.toml --start 01:30 --json > report.json",
 ];
 
-/// Plays one cue to the controllers, and reports what became of every frame.
+/// Plays one cue to the controllers, and reports the fate of every frame.
 ///
 /// Ctrl-C parks the seats and ends with the report; a second Ctrl-C, half a second after the first or later, ends at once and
 /// leaves the seats where they are. On a terminal keys lead the play; ? says which. None of it is an emergency stop: that one is
@@ -59,13 +59,13 @@ pub(super) struct Args {
     /// Ticks per second, 1 to 1000 [default: 100, or the configuration's].
     #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     rate: Option<f64>,
-    /// Which Time the frames carry [default: relative, or the configuration's].
+    /// The kind of Time that the frames carry [default: relative, or the configuration's].
     #[arg(long, value_parser = ["relative", "absolute"])]
     time: Option<String>,
-    /// Where in the cue to begin: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
+    /// Where in the cue to start: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24.
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     start: Option<ShowTime>,
-    /// Plays in all; 0 plays until stopped.
+    /// Number of plays; 0 plays until stopped.
     #[arg(long = "loop", value_name = "N", default_value_t = 1)]
     plays: u32,
     /// Intensity of motion and vibration about the seats' neutral pose: 60% or -6dB.
@@ -77,13 +77,13 @@ pub(super) struct Args {
     /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
     #[arg(long, value_name = "ADDR")]
     bind: Option<SocketAddrV4>,
-    /// Ask for a reply in each Nth frame, 1 to 1000 [default: 1, or the configuration's].
+    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
     ack_every: Option<u32>,
-    /// Ask for no replies, and read none.
+    /// Request no acks, and read none.
     #[arg(long)]
     no_acks: bool,
-    /// Wake up this long before each tick and spin, 0 to 900 µs: less late for more processor time [default: 0, or the
+    /// Wake up this long before each tick and spin, 0 to 900 µs: less lateness for more processor time [default: 0, or the
     /// configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,
@@ -128,9 +128,9 @@ fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bo
     let control = play.control().clone();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Said { control, ctrl_c, length, join: play.join(), names };
+    let said = Messages { control, ctrl_c, length, join: play.join(), names };
     let progress = Progress::start(said, for_ever);
-    let played = play.run(|reins| progress.lead(reins)).map_err(|error| refused(error, &cue));
+    let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
     tell(&played?, json)
 }
@@ -182,12 +182,12 @@ fn refused(error: PlayError, cue: &Path) -> Failure {
 #[derive(Debug, Clone, Default)]
 pub(super) struct CtrlC {
     pressed: Arc<AtomicBool>,
-    /// Whether the next one ends the program at once.
+    /// True if the next one ends the program at once.
     armed: Arc<AtomicBool>,
 }
 
 impl CtrlC {
-    /// Whether it was pressed.
+    /// True if it was pressed.
     pub(super) fn is_pressed(&self) -> bool {
         self.pressed.load(Ordering::Relaxed)
     }
@@ -197,7 +197,7 @@ impl CtrlC {
         self.armed.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the next one ends the program at once.
+    /// True if the next one ends the program at once.
     pub(super) fn is_armed(&self) -> bool {
         self.armed.load(Ordering::Relaxed)
     }
@@ -259,8 +259,8 @@ pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
             anyhow!("{who} acked nothing, or was lost at the end; check power, cable, PA15 and PA20 to PA24");
         return Err(why).or_exit(Exit::Unavailable);
     }
-    if !played.astray.is_empty() {
-        let who = played.astray.join(", ");
+    if !played.off_park.is_empty() {
+        let who = played.off_park.join(", ");
         let why = anyhow!(
             "{who} tells that it is not at park, where its last frames led; look at it before the next play"
         );

@@ -67,7 +67,7 @@ pub(super) struct Args {
     rate: Option<f64>,
     #[command(flatten)]
     server: client::ServerArgs,
-    /// Say what the checks are, or what one is, and why it matters; asks no controller.
+    /// Explain the checks, or one of them, and why they matter; contacts no controller.
     #[arg(long, value_name = "CHECK", num_args = 0..=1, exclusive = true)]
     explain: Option<Option<String>>,
 }
@@ -125,7 +125,7 @@ fn explain(which: Option<&str>) -> Result<Exit, Failure> {
 /// What asking one controller came to.
 struct Asked {
     route: Result<Route, String>,
-    /// None where there is no way to it.
+    /// `None` if there is no way to it.
     survey: Option<Survey>,
 }
 

@@ -12,7 +12,7 @@ pub(super) fn out(text: &str) -> Result<(), Failure> {
     data(&plain::lines(text))
 }
 
-/// Writes data for programs, every octet of it.
+/// Writes data for programs, every byte of it.
 pub(super) fn data(text: &str) -> Result<(), Failure> {
     match io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 
 use super::{Exit, Failure, OrExit as _, load, print};
-use crate::app::Staged;
+use crate::app::StagedShow;
 use crate::config::Config;
 use crate::cue::{self, Cue, CueFaults, Source};
 use crate::engine::Show;
@@ -118,7 +118,7 @@ fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
     verdict.more += proof.more;
     if verdict.faults.is_empty() {
         let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
-        let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false });
+        let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false });
         verdict.faults.extend(staged.err().map(|error| error.to_string()));
     }
 }

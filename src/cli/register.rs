@@ -25,7 +25,7 @@ as the panel of an integrated controller shows them (CP149, cd 006..011), or by 
 `kinocue register list`. Numbers of PA and DP are hexadecimal, those of CP and CD decimal;
 values are decimal, or hexadecimal behind 0x.";
 
-/// Reads, writes, keeps and compares the registers of controllers.
+/// Reads, writes, saves and compares the registers of controllers.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {

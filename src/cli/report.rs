@@ -13,7 +13,7 @@ use crate::sys::clock::local_now;
 mod csv;
 mod table;
 
-/// Says what was played, or what was asked.
+/// Reports what was played, or what was requested.
 ///
 /// Every show of a day with its cue, levels, seats, frames and end, and all together.
 ///
@@ -44,7 +44,7 @@ pub(super) struct Args {
     /// The configuration that names the folder.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Show what was asked, by whom and what came of it, instead of the shows.
+    /// Show the commands, who gave them and their results, instead of the shows.
     #[arg(long)]
     actions: bool,
     /// Print CSV (RFC 4180), one record a show or action.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Exit, Failure, OrExit as _, print};
-use crate::app::house::HouseError;
+use crate::app::runtime::RuntimeError;
 use crate::app::serve::{Parts, Places, ServeError, serve, signals};
 use crate::app::surfaces::Sockets;
 use crate::log::{Line, Log, Priority};
@@ -12,9 +12,9 @@ use crate::{config, console};
 
 /// Runs the service of a hall.
 ///
-/// Keeps its seats parked, its controllers watched and its shows ready, until it is told to end.
+/// Keeps its seats parked, its controllers monitored and its shows ready, until it is terminated.
 ///
-/// Nothing moves until somebody asks for it, by the client commands, the web console or any other surface. SIGTERM parks the
+/// Nothing moves until somebody commands it, by the client commands, the web console or any other surface. SIGTERM parks the
 /// seats and ends with 0; SIGHUP reads the configuration anew where nothing is armed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         let exit = match &error {
-            ServeError::House(HouseError::Net(NetError::Refused { cause, .. }))
+            ServeError::Runtime(RuntimeError::Net(NetError::Refused { cause, .. }))
                 if cause.kind() == std::io::ErrorKind::AddrInUse =>
             {
                 Exit::TryAgain

@@ -53,7 +53,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7408")]
     listen: SocketAddrV4,
 
-    /// How many controllers, at consecutive ports.
+    /// Number of controllers, at consecutive ports.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: u16,
 
@@ -61,7 +61,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=12))]
     axes: u16,
 
-    /// A parameter: register in hex, value decimal or 0x; may be given again.
+    /// A parameter: register in hex, value decimal or 0x; repeatable.
     #[arg(long = "pa", value_name = "HEX=VALUE", value_parser = parse::parameter)]
     parameters: Vec<(u8, u16)>,
 
@@ -69,15 +69,15 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = Family::Smc)]
     dialect: Family,
 
-    /// Chance that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost.
+    /// Probability that a datagram goes unanswered, 0..1: half of those never arrive, of the others the answer is lost.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance)]
     loss: f64,
 
-    /// Chance that an answer comes twice, 0..1.
+    /// Probability that an answer is sent twice, 0..1.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = parse::chance)]
     duplicate: f64,
 
-    /// How much later answers leave: 80ms, 1.5s.
+    /// Delay of answers: 80ms, 1.5s.
     #[arg(long, value_name = "SPAN", default_value = "0ms", value_parser = parse_duration)]
     delay: Duration,
 
@@ -89,7 +89,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "TIME", value_parser = parse::time)]
     estop_at: Option<Duration>,
 
-    /// What chance begins with [default: one that is told]
+    /// Seed of the random faults [default: a random one, which is printed]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 
@@ -101,11 +101,11 @@ pub(super) struct Args {
     #[arg(long)]
     safe: bool,
 
-    /// What happens when, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below.
+    /// Timed commands, as "2.0:X1=1, 3.0:X1=0, 5:err=12, 8:reboot"; see below.
     #[arg(long, value_name = "TIME:COMMAND, …", value_parser = script, default_value = "", hide_default_value = true)]
     script: Script,
 
-    /// Take commands at a Unix socket, one per line, each answered with ok or error and why.
+    /// Accept commands on a Unix socket, one per line, each answered with ok, or error and the reason.
     #[arg(long, value_name = "PATH")]
     control: Option<PathBuf>,
 
@@ -238,7 +238,7 @@ fn report(outcomes: &[Outcome], json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Ctrl-C and SIGTERM as an octet on a socket, which a thread can wait for.
+/// Ctrl-C and SIGTERM as a byte on a socket, which a thread can wait for.
 struct Signals(UnixStream);
 
 impl Signals {

@@ -62,7 +62,7 @@ impl TargetArgs {
         Ok(Targets { controllers: self.choose(controllers.into_iter().chain(meant).collect(), names)?, show })
     }
 
-    /// Whether anybody is meant: without, `home` and `preflight` ask the daemon for its own.
+    /// True if anybody is meant: without, `home` and `preflight` ask the daemon for its own.
     pub(super) fn are_named(&self) -> bool {
         self.config.is_some() || !self.to.is_empty()
     }
@@ -77,7 +77,7 @@ impl TargetArgs {
         Err(anyhow!(why)).or_exit(Exit::Usage)
     }
 
-    /// Whether a configuration names them.
+    /// True if a configuration names them.
     pub(super) const fn are_configured(&self) -> bool {
         self.config.is_some()
     }
@@ -170,7 +170,7 @@ impl Troubles {
         print::tell(&format!("kinocue: {name}: {line}"));
     }
 
-    /// Whether there were none.
+    /// True if there were none.
     pub(super) const fn none(&self) -> bool {
         !self.refused && !self.silent
     }

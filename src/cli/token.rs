@@ -9,14 +9,14 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use super::{Exit, Failure, OrExit as _, print};
-use crate::hall::Role;
+use crate::control::Role;
 
 /// 256 bits, which nobody guesses.
-const OCTETS: usize = 32;
+const BYTES: usize = 32;
 /// The longest name.
 const MAX_NAME: usize = 64;
 
-/// Makes a token with which somebody comes in over HTTP.
+/// Creates an access token for HTTP.
 ///
 /// The lines of the configuration that let them in come with it.
 ///
@@ -28,10 +28,10 @@ Examples:
   kinocue token tablet --role operate
   kinocue token booth --role engineer --json")]
 pub(super) struct Args {
-    /// Who gets it, as the journal is to name them.
+    /// The name of its holder in the journal.
     #[arg(value_parser = parse_name)]
     name: String,
-    /// What they may do: look; run the show; home, arm, clear and change the library as well.
+    /// What it permits: viewing; running the show; and homing, arming, clearing and changing the library.
     #[arg(long, value_enum)]
     role: RoleArg,
     /// Print one JSON object with all of it.
@@ -90,24 +90,24 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// From the generator of the kernel, which is ready long before a shell is.
-fn chance() -> io::Result<[u8; OCTETS]> {
-    let mut octets = [0; OCTETS];
-    File::open("/dev/urandom")?.read_exact(&mut octets)?;
-    Ok(octets)
+fn chance() -> io::Result<[u8; BYTES]> {
+    let mut bytes = [0; BYTES];
+    File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+    Ok(bytes)
 }
 
 impl<'n> Token<'n> {
     /// One that nobody guesses.
     ///
     /// # Errors
-    /// Where the kernel gives no chance.
+    /// If the kernel gives no chance.
     pub(super) fn new(name: &'n str, role: Role) -> io::Result<Self> {
         Ok(Self::of(name, role, &chance()?))
     }
 
-    fn of(name: &'n str, role: Role, octets: &[u8; OCTETS]) -> Self {
-        let token = URL_SAFE_NO_PAD.encode(octets);
-        let sha256: String = Sha256::digest(&token).iter().map(|octet| format!("{octet:02x}")).collect();
+    fn of(name: &'n str, role: Role, bytes: &[u8; BYTES]) -> Self {
+        let token = URL_SAFE_NO_PAD.encode(bytes);
+        let sha256: String = Sha256::digest(&token).iter().map(|byte| format!("{byte:02x}")).collect();
         let config = format!("[[api.token]]\nname = \"{name}\"\nrole = \"{role}\"\nsha256 = \"{sha256}\"");
         Self { name, role, token, sha256, config }
     }
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_token_goes_to_its_owner_and_its_hash_into_the_configuration() {
-        let token = Token::of("tablet", Role::Operate, &[0xff; OCTETS]);
+        let token = Token::of("tablet", Role::Operate, &[0xff; BYTES]);
         assert_eq!(
             token.token,
             format!("{}8", "_".repeat(42)),

@@ -4,7 +4,7 @@ use super::Acceptance;
 use super::section::{Entry, Section, did_you_mean};
 use crate::checks::{Check, Severity};
 
-/// Reads `accept_findings = [{ check = "…", why = "…" }]`; empty where there is none.
+/// Reads `accept_findings = [{ check = "…", why = "…" }]`; empty if there is none.
 pub(super) fn acceptances(section: &mut Section<'_, '_, '_>) -> Vec<Acceptance> {
     let Some(entries) = section.get("accept_findings").and_then(|entry| entry.array(section.faults)) else {
         return Vec::new();

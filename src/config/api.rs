@@ -81,7 +81,7 @@ pub(super) fn api(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Api> {
     Some(api)
 }
 
-/// The values of an array that can be read, none where the key is missing.
+/// The values of an array that can be read, `None` if the key is missing.
 fn list<T>(
     section: &mut Section<'_, '_, '_>,
     key: &'static str,
@@ -170,11 +170,11 @@ fn from_hex(text: &str) -> Option<[u8; 32]> {
     if digits.len() != 64 || !digits.iter().all(u8::is_ascii_hexdigit) {
         return None;
     }
-    let mut octets = [0; 32];
-    for (octet, pair) in octets.iter_mut().zip(digits.chunks_exact(2)) {
-        *octet = u8::from_str_radix(str::from_utf8(pair).ok()?, 16).ok()?;
+    let mut bytes = [0; 32];
+    for (byte, pair) in bytes.iter_mut().zip(digits.chunks_exact(2)) {
+        *byte = u8::from_str_radix(str::from_utf8(pair).ok()?, 16).ok()?;
     }
-    Some(octets)
+    Some(bytes)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use crate::plain;
 
-/// How much of a fault is told, octets.
+/// How much of a fault is told, bytes.
 const TOLD: usize = 1_000;
 
 /// One fault of a configuration file.
@@ -62,7 +62,7 @@ impl<'t> Faults<'t> {
         Self { text, found: Vec::new(), broken: Vec::new() }
     }
 
-    /// Notes a fault at octet `at` of the text.
+    /// Notes a fault at byte `at` of the text.
     pub(crate) fn note(&mut self, at: usize, message: impl Into<String>) {
         if !self.broken.contains(&self.line(at)) {
             self.found.push((at, message.into()));
@@ -76,23 +76,23 @@ impl<'t> Faults<'t> {
         }
     }
 
-    /// Notes that the text is no TOML at octet `at`; further faults of that line are not noted.
+    /// Notes that the text is no TOML at byte `at`; further faults of that line are not noted.
     pub(crate) fn note_syntax(&mut self, at: usize, message: impl Into<String>) {
         self.note(at, message);
         self.broken.push(self.line(at));
     }
 
-    /// The line of octet `at`, counted from 1.
+    /// The line of byte `at`, counted from 1.
     pub(crate) fn line(&self, at: usize) -> usize {
         self.place(at).0
     }
 
-    /// Line and column of octet `at`, both counted from 1.
+    /// Line and column of byte `at`, both counted from 1.
     pub(crate) fn place(&self, at: usize) -> (usize, usize) {
         place(self.text.as_bytes(), at)
     }
 
-    /// Whether none has been noted.
+    /// True if none has been noted.
     pub(crate) fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
@@ -111,11 +111,11 @@ impl<'t> Faults<'t> {
     }
 }
 
-/// Line and column of octet `at`, as an editor counts them: from 1, the column in characters.
+/// Line and column of byte `at`, as an editor counts them: from 1, the column in characters.
 pub(crate) fn place(text: &[u8], at: usize) -> (usize, usize) {
     let before = &text[..at.min(text.len())];
-    let line_start = before.iter().rposition(|&octet| octet == b'\n').map_or(0, |end| end + 1);
-    let line = 1 + before.iter().filter(|&&octet| octet == b'\n').count();
-    let is_char_start = |octet: &&u8| (**octet & 0xc0) != 0x80;
+    let line_start = before.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+    let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+    let is_char_start = |byte: &&u8| (**byte & 0xc0) != 0x80;
     (line, 1 + before[line_start..].iter().filter(is_char_start).count())
 }

@@ -1,4 +1,4 @@
-//! Whether a cue fits the hall: its axes, effects, vibration and stroke against the controllers.
+//! Checks that a cue fits the hall: its axes, effects, vibration and stroke against the controllers.
 
 use std::fmt;
 use std::ops::Range;
@@ -125,7 +125,7 @@ impl Misfit {
     }
 }
 
-/// Whether a cue stays within the strokes of the hall.
+/// True if a cue stays within the strokes of the hall.
 #[derive(Debug, Default)]
 pub struct HallStroke {
     /// Faults for each seat type and window of axes that is left.

@@ -1,4 +1,4 @@
-//! Show-control gear: `sources = ["10.0.0.5"]`, whose messages a port takes, and `allow = ["go"]`, what they may ask.
+//! Show-control gear: `sources = ["10.0.0.5"]`, the senders that a port accepts, and `allow = ["go"]`, the commands open to them.
 
 use std::net::Ipv4Addr;
 

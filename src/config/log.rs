@@ -1,4 +1,4 @@
-//! `[log]`: the journal of what was asked and what was played.
+//! `[log]`: the journal of commands and shows.
 
 use std::path::PathBuf;
 
@@ -44,7 +44,7 @@ pub struct Hours {
 }
 
 impl Hours {
-    /// Whether it is open at a time of day.
+    /// True if it is open at a time of day.
     #[must_use]
     pub fn contains(&self, time: Time) -> bool {
         if self.from <= self.until {

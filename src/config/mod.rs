@@ -47,7 +47,7 @@ pub use text::TextPort;
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
 pub const ALL_OUTPUTS: u16 = 0x0fff;
 
-/// The largest configuration file that is read, octets.
+/// The largest configuration file that is read, bytes.
 pub const MAX_FILE_LEN: u64 = 1 << 20;
 
 /// A hall: how it is played, what its seats are, and where its controllers are.
@@ -185,7 +185,7 @@ pub struct Controller {
     pub accept: Accept,
     /// The effects it switches; `None` for all of them and every bit of a raw output word.
     pub effects: Option<Vec<String>>,
-    /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where only its replies tell.
+    /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 if only its replies tell.
     pub estop_inputs: u16,
     /// The inputs of its belts, each active while its belt is open, bit 0 = X01; 0 for none.
     pub belt_inputs: u16,
@@ -225,7 +225,7 @@ pub enum FanOut {
 pub enum Accept {
     /// ffff: whoever gets the datagram.
     All,
-    /// The station's own code: the last two octets of its address (PA12, PA13).
+    /// The station's own code: the last two bytes of its address (PA12, PA13).
     Station,
     /// A code given as it is, not 0.
     Code(u16),
@@ -306,7 +306,7 @@ impl Controller {
         }
     }
 
-    /// Whether axis `axis` of the cue, counted from 0, is one of its own.
+    /// True if axis `axis` of the cue, counted from 0, is one of its own.
     #[must_use]
     pub fn takes(&self, axis: usize) -> bool {
         self.window().contains(&axis)
@@ -341,7 +341,7 @@ pub fn load(path: &Path) -> Result<Config, ConfigFaults> {
     read::document(path, &text)
 }
 
-/// Whether a window of `axes` axes from `offset` on can be one of a cue; the reason if not.
+/// True if a window of `axes` axes from `offset` on can be one of a cue; the reason if not.
 fn check_window(offset: usize, axes: usize, fan_out: FanOut) -> Result<(), String> {
     if fan_out == FanOut::Shared && offset + axes > MAX_AXES {
         let last = offset + axes;
@@ -354,7 +354,7 @@ fn check_window(offset: usize, axes: usize, fan_out: FanOut) -> Result<(), Strin
     Ok(())
 }
 
-/// Whether datagrams can be sent to one controller at `address`; the reason if not.
+/// True if datagrams can be sent to one controller at `address`; the reason if not.
 fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
     let ip = address.ip();
     if address.port() == 0 {
@@ -368,7 +368,7 @@ fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
     }
 }
 
-/// Whether cues can use `name` for an effect; the reason if not.
+/// True if cues can use `name` for an effect; the reason if not.
 fn check_effect_name(name: &str) -> Result<(), &'static str> {
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if !name.is_empty() && name.chars().all(fits) {

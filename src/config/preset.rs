@@ -16,7 +16,7 @@ pub struct Preset {
     pub motion: Option<f64>,
     /// Of the vibration, 0 to 1.
     pub vibration: Option<f64>,
-    /// Whether an effect may be on, by its name.
+    /// True if an effect may be on, by its name.
     pub effects: BTreeMap<String, bool>,
 }
 

@@ -25,17 +25,17 @@ use super::{
     Show, Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
 };
 
-/// The text of a file of at most [`MAX_FILE_LEN`] octets.
+/// The text of a file of at most [`MAX_FILE_LEN`] bytes.
 pub(super) fn file(path: &Path) -> Result<String, ConfigFaults> {
     let unreadable = |source| ConfigFaults::Unreadable { path: path.to_owned(), source };
     let file = File::open(path).map_err(unreadable)?;
     if file.metadata().map_err(unreadable)?.is_dir() {
         return Err(unreadable(io::ErrorKind::IsADirectory.into()));
     }
-    let mut octets = Vec::new();
-    file.take(MAX_FILE_LEN + 1).read_to_end(&mut octets).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    file.take(MAX_FILE_LEN + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     let bad = |at: usize, message: &str| {
-        let (line, column) = place(&octets, at);
+        let (line, column) = place(&bytes, at);
         ConfigFaults::Bad(vec![ConfigFault {
             path: path.to_owned(),
             line,
@@ -43,10 +43,10 @@ pub(super) fn file(path: &Path) -> Result<String, ConfigFaults> {
             message: message.to_owned(),
         }])
     };
-    if octets.len() as u64 > MAX_FILE_LEN {
-        return Err(bad(0, &format!("the file is longer than {MAX_FILE_LEN} octets")));
+    if bytes.len() as u64 > MAX_FILE_LEN {
+        return Err(bad(0, &format!("the file is longer than {MAX_FILE_LEN} bytes")));
     }
-    match str::from_utf8(&octets) {
+    match str::from_utf8(&bytes) {
         Ok(text) => Ok(text.to_owned()),
         Err(error) => Err(bad(error.valid_up_to(), "the file is not UTF-8")),
     }
@@ -393,16 +393,16 @@ fn dialect(section: &mut Section<'_, '_, '_>) -> Option<Dialect> {
     entry.choice(&[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)], section.faults)
 }
 
-/// Octets of Port Out in vibration frames, which MBOX controllers do not have.
+/// Bytes of Port Out in vibration frames, which MBOX controllers do not have.
 fn vibration_port(section: &mut Section<'_, '_, '_>, dialect: Option<Dialect>) -> Option<VibrationPort> {
     let entry = section.get("vibration_port_octets")?;
     if dialect == Some(Dialect::Mbox) {
         entry.fault(section.faults, "mbox controllers have no vibration frames; leave it out");
     }
-    let octets: u8 = entry.whole_in(2..=4, section.faults)?;
-    let port = VibrationPort::of_octets(octets);
+    let bytes: u8 = entry.whole_in(2..=4, section.faults)?;
+    let port = VibrationPort::of_bytes(bytes);
     if port.is_none() {
-        entry.fault(section.faults, &format!("{octets} is neither 2 nor 4"));
+        entry.fault(section.faults, &format!("{bytes} is neither 2 nor 4"));
     }
     port
 }
@@ -413,7 +413,7 @@ fn accept(section: &mut Section<'_, '_, '_>) -> Option<Accept> {
     if text == "station" {
         return Some(Accept::Station);
     }
-    let hex = text.len() == 4 && text.bytes().all(|octet| octet.is_ascii_hexdigit());
+    let hex = text.len() == 4 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
     match u16::from_str_radix(text, 16).ok().filter(|_| hex) {
         Some(0) => entry.fault(section.faults, "0000 means that no station accepts the frame; use \"ffff\""),
         Some(0xffff) => return Some(Accept::All),

@@ -26,7 +26,7 @@ impl Whole for usize {}
 pub(crate) struct Entry<'t> {
     /// What faults call it: its key.
     pub(crate) key: &'t str,
-    /// Its first octet in the text.
+    /// Its first byte in the text.
     pub(crate) at: usize,
     pub(crate) value: &'t DeValue<'t>,
 }
@@ -99,7 +99,7 @@ impl<'t> Entry<'t> {
     /// A time of day, `19:00` or `19:00:30`.
     pub(crate) fn time(&self, faults: &mut Faults<'_>) -> Option<Time> {
         let text = self.text(faults)?;
-        let digits = |part: &str| part.len() == 2 && part.bytes().all(|octet| octet.is_ascii_digit());
+        let digits = |part: &str| part.len() == 2 && part.bytes().all(|byte| byte.is_ascii_digit());
         let spelt = text.split(':').all(digits) && matches!(text.len(), 5 | 8);
         let time = text.parse().ok().filter(|_| spelt);
         if time.is_none() {
@@ -163,7 +163,7 @@ pub(crate) struct Section<'t, 'f, 'x> {
 }
 
 impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
-    /// Starts on the table called `name`, whose header is at octet `at`.
+    /// Starts on the table called `name`, whose header is at byte `at`.
     pub(crate) fn new(
         name: impl Into<String>,
         at: usize,

@@ -262,7 +262,7 @@ impl Options {
                 }
             }
             "vibration_port_octets" => {
-                let port = value.parse().ok().and_then(VibrationPort::of_octets);
+                let port = value.parse().ok().and_then(VibrationPort::of_bytes);
                 self.vibration_port = port.ok_or_else(|| refuse("2, 4"))?;
             }
             _ => {

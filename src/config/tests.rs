@@ -216,7 +216,7 @@ fn a_shared_frame_reaches_no_axis_past_the_twelfth() {
 }
 
 #[test]
-fn port_out_of_vibration_frames_has_two_octets_or_four_and_mbox_controllers_have_none() {
+fn port_out_of_vibration_frames_has_two_bytes_or_four_and_mbox_controllers_have_none() {
     let port = |more: &str| with(more).map(|hall| hall.controllers[0].vibration_port);
     assert_eq!(port(""), Ok(VibrationPort::Two));
     assert_eq!(port("vibration_port_octets = 4\n"), Ok(VibrationPort::Four));
@@ -241,7 +241,7 @@ fn a_stroke_of_more_pulses_than_a_register_holds_is_refused() {
 }
 
 #[test]
-fn a_missing_file_and_a_folder_are_unreadable_and_other_octets_a_fault() {
+fn a_missing_file_and_a_folder_are_unreadable_and_other_bytes_a_fault() {
     let folder = tempfile::tempdir().unwrap();
     for path in [folder.path().join("none.toml"), folder.path().to_owned()] {
         assert!(matches!(load(&path), Err(ConfigFaults::Unreadable { .. })), "{}", path.display());

@@ -16,7 +16,7 @@ pub struct TextPort {
     pub sources: Vec<Ipv4Addr>,
     /// What they may ask; stop may be asked always.
     pub allow: Vec<GearWord>,
-    /// SHA-256 of the token that the first line of a connection has to show; none where none is wanted.
+    /// SHA-256 of the token that the first line of a connection has to show; `None` if none is wanted.
     pub token: Option<[u8; 32]>,
 }
 

@@ -10,7 +10,7 @@ mod tests;
 pub struct Asset {
     /// Its `Content-Type`.
     pub content_type: &'static str,
-    /// Its octets.
+    /// Its bytes.
     pub body: &'static [u8],
 }
 
@@ -74,7 +74,7 @@ pub fn asset(path: &str) -> Option<Asset> {
     PAGE.iter().chain(VENDOR).find(|(at, _)| *at == path).map(|(_, asset)| *asset)
 }
 
-/// The content type and the octets of what is at a path, as a server hands them out.
+/// The content type and the bytes of what is at a path, as a server hands them out.
 #[must_use]
 pub fn page(path: &str) -> Option<(&'static str, &'static [u8])> {
     asset(path).map(|asset| (asset.content_type, asset.body))

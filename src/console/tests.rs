@@ -144,7 +144,7 @@ fn the_modules_stay_small() {
 fn what_others_wrote_is_as_they_published_it() {
     let sums = include_str!("vendor/README.md");
     for (path, asset) in VENDOR {
-        let sum: String = Sha256::digest(asset.body).iter().map(|octet| format!("{octet:02x}")).collect();
+        let sum: String = Sha256::digest(asset.body).iter().map(|byte| format!("{byte:02x}")).collect();
         let name = path.strip_prefix("/vendor/").unwrap();
         assert!(sums.contains(&format!("| `{name}` | {sum} |")), "{name}: {sum}");
     }

@@ -1,4 +1,4 @@
-//! Raw octets at a declared rate, as old ride players hold them: one octet an axis, 0 to 255 over the stroke.
+//! Raw bytes at a declared rate, as old ride players hold them: one byte an axis, 0 to 255 over the stroke.
 
 use std::io::Read;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
-/// Reads octets, axis 1 first, the first row at time 0; `path` names the file in faults.
+/// Reads bytes, axis 1 first, the first row at time 0; `path` names the file in faults.
 pub(super) fn read(path: &Path, input: impl Read, axes: usize, rate_hz: f64) -> Result<Cue, CueFaults> {
     if !(1..=MAX_AXES).contains(&axes) {
         return Err(CueFaults::one(path, Problem::Axes(axes)));
@@ -21,7 +21,7 @@ pub(super) fn read(path: &Path, input: impl Read, axes: usize, rate_hz: f64) -> 
     let mut cue = Cue {
         interpolation: Interpolation::Monotone,
         axes,
-        origin: Origin::Octets(axes),
+        origin: Origin::Bytes(axes),
         vibration: vec![Steps::default(); axes],
         ..Cue::blank(path)
     };
@@ -32,23 +32,23 @@ pub(super) fn read(path: &Path, input: impl Read, axes: usize, rate_hz: f64) -> 
 }
 
 fn fill(cue: &mut Cue, input: impl Read, rate_hz: f64) -> Result<(), Problem> {
-    let mut octets = Vec::new();
+    let mut bytes = Vec::new();
     let most = (MAX_ROWS * cue.axes) as u64;
-    input.take(most + 1).read_to_end(&mut octets).map_err(|error| Problem::Unread(error.to_string()))?;
-    let rows = octets.chunks_exact(cue.axes);
-    if octets.len() as u64 > most {
+    input.take(most + 1).read_to_end(&mut bytes).map_err(|error| Problem::Unread(error.to_string()))?;
+    let rows = bytes.chunks_exact(cue.axes);
+    if bytes.len() as u64 > most {
         return Err(Problem::TooManyRows);
     }
     if !rows.remainder().is_empty() {
-        return Err(Problem::PartOfARow { octets: octets.len(), axes: cue.axes });
+        return Err(Problem::PartOfARow { bytes: bytes.len(), axes: cue.axes });
     }
     if rows.len() < 2 {
-        return Err(if octets.is_empty() { Problem::Empty } else { Problem::TooFewRows(1) });
+        return Err(if bytes.is_empty() { Problem::Empty } else { Problem::TooFewRows(1) });
     }
     for row in 0..rows.len() {
         cue.times.push(time_of(row, rate_hz)?);
     }
-    cue.positions.extend(octets.iter().map(|octet| DeclaredUnit::U8.in_memory(f64::from(*octet))));
+    cue.positions.extend(bytes.iter().map(|byte| DeclaredUnit::U8.in_memory(f64::from(*byte))));
     Ok(())
 }
 
@@ -62,12 +62,12 @@ fn time_of(row: usize, rate_hz: f64) -> Result<ShowTime, Problem> {
 mod tests {
     use super::*;
 
-    fn faults(octets: &[u8], axes: usize, rate_hz: f64) -> String {
-        read(Path::new("t.u8"), octets, axes, rate_hz).expect_err("no fault was found").to_string()
+    fn faults(bytes: &[u8], axes: usize, rate_hz: f64) -> String {
+        read(Path::new("t.u8"), bytes, axes, rate_hz).expect_err("no fault was found").to_string()
     }
 
     #[test]
-    fn octets_become_fractions_at_their_rate() {
+    fn bytes_become_fractions_at_their_rate() {
         let cue = read(Path::new("t.u8"), [0, 255, 51, 102, 0, 1].as_slice(), 2, 20.0).unwrap();
         assert_eq!(cue.positions(), [0.0, 1.0, 0.2, 0.4, 0.0, 1.0 / 255.0]);
         assert_eq!(cue.times(), [0, 50, 100].map(ShowTime::from_millis));
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn what_is_no_whole_rows_is_refused() {
-        assert_eq!(faults(&[0; 7], 3, 20.0), "t.u8: 7 octets are no whole rows of 3 axes");
+        assert_eq!(faults(&[0; 7], 3, 20.0), "t.u8: 7 bytes are no whole rows of 3 axes");
         assert_eq!(faults(&[], 3, 20.0), "t.u8: is empty; a cue needs at least two rows");
         assert_eq!(faults(&[0; 3], 3, 20.0), "t.u8: 1 of the two rows that a cue needs at least");
         assert_eq!(faults(&[0; 3], 13, 20.0), "t.u8: 13 axes; a cue has 1 to 12");

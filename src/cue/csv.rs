@@ -182,7 +182,7 @@ impl Rows {
 struct Row {
     unit: DeclaredUnit,
     time_unit_ns: f64,
-    /// Whether a row was read, so that an empty cell has something to hold.
+    /// True if a row was read, so that an empty cell has something to hold.
     begun: bool,
     latest: Option<ShowTime>,
     time: ShowTime,

@@ -8,7 +8,7 @@ use crate::plain;
 
 /// How many faults of a file are told; the rest is counted.
 pub const FAULTS_TOLD: usize = 20;
-/// How much of a column's name is told, octets.
+/// How much of a column's name is told, bytes.
 const NAME_TOLD: usize = 80;
 
 /// Where in a cue something stands.
@@ -32,8 +32,8 @@ pub enum Place {
         /// Its log time, ns.
         log_time: u64,
     },
-    /// An octet of a file without lines, counted from 0.
-    Octet(u64),
+    /// A byte of a file without lines, counted from 0.
+    Byte(u64),
 }
 
 impl fmt::Display for Place {
@@ -45,7 +45,7 @@ impl fmt::Display for Place {
             Self::Message { topic, number, log_time } => {
                 write!(f, " {topic} message {number}, log_time {log_time} ns: ")
             }
-            Self::Octet(octet) => write!(f, " octet {octet}: "),
+            Self::Byte(byte) => write!(f, " byte {byte}: "),
         }
     }
 }
@@ -109,7 +109,7 @@ impl CueFaults {
         self.more
     }
 
-    /// Whether there was no file to read, reading failed, or what was read is wrong.
+    /// True if there was no file to read, reading failed, or what was read is wrong.
     #[must_use]
     pub fn class(&self) -> FaultClass {
         match self.told.first().map(|fault| &fault.problem) {
@@ -159,7 +159,7 @@ impl Collector {
         }
     }
 
-    /// Whether further faults are only counted.
+    /// True if further faults are only counted.
     pub(crate) fn is_full(&self) -> bool {
         self.told.len() == FAULTS_TOLD
     }

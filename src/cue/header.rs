@@ -134,7 +134,7 @@ fn axis_number(digits: &str) -> Option<usize> {
     axis.checked_sub(1).filter(|axis| *axis < MAX_AXES)
 }
 
-/// Whether an effect may have the name: a to z, 0 to 9 and `_`.
+/// True if an effect may have the name: a to z, 0 to 9 and `_`.
 pub(super) fn is_effect_name(name: &str) -> bool {
     !name.is_empty() && name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
 }

@@ -4,17 +4,17 @@ use crate::time::ShowTime;
 
 /// The most rows of a cue: two hours at 1 kHz and some.
 pub const MAX_ROWS: usize = 8_000_000;
-/// The most octets of one line, its end not counted, and of one MCAP message.
+/// The most bytes of one line, its end not counted, and of one MCAP message.
 pub const MAX_LINE: usize = 64 * 1024;
-/// The most octets of a file, and of what a compressed file unpacks to.
+/// The most bytes of a file, and of what a compressed file unpacks to.
 pub const MAX_FILE: u64 = 2 * 1024 * 1024 * 1024;
 /// The most effects that a cue may name.
 pub const MAX_EFFECTS: usize = 32;
 /// The most markers of a cue.
 pub const MAX_MARKERS: usize = 10_000;
-/// The most octets of a marker's name.
+/// The most bytes of a marker's name.
 pub const MAX_MARKER_NAME: usize = 256;
-/// The octets of a title that are kept.
+/// The bytes of a title that are kept.
 pub(super) const MAX_TITLE: usize = 1_024;
 /// The last show time a row may have: a day.
 pub const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);

@@ -45,7 +45,7 @@ pub enum Source {
         /// The unit of the positions, which such a file does not say.
         unit: DeclaredUnit,
     },
-    /// Raw octets, one an axis, axis 1 first; 0 to 255 over the stroke.
+    /// Raw bytes, one an axis, axis 1 first; 0 to 255 over the stroke.
     U8 {
         /// Axes, 1 to 12.
         axes: usize,
@@ -54,7 +54,7 @@ pub enum Source {
     },
 }
 
-/// A vibration of one axis; none where either part is 0.
+/// A vibration of one axis; `None` if either part is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Vibration {
     /// Frequency, Hz: 0, or [`limits::MIN_VIBRATION_HZ`] to [`limits::MAX_VIBRATION_HZ`].
@@ -182,7 +182,7 @@ impl Cue {
     /// Positions of one row, axis 1 first.
     ///
     /// # Panics
-    /// Where there is no such row.
+    /// If there is no such row.
     #[must_use]
     pub fn row(&self, row: usize) -> &[f64] {
         &self.positions[row * self.axes..][..self.axes]
@@ -212,7 +212,7 @@ impl Cue {
         &self.markers
     }
 
-    /// The line a row came from, or the number of its message or octet row, from 1.
+    /// The line a row came from, or the number of its message or byte row, from 1.
     #[must_use]
     pub fn line(&self, row: usize) -> u64 {
         self.origin.line(row)
@@ -236,7 +236,7 @@ impl Cue {
     /// The same cue with other rows. What has a place in it is then placed by the number of its row.
     ///
     /// # Panics
-    /// Where there are not as many positions as rows times axes.
+    /// If there are not as many positions as rows times axes.
     #[must_use]
     pub(crate) fn with_rows(
         &self,
@@ -324,7 +324,7 @@ fn title_of(text: &str) -> String {
     plain::escaped(text, limits::MAX_TITLE).into_owned()
 }
 
-/// Whether a file that begins so is MCAP.
+/// True if a file that begins so is MCAP.
 #[must_use]
 pub fn is_mcap(front: &[u8]) -> bool {
     front.starts_with(mcap::MAGIC)
@@ -360,7 +360,7 @@ mod tests {
         File::create(&path).unwrap().set_len(limits::MAX_FILE + 1).unwrap(); // a hole, it takes no space
         let faults = load(&path, &Source::Native).unwrap_err();
         assert!(
-            faults.to_string().ends_with("holds over 2147483648 octets, the most that is read"),
+            faults.to_string().ends_with("holds over 2147483648 bytes, the most that is read"),
             "{faults}"
         );
     }

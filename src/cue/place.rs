@@ -20,8 +20,8 @@ pub(super) enum Origin {
     },
     /// Messages of an MCAP file, one a row.
     Messages,
-    /// Octets, so many a row.
-    Octets(usize),
+    /// Bytes, so many a row.
+    Bytes(usize),
 }
 
 impl Default for Origin {
@@ -49,7 +49,7 @@ impl Origin {
                 let after = jumps.partition_point(|(first, _)| *first <= row);
                 after.checked_sub(1).map_or(1, |i| jumps[i].1 + (row - jumps[i].0) as u64)
             }
-            Self::Messages | Self::Octets(_) => row as u64 + 1,
+            Self::Messages | Self::Bytes(_) => row as u64 + 1,
         }
     }
 
@@ -65,7 +65,7 @@ impl Origin {
                 number: self.line(row),
                 log_time: time.as_nanos().unsigned_abs(),
             },
-            Self::Octets(axes) => Place::Octet((row * axes + axis) as u64),
+            Self::Bytes(axes) => Place::Byte((row * axes + axis) as u64),
         }
     }
 

@@ -24,10 +24,10 @@ pub enum Problem {
     #[error("reading failed: {0}")]
     Unread(String),
     /// The file, or what it unpacks to, is too large.
-    #[error("holds over {MAX_FILE} octets, the most that is read")]
+    #[error("holds over {MAX_FILE} bytes, the most that is read")]
     FileTooLarge,
     /// A line, or a message, is too long.
-    #[error("over {MAX_LINE} octets long, the most that is read")]
+    #[error("over {MAX_LINE} bytes long, the most that is read")]
     TooLong,
     /// There are too many rows.
     #[error("over {MAX_ROWS} rows, the most that a cue may have")]
@@ -38,7 +38,7 @@ pub enum Problem {
     /// There are too few rows to play.
     #[error("{0} of the two rows that a cue needs at least")]
     TooFewRows(usize),
-    /// Octets that are no text.
+    /// Bytes that are no text.
     #[error("not UTF-8 text")]
     NotUtf8,
     /// A carriage return that ends no line.
@@ -184,12 +184,12 @@ pub enum Problem {
     /// A raw output word that is none.
     #[error("{0:?} is no output word; 0 to 4095, or 0x0 to 0xfff, for Y01 to Y12")]
     Word(String),
-    /// Octets that do not fill whole rows.
-    #[error("{octets} octets are no whole rows of {axes} axes")]
+    /// Bytes that do not fill whole rows.
+    #[error("{bytes} bytes are no whole rows of {axes} axes")]
     PartOfARow {
-        /// Octets in the file.
-        octets: usize,
-        /// Octets of a row.
+        /// Bytes in the file.
+        bytes: usize,
+        /// Bytes of a row.
         axes: usize,
     },
     /// A number of axes that no cue has.
@@ -233,6 +233,6 @@ pub enum Problem {
     #[error("over {MAX_MARKERS} markers, the most that a cue may have")]
     TooManyMarkers,
     /// A marker's name that is too long.
-    #[error("a marker's name of {0} octets; it may have {MAX_MARKER_NAME}")]
+    #[error("a marker's name of {0} bytes; it may have {MAX_MARKER_NAME}")]
     MarkerName(usize),
 }

@@ -139,7 +139,7 @@ fn reached_after(before: ShowTime, text: &str) -> Result<ShowTime, Problem> {
     if reached > MAX_TIME { Err(Problem::TimeTooLate(reached.to_string())) } else { Ok(reached) }
 }
 
-/// The position in a cell; none where an empty cell holds the one before it.
+/// The position in a cell; `None` if an empty cell holds the one before it.
 fn position(text: &str, unit: DeclaredUnit, begun: bool) -> Result<Option<f64>, Problem> {
     match (text.is_empty(), begun) {
         (true, true) => Ok(None),

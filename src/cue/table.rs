@@ -26,12 +26,12 @@ pub(super) struct Lines<R> {
     input: BufReader<R>,
     line: Vec<u8>,
     number: u64,
-    octets: u64,
+    bytes: u64,
 }
 
 impl<R: Read> Lines<R> {
     pub(super) fn new(input: R) -> Self {
-        Self { input: BufReader::with_capacity(BUFFER, input), line: Vec::new(), number: 0, octets: 0 }
+        Self { input: BufReader::with_capacity(BUFFER, input), line: Vec::new(), number: 0, bytes: 0 }
     }
 
     /// The next line that is not blank, and its number from 1; nothing at the end of the file.
@@ -74,10 +74,10 @@ impl<R: Read> Lines<R> {
         let most = MAX_LINE as u64 + 2; // its LF and CR
         match self.input.by_ref().take(most).read_until(b'\n', &mut self.line) {
             Ok(0) => return Ok(false),
-            Ok(octets) => self.octets += octets as u64,
+            Ok(bytes) => self.bytes += bytes as u64,
             Err(error) => return Err(self.fatal(Problem::Unread(error.to_string()))),
         }
-        if self.octets > MAX_FILE {
+        if self.bytes > MAX_FILE {
             return Err(self.fatal(Problem::FileTooLarge));
         }
         if self.line.last() == Some(&b'\n') {
@@ -118,11 +118,11 @@ impl<R: Read> Lines<R> {
 
 fn memchr_cr(line: &[u8]) -> Option<usize> {
     // `contains` is vectorised where `position` is not, and hardly any line has one.
-    if line.contains(&b'\r') { line.iter().position(|octet| *octet == b'\r') } else { None }
+    if line.contains(&b'\r') { line.iter().position(|byte| *byte == b'\r') } else { None }
 }
 
-fn characters(octets: &[u8]) -> u64 {
-    String::from_utf8_lossy(octets).chars().count() as u64
+fn characters(bytes: &[u8]) -> u64 {
+    String::from_utf8_lossy(bytes).chars().count() as u64
 }
 
 /// Takes lines apart into cells; its memory is used again for each line.
@@ -144,7 +144,7 @@ impl Splitter {
 
     /// Lines without quotes, nearly all, need neither a copy nor a parser.
     fn split_plain<'a>(&'a mut self, line: &'a str) -> Cells<'a> {
-        let commas = line.bytes().enumerate().filter(|(_, octet)| *octet == b',').map(|(at, _)| at);
+        let commas = line.bytes().enumerate().filter(|(_, byte)| *byte == b',').map(|(at, _)| at);
         let mut count = 0;
         for end in commas.chain([line.len()]) {
             if let Some(slot) = self.ends.get_mut(count) {
@@ -160,15 +160,15 @@ impl Splitter {
             return Err((column, Problem::OpenQuote));
         }
         self.reader.reset();
-        let (_, _, octets, cells) = self.reader.read_record(line.as_bytes(), &mut self.text, &mut self.ends);
+        let (_, _, bytes, cells) = self.reader.read_record(line.as_bytes(), &mut self.text, &mut self.ends);
         let (result, _, _, last) =
-            self.reader.read_record(b"\n", &mut self.text[octets..], &mut self.ends[cells..]);
+            self.reader.read_record(b"\n", &mut self.text[bytes..], &mut self.ends[cells..]);
         let count = match result {
             csv_core::ReadRecordResult::Record => cells + last,
             _ => raw_cells(line).count(), // more than there is room for
         };
         // The line was UTF-8, and what was taken out of it are quotes and commas.
-        let text = str::from_utf8(&self.text[..octets]).unwrap_or("");
+        let text = str::from_utf8(&self.text[..bytes]).unwrap_or("");
         Ok(Cells { text, gap: 0, ends: &self.ends[..count.min(MAX_CELLS)], count })
     }
 
@@ -193,7 +193,7 @@ impl Splitter {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cells<'a> {
     text: &'a str,
-    /// Octets between a cell and the next.
+    /// Bytes between a cell and the next.
     gap: usize,
     ends: &'a [usize],
     count: usize,
@@ -215,7 +215,7 @@ impl<'a> Cells<'a> {
         })
     }
 
-    /// One cell without the spaces around it; empty where there is none.
+    /// One cell without the spaces around it; empty if there is none.
     pub(super) fn get(&self, index: usize) -> &'a str {
         self.iter().nth(index).unwrap_or("")
     }
@@ -234,17 +234,17 @@ fn open_quote(line: &str) -> Option<u64> {
     last.1.1.then(|| column_of(line, last.0))
 }
 
-/// Where each cell starts in the line, in octets, and whether the line ends within its quotes.
+/// Where each cell starts in the line, in bytes, and whether the line ends within its quotes.
 fn raw_cells(line: &str) -> impl Iterator<Item = (usize, bool)> {
-    let octets = line.as_bytes();
+    let bytes = line.as_bytes();
     let mut next = Some(0);
     std::iter::from_fn(move || {
         let start = next?;
-        let quoted = octets.get(start) == Some(&b'"');
+        let quoted = bytes.get(start) == Some(&b'"');
         let mut inside = quoted;
         let mut at = start + usize::from(quoted);
         next = loop {
-            match octets.get(at) {
+            match bytes.get(at) {
                 None => break None,
                 Some(b',') if !inside => break Some(at + 1),
                 Some(b'"') if quoted => inside = !inside,

@@ -63,7 +63,7 @@ pub enum DeclaredUnit {
     Fraction,
     /// Percent of the stroke, 0 to 100.
     Percent,
-    /// Octets, 0 to 255 over the stroke.
+    /// Bytes, 0 to 255 over the stroke.
     U8,
     /// Millimetres from the stroke's lower end.
     Millimetre,
@@ -94,7 +94,7 @@ impl DeclaredUnit {
         }
     }
 
-    /// What stands behind a value in a message; nothing for fractions and octets.
+    /// What stands behind a value in a message; nothing for fractions and bytes.
     #[must_use]
     pub(super) const fn suffix(self) -> &'static str {
         match self {

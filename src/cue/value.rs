@@ -53,7 +53,7 @@ pub(super) fn hertz(value: f64) -> Result<f64, Problem> {
     }
 }
 
-/// Whether an effect is on: `1` or `0`.
+/// True if an effect is on: `1` or `0`.
 pub(super) fn switch(text: &str) -> Result<bool, Problem> {
     match text {
         "0" => Ok(false),

@@ -37,7 +37,7 @@ impl Address {
         }
     }
 
-    /// Whether it belongs to a drive.
+    /// True if it belongs to a drive.
     #[must_use]
     pub const fn is_servo(self) -> bool {
         matches!(self, Self::Servo { .. })

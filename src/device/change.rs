@@ -106,13 +106,13 @@ pub fn check(assignment: Assignment, dialect: Dialect, force: bool) -> Result<()
     Ok(())
 }
 
-/// Whether writing the value moves the seat.
+/// True if writing the value moves the seat.
 #[must_use]
 pub fn moves(address: Address) -> bool {
     table().get(address).is_some_and(|register| register.flags.moves)
 }
 
-/// Whether the register keeps what is written to it, so that reading it back proves the write.
+/// True if the register keeps what is written to it, so that reading it back proves the write.
 #[must_use]
 pub fn keeps(address: Address) -> bool {
     table().get(address).is_none_or(|register| !register.flags.command)

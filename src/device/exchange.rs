@@ -19,7 +19,7 @@ use crate::wire::{
 
 /// How late an answer may be. The protocol says nothing; the books of a show call an ack lost after the same time.
 const LATEST: Duration = Duration::from_secs(1);
-/// Octets of a register message before its words.
+/// Bytes of a register message before its words.
 const HEAD_LEN: usize = 16;
 
 /// How a controller is spoken to.
@@ -242,8 +242,8 @@ impl Exchange {
 
     /// Takes a datagram from a controller's address; says whether it was about registers or broken, and so is done
     /// with. Motion replies and reports are left to others.
-    pub fn on_datagram(&mut self, lane: usize, octets: &[u8], at: MonoTime) -> bool {
-        match Reply::parse(octets) {
+    pub fn on_datagram(&mut self, lane: usize, bytes: &[u8], at: MonoTime) -> bool {
+        match Reply::parse(bytes) {
             Ok(Some(reply)) => self.on_reply(lane, &reply, at),
             Ok(None) => return false,
             Err(error) => {
@@ -283,7 +283,7 @@ impl Exchange {
         self.lanes.iter().filter_map(|lane| lane.wake(self.patience.timeout)).min()
     }
 
-    /// Whether every request has its outcome.
+    /// True if every request has its outcome.
     #[must_use]
     pub fn finished(&self) -> bool {
         self.lanes.iter().all(|lane| lane.flight.is_none() && lane.queue.is_empty())
@@ -328,9 +328,9 @@ struct Reply<'a> {
 }
 
 impl<'a> Reply<'a> {
-    /// None where it is a whole message, but no reply about registers.
-    fn parse(octets: &'a [u8]) -> Result<Option<Self>, WireError> {
-        let reply = match Message::parse(octets)? {
+    /// `None` if it is a whole message, but no reply about registers.
+    fn parse(bytes: &'a [u8]) -> Result<Option<Self>, WireError> {
+        let reply = match Message::parse(bytes)? {
             Message::RegisterReply(RegisterReply { access, code, channel, error, start, num, data }) => {
                 Self { servo: false, access, code, slot: channel | error, start, num, words: data }
             }
@@ -341,7 +341,7 @@ impl<'a> Reply<'a> {
         };
         // A refusal may bring an error number in place of its words.
         let words = if reply.code.refused() { reply.num.max(1) } else { reply.num };
-        let (len, need) = (octets.len(), HEAD_LEN + 2 * usize::from(words));
+        let (len, need) = (bytes.len(), HEAD_LEN + 2 * usize::from(words));
         if len > need { Err(WireError::Surplus { len, need }) } else { Ok(Some(reply)) }
     }
 

@@ -50,7 +50,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Whether the controller answered, but would not.
+    /// True if the controller answered, but would not.
     #[must_use]
     pub const fn refused(&self) -> bool {
         matches!(self, Self::Refused { .. } | Self::NoWay { .. })
@@ -146,7 +146,7 @@ mod tests {
             "{plain}"
         );
         let broken = silent(Some(Odd::Malformed(WireError::Length { len: 17, need: 18 })));
-        assert!(broken.ends_with("octet 17: ends after 17 octets; this message takes 18"), "{broken}");
+        assert!(broken.ends_with("byte 17: ends after 17 bytes; this message takes 18"), "{broken}");
         let other = silent(Some(Odd::Foreign { start: 0x96, num: 1 }));
         assert!(other.ends_with("answers something else (1 registers from 96)"), "{other}");
     }

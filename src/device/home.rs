@@ -56,7 +56,7 @@ pub enum HomeError {
     Timeout {
         /// How long was waited.
         after: Duration,
-        /// What DPF0 read last; none where it was never read.
+        /// What DPF0 read last; `None` if it was never read.
         dpf0: Option<u16>,
     },
 }
@@ -77,7 +77,7 @@ pub enum Progress {
     Homing {
         /// Since the order.
         since: Duration,
-        /// What DPF0 reads; none where a look had no answer.
+        /// What DPF0 reads; `None` if a look had no answer.
         dpf0: Option<u16>,
     },
     /// It is home.

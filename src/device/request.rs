@@ -1,4 +1,4 @@
-//! What is asked of a controller, as octets; and by what its answer is known.
+//! What is asked of a controller, as bytes; and by what its answer is known.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use crate::wire::{
     Access, Dialect, MAX_LEN, MAX_SERVO_READ, ReadRequest, ServoRead, ServoWrite, Words, WriteRequest,
 };
 
-/// The most registers of a controller that one request reads: a reply of 80 octets. The manuals set no limit, but
+/// The most registers of a controller that one request reads: a reply of 80 bytes. The manuals set no limit, but
 /// public programs ask for a few at a time, and nobody has shown a controller that answers many.
 pub const MAX_READ: u16 = 32;
 
@@ -36,7 +36,7 @@ pub enum Request {
         address: Address,
         /// The value.
         value: u16,
-        /// Whether an MBOX controller keeps it over a power cycle, which it does by another object channel; SMC
+        /// True if an MBOX controller keeps it over a power cycle, which it does by another object channel; SMC
         /// controllers keep nothing until PA0f = 2.
         keep: bool,
     },
@@ -73,7 +73,7 @@ impl Request {
         }
     }
 
-    /// By what the answer is known; none where a controller of this dialect has no way to be asked for it.
+    /// By what the answer is known; `None` if a controller of this dialect has no way to be asked for it.
     pub(super) fn id(&self, dialect: Dialect) -> Option<Id> {
         let (access, num) = match *self {
             Self::Read { count, .. } => (Access::Read, count),
@@ -140,7 +140,7 @@ impl fmt::Display for Request {
 /// By what a reply is known: the protocol gives register messages no number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Id {
-    /// Whether it is about a drive.
+    /// True if it is about a drive.
     pub(super) servo: bool,
     /// Read or write.
     pub(super) access: Access,
@@ -153,7 +153,7 @@ pub(super) struct Id {
 }
 
 impl Id {
-    /// Whether a reply to the one could pass for a reply to the other: with x over 2 an SMC controller puts its error
+    /// True if a reply to the one could pass for a reply to the other: with x over 2 an SMC controller puts its error
     /// number where channel or drive stood, and may leave out the words.
     pub(super) fn confusable(self, other: Self) -> bool {
         self.servo == other.servo && self.access == other.access && self.start == other.start
@@ -186,14 +186,14 @@ mod tests {
     use super::*;
     use crate::wire::{Code, Message};
 
-    fn octets(request: &Request, dialect: Dialect) -> Option<String> {
+    fn bytes(request: &Request, dialect: Dialect) -> Option<String> {
         let peer = Peer { dialect, code: Code::ALL };
         let id = request.id(dialect)?;
         let mut buf = [0xa5; MAX_LEN];
-        let octets = request.emit(id, &peer, &mut buf);
-        assert!(Message::parse(octets).is_ok());
+        let bytes = request.emit(id, &peer, &mut buf);
+        assert!(Message::parse(bytes).is_ok());
         Some(
-            octets
+            bytes
                 .chunks(2)
                 .map(|pair| format!("{:02x}{:02x}", pair[0], pair[1]))
                 .collect::<Vec<_>>()
@@ -203,18 +203,18 @@ mod tests {
 
     #[test]
     fn reads_name_dp_by_channel_0_and_pa_by_channel_1() {
-        let read = |first, count| octets(&Request::Read { first, count }, Dialect::Smc).unwrap();
+        let read = |first, count| bytes(&Request::Read { first, count }, Dialect::Smc).unwrap();
         assert_eq!(read(Address::Dp(6), 6), "55aa 0000 1101 0000 ffff ffff 0006 0006");
         assert_eq!(read(Address::Pa(0x95), 1), "55aa 0000 1101 0001 ffff ffff 0095 0001");
         assert_eq!(read(Address::Dp(0xf0), 1), "55aa 0000 1101 0000 ffff ffff 00f0 0001");
         let servo = Address::Servo { servo: 2, number: 508 };
-        assert_eq!(octets(&Request::read(servo), Dialect::Mbox), None);
+        assert_eq!(bytes(&Request::read(servo), Dialect::Mbox), None);
         assert_eq!(read(servo, 6), "33cc 0000 2101 0002 ffff ffff 01fc 0006");
     }
 
     #[test]
     fn the_channel_of_a_write_follows_the_dialect() {
-        let write = |address, keep, dialect| octets(&Request::Write { address, value: 5, keep }, dialect);
+        let write = |address, keep, dialect| bytes(&Request::Write { address, value: 5, keep }, dialect);
         let of = |channel: u16, start: u16| {
             Some(format!("55aa 0000 1201 {channel:04x} ffff ffff {start:04x} 0001 0005"))
         };
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_reset_is_the_one_that_was_captured_in_the_field() {
-        let reset = octets(&Request::write(Address::Dp(0xf0), 0), Dialect::Mbox).unwrap();
+        let reset = bytes(&Request::write(Address::Dp(0xf0), 0), Dialect::Mbox).unwrap();
         assert_eq!(reset, "55aa 0000 1201 0002 ffff ffff 0000 0001 0000");
     }
 

@@ -81,7 +81,7 @@ pub enum SelectError {
 pub struct Selection {
     /// Which, in order.
     pub addresses: Vec<Address>,
-    /// Whether a single register was named rather than a range or a table; it must then be there.
+    /// True if a single register was named rather than a range or a table; it must then be there.
     pub single: bool,
 }
 
@@ -209,7 +209,7 @@ fn on_panel(numbers: &str, panel: &Panel) -> Result<Selection, SelectError> {
         wanted: "000 to 255, or a range as 128..133",
     };
     let decimal = |text: &str| {
-        let digits = text.bytes().all(|octet| octet.is_ascii_digit());
+        let digits = text.bytes().all(|byte| byte.is_ascii_digit());
         text.parse::<u8>().ok().filter(|_| digits && text.len() <= 3).ok_or_else(bad)
     };
     let (first, last) = ends(numbers).ok_or_else(bad)?;

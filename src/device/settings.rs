@@ -157,7 +157,7 @@ pub struct Difference {
     pub found: u16,
 }
 
-/// Whether two controllers with the same settings may differ here: their own addresses.
+/// True if two controllers with the same settings may differ here: their own addresses.
 #[must_use]
 pub fn is_own(address: Address) -> bool {
     table().get(address).is_some_and(|register| register.flags.identity)

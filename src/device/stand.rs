@@ -106,7 +106,7 @@ pub enum StandError {
 }
 
 impl StandError {
-    /// Whether the controller answered, but will not do.
+    /// True if the controller answered, but will not do.
     #[must_use]
     pub const fn answered(&self) -> bool {
         match self {
@@ -148,13 +148,13 @@ pub fn places(axes: usize) -> impl Iterator<Item = Address> {
     (0..axes).map_while(words).flatten()
 }
 
-/// The two registers of an axis's position, from 0; none where it has none.
+/// The two registers of an axis's position, from 0; `None` if it has none.
 fn words(axis: usize) -> Option<[Address; 2]> {
     let first = u8::try_from(*DP_POSITIONS.get(axis)?).ok()?;
     Some([Address::Dp(first), Address::Dp(first + 1)])
 }
 
-/// What the position registers of the first `axes` axes hold, two words each; none where one of them is missing.
+/// What the position registers of the first `axes` axes hold, two words each; `None` if one of them is missing.
 #[must_use]
 pub fn position_words_of(values: &Values, axes: usize) -> Option<Vec<[u16; 2]>> {
     let held = |address| values.get(&address).copied();

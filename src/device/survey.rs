@@ -38,7 +38,7 @@ const PACKETS: Address = Address::Dp(0x34);
 pub struct Survey {
     /// What its registers hold.
     pub values: Values,
-    /// Why the first question had no answer; none where it had one.
+    /// Why the first question had no answer; `None` if it had one.
     pub silent: Option<Fault>,
     /// Why later questions had none.
     pub unread: Vec<Fault>,
@@ -54,14 +54,14 @@ pub struct Survey {
     pub changed: Vec<Address>,
     /// Where its axes stood the second time, by the position registers.
     pub again: Values,
-    /// Datagrams that it received beyond those sent from here; none where that is not known.
+    /// Datagrams that it received beyond those sent from here; `None` if that is not known.
     pub foreign_packets: Option<u16>,
     /// What it reported unasked.
     pub reported: ControllerState,
 }
 
 impl Survey {
-    /// Whether it answered at all.
+    /// True if it answered at all.
     #[must_use]
     pub const fn answered(&self) -> bool {
         self.silent.is_none()
@@ -259,10 +259,10 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
 
 /// Takes what is no answer for a report.
 fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
-    |origin, octets, at| {
+    |origin, bytes, at| {
         let _ = match origin {
-            Origin::Controller(lane) => observer.hear(lane, octets, at),
-            Origin::Stranger(from) => observer.hear_elsewhere(from, octets, at),
+            Origin::Controller(lane) => observer.hear(lane, bytes, at),
+            Origin::Stranger(from) => observer.hear_elsewhere(from, bytes, at),
         };
     }
 }

@@ -25,7 +25,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// Whether a controller of `dialect` has it.
+    /// True if a controller of `dialect` has it.
     #[must_use]
     pub const fn has(self, dialect: Dialect) -> bool {
         matches!((self, dialect), (Self::Both, _) | (Self::Smc, Dialect::Smc) | (Self::Mbox, Dialect::Mbox))
@@ -63,13 +63,13 @@ pub struct Register {
     pub min: u16,
     /// The greatest value that makes sense.
     pub max: u16,
-    /// Its value in the factory by the IMAX manual; none where that has none.
+    /// Its value in the factory by the IMAX manual; `None` if that has none.
     pub default_imax: Option<u16>,
     /// The same by the SMC manual, where that says anything of its own.
     pub default_smc: Option<u16>,
     /// Whose it is.
     pub dialect: Family,
-    /// Whether PA0f = 2 keeps it over a power cycle.
+    /// True if PA0f = 2 keeps it over a power cycle.
     pub saved: bool,
     /// What has to be heeded before it is written.
     pub flags: Flags,
@@ -126,7 +126,7 @@ impl Table {
         self.0.binary_search_by_key(&address, |register| register.address).ok().map(|index| &self.0[index])
     }
 
-    /// Whether controllers of `dialect` have what is at an address. Drives can be asked through SMC controllers only;
+    /// True if controllers of `dialect` have what is at an address. Drives can be asked through SMC controllers only;
     /// which registers they have, their own manuals say.
     #[must_use]
     pub fn has(&self, address: Address, dialect: Dialect) -> bool {
@@ -143,7 +143,7 @@ impl Table {
         self.0.iter().find(|register| register.name.to_lowercase().replace('-', " ") == name)
     }
 
-    /// The factory value of a parameter for a controller of `dialect`; 0 where the manuals say nothing.
+    /// The factory value of a parameter for a controller of `dialect`; 0 if the manuals say nothing.
     #[must_use]
     pub fn factory(&self, parameter: u8, dialect: Dialect) -> u16 {
         self.get(Address::Pa(parameter)).and_then(|register| register.default(dialect)).unwrap_or(0)

@@ -72,7 +72,7 @@ impl Talk {
     /// Takes the frame port for a conversation with `controllers`.
     ///
     /// # Errors
-    /// [`NetError`] where it cannot be had, be it that another kinocue holds it.
+    /// [`NetError`] where it cannot be had, even if another kinocue holds it.
     pub fn open(bind: SocketAddrV4, controllers: &[Controller]) -> Result<Self, NetError> {
         let addresses: Vec<_> = controllers.iter().map(|one| one.address).collect();
         Ok(Self::over(Ports::open(bind, &addresses)?.split(), Monotonic, &peers(controllers)))
@@ -153,9 +153,9 @@ impl<L: Link, C: Clock> Talk<L, C> {
 
     fn look(&mut self, watch: &mut Watch<'_>) {
         let Self { link, exchange, strangers, closed, .. } = self;
-        link.drain(&mut |origin, octets, at| {
+        link.drain(&mut |origin, bytes, at| {
             let done = match origin {
-                Origin::Controller(lane) => exchange.on_datagram(lane, octets, at),
+                Origin::Controller(lane) => exchange.on_datagram(lane, bytes, at),
                 Origin::Stranger(address) => {
                     if strangers.len() < STRANGERS || strangers.contains_key(&address) {
                         *strangers.entry(address).or_insert(0) += 1;
@@ -164,7 +164,7 @@ impl<L: Link, C: Clock> Talk<L, C> {
                 }
             };
             if !done {
-                watch(origin, octets, at);
+                watch(origin, bytes, at);
             }
         });
         for (lane, before) in closed.iter_mut().enumerate() {

@@ -69,8 +69,8 @@ impl Rig {
     }
 
     /// Has a datagram come from somewhere.
-    pub(super) fn inject(&self, origin: Origin, octets: Vec<u8>) {
-        self.net.borrow_mut().inbox.push_back((self.now.get(), origin, octets));
+    pub(super) fn inject(&self, origin: Origin, bytes: Vec<u8>) {
+        self.net.borrow_mut().inbox.push_back((self.now.get(), origin, bytes));
     }
 
     pub(super) fn lanes(&self) -> usize {
@@ -120,8 +120,8 @@ impl Link for Rig {
         net.inbox = waiting;
         drop(net);
         let come: VecDeque<_> = come;
-        for (at, origin, octets) in come {
-            on(origin, &octets, at);
+        for (at, origin, bytes) in come {
+            on(origin, &bytes, at);
         }
     }
 

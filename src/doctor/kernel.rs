@@ -107,7 +107,7 @@ impl PreemptionSigns<'_> {
 pub struct Slack {
     /// What it begins with, ns.
     pub default_ns: u64,
-    /// Whether 1 ns was accepted.
+    /// True if 1 ns was accepted.
     pub settable: bool,
 }
 
@@ -118,7 +118,7 @@ pub struct RealTimeThreads {
     pub of_programs: Vec<String>,
     /// How many of the kernel's own.
     pub of_kernel: usize,
-    /// Whether any thread of the kernel's was seen; if not, other programs are hidden as well.
+    /// True if any thread of the kernel's was seen; if not, other programs are hidden as well.
     pub whole: bool,
 }
 

@@ -6,9 +6,9 @@ use crate::sys::machine::Limit;
 /// What is known of memory.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    /// Whether locking it was granted; else why not.
+    /// True if locking it was granted; else why not.
     pub locked: Result<(), String>,
-    /// Octets that may be locked without a right (`RLIMIT_MEMLOCK`).
+    /// Bytes that may be locked without a right (`RLIMIT_MEMLOCK`).
     pub limit: Limit,
     /// What the machine swaps to.
     pub swaps: Seen<Vec<String>>,
@@ -40,10 +40,10 @@ impl Memory {
         const ID: &str = "memory_lock_limit";
         match self.limit.soft {
             None => Line::ok(ID, "RLIMIT_MEMLOCK unlimited"),
-            Some(octets) => Line::warn(
+            Some(bytes) => Line::warn(
                 ID,
                 format!(
-                    "RLIMIT_MEMLOCK {octets} octets: only what is there at the start is locked, and only if it fits"
+                    "RLIMIT_MEMLOCK {bytes} bytes: only what is there at the start is locked, and only if it fits"
                 ),
                 UNLIMITED,
             ),

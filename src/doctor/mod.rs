@@ -1,15 +1,15 @@
 //! Is this machine real-time? Facts about it in, one line for each of them out: what was found, whether that will do, and
 //! exactly what to change. Control thread only.
 //!
-//! One file for each family of facts holds the facts and their judgement, which is pure. [`look()`] reads them from this
+//! One file for each family of facts holds the facts and their judgement, which is pure. [`facts()`] reads them from this
 //! machine with the help of [`text`]; [`measure`] runs the bare tick loop; [`chart`] draws what came of it. What could not
 //! be seen is said so, never guessed.
 
 pub mod chart;
 pub mod clocks;
+pub mod facts;
 pub mod kernel;
 pub mod lateness;
-pub mod look;
 pub mod measure;
 pub mod memory;
 pub mod network;
@@ -19,7 +19,7 @@ pub mod text;
 
 use serde::Serialize;
 
-pub use look::look;
+pub use facts::facts;
 
 /// A fact, or why it could not be seen, in words.
 pub type Seen<T> = Result<T, String>;
@@ -126,7 +126,7 @@ pub fn judge(facts: &Facts, hall: Hall) -> Vec<Line> {
     lines
 }
 
-/// Whether a machine with these findings is ready: nothing is bad. What could not be seen does not count against it.
+/// True if a machine with these findings is ready: nothing is bad. What could not be seen does not count against it.
 #[must_use]
 pub fn ready(lines: &[Line]) -> bool {
     lines.iter().all(|line| line.verdict != Verdict::Bad)

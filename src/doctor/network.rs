@@ -8,9 +8,9 @@ use crate::sys::machine::Limit;
 pub struct Network {
     /// Sizes of the table of neighbours.
     pub neighbours: Seen<NeighbourTable>,
-    /// Octets that a socket's receive buffer may be asked to have (`rmem_max`).
+    /// Bytes that a socket's receive buffer may be asked to have (`rmem_max`).
     pub receive_max: Seen<u64>,
-    /// Octets that it has unasked (`rmem_default`).
+    /// Bytes that it has unasked (`rmem_default`).
     pub receive_default: Seen<u64>,
     /// Pages that all UDP sockets of the machine may fill together (the last of `udp_mem`).
     pub udp_pages: Seen<u64>,
@@ -35,10 +35,10 @@ const OTHER_NEIGHBOURS: u64 = 32;
 const OTHER_FILES: u64 = 64;
 /// Replies of a controller in 5 ms at 1 kHz: how long the thread that reads them may be kept from running.
 const REPLIES: u64 = 5;
-/// Octets that one short datagram takes of a receive buffer: half a page of the network card's driver and the kernel's
+/// Bytes that one short datagram takes of a receive buffer: half a page of the network card's driver and the kernel's
 /// own record of it.
-const REPLY_OCTETS: u64 = 2_304;
-/// Octets that a play asks for.
+const REPLY_BYTES: u64 = 2_304;
+/// Bytes that a play asks for.
 const ASKED: u64 = 1 << 20;
 /// The smallest page there is.
 const PAGE: u64 = 4_096;
@@ -91,12 +91,12 @@ impl Network {
             (Ok(most), Ok(unasked)) => (*most, *unasked),
             (Err(why), _) | (_, Err(why)) => return Line::unknown(ID, why, LOOK),
         };
-        let one = REPLIES * REPLY_OCTETS;
+        let one = REPLIES * REPLY_BYTES;
         let all = one * u64::from(hall.controllers);
         // The kernel doubles what is asked for: its own records count as well.
         let has = 2 * ASKED.min(most);
         let found = format!(
-            "{has} octets for each controller's replies (rmem_max {most}, rmem_default {unasked}); 5 ms of them take {one}"
+            "{has} bytes for each controller's replies (rmem_max {most}, rmem_default {unasked}); 5 ms of them take {one}"
         );
         if has < one {
             return Line::warn(ID, found, format!("sysctl -w net.core.rmem_max={ASKED}"));

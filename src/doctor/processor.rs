@@ -22,7 +22,7 @@ pub struct Processor {
 /// What is between this program and the bare machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Around {
-    /// Whether a container is.
+    /// True if a container is.
     pub container: bool,
     /// Which virtual machine is; `None` where there is none.
     pub machine: Seen<Option<String>>,
@@ -64,7 +64,7 @@ pub struct IdleState {
 /// `/dev/cpu_dma_latency`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DmaLatency {
-    /// Whether it could be opened for writing; else why not.
+    /// True if it could be opened for writing; else why not.
     pub opened: Result<(), String>,
     /// The longest wake-up, µs, that all who hold it open agreed on; `None` where it cannot be read.
     pub held_us: Option<i32>,

@@ -11,7 +11,7 @@ pub struct Scheduling {
     pub trial: Seen<Trial>,
     /// The highest priority that needs no right (`RLIMIT_RTPRIO`).
     pub limit: Limit,
-    /// Whether this process has the right to any priority (`CAP_SYS_NICE` in the first user namespace).
+    /// True if this process has the right to any priority (`CAP_SYS_NICE` in the first user namespace).
     pub right: Seen<bool>,
     /// The control group that rules processor time.
     pub group: Seen<Group>,
@@ -22,7 +22,7 @@ pub struct Scheduling {
 /// What came of asking the kernel for `SCHED_FIFO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Trial {
-    /// Whether whoever started the program gave it.
+    /// True if whoever started the program gave it.
     pub given: bool,
     /// The policy in force afterwards.
     pub policy: Policy,
@@ -37,7 +37,7 @@ pub struct Trial {
 pub struct Refusal {
     /// In the kernel's words.
     pub words: String,
-    /// Whether it was `EPERM`: for lack of a right, or by a control group.
+    /// True if it was `EPERM`: for lack of a right, or by a control group.
     pub not_permitted: bool,
 }
 
@@ -49,7 +49,7 @@ pub struct Group {
     /// The file that gives it its real-time share, and the share in µs; only the first version has one, and only in a
     /// kernel with `CONFIG_RT_GROUP_SCHED`.
     pub share: Option<(String, i64)>,
-    /// Whether the kernel shares out real-time by groups; `None` where its configuration could not be read.
+    /// True if the kernel shares out real-time by groups; `None` where its configuration could not be read.
     pub configured: Option<bool>,
 }
 
@@ -66,13 +66,13 @@ pub struct Throttle {
 const MOST_PERCENT: i64 = 90;
 
 impl Scheduling {
-    /// Whether a play would be real-time.
+    /// True if a play would be real-time.
     #[must_use]
     pub fn granted(&self) -> bool {
         self.trial.as_ref().is_ok_and(|trial| trial.policy != Policy::Other)
     }
 
-    /// Whether nothing but a control group, or a filter of the container, can have refused.
+    /// True if nothing but a control group, or a filter of the container, can have refused.
     fn entitled(&self) -> bool {
         self.right == Ok(true) || self.limit.soft.is_none_or(|most| most >= u64::from(PRIORITY))
     }
@@ -160,7 +160,7 @@ impl Scheduling {
             _ if refused.is_some_and(|refusal| refusal.not_permitted) && self.entitled() => Line::bad(
                 ID,
                 found
-                    + "; refused although right or limit allow it, so by the group or by a filter of the container",
+                    + "; refused although the limit allows it: blocked by the control group or a seccomp filter",
                 "no CPUWeight=, CPUQuota= or Delegate= in the unit and its slice; or boot with rt_group_sched=0; in a \
                  container: --cap-add SYS_NICE and a seccomp profile that allows sched_setscheduler",
             ),

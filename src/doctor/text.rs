@@ -8,14 +8,14 @@ pub fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
     text.lines().find_map(value).map(str::trim)
 }
 
-/// Whether the effective rights of `/proc/self/status` hold the one of that number.
+/// True if the effective rights of `/proc/self/status` hold the one of that number.
 #[must_use]
 pub fn has_right(status: &str, number: u32) -> Option<bool> {
     let held = u64::from_str_radix(field(status, "CapEff")?, 16).ok()?;
     Some(held.checked_shr(number)? & 1 == 1)
 }
 
-/// Whether `/proc/self/uid_map` is that of the first user namespace; in any other one rights do not reach the scheduler.
+/// True if `/proc/self/uid_map` is that of the first user namespace; in any other one rights do not reach the scheduler.
 #[must_use]
 pub fn is_first_user_namespace(uid_map: &str) -> bool {
     uid_map.split_ascii_whitespace().eq(["0", "0", "4294967295"])
@@ -38,7 +38,7 @@ fn range_len(range: &str) -> Option<usize> {
 pub struct ControlGroup {
     /// Its path below where its hierarchy is mounted.
     pub path: String,
-    /// Whether it is of the second version.
+    /// True if it is of the second version.
     pub unified: bool,
 }
 
@@ -98,7 +98,7 @@ pub fn swaps(text: &str) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
-/// Whether a kernel's configuration has an option set; `None` where it does not speak of it.
+/// True if a kernel's configuration has an option set; `None` where it does not speak of it.
 #[must_use]
 pub fn option_set(config: &str, name: &str) -> Option<bool> {
     config.lines().find_map(|line| {
@@ -129,11 +129,11 @@ pub fn bracketed(text: &str) -> Option<&str> {
 pub struct ThreadStat {
     /// Its name.
     pub name: String,
-    /// Whether it is the kernel's own.
+    /// True if it is the kernel's own.
     pub of_kernel: bool,
-    /// Its real-time priority; 0 where it has none.
+    /// Its real-time priority; 0 if it has none.
     pub priority: u32,
-    /// Whether its policy is `SCHED_FIFO` or `SCHED_RR`.
+    /// True if its policy is `SCHED_FIFO` or `SCHED_RR`.
     pub real_time: bool,
 }
 

@@ -55,11 +55,11 @@ pub enum Ending {
 pub struct Show {
     /// Ticks per second.
     pub rate: Rate,
-    /// Which Time the frames carry.
+    /// The kind of Time that the frames carry.
     pub timing: Timing,
     /// Show time of tick 0.
     pub start: ShowTime,
-    /// Plays in all; 0 plays until stopped.
+    /// Number of plays; 0 plays until stopped.
     pub plays: u32,
 }
 

@@ -71,7 +71,7 @@ impl Engine {
         self.resuming = false;
     }
 
-    /// Goes on from a pause.
+    /// Resumes a paused show.
     pub fn resume(&mut self) {
         self.resuming |= self.rest() == Some(Rest::Paused);
     }

@@ -7,7 +7,7 @@ use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
 use crate::belief::KnownPose;
-use crate::gate::{Asked, Counts, Gate, Verdict};
+use crate::limiter::{Admitted, Counts, Limiter, Provenance};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
 use crate::time::{Rate, ShowTime};
@@ -67,7 +67,7 @@ pub(super) struct Rider {
     trail: Trail,
     brake: Brake,
     /// Whatever is asked of it, what is sent keeps the limits.
-    gate: Gate,
+    limiter: Limiter,
 }
 
 impl Rider {
@@ -91,7 +91,7 @@ impl Rider {
             vibration: level,
             brake: Brake::new(&window, &nowhere.states()),
             trail: nowhere,
-            gate: Gate::new(&window, rate),
+            limiter: Limiter::new(&window, rate),
             window,
         }
     }
@@ -182,7 +182,7 @@ impl Rider {
     /// It is there (again), at rest in that pose.
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
-        self.gate.restart(known);
+        self.limiter.restart(known);
         (self.part, self.leaving, self.ahead) = (Part::Still, None, 0);
         (self.refused, self.returning) = (false, true);
     }
@@ -191,14 +191,14 @@ impl Rider {
     pub(super) fn begin_at_park(&mut self, known: &KnownPose) {
         self.come_back(known);
         self.trail.rest(self.window.park());
-        self.gate.restart_at_park(known, &self.window);
+        self.limiter.restart_at_park(known, &self.window);
         (self.part, self.returning) = (Part::With, false);
     }
 
     /// Frames stopped: none leads elsewhere than to the last pose, and the way goes on from there.
     pub(super) fn halt(&mut self) {
         self.trail.rest(*self.pose());
-        self.gate.rest();
+        self.limiter.rest();
         if self.is_blind() {
             self.fall_out();
         } else if self.is_there() {
@@ -206,17 +206,17 @@ impl Rider {
         }
     }
 
-    /// Goes on counting what the gate has to do where another left off.
+    /// Goes on counting what the limiter has to do where another left off.
     pub(super) const fn count_on(&mut self, before: &Self) {
-        self.gate.count_on(before.gate.counts());
+        self.limiter.count_on(before.limiter.counts());
     }
 
-    /// What the gate had to do.
+    /// What the limiter had to do.
     pub(super) const fn clamps(&self) -> &Counts {
-        self.gate.counts()
+        self.limiter.counts()
     }
 
-    /// Whether the gate has held it back too often; said once.
+    /// Whether the limiter has held it back too often; said once.
     pub(super) const fn take_fault(&mut self) -> bool {
         std::mem::replace(&mut self.is_at_fault, false)
     }
@@ -289,14 +289,14 @@ impl Rider {
         Some(leg.lasts_ms)
     }
 
-    /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the gate lets it pass.
+    /// Has `pose` sent in frame `index`, counted from 0, to be reached in `time`, as far as the limiter lets it pass.
     ///
     /// Following its course at a level that stands its way out is part of the proof: course and cue are within the limits to
     /// their ends, and from there to rest.
     pub(super) fn send(&mut self, index: u64, time: Duration, mut pose: Pose) {
         let proved = self.part == Part::With && self.fader.is_still();
-        let asked = if proved { Asked::Proved } else { Asked::Anyhow };
-        self.is_at_fault |= self.gate.admit(&mut pose, index, asked) == Verdict::Fault;
+        let asked = if proved { Provenance::Proved } else { Provenance::Anyhow };
+        self.is_at_fault |= self.limiter.admit(&mut pose, index, asked) == Admitted::Fault;
         self.trail.push(time, pose);
         let step = VIBRATION_RATE * time.as_secs_f64();
         self.vibration += (self.wanted.vibration - self.vibration).clamp(-step, step);

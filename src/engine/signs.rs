@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use super::{Ending, Engine, Phase, Rider};
-use crate::gate::Counts;
+use crate::limiter::Counts;
 
 /// What the planner found no move for, while the show goes on without it. In words by its `Display`, without the name of the seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,13 +38,13 @@ impl Engine {
         self.riders.iter_mut().position(Rider::take_refusal).map(Unplanned::Lane)
     }
 
-    /// What the gate had to do for a lane.
+    /// What the limiter had to do for a lane.
     #[must_use]
     pub fn clamps(&self, lane: usize) -> &Counts {
         self.riders[lane].clamps()
     }
 
-    /// Whether the gate has held a lane back three times within a second since this was asked last.
+    /// Whether the limiter has held a lane back three times within a second since this was asked last.
     pub fn take_gate_fault(&mut self) -> bool {
         self.riders.iter_mut().fold(false, |any, rider| any | rider.take_fault())
     }

@@ -11,7 +11,7 @@ use crate::wire::{Code, FrameNo, motion_channel_and_slots};
 pub struct Manner {
     /// Intensity of motion and vibration, 0 to 1, about the seats' neutral poses.
     pub level: f64,
-    /// Whether no frame asks for a reply.
+    /// True if no frame asks for a reply.
     pub silent: bool,
 }
 

@@ -1,4 +1,4 @@
-//! From a pose to the octets of one controller's frame: slots to pulses, effects to outputs, the frame number.
+//! From a pose to the bytes of one controller's frame: slots to pulses, effects to outputs, the frame number.
 //! Tick thread; allocates nothing.
 
 mod lanes;
@@ -43,13 +43,13 @@ pub struct Lane {
     pub channel: u16,
     /// Who takes its frames, and who answers those that ask.
     pub code: Code,
-    /// Whether its frames carry vibration.
+    /// True if its frames carry vibration.
     pub vibrates: bool,
     /// How these have Port Out.
     pub vibration_port: VibrationPort,
     /// Which outputs it switches.
     pub wiring: Wiring,
-    /// Asks for a reply in each so-manieth frame; 0 never asks.
+    /// Asks for a reply in each Nth frame; 0 never asks.
     pub ack_every: u32,
     /// The longest Time that its controller executes as it is, ms (PA0b).
     pub longest_ms: u32,
@@ -61,7 +61,7 @@ pub struct Lane {
 pub struct Stamped {
     /// Its number.
     pub frame: FrameNo,
-    /// Whether it asks for a reply.
+    /// True if it asks for a reply.
     pub asked: bool,
 }
 
@@ -100,7 +100,7 @@ impl Lane {
     }
 
     /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects off.
-    pub fn encode_homing<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+    pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
         let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
         let beat = Beat::still(Timing::Relative, time_ms);
         let written = self.encode(&beat, &park, Mix::STILL, buf);

@@ -29,8 +29,8 @@ fn frames(config: &Config, cue: &Timeline, manner: Manner) -> Vec<MotionRequest>
     let frame = |lane: &mut Lane| {
         let placed = lane.window.place(&pose);
         let mut buf = [0xa5; MAX_LEN];
-        let (_, octets) = lane.encode(&beat, &placed, Mix { vibration: manner.level, ..Mix::FULL }, &mut buf);
-        MotionRequest::parse(octets).unwrap()
+        let (_, bytes) = lane.encode(&beat, &placed, Mix { vibration: manner.level, ..Mix::FULL }, &mut buf);
+        MotionRequest::parse(bytes).unwrap()
     };
     lanes(config, cue, manner).iter_mut().map(frame).collect()
 }
@@ -78,15 +78,15 @@ fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
     let mut beat = Beat::still(Timing::Absolute, 10);
     beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
     let mut buf = [0xa5; MAX_LEN];
-    let (stamped, octets) = lane.encode(&beat, &lane.window.park(), Mix::FULL, &mut buf);
-    let frame = MotionRequest::parse(octets).unwrap();
+    let (stamped, bytes) = lane.encode(&beat, &lane.window.park(), Mix::FULL, &mut buf);
+    let frame = MotionRequest::parse(bytes).unwrap();
     assert_eq!(stamped, Stamped { frame: FrameNo::FIRST, asked: true });
     assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
-    assert_eq!(octets[4..6], [0x18, 0x01]);
+    assert_eq!(bytes[4..6], [0x18, 0x01]);
 }
 
 #[test]
-fn vibration_stands_two_octets_further_back_where_port_out_takes_four() {
+fn vibration_stands_two_bytes_further_back_where_port_out_takes_four() {
     let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
     let mut config = hall(&["127.0.0.1:1"], 1);
     config.controllers[0].vibration_port = VibrationPort::Four;
@@ -96,12 +96,12 @@ fn vibration_stands_two_octets_further_back_where_port_out_takes_four() {
     beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
     let mut buf = [0xa5; MAX_LEN];
     let park = lane.window.park();
-    let (_, octets) = lane.encode(&beat, &park, Mix::FULL, &mut buf);
-    assert_eq!((octets.len(), &octets[32..36]), (48, &[0, 0, 0, 3][..]));
-    let frame = MotionRequest::parse_as(VibrationPort::Four, octets).unwrap();
+    let (_, bytes) = lane.encode(&beat, &park, Mix::FULL, &mut buf);
+    assert_eq!((bytes.len(), &bytes[32..36]), (48, &[0, 0, 0, 3][..]));
+    let frame = MotionRequest::parse_as(VibrationPort::Four, bytes).unwrap();
     assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
-    let (_, octets) = lane.encode_homing(3_000, &mut buf);
-    assert_eq!(octets.len(), 38, "a frame without vibration is the same for all");
+    let (_, bytes) = lane.encode_slow_park(3_000, &mut buf);
+    assert_eq!(bytes.len(), 38, "a frame without vibration is the same for all");
 }
 
 #[test]
@@ -109,9 +109,9 @@ fn the_way_home_is_relative_and_plain_and_takes_a_frame_number() {
     let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
     let mut lane = lanes(&hall(&["127.0.0.1:1"], 1), &cue, FULL).remove(0);
     let mut buf = [0xa5; MAX_LEN];
-    let (first, octets) = lane.encode_homing(3_000, &mut buf);
-    assert_eq!((first.frame, &octets[4..6]), (FrameNo(1), &[0x14, 0x01][..]));
-    let (second, octets) =
+    let (first, bytes) = lane.encode_slow_park(3_000, &mut buf);
+    assert_eq!((first.frame, &bytes[4..6]), (FrameNo(1), &[0x14, 0x01][..]));
+    let (second, bytes) =
         lane.encode(&Beat::still(Timing::Relative, 10), &lane.window.park(), Mix::FULL, &mut buf);
-    assert_eq!((second.frame, &octets[4..6]), (FrameNo(2), &[0x19, 0x01][..]));
+    assert_eq!((second.frame, &bytes[4..6]), (FrameNo(2), &[0x19, 0x01][..]));
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use rtrb::Producer;
 
 use super::{Frame, Played};
-use crate::app::Staged;
+use crate::app::StagedShow;
 use crate::belief::Reading;
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
@@ -22,7 +22,7 @@ use crate::rt::{
     Alarm, Answer, Command, Conductor, Desk, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
     TickLoop, mailboxes,
 };
-use crate::state::Request;
+use crate::state::Transition;
 use crate::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use crate::timeline::Timeline;
 use crate::wire::{MotionRequest, Timing};
@@ -40,7 +40,7 @@ pub enum Event {
     /// Somebody presses stop.
     Stop,
     /// Somebody asks for something.
-    Ask(Request),
+    Ask(Transition),
     /// Somebody seeks.
     Seek(ShowTime),
     /// Something is seen of a controller.
@@ -117,7 +117,7 @@ impl Virtual {
         let rate = Rate::from_hz(self.rate_hz);
         let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
         let manner = Manner { level: self.level, silent: false };
-        let staged = Staged::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
+        let staged = StagedShow::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
         let (engine, lanes, planner, timeline) = staged.split();
@@ -325,7 +325,7 @@ impl FrameSink for Link<'_> {
         let stroke = SeatType::bench3(1).stroke_pulses();
         let there = |slot: usize| request.positions.get(slot).map_or(0.0, |at| f64::from(at.0) / stroke);
         self.stands.borrow_mut()[lane] = std::array::from_fn(there);
-        self.frames.push(Frame { lane, at: self.now.get(), request, octets: datagram.to_vec() });
+        self.frames.push(Frame { lane, at: self.now.get(), request, bytes: datagram.to_vec() });
         Delivery::Sent
     }
 }

@@ -1,4 +1,4 @@
-//! What tests and benches share of the inside: a hall in virtual time, rides, sequences for the gate, and judges of what was sent.
+//! What tests and benches share of the inside: a hall in virtual time, rides, sequences for the limiter, and judges of what was sent.
 //! Built with feature `harness` alone, which the crate's own tests and benches ask for.
 
 #![expect(

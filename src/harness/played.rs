@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::Event;
-use crate::gate::Counts;
+use crate::limiter::Counts;
 use crate::motion::{Measure, SeatType, Spacing};
 use crate::rt::{Ended, News};
 use crate::time::{MonoTime, Rate, ShowTime};
@@ -18,7 +18,7 @@ pub struct Frame {
     pub lane: usize,
     pub at: MonoTime,
     pub request: MotionRequest,
-    pub octets: Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 /// A show that was played.
@@ -29,7 +29,7 @@ pub struct Played {
     pub happened: Vec<(MonoTime, Event)>,
     /// What the hall made known.
     pub news: Vec<News>,
-    /// What the gate had to do, lane by lane.
+    /// What the limiter had to do, lane by lane.
     pub clamps: Vec<Counts>,
     /// How long the first join takes.
     pub join: ShowTime,

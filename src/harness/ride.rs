@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::net::SocketAddrV4;
 use std::path::Path;
 
-use crate::app::Staged;
+use crate::app::StagedShow;
 use crate::config::from_to_args;
 use crate::cue::{Source, read};
 use crate::engine::Show;
@@ -19,12 +19,17 @@ const AXES: u8 = 6;
 
 /// A ride that many times a second to six axes at each of the addresses, and what has to be known of who is there; `silent` asks
 /// for no replies.
-pub fn stage(timeline: Timeline, rate_hz: f64, to: &[SocketAddrV4], silent: bool) -> (Staged, Vec<Watched>) {
+pub fn stage(
+    timeline: Timeline,
+    rate_hz: f64,
+    to: &[SocketAddrV4],
+    silent: bool,
+) -> (StagedShow, Vec<Watched>) {
     let tos: Vec<String> = to.iter().map(|address| format!("{address},axes={AXES}")).collect();
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
     let show =
         Show { rate: Rate::from_hz(rate_hz), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
-    let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent });
+    let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent });
     let watched = config.controllers.iter().map(Watched::of).collect();
     (staged.expect("the ride is gentle"), watched)
 }

@@ -1,4 +1,4 @@
-//! Whether what a controller counts while frames go there is what was sent from here: once a second, so that another master is
+//! Checks if what a controller counts while frames go there is what was sent from here: once a second, so that another master is
 //! known within two. How a controller is known again after a silence is of `proof`.
 
 use std::time::Duration;
@@ -50,7 +50,7 @@ impl Counter {
         self.told = Some(packets);
     }
 
-    /// Whether it is time to read it; if so, the next time is due a while later.
+    /// True if it is time to read it; if so, the next time is due a while later.
     pub(super) fn take_turn(&mut self, controller: usize, now: MonoTime) -> bool {
         let turn = u32::try_from(controller % TURNS).unwrap_or_default();
         let next = *self.next.get_or_insert(now + APART * turn);

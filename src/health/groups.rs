@@ -44,7 +44,7 @@ impl Groups {
         self.names.len()
     }
 
-    /// Whether there is none.
+    /// True if there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()

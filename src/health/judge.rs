@@ -1,7 +1,7 @@
 //! From what is known of the members to the standing of their group, and to what the hall has to hear of it.
 
 use super::{
-    Change, Demand, Health, Latch, LossPolicy, Notice, Place, Standing, WELL_AFTER, Why, state, well,
+    Change, Demand, HealthState, HealthTable, Latch, LossPolicy, Notice, Place, WELL_AFTER, Why, state, well,
 };
 use crate::time::MonoTime;
 use crate::wire::DPFE;
@@ -10,8 +10,8 @@ use crate::wire::DPFE;
 #[derive(Debug, Clone, Copy, Default)]
 struct Findings {
     tripped: Option<Why>,
-    ailed: Option<Why>,
-    outcast: Option<Why>,
+    first_error: Option<Why>,
+    must_rehome: Option<Why>,
     silent: Option<Why>,
     poor: Option<Why>,
     moved: Option<Why>,
@@ -20,7 +20,7 @@ struct Findings {
     unseen: bool,
 }
 
-impl Health {
+impl HealthTable {
     pub(super) fn judge(&mut self, group: usize, now: MonoTime, on: &mut dyn FnMut(Notice)) {
         let findings = self.findings(group, now);
         let place = &mut self.places[group];
@@ -30,7 +30,7 @@ impl Health {
         let before = *place;
         let (standing, why) = before.after(findings, self.watched, now);
         (place.standing, place.why) = (standing, why);
-        let is_explained = standing == Standing::Error
+        let is_explained = standing == HealthState::Error
             && matches!(before.why, Why::Refuses(_))
             && !matches!(why, Why::Refuses(_));
         if standing == before.standing && !is_explained {
@@ -38,7 +38,7 @@ impl Health {
         }
         self.settle(group, before.standing, standing);
         on(Notice::Group(Change { group, at: now, from: before.standing, to: standing, why }));
-        if let (Standing::Excluded, Some(controller)) = (standing, why.controller()) {
+        if let (HealthState::Excluded, Some(controller)) = (standing, why.controller()) {
             on(Notice::Hall(state::Event::Rebooted(controller)));
         }
         let falls_out = (before.standing.may_move() || is_explained) && !standing.may_move();
@@ -53,8 +53,8 @@ impl Health {
             let member = &self.members[controller];
             let when = |is: bool, why: Why| is.then_some(why);
             found.tripped = found.tripped.or(when(member.tripped, Why::EmergencyStop(controller)));
-            found.ailed = found.ailed.or(member.ailed);
-            found.outcast = found.outcast.or(member.outcast);
+            found.first_error = found.first_error.or(member.first_error);
+            found.must_rehome = found.must_rehome.or(member.must_rehome);
             found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
             found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
             found.moved = found.moved.or(when(member.moved, Why::Moved(controller)));
@@ -68,8 +68,8 @@ impl Health {
     }
 
     /// Makes the members of a group that stood so fit for a new standing.
-    fn settle(&mut self, group: usize, from: Standing, to: Standing) {
-        let well = matches!(to, Standing::Ok | Standing::Degraded | Standing::Unwatched);
+    fn settle(&mut self, group: usize, from: HealthState, to: HealthState) {
+        let well = matches!(to, HealthState::Ok | HealthState::Degraded | HealthState::Unwatched);
         for controller in self.groups.members(group).filter(|_| !well) {
             let member = &mut self.members[controller];
             member.forget();
@@ -81,9 +81,9 @@ impl Health {
     }
 
     /// What the hall does when a group falls out. A drive with an alarm may hold its seat no more: then all park.
-    const fn demand(&self, standing: Standing, why: Why) -> Option<Demand> {
+    const fn demand(&self, standing: HealthState, why: Why) -> Option<Demand> {
         match (standing, why, self.policy) {
-            (Standing::Stopped, ..) => None,
+            (HealthState::Stopped, ..) => None,
             (_, Why::Drive { .. } | Why::Alarm { register: DPFE, .. }, _) | (.., LossPolicy::Park) => {
                 Some(Demand::Park)
             }
@@ -120,7 +120,7 @@ impl Health {
     /// Tells the hall whether groups that take part wait to be cleared.
     pub(super) fn tell_of_latches(&mut self, on: &mut dyn FnMut(Notice)) {
         let latched = |group: &usize| {
-            matches!(self.places[*group].standing, Standing::Stopped | Standing::Error)
+            matches!(self.places[*group].standing, HealthState::Stopped | HealthState::Error)
                 && self.groups.members(*group).any(|controller| !self.members[controller].out)
         };
         let mut latch = Latch::Free;
@@ -164,33 +164,35 @@ impl Why {
 }
 
 impl Place {
-    fn after(self, found: Findings, watched: bool, now: MonoTime) -> (Standing, Why) {
+    fn after(self, found: Findings, watched: bool, now: MonoTime) -> (HealthState, Why) {
         let same = (self.standing, self.why);
         if let Some(why) = found.tripped {
-            return (Standing::Stopped, why);
+            return (HealthState::Stopped, why);
         }
-        if let Some(why) = found.ailed {
-            return (Standing::Error, why);
+        if let Some(why) = found.first_error {
+            return (HealthState::Error, why);
         }
         match (self.standing, found) {
             // Both last until somebody looks anew.
-            (Standing::Stopped | Standing::Error, _) => same,
-            (_, Findings { outcast: Some(why), .. }) => (Standing::Excluded, why),
-            (Standing::Excluded, _) => (Standing::Lost, Why::NotSeenYet),
-            (_, Findings { outside: Some(why), .. }) => (Standing::Lost, why),
-            (Standing::Lost, _) if matches!(self.why, Why::Outside { .. } | Why::Ambiguous(_)) => {
-                (Standing::Lost, Why::NotSeenYet)
+            (HealthState::Stopped | HealthState::Error, _) => same,
+            (_, Findings { must_rehome: Some(why), .. }) => (HealthState::Excluded, why),
+            (HealthState::Excluded, _) => (HealthState::Lost, Why::NotSeenYet),
+            (_, Findings { outside: Some(why), .. }) => (HealthState::Lost, why),
+            (HealthState::Lost, _) if matches!(self.why, Why::Outside { .. } | Why::Ambiguous(_)) => {
+                (HealthState::Lost, Why::NotSeenYet)
             }
-            (Standing::Lost, Findings { unseen: false, .. }) => (Standing::Rejoining, self.why.once_seen()),
-            (Standing::Lost | Standing::Unwatched, _) => same,
+            (HealthState::Lost, Findings { unseen: false, .. }) => {
+                (HealthState::Rejoining, self.why.once_seen())
+            }
+            (HealthState::Lost | HealthState::Unwatched, _) => same,
             (_, Findings { moved: Some(why), .. } | Findings { unsure: Some(why), .. }) => {
-                (Standing::Lost, why)
+                (HealthState::Lost, why)
             }
-            (_, Findings { silent: Some(why), .. }) if watched => (Standing::Lost, why),
-            (Standing::Rejoining, _) => same,
-            (_, Findings { poor: Some(why), .. }) => (Standing::Degraded, why),
-            (Standing::Degraded, _) if now.since(self.poor) < WELL_AFTER => same,
-            (Standing::Ok | Standing::Degraded, _) => well(watched),
+            (_, Findings { silent: Some(why), .. }) if watched => (HealthState::Lost, why),
+            (HealthState::Rejoining, _) => same,
+            (_, Findings { poor: Some(why), .. }) => (HealthState::Degraded, why),
+            (HealthState::Degraded, _) if now.since(self.poor) < WELL_AFTER => same,
+            (HealthState::Ok | HealthState::Degraded, _) => well(watched),
         }
     }
 }

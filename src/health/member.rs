@@ -62,7 +62,7 @@ pub(super) struct Member {
     /// Nobody wants it to take part.
     pub(super) out: bool,
     /// It has to be homed, and why.
-    pub(super) outcast: Option<Why>,
+    pub(super) must_rehome: Option<Why>,
     /// An emergency stop is in effect.
     pub(super) pressed: bool,
     /// One was, since it was cleared.
@@ -75,7 +75,7 @@ pub(super) struct Member {
     drives: [u16; MAX_AXES],
     refusing: bool,
     /// What went wrong first since it was cleared.
-    pub(super) ailed: Option<Why>,
+    pub(super) first_error: Option<Why>,
     /// Its seat was found elsewhere than frames left it.
     pub(super) moved: bool,
     /// Nobody knows where its frames have led it.
@@ -115,7 +115,7 @@ impl Member {
             look_again: false,
             next_read: None,
             out: false,
-            outcast: None,
+            must_rehome: None,
             pressed: false,
             tripped: false,
             press_untold: false,
@@ -123,7 +123,7 @@ impl Member {
             alarm: (0, 0),
             drives: [0; MAX_AXES],
             refusing: false,
-            ailed: None,
+            first_error: None,
             moved: false,
             unsure: false,
             falls: [None; 2],
@@ -199,7 +199,7 @@ impl Member {
         self.look_again = self.must_be_home && at.since(self.read) >= LOOK_AGAIN;
     }
 
-    /// A sighting that nobody asked for since the controller was lost is none.
+    /// Takes a sighting. Ignores an identity reply not requested since the loss.
     pub(super) fn on_sighting(&mut self, sighting: &Sighting, at: MonoTime) {
         if !std::mem::take(&mut self.reading) {
             return;
@@ -214,8 +214,8 @@ impl Member {
         let is_well = sighting.error == 0 && sighting.alarm == 0;
         self.refusing &= !is_well;
         if let Some(why) = self.against(sighting) {
-            self.crowd_untold |= self.outcast.is_none() && matches!(why, Why::Crowded(_));
-            self.outcast.get_or_insert(why);
+            self.crowd_untold |= self.must_rehome.is_none() && matches!(why, Why::OtherMaster(_));
+            self.must_rehome.get_or_insert(why);
         } else {
             self.baseline = Some(Baseline::of(sighting, self.traffic));
             (self.trusted, self.gap) = (false, false);
@@ -241,7 +241,7 @@ impl Member {
             Verdict::Other => Some(Why::Other(controller)),
             Verdict::NotHome => Some(Why::NotHome(controller)),
             Verdict::Rebooted => Some(Why::Rebooted(controller)),
-            Verdict::Crowded => Some(Why::Crowded(controller)),
+            Verdict::Crowded => Some(Why::OtherMaster(controller)),
             Verdict::Gap => Some(Why::Gap(controller)),
             Verdict::Unproved => Some(Why::Unproved(controller)),
         }
@@ -268,7 +268,7 @@ impl Member {
 
     /// It answers with registers that nobody here can read.
     pub(super) fn on_wide_registers(&mut self) {
-        self.ailed.get_or_insert(Why::Wide(self.controller));
+        self.first_error.get_or_insert(Why::Wide(self.controller));
     }
 
     pub(super) fn on_drive(&mut self, axis: usize, error: u16) {
@@ -281,41 +281,41 @@ impl Member {
 
     /// The first that went wrong counts; but that frames are refused is soon explained by what is read.
     fn ail(&mut self, why: Why) {
-        if self.ailed.is_none_or(|before| matches!(before, Why::Refuses(_))) {
-            self.ailed = Some(why);
+        if self.first_error.is_none_or(|before| matches!(before, Why::Refuses(_))) {
+            self.first_error = Some(why);
         }
     }
 
     pub(super) fn on_refused(&mut self) {
         self.refusing = true;
-        self.ailed.get_or_insert(Why::Refuses(self.controller));
+        self.first_error.get_or_insert(Why::Refuses(self.controller));
     }
 
     /// Nobody presses it any more, and only a reset ends it, which is a homing.
     pub(super) const fn on_stop_held(&mut self) {
         self.pressed = false;
-        self.outcast = Some(Why::HeldUntilReset(self.controller));
+        self.must_rehome = Some(Why::HeldUntilReset(self.controller));
     }
 
     pub(super) fn on_emergency_stop(&mut self, pressed: bool) {
         // It was reset at its place, or is pressed anew.
-        self.outcast.take_if(|why| matches!(why, Why::HeldUntilReset(_)));
+        self.must_rehome.take_if(|why| matches!(why, Why::HeldUntilReset(_)));
         self.press_untold |= pressed && !self.pressed;
         self.tripped |= pressed;
         self.pressed = pressed;
     }
 
-    /// Whether an emergency stop began since this was last asked.
+    /// True if an emergency stop began since this was last asked.
     pub(super) const fn take_press(&mut self) -> bool {
         std::mem::replace(&mut self.press_untold, false)
     }
 
-    /// Whether an emergency stop is in effect that the hall waits for.
+    /// True if an emergency stop is in effect that the hall waits for.
     pub(super) const fn holds(&self) -> bool {
         self.pressed && !self.out
     }
 
-    /// Whether another master was found since this was last asked.
+    /// True if another master was found since this was last asked.
     pub(super) const fn take_crowd(&mut self) -> bool {
         std::mem::replace(&mut self.crowd_untold, false)
     }
@@ -326,18 +326,18 @@ impl Member {
         let [last, before] = self.falls;
         self.falls = [Some(self.asked), last];
         if before.is_some_and(|first| self.asked.since(first) < UNSTEADY) {
-            self.ailed.get_or_insert(Why::Unsteady(self.controller));
+            self.first_error.get_or_insert(Why::Unsteady(self.controller));
         }
     }
 
     /// Not all of its axes tell where they are.
     pub(super) fn on_unread(&mut self) {
-        self.outcast.get_or_insert(Why::Unread(self.controller));
+        self.must_rehome.get_or_insert(Why::Unread(self.controller));
     }
 
     /// It was homed: its position is known, and what it counts from here on is the new measure.
     pub(super) fn on_homed(&mut self) {
-        self.outcast = None;
+        self.must_rehome = None;
         self.baseline = None;
         self.trusted = true;
         self.seen = None;
@@ -345,7 +345,7 @@ impl Member {
         self.counter = Counter::default();
     }
 
-    /// Whether something is still wrong with it.
+    /// True if something is still wrong with it.
     pub(super) fn ails(&self) -> bool {
         self.error != 0 || self.alarm.1 != 0 || self.refusing || self.drives.iter().any(|error| *error != 0)
     }
@@ -356,7 +356,7 @@ impl Member {
         self.refusing = false;
         self.tripped = self.pressed;
         if !self.ails() {
-            (self.ailed, self.falls) = (None, [None; 2]);
+            (self.first_error, self.falls) = (None, [None; 2]);
         }
     }
 
@@ -368,15 +368,15 @@ impl Member {
         self.window.tick(now);
         match self.counter.judge(self.traffic, now) {
             Some(Said::Crowded) => {
-                self.crowd_untold |= self.outcast.is_none();
-                self.outcast.get_or_insert(Why::Crowded(self.controller));
+                self.crowd_untold |= self.must_rehome.is_none();
+                self.must_rehome.get_or_insert(Why::OtherMaster(self.controller));
             }
-            Some(Said::Rebooted) => drop(self.outcast.get_or_insert(Why::Rebooted(self.controller))),
+            Some(Said::Rebooted) => drop(self.must_rehome.get_or_insert(Why::Rebooted(self.controller))),
             None => {}
         }
     }
 
-    /// Whether frames go there, and it is time to read its packet counter; if so, it counts as sent.
+    /// True if frames go there, and it is time to read its packet counter; if so, it counts as sent.
     pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
         let flows = self.framed.is_some_and(|at| now.since(at) < FLOWS);
         let due = flows && self.counter.take_turn(self.controller, now);
@@ -420,7 +420,7 @@ impl Member {
         self.unheard = 0;
     }
 
-    /// Whether its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a
+    /// True if its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a
     /// show: that it is not home any more is the only sign of a reset.
     pub(super) fn wants_baseline(&self, now: MonoTime) -> bool {
         self.look_again
@@ -430,7 +430,7 @@ impl Member {
             })
     }
 
-    /// Whether it is time for a read; if so, the next one is due a while later.
+    /// True if it is time for a read; if so, the next one is due a while later.
     pub(super) fn take_read(&mut self, now: MonoTime) -> bool {
         let due = self.next_read.is_none_or(|next| now >= next);
         if due {

@@ -1,5 +1,5 @@
-//! How each motion group stands: told of frames, acks, reports and reads, it says who is degraded, lost, back, stopped,
-//! wrong or out, what the hall does about it, and whose registers are to be read. Ack thread; pure: told the time; its
+//! Health of each motion group: from frames, acks, reports and reads it decides who is degraded, lost, back, stopped,
+//! in error or excluded, what the hall does about it, and whose registers are to be read. Ack thread; pure: the time is an argument; its
 //! memory is made at the start.
 //!
 //! Life is an ack, the first one to a frame that asked and newer than any acked before, or a status report. Repeated,
@@ -8,10 +8,10 @@
 
 mod counter;
 mod groups;
+mod health_state;
 mod judge;
 mod member;
 mod proof;
-mod standing;
 #[cfg(test)]
 mod tests;
 mod window;
@@ -20,8 +20,8 @@ mod words;
 use std::time::Duration;
 
 pub use groups::Groups;
+pub use health_state::{Change, HealthState, Notice, Why};
 pub use proof::{Identity, Sighting};
-pub use standing::{Change, Notice, Standing, Why};
 pub use words::ACKS_OFF;
 
 use crate::config::LossPolicy;
@@ -37,7 +37,7 @@ const WELL_AFTER: Duration = Duration::from_secs(1);
 
 /// The standing of all groups. Every method that takes a controller or a group panics if there is none of that number.
 #[derive(Debug, Clone)]
-pub struct Health {
+pub struct HealthTable {
     groups: Groups,
     members: Vec<Member>,
     places: Vec<Place>,
@@ -54,13 +54,13 @@ pub struct Health {
 /// Where one group stands.
 #[derive(Debug, Clone, Copy)]
 struct Place {
-    standing: Standing,
+    standing: HealthState,
     why: Why,
     /// When acks were last missing.
     poor: MonoTime,
 }
 
-impl Health {
+impl HealthTable {
     /// Groups that all stand well, as after preflight. Each `ack_every`-th frame asks, one frame in each `period`; with
     /// `ack_every` 0 they are unwatched.
     #[must_use]
@@ -90,7 +90,7 @@ impl Health {
         self
     }
 
-    /// Whether somebody wants a controller to take part: clearing and parking wait for nobody else.
+    /// True if somebody wants a controller to take part: clearing and parking wait for nobody else.
     pub fn on_part(&mut self, controller: usize, takes_part: bool) {
         self.members[controller].out = !takes_part;
     }
@@ -103,7 +103,7 @@ impl Health {
 
     /// How a group stands.
     #[must_use]
-    pub fn standing(&self, group: usize) -> Standing {
+    pub fn standing(&self, group: usize) -> HealthState {
         self.places[group].standing
     }
 
@@ -158,7 +158,7 @@ impl Health {
         self.members[controller].on_other_sent(datagrams);
     }
 
-    /// A beat went out: any answer of the controller is a sign of life ([`Health::on_status`]), and it is lost without one.
+    /// A beat went out: any answer of the controller is a sign of life ([`HealthTable::on_status`]), and it is lost without one.
     pub fn on_beat_sent(&mut self, controller: usize, at: MonoTime) {
         self.members[controller].on_beat_sent(at);
     }
@@ -210,7 +210,7 @@ impl Health {
         self.members[controller].outside = outside;
     }
 
-    /// Whether the positions of a controller make two places of each, and nothing says in which order their words come.
+    /// True if the positions of a controller make two places of each, and nothing says in which order their words come.
     pub fn on_ambiguous(&mut self, controller: usize, ambiguous: bool) {
         self.members[controller].ambiguous = ambiguous;
     }
@@ -224,7 +224,7 @@ impl Health {
     /// All lanes of a group are on the cue, or at park: a group that rejoined is well.
     pub fn on_joined(&mut self, group: usize) {
         let place = &mut self.places[group];
-        if place.standing == Standing::Rejoining {
+        if place.standing == HealthState::Rejoining {
             (place.standing, place.why) = well(self.watched);
         }
     }
@@ -236,7 +236,7 @@ impl Health {
             self.members[controller].clear();
             self.members[controller].forget();
         }
-        self.places[group].standing = Standing::Lost;
+        self.places[group].standing = HealthState::Lost;
         self.places[group].why = Why::NotSeenYet;
     }
 
@@ -257,6 +257,6 @@ impl Health {
 }
 
 /// How a group stands with which all is well.
-const fn well(watched: bool) -> (Standing, Why) {
-    if watched { (Standing::Ok, Why::Acked) } else { (Standing::Unwatched, Why::AcksOff) }
+const fn well(watched: bool) -> (HealthState, Why) {
+    if watched { (HealthState::Ok, Why::Acked) } else { (HealthState::Unwatched, Why::AcksOff) }
 }

@@ -1,4 +1,4 @@
-//! Whether a controller that is back is the one it was, and has not rebooted: its identity, and its count of datagrams.
+//! Decides if a controller that is back is the one it was, and has not rebooted: its identity, and its count of datagrams.
 //!
 //! DP34 counts the datagrams that a controller received, round after 65,535. Since it was last read, it must have grown
 //! by at least the frames that were acked and at most by all that was sent; whether reads count is left open. A
@@ -17,9 +17,9 @@ pub struct Sighting {
     pub error: u16,
     /// What kind of alarm its drives have (DPFE of an MBOX controller); 0 for none.
     pub alarm: u16,
-    /// DP34, the datagrams it received; none where it has no such register.
+    /// DP34, the datagrams it received; `None` if it has no such register.
     pub packets: Option<u16>,
-    /// Whether DPF0 says that it knows its zero.
+    /// True if DPF0 says that it knows its zero.
     pub homed: bool,
 }
 
@@ -106,14 +106,14 @@ impl Baseline {
         if u64::from(now) <= counted_since { Verdict::Rebooted } else { Verdict::Crowded }
     }
 
-    /// Whether the counter should be read again while all is well. One that began not long ago is hard to tell from one that
+    /// True if the counter should be read again while all is well. One that began not long ago is hard to tell from one that
     /// begins anew, so it is read again as soon as it may have counted twice as much.
     pub(super) fn is_stale(&self, traffic: Traffic) -> bool {
         let counted = |packets: u16| u64::from(packets).clamp(UNDER_WAY, REFRESH);
         self.packets.is_some_and(|packets| self.doubt(traffic) > counted(packets))
     }
 
-    /// Whether it has a counter.
+    /// True if it has a counter.
     pub(super) const fn is_counted(&self) -> bool {
         self.packets.is_some()
     }

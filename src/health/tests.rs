@@ -13,18 +13,18 @@ const IDENTITY: Identity = Identity { version: 3, minor_version: 1, work_mode: 2
 
 /// Controllers that can be taken off the network, at 100 Hz, and what the health of their groups told.
 struct Hall {
-    health: Health,
+    health: HealthTable,
     now: MonoTime,
     frame: u32,
     /// How many datagrams each controller has received.
     packets: Vec<u16>,
-    /// How late acks come; none where they do not.
+    /// How late acks come; `None` if they do not.
     ack_after: Vec<Option<Duration>>,
     ack_every: u32,
     notices: Vec<(MonoTime, Notice)>,
     answers_reads: bool,
     homed: bool,
-    /// Whether they tell how many datagrams they received, as MBOX controllers do not.
+    /// True if they tell how many datagrams they received, as MBOX controllers do not.
     counts: bool,
     alarm: u16,
 }
@@ -40,7 +40,7 @@ impl Hall {
         let now = MonoTime::default() + Duration::from_secs(100);
         let packets = vec![65_500, 9, 300, 7];
         let mut hall = Self {
-            health: Health::new(groups, policy, ack_every, period),
+            health: HealthTable::new(groups, policy, ack_every, period),
             now,
             frame: 0,
             packets,
@@ -136,7 +136,7 @@ impl Hall {
         controllers.iter().for_each(|&controller| self.ack_after[controller] = None);
     }
 
-    fn standings(&self) -> [Standing; 3] {
+    fn standings(&self) -> [HealthState; 3] {
         [0, 1, 2].map(|group| self.health.standing(group))
     }
 
@@ -148,7 +148,7 @@ impl Hall {
         self.notices.iter().filter_map(read).collect()
     }
 
-    fn changes(&self) -> Vec<(Standing, Why)> {
+    fn changes(&self) -> Vec<(HealthState, Why)> {
         let change = |(_, notice): &(MonoTime, Notice)| match notice {
             Notice::Group(change) => Some((change.to, change.why)),
             _ => None,
@@ -174,7 +174,7 @@ impl Hall {
         hall.run(100);
         hall.silence(&[2]);
         hall.run(30);
-        assert_eq!(hall.standings(), [Standing::Ok, Standing::Lost, Standing::Ok]);
+        assert_eq!(hall.standings(), [HealthState::Ok, HealthState::Lost, HealthState::Ok]);
         hall.notices.clear();
         hall
     }
@@ -194,8 +194,8 @@ fn another_master_in_mid_show_is_told_within_two_seconds() {
         hall.tick();
     }
     assert_eq!(hall.told_hall()[0], Event::Trouble(Trouble::OtherMaster(3)));
-    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Excluded, Why::Crowded(3)));
-    assert_eq!(hall.standings()[..2], [Standing::Ok; 2]);
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (HealthState::Excluded, Why::OtherMaster(3)));
+    assert_eq!(hall.standings()[..2], [HealthState::Ok; 2]);
 }
 
 const ESTOP: What = What::EmergencyStop { cause: observe::Cause::Reply };
@@ -204,7 +204,7 @@ const ESTOP: What = What::EmergencyStop { cause: observe::Cause::Reply };
 fn a_hall_that_acks_stands_well_and_says_nothing() {
     let mut hall = Hall::new(LossPolicy::Park);
     hall.run(1_000);
-    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.standings(), [HealthState::Ok; 3]);
     assert_eq!(hall.notices, []);
 }
 
@@ -216,16 +216,16 @@ fn five_missing_acks_in_a_row_degrade_and_a_good_second_makes_well() {
     hall.run(4);
     hall.back();
     hall.run(20);
-    assert_eq!(hall.standings(), [Standing::Ok; 3], "four in a row, and four in a hundred");
+    assert_eq!(hall.standings(), [HealthState::Ok; 3], "four in a row, and four in a hundred");
     hall.silence(&[2]);
     hall.run(5);
     hall.back();
     hall.run(11);
-    assert_eq!(hall.changes(), [(Standing::Degraded, Why::AcksMissing(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Degraded, Why::AcksMissing(2))]);
     hall.run(98);
-    assert_eq!(hall.health.standing(1), Standing::Degraded);
+    assert_eq!(hall.health.standing(1), HealthState::Degraded);
     hall.run(10);
-    assert_eq!(hall.changes()[1..], [(Standing::Ok, Why::Acked)]);
+    assert_eq!(hall.changes()[1..], [(HealthState::Ok, Why::Acked)]);
     assert_eq!(hall.told_hall(), []);
 }
 
@@ -239,7 +239,7 @@ fn more_than_one_ack_in_ten_missing_in_a_second_degrades() {
         }
         hall.health.standing(2)
     };
-    assert_eq!((standing(11), standing(9)), (Standing::Ok, Standing::Degraded));
+    assert_eq!((standing(11), standing(9)), (HealthState::Ok, HealthState::Degraded));
 }
 
 #[test]
@@ -247,10 +247,10 @@ fn acks_that_come_after_more_than_100_ms_are_missing_and_still_a_sign_of_life() 
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.ack_after[3] = Some(Duration::from_millis(99));
     hall.run(300);
-    assert_eq!(hall.health.standing(2), Standing::Ok);
+    assert_eq!(hall.health.standing(2), HealthState::Ok);
     hall.ack_after[3] = Some(Duration::from_millis(600));
     hall.run(300);
-    assert_eq!(hall.health.standing(2), Standing::Degraded);
+    assert_eq!(hall.health.standing(2), HealthState::Degraded);
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn a_controller_is_lost_after_250_ms_of_silence_give_or_take_a_period() {
     hall.silence(&[3]);
     hall.run(40);
     let lost = hall.notices.iter().find_map(|(at, notice)| match notice {
-        Notice::Group(Change { to: Standing::Lost, why: Why::Silent(3), .. }) => Some(at.since(last_ack)),
+        Notice::Group(Change { to: HealthState::Lost, why: Why::Silent(3), .. }) => Some(at.since(last_ack)),
         _ => None,
     });
     let lost = lost.unwrap();
@@ -277,7 +277,7 @@ fn at_a_low_rate_a_controller_is_lost_after_ten_frames_that_asked() {
         (0..100 * every).for_each(|_| hall.tick_after(period));
         hall.silence(&[2]);
         let began = hall.now;
-        while hall.health.standing(1) != Standing::Lost {
+        while hall.health.standing(1) != HealthState::Lost {
             hall.tick_after(period);
             assert!(hall.now.since(began) < Duration::from_secs(5));
         }
@@ -295,7 +295,7 @@ fn hold_frames_at_ten_a_second_lose_nobody_by_their_slowness() {
     assert_eq!(hall.changes(), []);
     hall.silence(&[2]);
     (0..12).for_each(|_| hall.tick_after(Duration::from_millis(100)));
-    assert_eq!(hall.health.standing(1), Standing::Lost);
+    assert_eq!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -304,7 +304,7 @@ fn nine_hold_frames_without_an_ack_lose_nobody() {
     hall.run(100);
     hall.silence(&[2]);
     (0..9).for_each(|_| hall.tick_after(Duration::from_millis(100)));
-    assert_ne!(hall.health.standing(1), Standing::Lost);
+    assert_ne!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -314,9 +314,9 @@ fn what_was_unanswered_of_the_last_show_does_not_count_in_the_next() {
     (0..9).for_each(|_| hall.tick_after(Duration::from_millis(1)));
     hall.tick_after(Duration::from_mins(1));
     (0..200).for_each(|_| hall.tick_after(Duration::from_millis(1)));
-    assert_ne!(hall.health.standing(1), Standing::Lost);
+    assert_ne!(hall.health.standing(1), HealthState::Lost);
     (0..100).for_each(|_| hall.tick_after(Duration::from_millis(1)));
-    assert_eq!(hall.health.standing(1), Standing::Lost);
+    assert_eq!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -339,7 +339,7 @@ fn a_status_report_is_a_sign_of_life() {
         hall.tick();
         hall.health.on_status(3, hall.now);
     }
-    assert_eq!(hall.health.standing(2), Standing::Degraded);
+    assert_eq!(hall.health.standing(2), HealthState::Degraded);
 }
 
 #[test]
@@ -352,7 +352,7 @@ fn a_report_of_long_ago_told_again_at_every_look_is_none() {
         hall.health.on_status(2, reported_at);
         hall.tick();
     }
-    assert_eq!(hall.health.standing(1), Standing::Lost);
+    assert_eq!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -371,10 +371,10 @@ fn with_no_frames_on_their_way_a_controller_is_lost_that_answers_no_beat() {
         }
     };
     beats(&mut hall, true);
-    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.standings(), [HealthState::Ok; 3]);
     hall.silence(&[2]);
     beats(&mut hall, false);
-    assert_eq!(hall.standings(), [Standing::Ok, Standing::Lost, Standing::Ok]);
+    assert_eq!(hall.standings(), [HealthState::Ok, HealthState::Lost, HealthState::Ok]);
 }
 
 #[test]
@@ -383,14 +383,14 @@ fn one_controller_lost_is_its_whole_seat_lost_and_nobody_elses() {
     hall.run(100);
     hall.silence(&[1]);
     hall.run(40);
-    assert_eq!(hall.standings(), [Standing::Lost, Standing::Ok, Standing::Ok]);
+    assert_eq!(hall.standings(), [HealthState::Lost, HealthState::Ok, HealthState::Ok]);
     assert_eq!(hall.health.why(0), Why::Silent(1));
     let reads = hall.reads();
     assert!(reads.contains(&0) && reads.contains(&1) && !reads.contains(&2), "{reads:?}");
     hall.run(500);
     assert_eq!(
         hall.health.standing(0),
-        Standing::Lost,
+        HealthState::Lost,
         "the other controller of the seat is seen all the while"
     );
 }
@@ -415,9 +415,9 @@ fn with_acks_off_nobody_is_watched_but_emergency_stops_still_stop() {
     let mut hall = Hall::asking(LossPolicy::Park, 0, TICK);
     hall.silence(&[0, 1, 2, 3]);
     hall.run(1_000);
-    assert_eq!((hall.standings(), hall.notices.len()), ([Standing::Unwatched; 3], 0));
+    assert_eq!((hall.standings(), hall.notices.len()), ([HealthState::Unwatched; 3], 0));
     hall.observed(3, ESTOP);
     hall.look();
-    assert_eq!(hall.health.standing(2), Standing::Stopped);
+    assert_eq!(hall.health.standing(2), HealthState::Stopped);
     assert!(ACKS_OFF.starts_with("acks are off"));
 }

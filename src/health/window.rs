@@ -85,7 +85,7 @@ impl Window {
         }
     }
 
-    /// Whether so many are missing that it is worth showing.
+    /// True if so many are missing that it is worth showing.
     pub(super) const fn is_poor(&self) -> bool {
         let many = self.due >= SHARE && self.missing * SHARE > self.due;
         self.run >= RUN || many

@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-use super::{Change, Standing, Why};
+use super::{Change, HealthState, Why};
 use crate::wire::DPFE;
 
 /// What has to be said, loudly, where acks are off.
 pub const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
                             its own reports at best";
 
-impl fmt::Display for Standing {
+impl fmt::Display for HealthState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Ok => "ok",
@@ -24,17 +24,19 @@ impl fmt::Display for Standing {
     }
 }
 
-impl Standing {
+impl HealthState {
     /// What a person does about it.
     #[must_use]
     pub const fn next(self) -> &'static str {
         match self {
             Self::Ok => "nothing",
             Self::Rejoining => "park, or start a show: it joins slowly",
-            Self::Degraded => "look at the network",
-            Self::Lost => "look at its power and network; it joins again by itself if it did not reboot",
-            Self::Stopped => "release the emergency stop at its place, then clear",
-            Self::Error => "put the error right at the controller; with the seats parked or stopped, clear",
+            Self::Degraded => "check the network",
+            Self::Lost => "check its power and network; it rejoins by itself unless it rebooted",
+            Self::Stopped => "release the emergency-stop button at its place, then clear",
+            Self::Error => {
+                "clear the error at the controller; then, with the seats parked or stopped, clear the hall"
+            }
             Self::Excluded => "park, then home it with nobody on the seat",
             Self::Unwatched => "watch the seat",
         }
@@ -42,14 +44,14 @@ impl Standing {
 }
 
 impl Why {
-    /// What a person does about it before all else; none where the standing says enough.
+    /// What a person does about it before all else; `None` if the standing says enough.
     #[must_use]
     pub const fn next(self) -> Option<&'static str> {
         match self {
             Self::Moved(_) => {
                 Some("find out what moved it; then park, or start a show: it joins slowly from where it is")
             }
-            Self::Crowded(_) => {
+            Self::OtherMaster(_) => {
                 Some("stop the other machine; then park, and home it with nobody on the seat")
             }
             Self::Wide(_) => Some(
@@ -77,7 +79,7 @@ impl fmt::Display for Why {
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
             Self::Unsteady(_) => {
-                "frames to it, or its acks, were missing for over 50 ms three times within a minute: look at the network"
+                "frames to it, or its acks, were missing for over 50 ms three times within a minute: check the network"
             }
             Self::Ambiguous(_) => {
                 "in either order of their words its positions are inside the stroke, and nothing says which is true: home it"
@@ -109,7 +111,7 @@ impl fmt::Display for Why {
             }
             Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
-            Self::Crowded(_) => {
+            Self::OtherMaster(_) => {
                 "it got more datagrams (DP34) than were sent from here: another machine sends to it"
             }
             Self::NotHome(_) => "it was reset: it is not home (DPF0)",

@@ -1,5 +1,5 @@
-//! Repeats of what somebody asks, written as one line: the first at once, the others when their time is over, with how many
-//! they were and the newest of them. Whoever asks without end fills no disk with it, and hides nothing of others.
+//! Folds repeated commands into one line: the first is written at once, the others when their time is over, with how many
+//! there were and the newest of them. Endless repetition fills no disk, and hides no command of others.
 
 use std::time::Duration;
 

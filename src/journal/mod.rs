@@ -1,15 +1,15 @@
-//! The journal: what was asked of the hall, by whom and what came of it, and what was played. Records in, lines of JSON out,
+//! The journal: commands with operator and result, and the shows that were played. Records in, lines of JSON out,
 //! and from them the report of a day. Written by a thread of its own, so that no disk, full or slow, holds up anybody.
 //!
-//! - **Files** are `kinocue-DATE-NNN.jsonl` for shows and `kinocue-asked-DATE-NNN.jsonl` for what was asked, one or more for
+//! - **Files** are `kinocue-DATE-NNN.jsonl` for shows and `kinocue-asked-DATE-NNN.jsonl` for commands, one or more for
 //!   each day, the day being that of the records' own times. A new one begins with a day and where one would grow over its
 //!   limit; the oldest go by age and by the size of all of their kind, each of which has half of the room.
-//! - **What is asked** is bounded in its length, and repeats are folded: nobody washes out what others did.
+//! - **Commands** are bounded in length, and repeats are folded, so that nobody can flush out what others did.
 //! - **A line** is written by one write(2) with `O_APPEND`. Where a crash or a full disk has cut one, the next begins on a
 //!   line of its own, and whoever reads passes the cut one over with a note.
-//! - **On the disk**: the begin and the end of a show are synced before the next line is written; what was asked is left to
+//! - **On the disk**: the begin and the end of a show are synced before the next line is written; commands are left to
 //!   the kernel, so that a power cut may lose the last half minute of it, and a crash of the program nothing.
-//! - **Trouble**: a line that cannot be written is lost and counted, the cause is told once, and the next line that can be
+//! - **Trouble**: a line that cannot be written is lost and counted, the cause is reported once, and the next line that can be
 //!   written is preceded by how many were lost. Nothing waits, and nothing of the show depends on it.
 //!
 //! One folder belongs to one hall.
@@ -46,9 +46,9 @@ const WAITING: usize = 1024;
 /// How much is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Octets of one file, after which a new one begins.
+    /// Bytes of one file, after which a new one begins.
     pub max_size: u64,
-    /// Octets of all files together.
+    /// Bytes of all files together.
     pub max_total: u64,
     /// Days that a file is kept.
     pub max_age_days: u32,
@@ -56,10 +56,10 @@ pub struct Limits {
 
 impl From<&Log> for Limits {
     fn from(log: &Log) -> Self {
-        let octets = |mib: u32| u64::from(mib) << 20;
+        let bytes = |mib: u32| u64::from(mib) << 20;
         Self {
-            max_size: octets(log.max_size_mib),
-            max_total: octets(log.max_total_mib),
+            max_size: bytes(log.max_size_mib),
+            max_total: bytes(log.max_total_mib),
             max_age_days: log.max_age_days,
         }
     }
@@ -117,7 +117,7 @@ impl Journal {
         self.put(&Line::Show(Box::new(show.shortened())), true);
     }
 
-    /// Why lines cannot be written at present, and what to do; none where they can.
+    /// Why lines cannot be written at present, and what to do; `None` if they can.
     #[must_use]
     pub fn trouble(&self) -> Option<String> {
         lock(&self.standing.trouble).clone()

@@ -41,7 +41,7 @@ const fn is_once(times: &u32) -> bool {
 }
 
 impl Action {
-    /// Whether it was done.
+    /// True if it was done.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.result == "done"
@@ -78,7 +78,7 @@ pub struct ShowRecord {
     pub sha256: String,
     /// Its title.
     pub title: Option<String>,
-    /// Where it stands in the playlist; null where it was loaded by itself.
+    /// Where it stands in the playlist; null if it was loaded by itself.
     pub playlist: Option<PlaylistPlace>,
     /// Level of the motion at the start, 0 to 1.
     pub level: f64,
@@ -94,11 +94,11 @@ pub struct ShowRecord {
     pub seats_available: usize,
     /// Who started it.
     pub operator: String,
-    /// Whether the playlist started it: at its time, or because the entry before came to its end.
+    /// True if the playlist started it: at its time, or because the entry before came to its end.
     pub scheduled: bool,
-    /// Whether that was outside the hours of the house ([`crate::config::Hours`]).
+    /// True if that was outside the hours of the house ([`crate::config::Hours`]).
     pub out_of_hours: bool,
-    /// How it ended; null where it has not.
+    /// How it ended; null if it has not.
     pub outcome: Option<Outcome>,
 }
 
@@ -154,7 +154,7 @@ pub enum Ending {
     Fault,
 }
 
-/// Percentiles in µs; null where nothing was counted.
+/// Percentiles in µs; null if nothing was counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = RecordPercentiles)]
 pub struct Percentiles {

@@ -64,7 +64,7 @@ pub struct Report {
 pub struct Shown {
     /// What came of it.
     pub result: ShowResult,
-    /// How long it took from begin to end, s; null where it has no end.
+    /// How long it took from begin to end, s; null if it has no end.
     pub took_s: Option<f64>,
     /// Its record.
     #[serde(flatten)]

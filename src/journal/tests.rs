@@ -365,9 +365,9 @@ proptest! {
 
     /// Whatever a file holds, a report is made of what can be read.
     #[test]
-    fn no_file_is_too_damaged_for_a_report(octets in prop::collection::vec(any::<u8>(), 0..2_000)) {
+    fn no_file_is_too_damaged_for_a_report(bytes in prop::collection::vec(any::<u8>(), 0..2_000)) {
         let dir = tempfile::tempdir().unwrap();
-        fs::write(dir.path().join("kinocue-2026-11-21-000.jsonl"), &octets).unwrap();
+        fs::write(dir.path().join("kinocue-2026-11-21-000.jsonl"), &bytes).unwrap();
         let mut journal = Journal::open(dir.path(), LIMITS, &zoned("2026-11-21T08:00:00Z"));
         journal.note(&action("2026-11-21T09:00:00.000+00:00", "go"));
         drop(journal);
@@ -375,4 +375,36 @@ proptest! {
         prop_assert_eq!(report.actions.len(), 1);
         prop_assert!(report.notes.len() <= 21);
     }
+}
+
+/// What 0.1 wrote: its states have the words of then.
+const OF_0_1: [&str; 3] = [
+    r#"{"kind":"start","at":"2026-11-20T08:00:00.000+01:00","version":"0.1.0"}"#,
+    concat!(
+        r#"{"kind":"show","start":"2026-11-20T19:00:03.250+01:00","hall":"one","cue":"storm","sha256":"00","title":null,"#,
+        r#""playlist":null,"level":0.6,"vibration":0.5,"trim_ms":-40,"effects_off":[],"seats_total":4,"seats_available":3,"#,
+        r#""operator":"ann","scheduled":false,"out_of_hours":false,"outcome":{"end":"2026-11-20T19:05:03.250+01:00","#,
+        r#""result":"completed","events":["A2 lost"],"ticks":1000,"missed_ticks":1,"sent":4000,"asked":4000,"acked":3990,"#,
+        r#""refused":1,"lost":9,"send_failed":0,"lateness":{"p50_us":3.0,"p99_us":9.5,"max_us":60.0},"#,
+        r#""ack":{"p50_us":null,"p99_us":null,"max_us":null}}}"#,
+    ),
+    concat!(
+        r#"{"kind":"action","at":"2026-11-20T19:01:00.000+01:00","who":"root (socket, engineer)","what":"pause","#,
+        r#""result":"done","state":"freewheeling"}"#,
+    ),
+];
+
+#[test]
+fn a_journal_of_0_1_is_still_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let [start, show, action] = OF_0_1;
+    fs::write(dir.path().join("kinocue-2026-11-20-000.jsonl"), format!("{start}\n{show}\n")).unwrap();
+    fs::write(dir.path().join("kinocue-asked-2026-11-20-000.jsonl"), format!("{action}\n")).unwrap();
+    let report = of_day(dir.path(), "2026-11-20");
+    assert_eq!(report.notes, [""; 0]);
+    let [shown] = &report.shows[..] else { panic!("one show: {report:?}") };
+    assert_eq!((shown.result, shown.took_s), (ShowResult::Completed, Some(300.0)));
+    assert_eq!(shown.record.outcome.as_ref().unwrap().acked, 3990);
+    let [paused] = &report.actions[..] else { panic!("one action: {report:?}") };
+    assert_eq!((paused.what.as_str(), paused.state.as_str()), ("pause", "freewheeling"));
 }

@@ -22,7 +22,7 @@ pub(super) struct Entry {
     pub(super) text: Vec<u8>,
     /// In which files it belongs.
     pub(super) kind: Kind,
-    /// Whether it is to be on the disk before the next one is written.
+    /// True if it is to be on the disk before the next one is written.
     pub(super) sync: bool,
 }
 
@@ -43,7 +43,7 @@ struct Current {
     id: FileId,
     file: File,
     size: u64,
-    /// Whether its last line has no end.
+    /// True if its last line has no end.
     torn: bool,
 }
 

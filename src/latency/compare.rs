@@ -20,7 +20,7 @@ pub struct Figure {
     pub a_us: Option<f64>,
     /// Of the second, µs.
     pub b_us: Option<f64>,
-    /// The second over the first; null where that says nothing.
+    /// The second over the first; null if that says nothing.
     pub ratio: Option<f64>,
 }
 

@@ -103,7 +103,7 @@ pub fn read(text: &[u8]) -> Result<Times, LogError> {
     let mut deserializer = Deserializer::new();
     for entry in IntervalLogIterator::new(text) {
         let entry = entry.map_err(|LogIteratorError::ParseError { offset }| LogError::Line {
-            line: 1 + text[..offset].iter().filter(|octet| **octet == b'\n').count(),
+            line: 1 + text[..offset].iter().filter(|byte| **byte == b'\n').count(),
         })?;
         let LogEntry::Interval(line) = entry else { continue };
         interval += 1;
@@ -114,9 +114,9 @@ pub fn read(text: &[u8]) -> Result<Times, LogError> {
         };
         ours = true;
         let bad = |why: String| LogError::Histogram { interval, why };
-        let octets = STANDARD.decode(line.encoded_histogram()).map_err(|error| bad(error.to_string()))?;
+        let bytes = STANDARD.decode(line.encoded_histogram()).map_err(|error| bad(error.to_string()))?;
         let part: Histogram =
-            deserializer.deserialize(&mut &octets[..]).map_err(|error| bad(error.to_string()))?;
+            deserializer.deserialize(&mut &bytes[..]).map_err(|error| bad(error.to_string()))?;
         sum.add(&part).map_err(|_| bad("holds times of more than 10 s".to_owned()))?;
     }
     if ours { Ok(times) } else { Err(LogError::Empty) }
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn no_cut_or_changed_octet_makes_reading_panic() {
+    fn no_cut_or_changed_byte_makes_reading_panic() {
         let text = written(&[times(5_000, 60_000, 1_000)]).into_bytes();
         for place in 0..text.len() {
             let _ = read(&text[..place]);

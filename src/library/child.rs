@@ -13,11 +13,11 @@ use rustix::process::{Pid, PidfdFlags, pidfd_open};
 use serde::de::DeserializeOwned;
 
 use super::{Bounds, Drawing, Hall, Verdict};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
-/// The most that is taken of what it prints, octets: the curves of twelve axes in as many stretches as may be asked.
+/// The most that is taken of what it prints, bytes: the curves of twelve axes in as many stretches as may be asked.
 const MAX_OUTPUT: u64 = 4 << 20;
 /// How it ends where the configuration has faults (sysexits).
 const BAD_CONFIGURATION: i32 = 78;
@@ -81,7 +81,7 @@ fn watch(child: &mut Child, deadline: MonoTime) -> io::Result<Vec<u8>> {
         wait_for(&PollFd::new(&stdout, PollFlags::IN), deadline)?;
         match stdout.read(&mut buf)? {
             0 => break,
-            octets => output.extend_from_slice(&buf[..octets]),
+            bytes => output.extend_from_slice(&buf[..bytes]),
         }
         if output.len() as u64 > MAX_OUTPUT {
             return Err(io::Error::other("it printed more than any verdict is long"));

@@ -61,7 +61,7 @@ pub fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveD
     }
 }
 
-/// Whether the hall has to be known to draw a cue in that unit.
+/// True if the hall has to be known to draw a cue in that unit.
 #[must_use]
 pub fn needs_hall(unit: Unit) -> bool {
     unit != Unit::Fraction

@@ -1,4 +1,4 @@
-//! A file whose octets are hashed as they are read, so that it is never in memory whole.
+//! A file whose bytes are hashed as they are read, so that it is never in memory whole.
 
 use std::io::{self, Read};
 
@@ -6,7 +6,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::hex;
 
-/// As many of the first octets are kept: enough to tell one form of file from another.
+/// As many of the first bytes are kept: enough to tell one form of file from another.
 const FRONT: usize = 16;
 
 /// What is read through this is hashed.
@@ -23,7 +23,7 @@ impl<R: Read> Hashed<R> {
         Self { input, hash: Sha256::new(), front: Vec::new() }
     }
 
-    /// Its first octets, 16 at the most, of those that were read.
+    /// Its first bytes, 16 at the most, of those that were read.
     #[must_use]
     pub fn front(&self) -> &[u8] {
         &self.front
@@ -32,7 +32,7 @@ impl<R: Read> Hashed<R> {
     /// SHA-256 of all of it, hexadecimal: what was not read yet is read now.
     ///
     /// # Errors
-    /// Where it cannot be read to its end.
+    /// If it cannot be read to its end.
     pub fn finish(mut self) -> io::Result<String> {
         io::copy(&mut self, &mut io::sink())?;
         Ok(hex(&self.hash.finalize()))
@@ -41,10 +41,10 @@ impl<R: Read> Hashed<R> {
 
 impl<R: Read> Read for Hashed<R> {
     fn read(&mut self, buf: &mut [u8]) -> io::Result<usize> {
-        let octets = self.input.read(buf)?;
-        self.hash.update(&buf[..octets]);
-        let wanted = FRONT.saturating_sub(self.front.len()).min(octets);
+        let bytes = self.input.read(buf)?;
+        self.hash.update(&buf[..bytes]);
+        let wanted = FRONT.saturating_sub(self.front.len()).min(bytes);
         self.front.extend_from_slice(&buf[..wanted]);
-        Ok(octets)
+        Ok(bytes)
     }
 }

@@ -13,7 +13,7 @@ use crate::sys::folder::{Folder, Stamp};
 const FILE: &str = ".index.json";
 /// While it is written.
 const NEW_FILE: &str = ".index.new";
-/// The most of it that is read, octets.
+/// The most of it that is read, bytes.
 const MAX_LEN: u64 = 64 << 20;
 
 /// What is known of each file, by its name.

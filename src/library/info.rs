@@ -1,4 +1,4 @@
-//! What the checking process says of a cue, and what the library says of it to others.
+//! The verdict of the checking process on a cue, and the library's entry for it.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,7 +8,7 @@ use super::CueId;
 /// What a check of one cue for one hall has shown; a line of JSON from the process that checked it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Whether it can be read, fits the hall, and keeps all limits at full level.
+    /// True if it can be read, fits the hall, and keeps all limits at full level.
     pub passed: bool,
     /// Every fault, each with its place in the file, the first twenty in words.
     pub faults: Vec<String>,
@@ -16,17 +16,17 @@ pub struct Verdict {
     pub more: u64,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// SHA-256 of what the cue does, hexadecimal ([`crate::proof::Digest`]); none where it cannot be read.
+    /// SHA-256 of what the cue does, hexadecimal ([`crate::proof::Digest`]); `None` if it cannot be read.
     pub digest: Option<String>,
     /// Its title.
     pub title: Option<String>,
-    /// How long it is, s; none where it cannot be read.
+    /// How long it is, s; `None` if it cannot be read.
     pub length_s: Option<f64>,
-    /// How many axes it has; none where it cannot be read.
+    /// How many axes it has; `None` if it cannot be read.
     pub axes: Option<usize>,
     /// The effects that it names.
     pub effects: Vec<String>,
-    /// Whether it is MCAP; CSV if not.
+    /// True if it is MCAP; CSV if not.
     pub mcap: bool,
 }
 
@@ -39,7 +39,7 @@ impl Verdict {
     }
 }
 
-/// Whether a cue is proved to keep the limits of the hall, as the configuration's file now is.
+/// True if a cue is proved to keep the limits of the hall, as the configuration's file now is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(tag = "state", rename_all = "lowercase")]
 pub enum Proved {
@@ -67,11 +67,11 @@ pub struct CueInfo {
     pub axes: Option<usize>,
     /// The effects that it names.
     pub effects: Vec<String>,
-    /// The size of its file, octets.
+    /// The size of its file, bytes.
     pub size: u64,
     /// SHA-256 of its file, hexadecimal.
     pub sha256: Option<String>,
-    /// Whether it keeps the limits of the hall.
+    /// True if it keeps the limits of the hall.
     pub proof: Proved,
 }
 

@@ -3,7 +3,7 @@
 //!
 //! A cue named `x` is the file `x.csv` or `x.mcap`, a regular one; of two the newer counts. What comes from outside is
 //! checked and proved in a process of its own, of the lowest priority and with limits on memory, time and files, before it
-//! gets that name. What the library says of a proof is for people and playlists: whoever plays a cue proves it again.
+//! gets that name. The library's verdict is for people and playlists: a cue is proved again before it is played.
 
 mod child;
 mod curve;
@@ -30,13 +30,13 @@ use std::time::Duration;
 use sha2::{Digest as _, Sha256};
 
 use crate::config::Store;
+use crate::control::{Code, Problem};
 use crate::cue::{self, Source, limits};
-use crate::hall::{Code, Problem};
 use crate::sys::folder::{Folder, Stamp};
 use crate::timeline::Timeline;
 use index::Index;
 
-/// A CSV file of so many octets is read by whoever wants to play it, known or not; MCAP may unpack to more.
+/// A CSV file of so many bytes is read by whoever wants to play it, known or not; MCAP may unpack to more.
 const SMALL: u64 = 16 << 20;
 /// Curves that are kept; a page asks for the same one again and again.
 const CURVES: usize = 4;
@@ -65,8 +65,8 @@ pub struct Hall {
 /// What a cue and its check may take.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Bounds {
-    /// The longest file that is taken in, octets.
-    pub max_octets: u64,
+    /// The longest file that is taken in, bytes.
+    pub max_bytes: u64,
     /// Memory of the checking process, MiB: what a cue may take once it is read.
     pub memory_mib: u64,
     /// Processor time of the checking process, and how long it is waited for.
@@ -77,7 +77,7 @@ impl Default for Bounds {
     /// Room for a cue of two hours and one axis at 1 kHz, or of twelve at 100 Hz; a proof of it takes seconds where nothing
     /// else runs. The service takes as much once it plays it, beside one that is loaded, and its unit has 2 GiB.
     fn default() -> Self {
-        Self { max_octets: 256 << 20, memory_mib: 768, time: Duration::from_secs(300) }
+        Self { max_bytes: 256 << 20, memory_mib: 768, time: Duration::from_secs(300) }
     }
 }
 
@@ -87,7 +87,7 @@ impl Hall {
     #[must_use]
     pub fn new(config: &Path, store: &Store) -> Self {
         let bounds = Bounds {
-            max_octets: u64::from(store.max_cue_mib) << 20,
+            max_bytes: u64::from(store.max_cue_mib) << 20,
             memory_mib: u64::from(store.max_memory_mib),
             ..Bounds::default()
         };
@@ -221,7 +221,7 @@ impl Library {
         }
     }
 
-    /// Reads a cue whole into memory, and gives the SHA-256 of those very octets, hexadecimal. Blocks for as long as that
+    /// Reads a cue whole into memory, and gives the SHA-256 of those very bytes, hexadecimal. Blocks for as long as that
     /// takes, seconds for the longest.
     ///
     /// # Errors
@@ -279,10 +279,10 @@ impl Library {
         Ok(curve)
     }
 
-    /// The longest file that is taken in, octets.
+    /// The longest file that is taken in, bytes.
     #[must_use]
-    pub fn max_octets(&self) -> u64 {
-        self.inner.hall.bounds.max_octets
+    pub fn max_bytes(&self) -> u64 {
+        self.inner.hall.bounds.max_bytes
     }
 
     /// Begins to take a cue in; it replaces the one with that id when it is finished and passes. Two at a time.
@@ -337,9 +337,9 @@ fn file_problem(what: &str, error: &io::Error) -> Problem {
     )
 }
 
-/// Octets as hexadecimal digits.
-fn hex(octets: &[u8]) -> String {
-    octets.iter().map(|octet| format!("{octet:02x}")).collect()
+/// Bytes as hexadecimal digits.
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// What is behind a lock is whole at any time, also where a thread that held it panicked.

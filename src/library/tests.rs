@@ -9,7 +9,7 @@ const CUE: &str = "# title: Ride\ntime_ms,a1\n0,0.5\n100,0.5\n";
 
 fn library(dir: &Path) -> Library {
     let program = PathBuf::from("/nonexistent/kinocue");
-    let bounds = Bounds { max_octets: 1000, ..Bounds::default() };
+    let bounds = Bounds { max_bytes: 1000, ..Bounds::default() };
     Library::open(dir, Hall { config: dir.join("hall.toml"), program, bounds }).unwrap()
 }
 

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use sha2::{Digest as _, Sha256};
 
 use super::{CueId, CueInfo, Library, child, file_name, file_problem, hex, lock};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
 
 /// What the names of unfinished files begin with; no id does.
@@ -60,20 +60,20 @@ impl Upload {
         Ok(Self { place, id: id.clone(), file, size: 0, hash: Sha256::new() })
     }
 
-    /// Takes the next octets of the file. Blocks while they are written.
+    /// Takes the next bytes of the file. Blocks while they are written.
     ///
     /// # Errors
     /// [`Problem`] where the file grows over the limit of the library, or the disk does not take it.
-    pub fn write(&mut self, octets: &[u8]) -> Result<(), Problem> {
-        let most = self.place.library.inner.hall.bounds.max_octets;
-        self.size = self.size.saturating_add(octets.len() as u64);
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), Problem> {
+        let most = self.place.library.inner.hall.bounds.max_bytes;
+        self.size = self.size.saturating_add(bytes.len() as u64);
         if self.size > most {
             let detail = format!("the cue is longer than {} MiB", most >> 20);
             let remedy = "make it smaller, as MCAP perhaps, or raise max_cue_mib in [library]";
             return Err(Problem::new(Code::Size, detail, remedy));
         }
-        self.hash.update(octets);
-        self.file.write_all(octets).map_err(|error| unwritten(&error))
+        self.hash.update(bytes);
+        self.file.write_all(bytes).map_err(|error| unwritten(&error))
     }
 
     /// Has the file checked and proved by a process of the lowest priority, one at a time, and puts it into the library.

@@ -10,7 +10,7 @@ use super::Line;
 use crate::plain::escaped;
 
 const SOCKET: &str = "/run/systemd/journal/socket";
-/// The longest message, octets; a datagram has room for many times that.
+/// The longest message, bytes; a datagram has room for many times that.
 const MESSAGE_LEN: usize = 4_096;
 /// The longest value of a field.
 const VALUE_LEN: usize = 256;
@@ -43,7 +43,7 @@ impl Journal {
     }
 }
 
-/// Whether `JOURNAL_STREAM` ("device:inode") names that file.
+/// True if `JOURNAL_STREAM` ("device:inode") names that file.
 fn is_stream(stream: &str, dev: u64, ino: u64) -> bool {
     stream.split_once(':').is_some_and(|(a, b)| a.parse() == Ok(dev) && b.parse() == Ok(ino))
 }

@@ -1,4 +1,4 @@
-//! At most one line a second for each cause; told the time.
+//! Limits the log to one line a second for each cause; the time is an argument.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -15,7 +15,7 @@ const OTHERS: &str = "others";
 
 /// Holds lines back, but never the newest of a cause for longer than a second.
 #[derive(Debug, Default)]
-pub(super) struct Limiter {
+pub(super) struct RateLimiter {
     causes: HashMap<String, Seen>,
 }
 
@@ -29,7 +29,7 @@ struct Seen {
     more: u64,
 }
 
-impl Limiter {
+impl RateLimiter {
     /// The line if it may pass, with a word about those held back before; else it is held back.
     pub(super) fn offer(&mut self, mut line: Line, now: MonoTime) -> Option<Line> {
         let cause = self.place(&line.cause, now);
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_cause_gets_a_line_a_second_and_the_next_says_how_many_went_unsaid() {
-        let mut limiter = Limiter::default();
+        let mut limiter = RateLimiter::default();
         assert_eq!(words(limiter.offer(line("stranger", "from 1"), ms(0))), ["from 1"]);
         for at in 1..1_000 {
             assert_eq!(limiter.offer(line("stranger", "again"), ms(at)), None);
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_newest_line_of_a_cause_that_falls_silent_is_said_a_second_after_the_last() {
-        let mut limiter = Limiter::default();
+        let mut limiter = RateLimiter::default();
         let _ = limiter.offer(line("state", "stopping"), ms(0));
         assert_eq!(limiter.next(), None);
         assert_eq!(limiter.offer(line("state", "stopped"), ms(300)), None);
@@ -134,14 +134,14 @@ mod tests {
 
     #[test]
     fn causes_do_not_hold_each_other_back() {
-        let mut limiter = Limiter::default();
+        let mut limiter = RateLimiter::default();
         let _ = limiter.offer(line("stranger", "a"), ms(0));
         assert!(limiter.offer(line("stop", "stop asked for"), ms(1)).is_some());
     }
 
     #[test]
     fn a_flood_of_causes_takes_bounded_room_and_few_lines() {
-        let mut limiter = Limiter::default();
+        let mut limiter = RateLimiter::default();
         let mut passed = 0;
         for n in 0..10_000 {
             let flood = Line::new(Priority::Info, format!("cause {n}"), "x");
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn at_the_end_nothing_that_was_held_back_is_lost() {
-        let mut limiter = Limiter::default();
+        let mut limiter = RateLimiter::default();
         for n in 0..4 {
             let _ = limiter.offer(line("a", format!("{n}")), ms(n));
         }

@@ -1,4 +1,4 @@
-//! What happens to the hall, as lines for whoever looks after it: to the journal with fields, or as text to the standard
+//! Events of the hall as log lines: to the journal with fields, or as text to the standard
 //! error output. At most one line a second for each cause. Any thread but the tick thread may speak; none of them waits, and
 //! a thread of its own writes.
 
@@ -18,13 +18,13 @@ mod limit;
 
 pub use crate::plain::escaped;
 use journal::Journal;
-use limit::Limiter;
+use limit::RateLimiter;
 
 /// Lines that wait to be written at the most.
 const QUEUE: usize = 256;
 /// How long the end of the program waits for the last lines.
 const FLUSH: Duration = Duration::from_secs(1);
-/// The longest line of text, octets.
+/// The longest line of text, bytes.
 const TEXT_LEN: usize = 4_096;
 
 /// How grave a line is; the numbers are those of syslog.
@@ -102,7 +102,7 @@ struct Shared {
 
 #[derive(Debug, Default)]
 struct State {
-    limiter: Limiter,
+    limiter: RateLimiter,
     queue: VecDeque<Line>,
     closing: bool,
     written: bool,
@@ -113,7 +113,7 @@ impl Log {
     /// may block. To be started by a thread of ordinary priority.
     ///
     /// # Errors
-    /// Where the system starts no further thread.
+    /// If the system starts no further thread.
     pub fn start(mut tell: impl FnMut(&str) + Send + 'static) -> io::Result<Self> {
         match Journal::open() {
             Some(journal) => Self::writing(move |line| journal.send(line).is_ok()),

@@ -1,22 +1,22 @@
 //! Figures of each controller.
 
 use super::{Family, Labels, Values, flag};
-use crate::hall::ControllerStatus;
+use crate::control::ControllerStatus;
 
 pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<Family> {
-    let mut all = standing(controllers);
+    let mut all = health(controllers);
     all.extend(frames(controllers));
     all
 }
 
-fn standing(all: &[ControllerStatus]) -> Vec<Family> {
+fn health(all: &[ControllerStatus]) -> Vec<Family> {
     vec![
-        gauges(all, "controller_up", "1 where the controller answers", |one| answers(one.standing)),
+        gauges(all, "controller_up", "1 where the controller answers", |one| answers(one.health)),
         gauges(all, "controller_enabled", "1 where it is to take part", |one| Some(flag(one.enabled))),
         Family {
-            name: "controller_standing",
+            name: "controller_health",
             help: "1, with how it stands",
-            values: Values::Gauges(all.iter().map(|one| (and(one, "standing", one.standing), 1.0)).collect()),
+            values: Values::Gauges(all.iter().map(|one| (and(one, "health", one.health), 1.0)).collect()),
         },
         gauges(all, "controller_emergency_stop", "1 while an emergency stop is in effect", |one| {
             Some(flag(one.emergency_stop))
@@ -44,13 +44,13 @@ fn frames(all: &[ControllerStatus]) -> Vec<Family> {
             help: "What became of the frames that asked; lost: no reply within a second",
             values: Values::Counters(acks.collect()),
         },
-        counters(all, "limit_interventions", "How often the last gate held motion back", |one| one.clamps),
+        counters(all, "limit_interventions", "How often the limiter held motion back", |one| one.clamps),
     ]
 }
 
-/// Whether it answers; none where nobody listens for its answers, or asks.
-fn answers(standing: &str) -> Option<f64> {
-    match standing {
+/// True if it answers; `None` if nobody listens for its answers, or asks.
+fn answers(health: &str) -> Option<f64> {
+    match health {
         "lost" | "unknown" => Some(0.0),
         "unwatched" | "out" => None,
         _ => Some(1.0),

@@ -1,4 +1,4 @@
-//! The status of the hall as figures for Prometheus: `OpenMetrics` text, in base units, nothing of it told by the tick thread.
+//! The status of the hall as figures for Prometheus: `OpenMetrics` text, in base units; the tick thread formats none of it.
 //! Every label has as many values as the configuration has names. Control plane.
 
 use std::fmt;
@@ -9,7 +9,7 @@ use prometheus_client::metrics::MetricType;
 use prometheus_client::metrics::exemplar::Exemplar;
 use prometheus_client::registry::Registry;
 
-use crate::hall::{self, Status};
+use crate::control::{self, Status};
 
 mod controllers;
 mod shows;
@@ -76,7 +76,7 @@ impl Family {
         Self { name, help, values: Values::Counters(vec![(Labels::new(), value)]) }
     }
 
-    fn histogram(name: &'static str, help: &'static str, histogram: &hall::Histogram) -> Self {
+    fn histogram(name: &'static str, help: &'static str, histogram: &control::Histogram) -> Self {
         let bounds = histogram.bounds_us.iter().map(|us| us / 1e6).chain([f64::INFINITY]);
         let mut buckets: Vec<_> = bounds.zip(histogram.counts.iter().copied()).collect();
         if buckets.is_empty() {

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::{Family, Labels, Values, flag};
-use crate::hall::{Severity, Status};
+use crate::control::{Severity, Status};
 
-/// Every state there is, so that a panel shows which ones it is not in; as `hall::Status` has them.
+/// Every state there is, so that a panel shows which ones it is not in; as `control::Status` has them.
 const STATES: [&str; 13] = [
     "boot",
     "recovering",
@@ -14,7 +14,7 @@ const STATES: [&str; 13] = [
     "armed",
     "joining",
     "playing",
-    "freewheeling",
+    "holding",
     "paused",
     "parking",
     "stopping",

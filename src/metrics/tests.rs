@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::hall::{
+use crate::control::{
     ControllerStatus, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus, Severity, ShowStatus,
     Warning,
 };
@@ -24,7 +24,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         address: "127.0.0.1:7408".to_owned(),
         group: name.to_owned(),
         enabled: true,
-        standing: "ok",
+        health: "ok",
         why: "it answers".to_owned(),
         heard_s: Some(0.25),
         ack_rate: Some(1.0),
@@ -60,6 +60,7 @@ fn playing() -> Status {
     Status {
         test: None,
         hall: "1".to_owned(),
+        format: 2,
         version: "9.9.9",
         uptime_s: 60.5,
         state: "playing",
@@ -211,9 +212,9 @@ fn bucket(page: &Page, le: &str) -> f64 {
 #[test]
 fn what_nobody_knows_is_left_out_rather_than_told_as_0() {
     let mut status = playing();
-    status.controllers[0].standing = "unwatched";
+    status.controllers[0].health = "unwatched";
     status.controllers[0].heard_s = None;
-    status.controllers[1].standing = "lost";
+    status.controllers[1].health = "lost";
     status.show = None;
     let page = page(&status);
     assert_eq!(page.samples.get("kinocue_controller_up{controller=\"A1\",row=\"A\"}"), None);

@@ -104,12 +104,12 @@ impl Halt {
         Self { stretches, rest: at.position }
     }
 
-    /// Whether it stays inside the stroke, and at no time is faster than its means.
+    /// True if it stays inside the stroke, and at no time is faster than its means.
     fn fits(&self, means: Means) -> bool {
         !self.runs_past(1.0, means) && !self.runs_past(-1.0, means)
     }
 
-    /// Whether it passes that end of the stroke, 1 or -1 for upper and lower, or is too fast on its way there.
+    /// True if it passes that end of the stroke, 1 or -1 for upper and lower, or is too fast on its way there.
     fn runs_past(&self, onward: f64, means: Means) -> bool {
         let past = |position: f64| onward * (position - 0.5) > 0.5 + STROKE_SLACK;
         past(self.rest)
@@ -242,7 +242,7 @@ impl Stretch {
     }
 }
 
-/// The way with the least of something, up to `most`, that no longer runs past the end that lies `onward`; none where it
+/// The way with the least of something, up to `most`, that no longer runs past the end that lies `onward`; `None` if it
 /// does not fit elsewhere.
 fn least(most: f64, way: impl Fn(f64) -> Halt, onward: f64, means: Means) -> Option<Halt> {
     let (mut short, mut far) = (0.0, most);

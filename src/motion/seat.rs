@@ -114,7 +114,7 @@ impl SeatType {
 /// place to some pulses.
 const ROUNDING: f64 = 0.001;
 
-/// Whether a motor can stand at `pulses`, of a stroke of so many: inside it, or outside by no more than rounding. What is
+/// True if a motor can stand at `pulses`, of a stroke of so many: inside it, or outside by no more than rounding. What is
 /// farther out is no position, but a wrong word order, another seat type, or a zero that was lost.
 #[must_use]
 pub fn in_stroke(pulses: Pulses, stroke_pulses: f64) -> bool {

@@ -28,9 +28,9 @@ impl Limits {
 /// One position of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slot {
-    /// The axis of the cue it carries, counted from 0; none where the cue has nothing for it: it is led to park then.
+    /// The axis of the cue it carries, counted from 0; `None` if the cue has nothing for it: it is led to park then.
     pub axis: Option<usize>,
-    /// Whether the lane's own seat has such an axis: what is sent in the slot moves it.
+    /// True if the lane's own seat has such an axis: what is sent in the slot moves it.
     pub is_own: bool,
     /// Cue unit to fraction of this slot's stroke.
     pub to_stroke: f64,
@@ -115,7 +115,7 @@ impl Window {
     /// A window of these slots.
     ///
     /// # Panics
-    /// Where there are more than [`MAX_AXES`].
+    /// If there are more than [`MAX_AXES`].
     #[must_use]
     pub fn new(slots: Vec<Slot>) -> Self {
         assert!(slots.len() <= MAX_AXES, "a frame has at most {MAX_AXES} slots");

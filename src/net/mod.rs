@@ -56,7 +56,7 @@ impl Ports {
     ///
     /// # Errors
     /// [`NetError::Twice`] and [`NetError::NotUnicast`] for peers that cannot have a socket of their own;
-    /// [`NetError::Refused`] where the system refuses, be it that another program has the port.
+    /// [`NetError::Refused`] where the system refuses, even if another program has the port.
     pub fn open(bind: SocketAddrV4, peers: &[SocketAddrV4]) -> Result<Self, NetError> {
         open::open(bind, peers)
     }

@@ -13,7 +13,7 @@ use crate::sys::batch::{Batch, stamp_arrivals};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock;
 
-/// Octets of replies that may wait in a socket; the kernel cuts it to what it allows. Generous, so that an ack thread
+/// Bytes of replies that may wait in a socket; the kernel cuts it to what it allows. Generous, so that an ack thread
 /// kept from running for a while finds them all.
 const RECEIVE_BUFFER_LEN: usize = 1 << 20;
 

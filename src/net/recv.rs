@@ -1,4 +1,4 @@
-//! Reads all that came since the last look, each datagram with the instant at which the kernel received it. Ack thread:
+//! Reads all that arrived since the last drain, each datagram with the instant at which the kernel received it. Ack thread:
 //! never blocks, never allocates.
 
 use std::fmt;
@@ -135,7 +135,7 @@ impl Sockets {
             for datagram in self.batch.datagrams() {
                 let at = received_at(datagram.stamp_ns, wall_ns, now, self.emptied[index]);
                 let origin = lane.map_or(Origin::Stranger(datagram.from), |_| Origin::Controller(index));
-                on(origin, datagram.octets, at);
+                on(origin, datagram.bytes, at);
             }
             if count < SLOTS {
                 self.emptied[index] = before;

@@ -8,14 +8,14 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 pub struct Route {
     /// The address of this machine that the controller sees.
     pub local: Ipv4Addr,
-    /// The largest IP packet that goes there in one piece, octets.
+    /// The largest IP packet that goes there in one piece, bytes.
     pub mtu: u32,
 }
 
 /// The way from `bind`, which may be unspecified, to `peer`. Sends nothing.
 ///
 /// # Errors
-/// Where the system knows no way, or `bind` is no address of this machine.
+/// If the system knows no way, or `bind` is no address of this machine.
 pub fn route(bind: Ipv4Addr, peer: SocketAddrV4) -> io::Result<Route> {
     let socket = UdpSocket::bind(SocketAddrV4::new(bind, 0))?;
     socket.connect(peer)?;

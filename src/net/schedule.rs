@@ -1,4 +1,4 @@
-//! When to look for replies: often enough to keep the books fresh, never when a tick is due.
+//! When to drain replies: often enough to keep the accounts current, never when a tick is due.
 
 use std::time::Duration;
 

@@ -43,7 +43,7 @@ impl SendFault {
         self.errno
     }
 
-    /// Whether the controller's port is closed: it is restarting, or nothing listens there.
+    /// True if the controller's port is closed: it is restarting, or nothing listens there.
     #[must_use]
     pub const fn refused(self) -> bool {
         self.errno == libc::ECONNREFUSED
@@ -135,6 +135,6 @@ impl Lane {
         if sent == Err(Errno::CONNREFUSED) {
             self.refusals.fetch_add(1, Ordering::Relaxed);
         }
-        sent.map(|_octets| ())
+        sent.map(|_bytes| ())
     }
 }

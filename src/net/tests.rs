@@ -44,7 +44,7 @@ fn collect(receiver: &mut Receiver, count: usize) -> Vec<(Origin, Vec<u8>, MonoT
     let (mut got, start) = (Vec::new(), Monotonic.now());
     while got.len() < count {
         assert!(Monotonic.now().since(start) < PATIENCE, "{} of {count} came", got.len());
-        receiver.drain(|origin, octets, at| got.push((origin, octets.to_vec(), at)));
+        receiver.drain(|origin, bytes, at| got.push((origin, bytes.to_vec(), at)));
     }
     got
 }
@@ -106,12 +106,12 @@ fn each_reply_comes_from_its_own_controller_and_anyone_else_is_a_stranger() {
     assert_eq!(sender.send(0, b"to a"), Delivery::Sent);
     assert_eq!(sender.send(1, b"to b"), Delivery::Sent);
     assert_eq!((take(&a), take(&b)), (b"to a".to_vec(), b"to b".to_vec()));
-    for (socket, octets) in [(&b, b"from b"), (&stranger, b"no one"), (&a, b"from a")] {
-        socket.send_to(octets, local).unwrap();
+    for (socket, bytes) in [(&b, b"from b"), (&stranger, b"no one"), (&a, b"from a")] {
+        socket.send_to(bytes, local).unwrap();
     }
     let mut got = collect(&mut receiver, 3);
     let now = Monotonic.now();
-    got.sort_by_key(|(_, octets, _)| octets.clone());
+    got.sort_by_key(|(_, bytes, _)| bytes.clone());
     let of = |index: usize| (got[index].0, got[index].1.as_slice());
     assert_eq!(of(0), (Origin::Controller(0), &b"from a"[..]));
     assert_eq!(of(1), (Origin::Controller(1), &b"from b"[..]));

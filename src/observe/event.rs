@@ -1,4 +1,4 @@
-//! What happened to a controller, as far as it tells.
+//! Events of a controller, as far as it reports them.
 
 use std::fmt;
 

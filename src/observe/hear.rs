@@ -9,15 +9,15 @@ use crate::wire::{Access, DP_INPUTS, RegisterReply, Report, Status};
 impl Observer {
     /// Hears a report that a controller sent unasked (0x3101, 0x1001); says whether it was one. What a register tells of the
     /// inputs is heard too, whoever asked for it: where no frames go, nothing else may tell that an emergency stop is over.
-    pub fn hear(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-        if let Ok(status) = Status::parse(octets) {
+    pub fn hear(&mut self, controller: usize, bytes: &[u8], at: MonoTime) -> bool {
+        if let Ok(status) = Status::parse(bytes) {
             return self.on_status(controller, &status, at);
         }
-        if let Ok(reply) = RegisterReply::parse(octets) {
+        if let Ok(reply) = RegisterReply::parse(bytes) {
             self.on_register(controller, &reply, at);
             return false;
         }
-        let report = Report::parse(octets);
+        let report = Report::parse(bytes);
         report.is_ok_and(|report| {
             self.on_report(controller, &report, at);
             true
@@ -33,9 +33,9 @@ impl Observer {
     }
 
     /// Hears a report that came from a port that is no controller's frame port; says whether it was one.
-    pub fn hear_elsewhere(&mut self, from: SocketAddrV4, octets: &[u8], at: MonoTime) -> bool {
-        let station = Status::parse(octets).ok().map(|status| status.station);
+    pub fn hear_elsewhere(&mut self, from: SocketAddrV4, bytes: &[u8], at: MonoTime) -> bool {
+        let station = Status::parse(bytes).ok().map(|status| status.station);
         let controller = self.sender_of_report(*from.ip(), station);
-        controller.is_some_and(|controller| self.hear(controller, octets, at))
+        controller.is_some_and(|controller| self.hear(controller, bytes, at))
     }
 }

@@ -1,5 +1,5 @@
-//! What the controllers say of themselves: the last known state of each, how old it is, and what happened to them.
-//! Ack thread; told of messages and of the time; its memory is made at the start.
+//! Self-reports of the controllers: the last known state of each, its age, and their events.
+//! Ack thread; messages and time are arguments; all memory is allocated at the start.
 //!
 //! One structure that the report, the API and the console read alike.
 
@@ -26,13 +26,13 @@ const EVENTS_KEPT: usize = 1_000;
 /// What has to be known of a controller to understand it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Watched {
-    /// Where it is; the last two octets of the address are its control ID (PA12, PA13).
+    /// Where it is; the last two bytes of the address are its control ID (PA12, PA13).
     pub address: SocketAddrV4,
     /// Its message set.
     pub dialect: Dialect,
     /// How its answers to vibration frames have the inputs.
     pub vibration_port: VibrationPort,
-    /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 where none does.
+    /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 if none does.
     pub estop_inputs: u16,
 }
 
@@ -114,8 +114,8 @@ impl Observer {
     ///
     /// # Errors
     /// As [`MotionReply::parse`].
-    pub fn read_reply(&self, controller: usize, octets: &[u8]) -> Result<MotionReply, WireError> {
-        MotionReply::parse_as(self.watched[controller].vibration_port, octets)
+    pub fn read_reply(&self, controller: usize, bytes: &[u8]) -> Result<MotionReply, WireError> {
+        MotionReply::parse_as(self.watched[controller].vibration_port, bytes)
     }
 
     /// The last known states.

@@ -54,12 +54,12 @@ pub struct ControllerState {
     pub(super) stopped_by_inputs: bool,
     /// Nothing asks for the emergency stop any more, but it lasts until a reset.
     pub(super) stop_is_held: bool,
-    /// Whether the error number came with a reply, so that a reply without one ends it; else only a report does.
+    /// True if the error number came with a reply, so that a reply without one ends it; else only a report does.
     pub(super) error_by_reply: bool,
 }
 
 impl ControllerState {
-    /// Whether an emergency stop is in effect: its replies say so, or one of the configured inputs does.
+    /// True if an emergency stop is in effect: its replies say so, or one of the configured inputs does.
     #[must_use]
     pub const fn emergency_stop(&self) -> bool {
         self.stopped_by_reply || self.stopped_by_inputs

@@ -51,7 +51,7 @@ impl Counts {
         std::array::from_fn(|place| (WORDS[place], self.0[place].load(Ordering::Relaxed)))
     }
 
-    /// One of them by its word; 0 where none is called so.
+    /// One of them by its word; 0 if none is called so.
     #[must_use]
     pub fn of(&self, word: &str) -> u64 {
         self.all().iter().find(|(name, _)| *name == word).map_or(0, |&(_, count)| count)

@@ -2,7 +2,7 @@
 
 use rosc::{OscMessage, OscType};
 
-use crate::hall::{Severity, Status, Warning};
+use crate::control::{Severity, Status, Warning};
 
 /// What one receiver has been told so far.
 #[derive(Debug, Default)]

@@ -28,7 +28,7 @@ use std::sync::Arc;
 pub use counts::Counts;
 
 use crate::config::OscPort;
-use crate::hall::Handle;
+use crate::control::Handle;
 use port::Port;
 
 /// Why the port cannot be opened.
@@ -67,7 +67,7 @@ impl Osc {
     /// Where it listens.
     ///
     /// # Errors
-    /// Where the system does not say.
+    /// If the system does not say.
     pub fn address(&self) -> io::Result<std::net::SocketAddr> {
         self.socket.local_addr()
     }
@@ -81,7 +81,7 @@ impl Osc {
     /// Serves the port until its future is dropped. To be awaited within a tokio runtime with time and network.
     ///
     /// # Errors
-    /// Where the socket fails; it never ends otherwise.
+    /// If the socket fails; it never ends otherwise.
     pub async fn serve(self) -> io::Result<std::convert::Infallible> {
         let incoming = tokio::net::UdpSocket::from_std(self.socket.try_clone()?)?;
         Port::new(self.socket, self.config, self.hall, self.counts).serve(&incoming).await

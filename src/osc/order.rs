@@ -3,7 +3,7 @@
 use rosc::{OscMessage, OscType};
 
 use crate::config::GearWord;
-use crate::hall::{Ask, LevelsChange};
+use crate::control::{Command, LevelsChange};
 use crate::time::ShowTime;
 
 /// The longest that a subscription lasts before it has to be renewed, s.
@@ -13,7 +13,7 @@ const LONGEST_S: u16 = 3_600;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Order {
     /// Of the hall.
-    Ask(Ask),
+    Command(Command),
     /// Feedback to that port of its sender, for so many seconds; 0 ends it.
     Subscribe { port: u16, seconds: u16 },
     /// Nothing: a button was let go.
@@ -49,10 +49,10 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
     let taken = Taken { message, allow };
     match parts[..] {
         ["stop"] => Ok(taken.stop()),
-        ["go"] => taken.allowed(GearWord::Go)?.button(Ask::Go),
-        ["pause"] => taken.allowed(GearWord::Pause)?.button(Ask::Pause),
-        ["resume"] => taken.allowed(GearWord::Resume)?.button(Ask::Resume),
-        ["park"] => taken.allowed(GearWord::Park)?.button(Ask::Park),
+        ["go"] => taken.allowed(GearWord::Go)?.button(Command::Go),
+        ["pause"] => taken.allowed(GearWord::Pause)?.button(Command::Pause),
+        ["resume"] => taken.allowed(GearWord::Resume)?.button(Command::Resume),
+        ["park"] => taken.allowed(GearWord::Park)?.button(Command::Park),
         ["seek"] => taken.allowed(GearWord::Seek)?.seek(),
         ["trim"] => taken.allowed(GearWord::Trim)?.trim(),
         ["subscribe"] => taken.subscribe(),
@@ -66,12 +66,12 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
         ["effect", name] if !name.is_empty() => {
             let on = taken.allowed(GearWord::Levels)?.switch()?;
             let effects = [(name.to_owned(), on)].into();
-            Ok(Order::Ask(Ask::Levels(LevelsChange { effects, ..<_>::default() })))
+            Ok(Order::Command(Command::Levels(LevelsChange { effects, ..<_>::default() })))
         }
         ["seat", name, "enable"] if !name.is_empty() => {
             let on = taken.allowed(GearWord::Seats)?.switch()?;
             let name = name.to_owned();
-            Ok(Order::Ask(if on { Ask::Enable(name) } else { Ask::Disable { name, why: None } }))
+            Ok(Order::Command(if on { Command::Enable(name) } else { Command::Disable { name, why: None } }))
         }
         ["arm", ..] => Err(Fault::Forbidden("arm")),
         ["disarm", ..] => Err(Fault::Forbidden("disarm")),
@@ -95,7 +95,7 @@ impl Taken<'_> {
     }
 
     /// Without an argument, or with one that says whether a button went down or up.
-    fn button(self, ask: Ask) -> Result<Order, Fault> {
+    fn button(self, ask: Command) -> Result<Order, Fault> {
         let pressed = match self.message.args.as_slice() {
             [] => true,
             [value] => {
@@ -103,35 +103,35 @@ impl Taken<'_> {
             }
             _ => return Err(self.wants("nothing, or 1 for a button that goes down")),
         };
-        Ok(if pressed { Order::Ask(ask) } else { Order::Released })
+        Ok(if pressed { Order::Command(ask) } else { Order::Released })
     }
 
     /// Whatever comes with it, unless that says that a button came up.
     fn stop(self) -> Order {
         match self.message.args.as_slice() {
             [value] if switch(value) == Some(false) => Order::Released,
-            _ => Order::Ask(Ask::Stop),
+            _ => Order::Command(Command::Stop),
         }
     }
 
     fn seek(self) -> Result<Order, Fault> {
         let at = self.number().filter(|&s| (0.0..=1e6).contains(&s));
         let at = at.ok_or_else(|| self.wants("a position in seconds, 0 or more"))?;
-        Ok(Order::Ask(Ask::Seek(ShowTime::from_secs_f64(at))))
+        Ok(Order::Command(Command::Seek(ShowTime::from_secs_f64(at))))
     }
 
     fn trim(self) -> Result<Order, Fault> {
         let ms = self.number().filter(|ms| (-500.0..=500.0).contains(ms));
         let ms = ms.ok_or_else(|| self.wants("milliseconds, -500 to 500"))?;
         #[expect(clippy::cast_possible_truncation, reason = "it is within -500 to 500")]
-        Ok(Order::Ask(Ask::Trim(ms.round() as i32)))
+        Ok(Order::Command(Command::Trim(ms.round() as i32)))
     }
 
     fn levels(self, change: impl FnOnce(f64) -> LevelsChange) -> Result<Order, Fault> {
         let taken = self.allowed(GearWord::Levels)?;
         let level = taken.number().filter(|level| (0.0..=1.0).contains(level));
         let level = level.ok_or_else(|| taken.wants("a level, 0 to 1"))?;
-        Ok(Order::Ask(Ask::Levels(change(level))))
+        Ok(Order::Command(Command::Levels(change(level))))
     }
 
     fn subscribe(self) -> Result<Order, Fault> {
@@ -203,16 +203,16 @@ mod tests {
 
     #[test]
     fn each_address_asks_what_it_says() {
-        let levels = |change| Ask::Levels(change);
+        let levels = |change| Command::Levels(change);
         for (addr, args, ask) in [
-            ("/kinocue/go", vec![], Ask::Go),
-            ("/kinocue/pause", vec![OscType::Float(1.0)], Ask::Pause),
-            ("/kinocue/resume", vec![OscType::Int(1)], Ask::Resume),
-            ("/kinocue/stop", vec![OscType::Bool(true)], Ask::Stop),
-            ("/kinocue/park", vec![], Ask::Park),
-            ("/kinocue/seek", vec![OscType::Float(12.5)], Ask::Seek(ShowTime::from_millis(12_500))),
-            ("/kinocue/seek", vec![OscType::Int(750)], Ask::Seek(ShowTime::from_millis(750_000))),
-            ("/kinocue/trim", vec![OscType::Float(-80.4)], Ask::Trim(-80)),
+            ("/kinocue/go", vec![], Command::Go),
+            ("/kinocue/pause", vec![OscType::Float(1.0)], Command::Pause),
+            ("/kinocue/resume", vec![OscType::Int(1)], Command::Resume),
+            ("/kinocue/stop", vec![OscType::Bool(true)], Command::Stop),
+            ("/kinocue/park", vec![], Command::Park),
+            ("/kinocue/seek", vec![OscType::Float(12.5)], Command::Seek(ShowTime::from_millis(12_500))),
+            ("/kinocue/seek", vec![OscType::Int(750)], Command::Seek(ShowTime::from_millis(750_000))),
+            ("/kinocue/trim", vec![OscType::Float(-80.4)], Command::Trim(-80)),
             (
                 "/kinocue/level/motion",
                 vec![OscType::Float(0.6)],
@@ -236,14 +236,14 @@ mod tests {
                 vec![OscType::Int(0)],
                 levels(LevelsChange { rows: [("A".to_owned(), 0.0)].into(), ..LevelsChange::default() }),
             ),
-            ("/kinocue/seat/F4/enable", vec![OscType::Int(1)], Ask::Enable("F4".to_owned())),
+            ("/kinocue/seat/F4/enable", vec![OscType::Int(1)], Command::Enable("F4".to_owned())),
             (
                 "/kinocue/seat/F4/enable",
                 vec![OscType::Bool(false)],
-                Ask::Disable { name: "F4".to_owned(), why: None },
+                Command::Disable { name: "F4".to_owned(), why: None },
             ),
         ] {
-            assert_eq!(ordered(addr, args), Ok(Order::Ask(ask)), "{addr}");
+            assert_eq!(ordered(addr, args), Ok(Order::Command(ask)), "{addr}");
         }
     }
 
@@ -258,7 +258,7 @@ mod tests {
         let odd =
             [vec![OscType::Float(0.5)], vec![OscType::String("now".to_owned())], vec![OscType::Int(0); 2]];
         for args in odd {
-            assert_eq!(ordered("/kinocue/stop", args), Ok(Order::Ask(Ask::Stop)));
+            assert_eq!(ordered("/kinocue/stop", args), Ok(Order::Command(Command::Stop)));
         }
         assert_eq!(ordered("/kinocue/stop", vec![OscType::Int(0)]), Ok(Order::Released));
     }
@@ -304,7 +304,7 @@ mod tests {
     #[test]
     fn what_is_not_listed_is_not_allowed_but_stop_is() {
         let message = |addr: &str| OscMessage { addr: addr.to_owned(), args: Vec::new() };
-        assert_eq!(order(&message("/kinocue/stop"), &[]), Ok(Order::Ask(Ask::Stop)));
+        assert_eq!(order(&message("/kinocue/stop"), &[]), Ok(Order::Command(Command::Stop)));
         assert!(matches!(order(&message("/kinocue/go"), &[GearWord::Pause]), Err(Fault::NotAllowed(_))));
     }
 
@@ -325,7 +325,7 @@ mod tests {
             with_value in any::<bool>(),
         ) {
             let args = if with_value { vec![OscType::Float(value)] } else { Vec::new() };
-            if let Ok(Order::Ask(ask)) = ordered(&addr, args) {
+            if let Ok(Order::Command(ask)) = ordered(&addr, args) {
                 let words =
                     ["go", "pause", "resume", "stop", "park", "seek", "trim", "levels", "enable", "disable"];
                 prop_assert!(words.contains(&ask.word()), "{}", ask.word());

@@ -2,7 +2,7 @@
 
 use rosc::{OscMessage, OscPacket, OscTime, decoder};
 
-/// The longest datagram that is looked at, octets. It also bounds how deep bundles nest, as each costs 20.
+/// The longest datagram that is looked at, bytes. It also bounds how deep bundles nest, as each costs 20.
 pub(super) const MOST: usize = 1536;
 
 /// From 1900, which OSC counts from, to 1970 (RFC 5905).
@@ -15,7 +15,7 @@ pub(super) struct Timed {
     pub(super) early: bool,
 }
 
-/// The messages of a datagram in their order; none where it is not OSC from its first octet to its last. `wall_ns` is the
+/// The messages of a datagram in their order; `None` if it is not OSC from its first byte to its last. `wall_ns` is the
 /// wall clock, since 1970.
 pub(super) fn read(datagram: &[u8], wall_ns: u64) -> Option<Vec<Timed>> {
     let (rest, packet) = decoder::decode_udp(datagram).ok()?;
@@ -34,7 +34,7 @@ fn take_apart(packet: OscPacket, early: bool, now: u64, into: &mut Vec<Timed>) {
     }
 }
 
-/// Whether a time tag lies after `now`; one without seconds means "at once".
+/// True if a time tag lies after `now`; one without seconds means "at once".
 fn is_later(tag: OscTime, now: u64) -> bool {
     let tag_time = u64::from(tag.seconds) << 32 | u64::from(tag.fractional);
     // Seconds wrap in 2036: what is less than half the range ahead is later.
@@ -102,38 +102,38 @@ mod tests {
     }
 
     #[test]
-    fn octets_after_the_message_are_no_osc() {
-        let mut octets = encoder::encode(&message("/kinocue/go")).unwrap();
-        assert!(read(&octets, NOW_NS).is_some());
-        octets.extend([0; 4]);
-        assert!(read(&octets, NOW_NS).is_none());
+    fn bytes_after_the_message_are_no_osc() {
+        let mut bytes = encoder::encode(&message("/kinocue/go")).unwrap();
+        assert!(read(&bytes, NOW_NS).is_some());
+        bytes.extend([0; 4]);
+        assert!(read(&bytes, NOW_NS).is_none());
         assert!(read(&[], NOW_NS).is_none());
     }
 
     #[test]
     fn bundles_nested_as_deep_as_a_datagram_allows_are_read() {
-        let mut octets = encoder::encode(&message("/a")).unwrap();
-        while octets.len() + 20 <= MOST {
-            let length = u32::try_from(octets.len()).unwrap().to_be_bytes();
-            octets = [b"#bundle\0\0\0\0\0\0\0\0\x01".as_slice(), &length, &octets].concat();
+        let mut bytes = encoder::encode(&message("/a")).unwrap();
+        while bytes.len() + 20 <= MOST {
+            let length = u32::try_from(bytes.len()).unwrap().to_be_bytes();
+            bytes = [b"#bundle\0\0\0\0\0\0\0\0\x01".as_slice(), &length, &bytes].concat();
         }
-        assert_eq!(read(&octets, NOW_NS).unwrap().len(), 1);
+        assert_eq!(read(&bytes, NOW_NS).unwrap().len(), 1);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
         #[test]
-        fn no_octets_panic(octets in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = read(&octets, NOW_NS);
-            let _ = read(&[b"/kinocue/a\0\0".as_slice(), &octets].concat(), NOW_NS);
-            let _ = read(&[b"#bundle\0".as_slice(), &octets].concat(), NOW_NS);
+        fn no_bytes_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = read(&bytes, NOW_NS);
+            let _ = read(&[b"/kinocue/a\0\0".as_slice(), &bytes].concat(), NOW_NS);
+            let _ = read(&[b"#bundle\0".as_slice(), &bytes].concat(), NOW_NS);
         }
 
         #[test]
-        fn no_type_tags_panic(tags in "[ifsbtdTFNIcrm\\[\\]]{0,40}", octets in proptest::collection::vec(any::<u8>(), 0..80)) {
+        fn no_type_tags_panic(tags in "[ifsbtdTFNIcrm\\[\\]]{0,40}", bytes in proptest::collection::vec(any::<u8>(), 0..80)) {
             let mut text = format!(",{tags}\0").into_bytes();
             text.resize(text.len().next_multiple_of(4), 0);
-            let _ = read(&[b"/a\0\0".as_slice(), &text, &octets].concat(), NOW_NS);
+            let _ = read(&[b"/a\0\0".as_slice(), &text, &bytes].concat(), NOW_NS);
         }
     }
 }

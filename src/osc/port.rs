@@ -18,7 +18,7 @@ use super::packet::{self, Timed};
 use super::repeats::Repeats;
 use super::subscribers::Subscribers;
 use crate::config::OscPort;
-use crate::hall::{Ask, Handle, LevelsChange, Problem, Role, Severity, Surface, Who};
+use crate::control::{Command, Handle, LevelsChange, Problem, Role, Severity, Surface, Who};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::{Clock as _, MonoTime};
 
@@ -74,12 +74,12 @@ impl Port {
     pub(super) async fn serve(mut self, incoming: &tokio::net::UdpSocket) -> io::Result<Infallible> {
         let mut feedback = interval(FEEDBACK);
         feedback.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut octets = [0; packet::MOST];
+        let mut bytes = [0; packet::MOST];
         loop {
             tokio::select! {
-                received = incoming.recv_from(&mut octets) => {
+                received = incoming.recv_from(&mut bytes) => {
                     let (len, from) = received?;
-                    self.take(&octets[..len], from, Monotonic.now());
+                    self.take(&bytes[..len], from, Monotonic.now());
                 }
                 Some(outcome) = self.asked.join_next() => {
                     self.answered(&outcome.expect("what is asked neither panics nor is it given up"));
@@ -99,13 +99,13 @@ impl Port {
             return self.counts.add(Count::Malformed);
         };
         for timed in messages {
-            if let Err(fault) = self.obey(&timed, from, now) {
+            if let Err(fault) = self.dispatch(&timed, from, now) {
                 self.refuse(&fault, from);
             }
         }
     }
 
-    fn obey(&mut self, timed: &Timed, from: SocketAddrV4, now: MonoTime) -> Result<(), Fault> {
+    fn dispatch(&mut self, timed: &Timed, from: SocketAddrV4, now: MonoTime) -> Result<(), Fault> {
         let Timed { message, early } = timed;
         match order(message, &self.config.allow)? {
             Order::Released => Ok(()),
@@ -113,19 +113,19 @@ impl Port {
                 self.subscribers.subscribe(SocketAddrV4::new(*from.ip(), port), seconds, now)
             }
             // A stop waits for nothing, least of all for a clock that goes wrong.
-            Order::Ask(ask) if *early && ask != Ask::Stop => Err(Fault::Early(message.addr.clone())),
-            Order::Ask(ask) if self.repeats.is_repeat(&ask, now) => {
+            Order::Command(ask) if *early && ask != Command::Stop => Err(Fault::Early(message.addr.clone())),
+            Order::Command(ask) if self.repeats.is_repeat(&ask, now) => {
                 self.counts.add(Count::Repeated);
                 Ok(())
             }
-            Order::Ask(Ask::Levels(change)) => self.turn(change, from, &message.addr),
-            Order::Ask(ask) => self.ask(ask, from, &message.addr),
+            Order::Command(Command::Levels(change)) => self.coalesce(change, from, &message.addr),
+            Order::Command(ask) => self.ask(ask, from, &message.addr),
         }
     }
 
     /// Asks the hall, in the order of the messages, without waiting for its answer.
-    fn ask(&mut self, ask: Ask, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
-        let is_stop = ask == Ask::Stop;
+    fn ask(&mut self, ask: Command, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
+        let is_stop = ask == Command::Stop;
         if is_stop {
             self.hall.stop();
         }
@@ -133,7 +133,7 @@ impl Port {
             // A stop is done by now; what would follow is its line in the journal.
             return if is_stop { Ok(()) } else { Err(Fault::Busy(address.to_owned())) };
         }
-        let was_levels = matches!(ask, Ask::Levels(_));
+        let was_levels = matches!(ask, Command::Levels(_));
         let who = Who { role: Role::Operate, surface: Surface::Osc, name: from.ip().to_string() };
         let posted = self.hall.post(who, ask);
         self.asked.spawn(async move {
@@ -148,7 +148,7 @@ impl Port {
     }
 
     /// Changes levels, at once or as soon as the change before is through.
-    fn turn(&mut self, change: LevelsChange, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
+    fn coalesce(&mut self, change: LevelsChange, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
         if self.levels.effects.len() + self.levels.rows.len() >= MOST_NAMED {
             return Err(Fault::Busy(address.to_owned()));
         }
@@ -158,7 +158,11 @@ impl Port {
 
     fn ask_levels(&mut self, from: SocketAddrV4, address: &str) -> Result<(), Fault> {
         let change = std::mem::take(&mut self.levels);
-        if change == LevelsChange::default() { Ok(()) } else { self.ask(Ask::Levels(change), from, address) }
+        if change == LevelsChange::default() {
+            Ok(())
+        } else {
+            self.ask(Command::Levels(change), from, address)
+        }
     }
 
     fn answered(&mut self, outcome: &Outcome) {
@@ -214,8 +218,8 @@ impl Port {
 
 /// Sends a message where the system takes it now; what comes late is worth nothing.
 fn send(out: &UdpSocket, counts: &Counts, message: &OscMessage, to: SocketAddrV4) {
-    let octets = encoder::encode(&OscPacket::Message(message.clone()));
-    if octets.is_ok_and(|octets| out.send_to(&octets, to).is_ok()) {
+    let bytes = encoder::encode(&OscPacket::Message(message.clone()));
+    if bytes.is_ok_and(|bytes| out.send_to(&bytes, to).is_ok()) {
         return;
     }
     counts.add(Count::Unsent);

@@ -1,4 +1,4 @@
-//! The port with real datagrams over loopback, before a hall that a double of its keeper keeps.
+//! The port with real datagrams over loopback, before a hall that a double of its supervisor keeps.
 
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
@@ -9,8 +9,8 @@ use tokio::runtime::Builder;
 
 use super::{Counts, open};
 use crate::config::{GearWord, OscPort};
-use crate::hall::{
-    Ask, Code, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status, StatusSource, Surface,
+use crate::control::{
+    Code, Command, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status, StatusSource, Surface,
     Warning, handle,
 };
 use crate::rt::Desk;
@@ -60,7 +60,7 @@ impl Stage {
     }
 
     /// What the hall is asked next; it is answered well.
-    fn asked(&self) -> Ask {
+    fn asked(&self) -> Command {
         let asked = self.inbox.next(PATIENCE).expect("something is asked");
         assert_eq!((asked.desired.who.role, asked.desired.who.surface), (Role::Operate, Surface::Osc));
         assert_eq!(asked.desired.who.name, "127.0.0.1");
@@ -71,11 +71,11 @@ impl Stage {
 
     /// The next message to the gear that is called so.
     fn heard(&self, word: &str) -> Vec<OscType> {
-        let mut octets = [0; 2048];
+        let mut bytes = [0; 2048];
         loop {
-            let (len, from) = self.gear.recv_from(&mut octets).expect("something is said");
+            let (len, from) = self.gear.recv_from(&mut bytes).expect("something is said");
             assert_eq!(from, self.port);
-            let (_, packet) = decoder::decode_udp(&octets[..len]).unwrap();
+            let (_, packet) = decoder::decode_udp(&bytes[..len]).unwrap();
             let OscPacket::Message(message) = packet else { panic!("a bundle") };
             if message.addr == format!("/kinocue/{word}") {
                 return message.args;
@@ -123,8 +123,8 @@ fn what_is_said_is_asked_in_its_order() {
     stage.say("go", vec![]);
     stage.say("pause", vec![]);
     stage.say("seek", vec![OscType::Float(12.5)]);
-    assert_eq!([stage.asked(), stage.asked()], [Ask::Go, Ask::Pause]);
-    assert_eq!(stage.asked(), Ask::Seek(crate::time::ShowTime::from_millis(12_500)));
+    assert_eq!([stage.asked(), stage.asked()], [Command::Go, Command::Pause]);
+    assert_eq!(stage.asked(), Command::Seek(crate::time::ShowTime::from_millis(12_500)));
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn a_go_that_comes_twice_is_asked_once() {
     stage.say("go", vec![]);
     stage.say("go", vec![]);
     stage.say("park", vec![]);
-    assert_eq!([stage.asked(), stage.asked()], [Ask::Go, Ask::Park]);
+    assert_eq!([stage.asked(), stage.asked()], [Command::Go, Command::Park]);
     assert_eq!(stage.counts.of("repeated"), 1);
 }
 
@@ -177,7 +177,7 @@ fn nothing_is_done_later_but_a_stop_is_done_at_once() {
     let now_s = wall_now_ns() / 1_000_000_000 + 2_208_988_800; // since 1900
     let timetag = OscTime { seconds: u32::try_from(now_s).unwrap() + 3_600, fractional: 0 };
     stage.send(&OscPacket::Bundle(OscBundle { timetag, content }));
-    assert_eq!(stage.asked(), Ask::Stop);
+    assert_eq!(stage.asked(), Command::Stop);
     assert!(stage.desk.take_stop());
     assert_eq!(stage.counts.of("early"), 1);
 }
@@ -196,7 +196,7 @@ fn faders_that_move_while_levels_are_set_add_up_to_their_last_value() {
     stage.heard("warning");
     first.answer(Ok(Arc::new(Status::starting("Hall 1"))));
     let effects = [("water".to_owned(), false)].into();
-    assert_eq!(stage.asked(), Ask::Levels(LevelsChange { motion: Some(0.6), effects, ..<_>::default() }));
+    assert_eq!(stage.asked(), Command::Levels(LevelsChange { motion: Some(0.6), effects, ..<_>::default() }));
 }
 
 #[test]
@@ -231,14 +231,14 @@ fn a_subscriber_hears_state_position_warnings_and_the_beat() {
 }
 
 #[test]
-fn octets_that_are_no_osc_are_counted_and_the_port_lives_on() {
+fn bytes_that_are_no_osc_are_counted_and_the_port_lives_on() {
     let stage = Stage::new();
-    for octets in
+    for bytes in
         [b"".as_slice(), b"GET / HTTP/1.1\r\n\r\n", &[0xff; 1400], b"#bundle\0\0\0\0\0\0\0\0\x01\0\0\xff\xff"]
     {
-        stage.gear.send_to(octets, stage.port).unwrap();
+        stage.gear.send_to(bytes, stage.port).unwrap();
     }
     stage.say("park", vec![]);
-    assert_eq!(stage.asked(), Ask::Park);
+    assert_eq!(stage.asked(), Command::Park);
     assert_eq!(stage.counts.of("malformed"), 4);
 }

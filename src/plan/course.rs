@@ -19,11 +19,11 @@ pub enum After {
 pub struct Leg {
     /// The show time at which its move starts.
     pub start: ShowTime,
-    /// Its move; none where the lane goes on as `then` says at once.
+    /// Its move; `None` if the lane goes on as `then` says at once.
     pub plan: Option<Plan>,
     /// What comes after it.
     pub then: After,
-    /// Whether it is out: it rests in park while the others play.
+    /// True if it is out: it rests in park while the others play.
     pub out: bool,
 }
 
@@ -64,7 +64,7 @@ impl Course {
         self.settled
     }
 
-    /// Whether a lane follows the cue at a show time.
+    /// True if a lane follows the cue at a show time.
     #[must_use]
     pub fn is_on_cue(&self, lane: usize, at: ShowTime) -> bool {
         self.legs[lane].then == After::Cue && at >= self.legs[lane].settled()
@@ -84,7 +84,7 @@ impl Course {
         plan.pose_at(at, leg.start, window)
     }
 
-    /// Whether a lane's move is over at a show time.
+    /// True if a lane's move is over at a show time.
     #[must_use]
     pub fn is_settled(&self, lane: usize, at: ShowTime) -> bool {
         at >= self.legs[lane].settled()

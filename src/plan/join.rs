@@ -61,7 +61,7 @@ pub(super) fn join(
     least_rough.map(|(_, plan)| plan).ok_or(no_join)
 }
 
-/// Whether a lane at rest in its park pose can take up the cue at `start` without a move: the cue stands there in that
+/// True if a lane at rest in its park pose can take up the cue at `start` without a move: the cue stands there in that
 /// pose, to a pulse, and leaves it within the limits.
 #[must_use]
 pub(super) fn joins_without_a_move(window: &Window, cue: &Curve<'_>, start: ShowTime, rate_hz: f64) -> bool {

@@ -14,7 +14,7 @@ mod states;
 
 pub use course::{After, Course, Leg};
 pub use join::JOIN_MIN;
-pub use park::{PARK_VELOCITY_MM_S, homing_time};
+pub use park::{PARK_VELOCITY_MM_S, slow_park_time};
 pub use planner::{From, Planner, Request, To};
 pub use scene::{LaneScene, Place, Scene};
 

@@ -85,7 +85,7 @@ fn stop_first(window: &Window, from: &[AxisState]) -> Result<Plan, String> {
     reason = "a saturating cast is what is wanted"
 )]
 #[must_use]
-pub fn homing_time(stroke_mm: f64) -> (u32, bool) {
+pub fn slow_park_time(stroke_mm: f64) -> (u32, bool) {
     let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
     (whole.min(LONGEST_MS), whole > LONGEST_MS)
 }
@@ -177,8 +177,8 @@ mod tests {
 
     #[test]
     fn the_way_home_takes_the_stroke_at_50_mm_a_second_and_3_s_at_the_most() {
-        assert_eq!(homing_time(100.0), (2_000, false));
-        assert_eq!(homing_time(150.0), (3_000, false));
-        assert_eq!(homing_time(475.0), (3_000, true));
+        assert_eq!(slow_park_time(100.0), (2_000, false));
+        assert_eq!(slow_park_time(150.0), (3_000, false));
+        assert_eq!(slow_park_time(475.0), (3_000, true));
     }
 }

@@ -1,5 +1,5 @@
-//! The planner: asked for a course by the tick thread, answers with one. It keeps the courses that it gave out, so that
-//! a request need only say from which one, and when, to go on.
+//! The planner: answers requests of the tick thread for a course. It keeps the courses that it issued, so that
+//! a request need only name the one to continue from, and when.
 
 use std::collections::VecDeque;
 
@@ -76,7 +76,7 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Whether a leg made for the other serves this one as well: the seats of a hall are mostly alike.
+    /// True if a leg made for the other serves this one as well: the seats of a hall are mostly alike.
     fn is_like(&self, other: &Task<'_>) -> bool {
         self.window == other.window
             && self.to == other.to

@@ -1,4 +1,4 @@
-//! How the lanes are when a course is asked for: what the planner cannot know from the courses it gave out.
+//! State of the lanes when a course is requested: what the planner cannot know from the courses it issued.
 
 use crate::motion::{Pose, Window};
 
@@ -20,7 +20,7 @@ pub struct LaneScene {
     pub place: Place,
     /// How much of the cue's motion about its neutral pose it makes, 0 to 1.
     pub level: f64,
-    /// Whether it rests in park while the others play.
+    /// True if it rests in park while the others play.
     pub out: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Whether a playlist can be played: everything that may go wrong is found when it is loaded, not when it starts.
+//! Checks if a playlist can be played: everything that may go wrong is found when it is loaded, not when it starts.
 
 use std::collections::BTreeSet;
 

@@ -1,7 +1,7 @@
 //! Playlists: the cues of a day in order, each with its levels, and when it starts. From TOML to checked entries, and from
-//! the wall clock to what is due. Control plane; the schedule is pure and told the time.
+//! the wall clock to what is due. Control plane; the schedule is pure; the time is an argument.
 //!
-//! A schedule starts nothing by itself: it only says what is due. Whoever keeps the hall starts it, and only while a person
+//! A schedule starts nothing by itself: it only reports what is due. The supervisor starts it, and only while a person
 //! has armed the hall.
 
 mod check;
@@ -21,7 +21,7 @@ use jiff::civil::{Time, Weekday};
 use jiff::tz::TimeZone;
 
 use crate::config::{Config, Preset};
-use crate::hall::LevelsChange;
+use crate::control::LevelsChange;
 use crate::library::{CueId, Id};
 
 /// The name of a playlist.
@@ -53,11 +53,11 @@ pub struct Entry {
     pub vibration: Option<f64>,
     /// How much later than the film the motion is, ms, -500 to 500.
     pub trim_ms: Option<i32>,
-    /// Whether an effect may be on, by its name.
+    /// True if an effect may be on, by its name.
     pub effects: BTreeMap<String, bool>,
     /// What follows its end.
     pub then: Then,
-    /// When it starts by the wall clock; none where a person starts it, or the entry before goes on to it.
+    /// When it starts by the wall clock; `None` if a person starts it, or the entry before goes on to it.
     pub at: Option<At>,
     /// Where the file says what has to be looked up elsewhere.
     pub(crate) places: Places,
@@ -102,7 +102,7 @@ impl Then {
 }
 
 impl At {
-    /// Whether it is a time of that day.
+    /// True if it is a time of that day.
     #[must_use]
     pub fn is_on(&self, day: Weekday) -> bool {
         self.days.contains(&day.to_monday_zero_offset())

@@ -1,4 +1,4 @@
-//! Which entry starts when. Pure: told the wall clock, never asks.
+//! Start times of the entries. Pure: the wall clock is an argument.
 //!
 //! A time that the clock skips (in spring) is moved on by as much as it skips; of a time that comes twice (in autumn) the
 //! first counts. So each entry has one start on each of its days.
@@ -57,7 +57,7 @@ pub fn next_start(playlist: &Playlist, now: &Zoned) -> Option<(usize, Zoned)> {
 }
 
 /// The entry, counted from 0, whose start came after `previous` and at or before `now`, no longer than [`LATEST`] before it.
-/// Of several the last; none where the clock went back.
+/// Of several the last; `None` if the clock went back.
 #[must_use]
 pub fn due(playlist: &Playlist, previous: &Zoned, now: &Zoned) -> Option<usize> {
     find_due(playlist, previous, now).map(|(entry, _)| entry)

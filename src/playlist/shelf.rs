@@ -7,10 +7,10 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{Playlist, PlaylistId};
-use crate::hall::{Code, Problem};
+use crate::control::{Code, Problem};
 use crate::sys::folder::Folder;
 
-/// The largest playlist that is read, octets.
+/// The largest playlist that is read, bytes.
 const MAX_LEN: u64 = 1 << 20;
 /// What a playlist's file is called behind its id.
 const ENDING: &str = ".toml";
@@ -26,7 +26,7 @@ pub struct Shelf {
 pub struct PlaylistInfo {
     /// Its id.
     pub id: String,
-    /// Its title; null where it has faults.
+    /// Its title; null if it has faults.
     pub title: Option<String>,
     /// The ids of its cues, in order.
     pub cues: Vec<String>,
@@ -90,7 +90,7 @@ impl Shelf {
     fn text(&self, name: &str) -> io::Result<Option<String>> {
         let Some((file, stamp)) = Folder::open(&self.dir)?.file(name)? else { return Ok(None) };
         if stamp.size > MAX_LEN {
-            return Err(io::Error::other(format!("it is longer than {MAX_LEN} octets")));
+            return Err(io::Error::other(format!("it is longer than {MAX_LEN} bytes")));
         }
         let mut text = String::new();
         file.take(MAX_LEN).read_to_string(&mut text)?;

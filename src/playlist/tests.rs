@@ -1,4 +1,4 @@
-//! What a playlist may say, and when it says that something is due.
+//! Playlists: what one may hold, and when an entry is due.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::config::from_to_args;
-use crate::hall::Code;
+use crate::control::Code;
 use crate::library::{Bounds, Hall, Library};
 
 /// Central Europe, without asking the machine: clocks go on at 01:00 UTC of 29 March and back at 01:00 UTC of 25 October 2026.

@@ -1,4 +1,4 @@
-//! Whether a controller answers, how fast and how reliably, and whether it told all that was asked.
+//! Judges if a controller answers, how fast and how reliably, and if it told all that was asked.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ const SLOW: Duration = Duration::from_millis(20);
 /// Of 20 reads: more than a tenth lost is what a show calls degraded.
 const LOST: usize = 2;
 
-/// Median and maximum of round trips; none where there are none.
+/// Median and maximum of round trips; `None` if there are none.
 #[must_use]
 pub fn round_trip(took: &[Duration]) -> Option<(Duration, Duration)> {
     let mut sorted = took.to_vec();

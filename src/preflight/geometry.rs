@@ -1,4 +1,4 @@
-//! What the controller knows of the seat's mechanics, against what its type says: encoder, lead, stroke.
+//! Compares the controller's settings of the mechanics with the seat type: encoder, lead, stroke.
 
 use std::collections::BTreeMap;
 

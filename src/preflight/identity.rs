@@ -1,4 +1,4 @@
-//! Whether a controller is the one it should be, alone at its address, and set up for its seat.
+//! Decides if a controller is the one it should be, alone at its address, and set up for its seat.
 
 use std::collections::BTreeMap;
 
@@ -171,8 +171,8 @@ fn judge_versions(subjects: &[Subject<'_>], all: &mut [Notes]) {
 /// The hardware address, where the controller tells one.
 fn mac(subject: &Subject<'_>) -> Option<[u16; 6]> {
     let mut mac = [0; 6];
-    for (octet, number) in mac.iter_mut().zip(0x16..) {
-        *octet = subject.pa(number)?;
+    for (byte, number) in mac.iter_mut().zip(0x16..) {
+        *byte = subject.pa(number)?;
     }
     (mac != [0; 6]).then_some(mac)
 }

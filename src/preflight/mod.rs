@@ -39,7 +39,7 @@ pub struct Finding {
     pub check: Check,
     /// What was found, with the register and its value.
     pub found: String,
-    /// What to do; empty where nothing is to be done.
+    /// What to do; empty if nothing is to be done.
     pub remedy: String,
     /// Why the site lives with it, where it does.
     pub accepted: Option<String>,
@@ -52,7 +52,7 @@ impl Finding {
         self.check.severity()
     }
 
-    /// Whether preflight fails for it.
+    /// True if preflight fails for it.
     #[must_use]
     pub fn fails(&self) -> bool {
         self.severity() == Severity::Fail && self.accepted.is_none()

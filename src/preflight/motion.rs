@@ -1,7 +1,7 @@
 //! How a controller takes frames: what it does with their Time, with a backlog, with silence, and with positions.
 
 use super::{Check, Notes, Subject, Terms};
-use crate::plan::homing_time;
+use crate::plan::slow_park_time;
 use crate::wire::Dialect;
 
 pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
@@ -108,7 +108,7 @@ fn judge_interval(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
         return;
     }
     let frame = terms.frame_time_ms();
-    let (slow, _) = homing_time(subject.controller.seat.stroke_mm);
+    let (slow, _) = slow_park_time(subject.controller.seat.stroke_mm);
     let (longest, what) = match frame.max(slow) {
         longest if longest == frame => (longest, "frames of the show"),
         longest => (longest, "the frame that brings the seat to its park pose"),

@@ -2,7 +2,7 @@
 
 use super::{Check, Notes, Subject, Terms};
 
-/// Whether datagrams get there, whole.
+/// True if datagrams get there, whole.
 pub(super) fn judge_way(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     let address = subject.controller.address;
     match &subject.route {
@@ -14,14 +14,14 @@ pub(super) fn judge_way(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes)
             let need = terms.packet_len(subject.controller);
             if usize::try_from(route.mtu).is_ok_and(|mtu| mtu < need) {
                 let found =
-                    format!("the interface takes packets of {} octets, but {need} are sent", route.mtu);
+                    format!("the interface takes packets of {} bytes, but {need} are sent", route.mtu);
                 notes.add(Check::Mtu, found, "set the interface's MTU to 1500");
             }
         }
     }
 }
 
-/// Whether its answers come here.
+/// True if its answers come here.
 pub(super) fn judge_replies(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     if let (Ok(route), Some(host)) = (&subject.route, subject.ip(0x20))
         && host != route.local

@@ -1,4 +1,4 @@
-//! Whether an output is on when it is called for, and then alone.
+//! Checks if an output is on when it is called for, and then alone.
 
 use super::{Check, Notes, Subject};
 

@@ -1,4 +1,4 @@
-//! Where the axes say that they stand: in which order of words, and whether that can be.
+//! Judges the reported positions of the axes: their word order, and if they are plausible.
 
 use super::{Check, Notes, Subject};
 use crate::device::home::DPF0;
@@ -71,7 +71,7 @@ impl Stand<'_> {
         word_order(self.words, self.dialect, self.stroke, self.reported)
     }
 
-    /// Whether the seat stood where it stands by a later reading: only then does a report tell of the same place.
+    /// True if the seat stood where it stands by a later reading: only then does a report tell of the same place.
     fn rests(&self, again: &[[u16; 2]]) -> bool {
         let near = |(one, two): (&[u16; 2], &[u16; 2])| {
             let [one, two] = [one, two].map(|words| position(*words, self.dialect));

@@ -1,4 +1,4 @@
-//! What a controller says of itself: its present errors, and whether it would tell of the next.
+//! Judges a controller's present errors, and if it would report the next.
 
 use std::net::SocketAddrV4;
 
@@ -53,7 +53,7 @@ fn judge_state(subject: &Subject<'_>, notes: &mut Notes) {
     }
 }
 
-/// Whether what PA92 names are belts and nothing else.
+/// True if what PA92 names are belts and nothing else.
 fn are_belts(subject: &Subject<'_>) -> bool {
     let belts = subject.controller.belt_inputs;
     belts != 0 && subject.pa(0x92).is_some_and(|mask| mask & !belts == 0)
@@ -111,7 +111,7 @@ fn judge_second_host(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     }
 }
 
-/// Whether its reports, if there are any, come here.
+/// True if its reports, if there are any, come here.
 fn report_to_here(subject: &Subject<'_>, terms: &Terms) -> bool {
     let to = match subject.pa(0x1f) {
         Some(1) => host(subject, HOST),

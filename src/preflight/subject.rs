@@ -11,11 +11,11 @@ use crate::net::Route;
 use crate::time::Rate;
 use crate::wire::{Dialect, motion_channel_and_slots, motion_len};
 
-/// Octets of the longest register message that preflight itself exchanges: a read of 32 registers answered.
+/// Bytes of the longest register message that preflight itself exchanges: a read of 32 registers answered.
 const REGISTER_LEN: usize = 80;
 /// Frames with vibration carry at most so many axes (SMC manual 2.2.2.9).
 const MAX_VIBRATING_AXES: usize = 6;
-/// Octets of IP and UDP before each message.
+/// Bytes of IP and UDP before each message.
 const HEADERS_LEN: usize = 28;
 
 /// What is known of one controller.
@@ -23,22 +23,22 @@ const HEADERS_LEN: usize = 28;
 pub struct Subject<'a> {
     /// What it should be.
     pub controller: &'a Controller,
-    /// How many axes its seat has; none where nobody says.
+    /// How many axes its seat has; `None` if nobody says.
     pub axes: Option<usize>,
     /// The way to it, or why there is none.
     pub route: Result<Route, String>,
-    /// What it told; none where it could not be asked.
+    /// What it told; `None` if it could not be asked.
     pub survey: Option<&'a Survey>,
 }
 
 /// What a show will ask of the controllers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terms {
-    /// The port that controllers answer to; 0 where it is another each time.
+    /// The port that controllers answer to; 0 if it is another each time.
     pub frame_port: u16,
     /// Frames a second.
     pub rate_hz: f64,
-    /// The axes of the cue, and whether it vibrates; none where no cue is known.
+    /// The axes of the cue, and whether it vibrates; `None` if no cue is known.
     pub cue: Option<(usize, bool)>,
 }
 
@@ -72,7 +72,7 @@ pub fn wanted(controller: &Controller) -> Vec<Address> {
 }
 
 impl Subject<'_> {
-    /// Whether it answered at all.
+    /// True if it answered at all.
     #[must_use]
     pub fn answered(&self) -> bool {
         self.survey.is_some_and(Survey::answered)
@@ -90,11 +90,11 @@ impl Subject<'_> {
         self.survey?.values.get(&address).copied()
     }
 
-    /// An IPv4 address in four parameters; none where one is missing or no octet.
+    /// An IPv4 address in four parameters; `None` if one is missing or no byte.
     #[must_use]
     pub fn ip(&self, first: u8) -> Option<Ipv4Addr> {
-        let octet = |step| self.pa(first + step).and_then(|word| u8::try_from(word).ok());
-        Some(Ipv4Addr::new(octet(0)?, octet(1)?, octet(2)?, octet(3)?))
+        let byte = |step| self.pa(first + step).and_then(|word| u8::try_from(word).ok());
+        Some(Ipv4Addr::new(byte(0)?, byte(1)?, byte(2)?, byte(3)?))
     }
 
     /// Axes that it works with: the seat's, else what PA02 says.
@@ -113,7 +113,7 @@ impl Terms {
         (0..1_000).map(|frame| rate.time_ms(frame)).max().unwrap_or(0)
     }
 
-    /// The largest IP packet that goes to a controller or comes from it, octets.
+    /// The largest IP packet that goes to a controller or comes from it, bytes.
     #[must_use]
     pub fn packet_len(&self, controller: &Controller) -> usize {
         let cue_axes = self.cue.map_or_else(|| most_axes(controller), |(axes, _)| axes);

@@ -313,7 +313,7 @@ fn reports_that_are_promised_and_do_not_come_are_told() {
 fn a_way_that_is_none_or_too_narrow_is_told() {
     let mut case = Case::smc();
     case.route = Ok(crate::net::Route { local: super::testing::HOST, mtu: 68 });
-    assert_eq!(only(&case).unwrap().found, "the interface takes packets of 68 octets, but 108 are sent");
+    assert_eq!(only(&case).unwrap().found, "the interface takes packets of 68 bytes, but 108 are sent");
     let mut case = Case::smc();
     case.route = Err("network is unreachable".to_owned());
     assert_eq!(only(&case).unwrap().found, "no way to 192.168.15.201:7408: network is unreachable");

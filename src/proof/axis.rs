@@ -23,9 +23,9 @@ pub struct AxisProof {
     pub lowest: Figure,
     /// The highest position that is sent, mm from the stroke's lower end.
     pub highest: Figure,
-    /// The lowest position with vibration on top; none where the axis never vibrates.
+    /// The lowest position with vibration on top; `None` if the axis never vibrates.
     pub lowest_shaken: Option<Figure>,
-    /// The highest position with vibration on top; none where the axis never vibrates.
+    /// The highest position with vibration on top; `None` if the axis never vibrates.
     pub highest_shaken: Option<Figure>,
     /// mm/s.
     pub velocity: Worst,

@@ -7,7 +7,7 @@ use sha2::{Digest as _, Sha256};
 use crate::cue::{Cue, Effects, Steps};
 use crate::time::ShowTime;
 
-/// Octets that are hashed at once.
+/// Bytes that are hashed at once.
 const CHUNK: usize = 1 << 16;
 
 /// The SHA-256 of what a cue does: rows, unit, interpolation, vibration and effects, as they are in memory. Title, markers
@@ -25,22 +25,22 @@ impl Digest {
         sink.count(cue.axes());
         sink.count(cue.rows());
         cue.times().iter().for_each(|time| sink.time(*time));
-        cue.positions().iter().for_each(|position| sink.octets(position.to_le_bytes()));
+        cue.positions().iter().for_each(|position| sink.bytes(position.to_le_bytes()));
         for steps in cue.vibration() {
             sink.steps(steps, |sink, vibration| {
-                sink.octets(vibration.hz.to_le_bytes());
-                sink.octets(vibration.amplitude.to_le_bytes());
+                sink.bytes(vibration.hz.to_le_bytes());
+                sink.bytes(vibration.amplitude.to_le_bytes());
             });
         }
         match cue.effects() {
             Effects::Named { names, steps } => {
                 sink.count(names.len());
                 names.iter().for_each(|name| sink.text(name));
-                sink.steps(steps, |sink, on| sink.octets(u64::from(on).to_le_bytes()));
+                sink.steps(steps, |sink, on| sink.bytes(u64::from(on).to_le_bytes()));
             }
             Effects::Words(steps) => {
                 sink.count(usize::MAX); // unlike any count of names
-                sink.steps(steps, |sink, word| sink.octets(u64::from(word).to_le_bytes()));
+                sink.steps(steps, |sink, word| sink.bytes(u64::from(word).to_le_bytes()));
             }
         }
         sink.hash.update(&sink.buffer);
@@ -51,7 +51,7 @@ impl Digest {
 impl fmt::Display for Digest {
     /// 64 hex digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|octet| write!(f, "{octet:02x}"))
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 
@@ -62,8 +62,8 @@ struct Sink {
 }
 
 impl Sink {
-    fn octets(&mut self, octets: [u8; 8]) {
-        self.buffer.extend_from_slice(&octets);
+    fn bytes(&mut self, bytes: [u8; 8]) {
+        self.buffer.extend_from_slice(&bytes);
         if self.buffer.len() >= CHUNK {
             self.hash.update(&self.buffer);
             self.buffer.clear();
@@ -71,11 +71,11 @@ impl Sink {
     }
 
     fn count(&mut self, count: usize) {
-        self.octets((count as u64).to_le_bytes());
+        self.bytes((count as u64).to_le_bytes());
     }
 
     fn time(&mut self, time: ShowTime) {
-        self.octets(time.as_nanos().to_le_bytes());
+        self.bytes(time.as_nanos().to_le_bytes());
     }
 
     fn text(&mut self, text: &str) {

@@ -10,7 +10,7 @@ const LENGTHS: [f64; 10] = [0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0];
 /// Rows of that stretch are at most this far apart, nanoseconds.
 const FINE: i64 = 5_000_000;
 
-/// The cue with each of these endings, and the seconds that it takes; none where it jumps from row to row.
+/// The cue with each of these endings, and the seconds that it takes; `None` if it jumps from row to row.
 pub(super) fn eased(timeline: &Timeline) -> impl Iterator<Item = (f64, Cue)> {
     let jumps = timeline.cue().interpolation() == Interpolation::Hold;
     let half = timeline.duration().as_secs_f64() / 2.0;

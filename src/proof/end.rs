@@ -1,4 +1,4 @@
-//! Whether an axis can come to rest after the cue's last pose: windows of the measure that end at the last row see nothing
+//! Decides if an axis can come to rest after the cue's last pose: windows of the measure that end at the last row see nothing
 //! of what has to follow it.
 //!
 //! This is also what makes a stop possible anywhere before. With -jerk, and then with all acceleration, an axis turns before

@@ -26,9 +26,9 @@ const HALVINGS: usize = 12;
 /// How a cue is made to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Manner {
-    /// Whether each axis has its own amplitude; else all have the least of them, so that they keep their proportions.
+    /// True if each axis has its own amplitude; else all have the least of them, so that they keep their proportions.
     pub per_axis: bool,
-    /// Whether a low-pass may help.
+    /// True if a low-pass may help.
     pub smooth: bool,
 }
 
@@ -77,7 +77,7 @@ pub enum FitError {
         if *smooth { "" } else { "; steps and corners need a low-pass: --smooth" }
     )]
     NoAmplitude {
-        /// Whether a low-pass was tried too.
+        /// True if a low-pass was tried too.
         smooth: bool,
     },
 }
@@ -151,7 +151,7 @@ fn best_of(original: &Timeline, cue: Cue, terms: &Terms, manner: Manner) -> Opti
     smoothest(original, &Timeline::new(cue), terms, manner.per_axis, plain)
 }
 
-/// Whether every axis can come to rest after its last pose.
+/// True if every axis can come to rest after its last pose.
 fn all_rest(timeline: &Timeline, terms: &Terms) -> bool {
     let stencils = Stencils::at(terms.rate);
     subjects(timeline, terms).iter().all(|subject| able_to_rest(subject, terms, &stencils) >= 1.0)

@@ -1,5 +1,5 @@
-//! Whether a cue keeps the limits of the seats that play it, over its whole length and however the frames fall on it, by
-//! the measure that the last gate enforces. From a [`Timeline`] and [`Terms`] to a [`Proof`]. Control thread; pure.
+//! Proves that a cue keeps the limits of the seats that play it, over its whole length and however the frames fall on it, by
+//! the measure that the limiter enforces. From a [`Timeline`] and [`Terms`] to a [`Proof`]. Control thread; pure.
 //!
 //! A divided difference over fixed distances is, between the rows shifted by those distances, a cubic of the phase: its
 //! extremes are found in closed form, so that no phase has to be tried.
@@ -81,13 +81,13 @@ pub struct Proof {
 }
 
 impl Proof {
-    /// Whether no limit is broken.
+    /// True if no limit is broken.
     #[must_use]
     pub fn passed(&self) -> bool {
         self.violations.is_empty()
     }
 
-    /// Whether a play on these terms is proved to keep all limits.
+    /// True if a play on these terms is proved to keep all limits.
     #[must_use]
     pub fn covers(&self, terms: &Terms) -> bool {
         self.passed() && self.terms.cover(terms)

@@ -29,7 +29,7 @@ pub(super) struct Block {
     pub(super) derivatives: [f64; 3],
     /// Sums of the jumps of position, slope and second derivative where its cubics begin.
     pub(super) jumps: [f64; 3],
-    /// How long each of its cubics lasts, nanoseconds; 0 where none lasts, -1 where they differ.
+    /// How long each of its cubics lasts, nanoseconds; 0 if none lasts, -1 where they differ.
     pub(super) span: i64,
 }
 

@@ -51,7 +51,7 @@ impl Swing {
 }
 
 impl Subject<'_> {
-    /// The motion of the axis, to put vibrations on; none where it never vibrates.
+    /// The motion of the axis, to put vibrations on; `None` if it never vibrates.
     pub(super) fn under<'a>(
         &self,
         pieces: &'a Pieces,
@@ -101,7 +101,7 @@ impl Subject<'_> {
         ends
     }
 
-    /// One of the axis's vibrations; none where it stands for none.
+    /// One of the axis's vibrations; `None` if it stands for none.
     fn swing(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<Swing> {
         let steps = self.timeline.cue().vibration().get(self.axis)?.as_slice();
         let (step, next): (&Step<Vibration>, _) = (steps.get(index)?, steps.get(index + 1));

@@ -159,7 +159,7 @@ impl Sweep<'_, Over> {
 }
 
 impl<T: Sink> Sweep<'_, T> {
-    /// The last show time of a first pose; none where the axis is too short for the stencil.
+    /// The last show time of a first pose; `None` if the axis is too short for the stencil.
     pub(super) fn last(&self) -> Option<i64> {
         let last = self.pieces.end() - self.stencil.reach();
         (last >= self.pieces.list()[0].start).then_some(last)

@@ -65,7 +65,7 @@ impl Terms {
         Self { cue, parts: vec![Part { seat, axes: 0..axes }], effects: Vec::new(), rate, level }
     }
 
-    /// Whether what is proved for these terms holds for `other`: all is the same, but the level may be lower. Motion and
+    /// True if what is proved for these terms holds for `other`: all is the same, but the level may be lower. Motion and
     /// vibration shrink in proportion to the level, about a pose inside the stroke.
     #[must_use]
     pub fn cover(&self, other: &Self) -> bool {

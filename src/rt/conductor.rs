@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use super::mail::{Alarm, News};
 use crate::engine::{Ending, Engine, Rest};
-use crate::state::{Cause, Event, Finding, Machine, Next, Readiness, Refusal, Request, Ride, State, Trouble};
+use crate::state::{
+    Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble,
+};
 use crate::time::{MonoTime, ShowTime};
 
 /// The machine, and what was last done for it.
@@ -102,7 +104,7 @@ impl Conductor {
         let mut machine = Machine::new(now);
         machine.event(Event::Identified(Finding { homed: true, at_park: true, crashed: false }), now);
         machine.event(Event::Readiness(Readiness::Ready), now);
-        for request in [Request::Arm, Request::Go] {
+        for request in [Transition::Arm, Transition::Go] {
             // Neither is refused to a parked hall that is ready.
             let _ = machine.request(request, now);
         }
@@ -119,7 +121,12 @@ impl Conductor {
     ///
     /// # Errors
     /// [`Refusal`] where the state does not allow it; nothing has changed then.
-    pub fn request(&mut self, request: Request, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
+    pub fn request(
+        &mut self,
+        request: Transition,
+        engine: &mut Engine,
+        now: MonoTime,
+    ) -> Result<(), Refusal> {
         self.look_for_stray(engine, now);
         self.machine.request(request, now)?;
         self.steer(engine);
@@ -131,7 +138,7 @@ impl Conductor {
     /// # Errors
     /// As [`Conductor::request`].
     pub fn seek(&mut self, film: ShowTime, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
-        self.machine.request(Request::Seek, now)?;
+        self.machine.request(Transition::Seek, now)?;
         engine.seek(film);
         self.steer(engine);
         Ok(())
@@ -160,7 +167,7 @@ impl Conductor {
         self.left = true;
         match self.machine.state() {
             State::Playing(_) | State::Paused => {
-                let _ = self.machine.request(Request::Park, now);
+                let _ = self.machine.request(Transition::Park, now);
                 self.steer(engine);
             }
             State::Stopping | State::Parking => {}
@@ -170,7 +177,7 @@ impl Conductor {
 
     /// Stops; never refused.
     pub fn stop(&mut self, engine: &mut Engine, now: MonoTime) {
-        let _ = self.machine.request(Request::Stop, now);
+        let _ = self.machine.request(Transition::Stop, now);
         self.steer(engine);
     }
 
@@ -227,14 +234,14 @@ impl Conductor {
             return Some(Event::Trouble(Trouble::Planner));
         }
         if engine.take_gate_fault() {
-            return Some(Event::Trouble(Trouble::Gate));
+            return Some(Event::Trouble(Trouble::Limiter));
         }
         match self.machine.state() {
             State::Playing(_) if engine.is_homeward() => Some(Event::CueEnded),
             State::Playing(ride) => match (ride, engine.rest()) {
-                (Ride::Joining | Ride::Following, Some(Rest::Late)) => Some(Event::Late),
-                (Ride::Freewheeling, None) => Some(Event::JoinBegun),
-                (Ride::Joining, None) if engine.is_on_cue() => Some(Event::Joined),
+                (PlayMode::Joining | PlayMode::Following, Some(Rest::Late)) => Some(Event::Late),
+                (PlayMode::Holding, None) => Some(Event::JoinBegun),
+                (PlayMode::Joining, None) if engine.is_on_cue() => Some(Event::Joined),
                 _ => None,
             },
             State::Stopping if engine.is_told_to_rest() => Some(Event::AtRest),

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::TickReport;
 use super::table::Row;
 use crate::belief::Evidence;
-use crate::state::{Ride, State};
+use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
 
@@ -59,9 +59,9 @@ impl Phase {
         match state {
             State::Boot => Self::Asking,
             State::Homing => Self::Homing,
-            State::Armed | State::Playing(Ride::Joining) => Self::Joining,
-            State::Playing(Ride::Following) => Self::Playing,
-            State::Playing(Ride::Freewheeling) => Self::Freewheeling,
+            State::Armed | State::Playing(PlayMode::Joining) => Self::Joining,
+            State::Playing(PlayMode::Following) => Self::Playing,
+            State::Playing(PlayMode::Holding) => Self::Freewheeling,
             State::Paused => Self::Paused,
             State::Stopping => Self::Stopping,
             State::Stopped => Self::Stopped,
@@ -101,7 +101,7 @@ pub struct Live {
     closed: AtomicBool,
     clears: AtomicU32,
     moving: AtomicBool,
-    /// How often the last gate held each lane back.
+    /// How often the limiter held each lane back.
     clamps: Box<[AtomicU64]>,
     /// What the ack thread has seen of each lane.
     evidence: Box<[Evidence]>,
@@ -165,13 +165,13 @@ impl Live {
         self.told_ns.store(until.as_nanos(), Ordering::Release);
     }
 
-    /// How often the last gate held a lane back since the program started; 0 where that is not told.
+    /// How often the limiter held a lane back since the program started; 0 where that is not told.
     #[must_use]
     pub fn clamps(&self, lane: usize) -> u64 {
         self.clamps.get(lane).map_or(0, |clamps| clamps.load(Ordering::Relaxed))
     }
 
-    /// Notes how often the last gate held a lane back.
+    /// Notes how often the limiter held a lane back.
     pub(super) fn on_clamps(&self, lane: usize, clamps: u64) {
         if let Some(told) = self.clamps.get(lane) {
             told.store(clamps, Ordering::Relaxed);

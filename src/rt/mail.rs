@@ -10,7 +10,7 @@ use crate::belief::Evidence;
 use crate::engine::{Engine, Unplanned};
 use crate::fanout::Lane;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
-use crate::state::{Cause, Event, Machine, Next, Refusal, Request, State};
+use crate::state::{Cause, Event, Machine, Next, Refusal, State, Transition};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
 use crate::wire::FrameNo;
@@ -86,7 +86,7 @@ pub enum Answer {
 #[derive(Debug)]
 pub enum Command {
     /// Anything but to seek.
-    Request(Request),
+    Request(Transition),
     /// Go on at that time of the film.
     Seek(ShowTime),
     /// Something that the control plane has found out: the hall is ready, the seats are home.
@@ -277,7 +277,7 @@ impl Mail {
         self.live.told()
     }
 
-    /// Notes how often the last gate held a lane back.
+    /// Notes how often the limiter held a lane back.
     pub(super) fn clamps(&self, lane: usize, clamps: u64) {
         self.live.on_clamps(lane, clamps);
     }

@@ -8,7 +8,7 @@ use rtrb::Consumer;
 use super::desk::Desk;
 use super::line::LineEnd;
 use crate::config::Controller;
-use crate::health::{Health, Standing};
+use crate::health::{HealthState, HealthTable};
 use crate::state::Finding;
 use crate::time::MonoTime;
 
@@ -87,7 +87,7 @@ impl Standby {
     }
 
     /// Takes orders, and counts what the line sent; `on_homed` hears of every controller that is home.
-    pub(super) fn serve(&mut self, health: &mut Health, mut on_homed: impl FnMut(usize)) {
+    pub(super) fn serve(&mut self, health: &mut HealthTable, mut on_homed: impl FnMut(usize)) {
         while let Ok(Order::Homed(controller)) = self.orders.pop() {
             on_homed(usize::from(controller));
             health.on_homed(usize::from(controller));
@@ -99,13 +99,13 @@ impl Standby {
     }
 
     /// What the start has found, once every controller that is to take part has told; said once.
-    pub(super) fn take_finding(&mut self, health: &Health) -> Option<Finding> {
+    pub(super) fn take_finding(&mut self, health: &HealthTable) -> Option<Finding> {
         let crashed = self.boot?;
         let groups = health.groups();
         // What is latched was seen as well; it waits for a person, who may clear it only once all have told.
         let known = |controller: usize| {
             let standing = health.standing(groups.group_of(controller));
-            self.seen[controller].filter(|_| standing != Standing::Lost)
+            self.seen[controller].filter(|_| standing != HealthState::Lost)
         };
         let mut finding = Finding { homed: true, at_park: true, crashed };
         for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {

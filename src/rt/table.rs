@@ -1,6 +1,6 @@
 //! How each controller stands, as the ack thread tells it ten times a second.
 
-use crate::health::{Standing, Why};
+use crate::health::{HealthState, Why};
 use crate::observe::ControllerState;
 use crate::time::MonoTime;
 use crate::tracker::{Counts, Tracker};
@@ -16,7 +16,7 @@ pub struct Row {
     /// Latency of its acks, ns; none where there were none.
     pub ack_ns: Option<AckTimes>,
     /// How its group stands.
-    pub standing: Standing,
+    pub standing: HealthState,
     /// Why.
     pub why: Why,
     /// What it said of itself.

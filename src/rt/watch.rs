@@ -16,7 +16,7 @@ use super::standby::{Seen, Standby};
 use super::table::{Row, Turns};
 use crate::config::Controller;
 use crate::fanout::Lane;
-use crate::health::{Change, Health, Notice, Standing};
+use crate::health::{Change, HealthState, HealthTable, Notice};
 use crate::motion::Pulses;
 use crate::net::Sender;
 use crate::observe::{Look, Observer};
@@ -36,7 +36,7 @@ const SILENT_AFTER: Duration = Duration::from_secs(3);
 /// The watch over the controllers of one play.
 #[derive(Debug)]
 pub struct Watch {
-    health: Health,
+    health: HealthTable,
     lookers: Vec<Looker>,
     /// What each seat tells of where it is.
     positions: Vec<Positions>,
@@ -78,7 +78,7 @@ impl Watch {
     /// A watch over controllers, in the order of their lanes; `health` is of as many.
     #[must_use]
     pub fn new(
-        health: Health,
+        health: HealthTable,
         controllers: &[Controller],
         lanes: &[Lane],
         sender: Sender,
@@ -86,7 +86,7 @@ impl Watch {
         live: Arc<Live>,
     ) -> Self {
         let groups = health.groups().len();
-        let silent = (0..groups).all(|group| health.standing(group) == Standing::Unwatched);
+        let silent = (0..groups).all(|group| health.standing(group) == HealthState::Unwatched);
         if !silent {
             live.on_reader();
         }
@@ -130,7 +130,10 @@ impl Watch {
     pub fn into_outcome(self) -> (Vec<Change>, Vec<usize>) {
         let groups = self.health.groups();
         let is_gone = |controller: &usize| {
-            matches!(self.health.standing(groups.group_of(*controller)), Standing::Lost | Standing::Excluded)
+            matches!(
+                self.health.standing(groups.group_of(*controller)),
+                HealthState::Lost | HealthState::Excluded
+            )
         };
         let gone = (0..groups.controllers()).filter(is_gone).collect();
         (self.changes, gone)
@@ -297,7 +300,7 @@ impl Watch {
         let Some(reading) = self.positions[controller].reading(at).filter(|reading| reading.rests) else {
             return;
         };
-        if self.stands(controller) != Standing::Rejoining
+        if self.stands(controller) != HealthState::Rejoining
             && !self.lookers[controller].rests_at_park(&reading.pose)
         {
             self.health.on_moved(controller);
@@ -398,7 +401,7 @@ impl Watch {
         self.standby.as_ref().is_some_and(Standby::is_hushed) && !self.live.is_moving()
     }
 
-    fn stands(&self, controller: usize) -> Standing {
+    fn stands(&self, controller: usize) -> HealthState {
         self.health.standing(self.health.groups().group_of(controller))
     }
 
@@ -410,12 +413,12 @@ impl Watch {
     fn tell_lane(&mut self, controller: usize, change: Change) {
         let lane = u16::try_from(controller).expect("fewer controllers than ports");
         match change.to {
-            Standing::Stopped => {
+            HealthState::Stopped => {
                 // Frames have left effects on; between shows none of ours are.
                 self.lit[controller] = if self.live.is_moving() { DARKENED } else { 0 };
                 self.alarm(Alarm::Cut(lane));
             }
-            Standing::Rejoining => self.alarm(Alarm::Found(lane)),
+            HealthState::Rejoining => self.alarm(Alarm::Found(lane)),
             to if !to.may_move() => self.alarm(Alarm::Leave(lane)),
             _ => {}
         }
@@ -451,7 +454,7 @@ impl Watch {
         }
         let groups = self.health.groups();
         let is_lost = |controller: &usize| {
-            self.health.standing(groups.group_of(*controller)) == Standing::Excluded
+            self.health.standing(groups.group_of(*controller)) == HealthState::Excluded
                 && self.takes_part(*controller)
         };
         let lost = (0..groups.controllers()).find(is_lost);
@@ -528,7 +531,7 @@ impl Watch {
         }
         // A group that was found at park is where the others are.
         for group in 0..health.groups().len() {
-            if health.standing(group) == Standing::Rejoining
+            if health.standing(group) == HealthState::Rejoining
                 && standby.is_at_park(health.groups().members(group))
             {
                 health.on_joined(group);
@@ -545,7 +548,7 @@ impl Watch {
         let Some(since) = self.anew else { return };
         let is_open = |group| {
             let mut members = self.health.groups().members(group);
-            self.health.standing(group) == Standing::Lost
+            self.health.standing(group) == HealthState::Lost
                 && members.any(|controller| self.takes_part(controller))
         };
         let is_read = !(0..self.health.groups().len()).any(is_open);
@@ -583,8 +586,12 @@ mod tests {
         let (sender, _) =
             Ports::open("127.0.0.1:0".parse().unwrap(), &[config.controllers[0].address]).unwrap().split();
         let (producer, mut alarms) = RingBuffer::new(2);
-        let health =
-            Health::new(Groups::of(&config.controllers), LossPolicy::Continue, 1, Duration::from_millis(10));
+        let health = HealthTable::new(
+            Groups::of(&config.controllers),
+            LossPolicy::Continue,
+            1,
+            Duration::from_millis(10),
+        );
         let mut watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
         let all: Vec<Alarm> = (0..7).map(Alarm::Leave).collect();
         all.iter().for_each(|alarm| watch.alarm(*alarm));

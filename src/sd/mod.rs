@@ -1,5 +1,5 @@
-//! What the service manager is told: that the hall is ready, what it does, and that its ticks go on. Control plane; where no
-//! service manager asks to be told (`NOTIFY_SOCKET`), all of it does nothing. By the protocol of `sd_notify(3)`.
+//! Notifies the service manager: that the hall is ready, its state, and that its ticks go on. Control plane; if no
+//! service manager wants notifications (`NOTIFY_SOCKET`), all of it does nothing. By the protocol of `sd_notify(3)`.
 
 use std::borrow::Cow;
 use std::io;
@@ -12,11 +12,11 @@ use crate::time::MonoTime;
 
 mod watchdog;
 
-pub use watchdog::{Feeder, Hunger, Pulse};
+pub use watchdog::{FeedDecision, Pulse, WatchdogThread};
 
 /// How often the line in `systemctl status` changes at the most.
 const STATUS_EVERY: Duration = Duration::from_secs(1);
-/// The longest such line, octets; systemd takes no more than 4,096 in all.
+/// The longest such line, bytes; systemd takes no more than 4,096 in all.
 const STATUS_LEN: usize = 1_024;
 
 /// Tells the service manager how the hall is. Of one thread, which owns it.
@@ -75,7 +75,7 @@ struct StatusLine {
 }
 
 impl StatusLine {
-    /// Whether it is to be told now; taken for told then.
+    /// True if it is to be told now; taken for told then.
     fn is(&mut self, text: &str, now: MonoTime) -> bool {
         let tell = match &self.told {
             Some((at, last)) => last != text && now.since(*at) >= STATUS_EVERY,

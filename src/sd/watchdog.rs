@@ -21,16 +21,16 @@ const BETWEEN: Duration = Duration::from_secs(10);
 /// What counts the ticks, and the drains of the ack thread.
 pub type Pulse = [u64; 2];
 
-/// Whether the watchdog is to be fed, by counters of ticks and of drains; told the time.
+/// True if the watchdog is to be fed, by counters of ticks and of drains; told the time.
 #[derive(Debug)]
-pub struct Hunger {
+pub struct FeedDecision {
     patience: Duration,
     seen: Option<Pulse>,
     /// When each counter moved last, or was there, or went.
     moved: [MonoTime; 2],
 }
 
-impl Hunger {
+impl FeedDecision {
     /// One for a service manager that waits `interval` long, and ticks every `period`. No counter may stand still from one
     /// look to the next no longer than a quarter of the interval, or two periods where ticks are rare.
     #[must_use]
@@ -38,7 +38,7 @@ impl Hunger {
         Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: [now; 2] }
     }
 
-    /// Whether all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
+    /// True if all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
     /// or opens, that is as good for ten seconds.
     #[must_use]
     pub fn feed(&mut self, beats: Option<Pulse>, now: MonoTime) -> bool {
@@ -56,18 +56,18 @@ impl Hunger {
 
 /// The thread that feeds the watchdog. It ends when this is dropped.
 #[derive(Debug)]
-pub struct Feeder {
+pub struct WatchdogThread {
     done: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Feeder {
+impl WatchdogThread {
     /// Feeds the service manager that waits `interval` long ([`watchdog()`](super::watchdog())) while `beats` counts ticks, which come
     /// every `period`, in every state of the hall; it gives none while no hall is open. To be started by a thread of ordinary
     /// priority.
     ///
     /// # Errors
-    /// Where the system starts no further thread.
+    /// If the system starts no further thread.
     pub fn start(
         interval: Duration,
         period: Duration,
@@ -86,7 +86,7 @@ impl Feeder {
         let done = Arc::new(AtomicBool::new(false));
         let end = Arc::clone(&done);
         let thread = thread::Builder::new().name("watchdog".to_owned()).spawn(move || {
-            let mut hunger = Hunger::new(interval, period, beats(), Monotonic.now());
+            let mut hunger = FeedDecision::new(interval, period, beats(), Monotonic.now());
             while !end.load(Ordering::Acquire) {
                 // Not a sleep: who wants it to end unparks it. A look too early does no harm.
                 thread::park_timeout(interval / LOOKS);
@@ -99,7 +99,7 @@ impl Feeder {
     }
 }
 
-impl Drop for Feeder {
+impl Drop for WatchdogThread {
     fn drop(&mut self) {
         self.done.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn it_is_not_fed_while_one_of_the_two_stands() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), Some([0, 0]), ms(0));
+        let mut hunger = FeedDecision::new(SECOND, Duration::from_millis(10), Some([0, 0]), ms(0));
         assert!(hunger.feed(Some([25, 40]), ms(200)));
         assert!(!hunger.feed(Some([50, 40]), ms(450)), "nobody hears of an emergency stop");
         assert!(hunger.feed(Some([75, 41]), ms(650)));
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn it_is_fed_while_the_counter_moves_and_not_once_it_stands() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), both(0), ms(0));
+        let mut hunger = FeedDecision::new(SECOND, Duration::from_millis(10), both(0), ms(0));
         assert!(hunger.feed(both(25), ms(250)));
         assert!(hunger.feed(both(26), ms(500)), "one tick is enough");
         assert!(!hunger.feed(both(26), ms(750)), "it hangs");
@@ -150,13 +150,13 @@ mod tests {
 
     #[test]
     fn a_tick_thread_that_never_ticked_gets_nothing() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(1), both(0), ms(0));
+        let mut hunger = FeedDecision::new(SECOND, Duration::from_millis(1), both(0), ms(0));
         assert!((1..40).all(|look| !hunger.feed(both(0), ms(250 * look))));
     }
 
     #[test]
     fn ticks_once_a_second_are_no_hang() {
-        let mut hunger = Hunger::new(4 * SECOND, SECOND, both(0), ms(0));
+        let mut hunger = FeedDecision::new(4 * SECOND, SECOND, both(0), ms(0));
         assert!((1..=10).all(|s| hunger.feed(both(s), ms(1_000 * s))));
         assert!(hunger.feed(both(10), ms(11_000)), "the next tick may be due this very moment");
         assert!(!hunger.feed(both(10), ms(12_000)));
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn a_hall_that_is_opened_anew_has_ten_seconds_and_counts_from_where_it_likes() {
-        let mut hunger = Hunger::new(SECOND, Duration::from_millis(10), both(7_000), ms(0));
+        let mut hunger = FeedDecision::new(SECOND, Duration::from_millis(10), both(7_000), ms(0));
         assert!((1..40).all(|look| hunger.feed(None, ms(250 * look))));
         assert!(hunger.feed(both(0), ms(10_000)));
         assert!(!hunger.feed(both(0), ms(10_250)), "open, it has to tick");
@@ -178,7 +178,7 @@ mod tests {
         let (fed, feeds) = mpsc::channel();
         let beats = move || both(ticks.fetch_add(1, Ordering::Relaxed));
         let interval = Duration::from_millis(4);
-        let feeder = Feeder::feeding(interval, interval, beats, move || {
+        let feeder = WatchdogThread::feeding(interval, interval, beats, move || {
             let _ = fed.send(());
         })
         .unwrap();

@@ -18,7 +18,7 @@ const UNFINISHED: &str = "settings.json.new";
 const ASIDE: &str = "settings.json.bad";
 /// There while what was loaded before is being loaded again.
 const LOADING: &str = "loading";
-/// The longest file that is read, octets.
+/// The longest file that is read, bytes.
 const LONGEST: u64 = 16 << 20;
 /// How often it is tried again where the disk takes nothing.
 const AGAIN: Duration = Duration::from_secs(10);
@@ -26,7 +26,7 @@ const AGAIN: Duration = Duration::from_secs(10);
 /// What was found at the start.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Kept {
-    /// What was set; none where nobody has set anything, or it cannot be read.
+    /// What was set; `None` if nobody has set anything, or it cannot be read.
     pub settings: Option<Settings>,
     /// What a person should know of it.
     pub said: Vec<String>,
@@ -113,13 +113,13 @@ impl SettingsFile {
         &self.folder
     }
 
-    /// Why it cannot be kept at present, and what to do; none where it can.
+    /// Why it cannot be kept at present, and what to do; `None` if it can.
     #[must_use]
     pub fn trouble(&self) -> Option<String> {
         self.exchange.lock().trouble.clone()
     }
 
-    /// Whether trouble has ended since this was last asked.
+    /// True if trouble has ended since this was last asked.
     pub fn take_mended(&mut self) -> bool {
         std::mem::take(&mut self.exchange.lock().mended)
     }
@@ -222,7 +222,7 @@ fn read(folder: &Path) -> Kept {
     }
 }
 
-/// The text of the file; none where there is none.
+/// The text of the file; `None` if there is none.
 fn text(folder: &Path) -> Result<Option<String>, String> {
     let read = || -> io::Result<Option<String>> {
         let folder = Folder::open(folder)?;
@@ -233,7 +233,7 @@ fn text(folder: &Path) -> Result<Option<String>, String> {
         let mut text = String::new();
         file.take(LONGEST + 1).read_to_string(&mut text)?;
         if text.len() as u64 > LONGEST {
-            return Err(io::Error::other(format!("it is longer than {LONGEST} octets")));
+            return Err(io::Error::other(format!("it is longer than {LONGEST} bytes")));
         }
         Ok(Some(text))
     };

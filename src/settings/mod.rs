@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub use file::{Kept, Loading, SettingsFile};
 pub use words::seats_out;
 
-use crate::hall::{Levels, Surface};
+use crate::control::{Levels, Surface};
 use crate::journal::PlaylistPlace;
 use crate::time::TRIM_MS;
 
@@ -55,7 +55,7 @@ pub struct Out {
     pub surface: Surface,
     /// When, RFC 3339.
     pub at: String,
-    /// Why; none where nobody said.
+    /// Why; `None` if nobody said.
     pub why: Option<String>,
 }
 

@@ -94,10 +94,10 @@ proptest! {
     #[test]
     fn no_text_makes_the_reader_panic(text in ".{0,200}", cut in 0_usize..400, with in any::<u8>()) {
         let _ = Settings::parse(&text);
-        let mut octets = set().text().into_bytes();
-        let place = cut % octets.len();
-        octets[place] = with;
-        if let Ok(text) = String::from_utf8(octets) {
+        let mut bytes = set().text().into_bytes();
+        let place = cut % bytes.len();
+        bytes[place] = with;
+        if let Ok(text) = String::from_utf8(bytes) {
             let _ = Settings::parse(&text);
         }
     }

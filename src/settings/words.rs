@@ -5,7 +5,7 @@ use jiff::civil::Date;
 use jiff::tz::TimeZone;
 
 use super::{LONGEST_WHY, LoadedShow, Out, Settings};
-use crate::hall::Levels;
+use crate::control::Levels;
 use crate::time::ShowTime;
 
 impl Out {
@@ -16,7 +16,7 @@ impl Out {
         format!("out since {}, by {}{why}", since(&self.at, now), self.who)
     }
 
-    /// A reason as it is kept: in a line, none where there is nothing to read.
+    /// A reason as it is kept: in a line, `None` if there is nothing to read.
     ///
     /// # Errors
     /// What is wrong with it.

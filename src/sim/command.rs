@@ -22,7 +22,7 @@ pub enum Action {
     Switch {
         /// The input, 1 to 12 for X01 to X12.
         input: u8,
-        /// Whether it closes.
+        /// True if it closes.
         closed: bool,
     },
     /// An error comes (Err1 to 7, 10 to 15, 17, 20, 21), or with 0 all go and so do their causes.
@@ -70,7 +70,7 @@ pub enum CommandError {
 }
 
 impl Action {
-    /// Whether this can happen to any controller.
+    /// True if this can happen to any controller.
     ///
     /// # Errors
     /// What there is not: an input, an error, a chance.

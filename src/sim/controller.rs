@@ -41,7 +41,7 @@ pub struct Controller {
     player: Player,
     outputs: u16,
     inputs: Inputs,
-    /// Time of the last motion in absolute time; none where the next one is a first one.
+    /// Time of the last motion in absolute time; `None` if the next one is a first one.
     last_absolute: Option<u32>,
     errors: Errors,
     memory: Memory,
@@ -55,7 +55,7 @@ pub struct Controller {
     /// Moves that had been executed when an emergency stop was released, as long as what follows is slow.
     released: Option<u64>,
     jog: Option<Jog>,
-    /// Whether the inputs ask for an emergency reset.
+    /// True if the inputs ask for an emergency reset.
     reset_asked: bool,
     /// When something happens by itself next.
     next_event: MonoTime,
@@ -119,7 +119,7 @@ impl Controller {
     pub fn on_datagram<'b>(
         &mut self,
         from: SocketAddrV4,
-        octets: &[u8],
+        bytes: &[u8],
         at: MonoTime,
         buf: &'b mut [u8; MAX_LEN],
     ) -> Handled<'b> {
@@ -130,7 +130,7 @@ impl Controller {
             self.counts.refused.rebooting += 1;
             return ignored;
         }
-        self.seen.datagram(octets.len(), at);
+        self.seen.datagram(bytes.len(), at);
         if self.memory.overflows(at) {
             self.memory_full_until = at + Memory::WINDOW;
             self.next_event = self.next_event.min(self.memory_full_until);
@@ -141,9 +141,9 @@ impl Controller {
             self.counts.refused.source_port += 1;
             return ignored;
         }
-        match Message::parse_as(self.invented.vibration_port, octets) {
+        match Message::parse_as(self.invented.vibration_port, bytes) {
             Ok(message) => self.on_message(&message, at, buf),
-            Err(_) => Handled { reply: self.on_malformed(octets, buf), motion: None },
+            Err(_) => Handled { reply: self.on_malformed(bytes, buf), motion: None },
         }
     }
 
@@ -167,7 +167,7 @@ impl Controller {
             self.put_off_auto_reset(at);
         }
         let mut motion = None;
-        let octets: &[u8] = match message {
+        let bytes: &[u8] = match message {
             Message::Motion(request) => {
                 let answer = self.on_motion(request, at);
                 motion = Some(MotionSeen { request: *request, code: answer.code });
@@ -179,12 +179,12 @@ impl Controller {
             Message::ServoWrite(write) => self.on_servo_write(write, buf),
             _ => return nothing,
         };
-        let answers = answers && !octets.is_empty();
+        let answers = answers && !bytes.is_empty();
         self.counts.replied += u64::from(answers);
-        Handled { reply: answers.then_some(octets), motion }
+        Handled { reply: answers.then_some(bytes), motion }
     }
 
-    /// Whether it answers a request with this reply code.
+    /// True if it answers a request with this reply code.
     fn answers(&self, reply: Code) -> bool {
         !self.mute && self.registers.get(pa::ANSWERS) != 0 && reply.matches(self.registers.station())
     }

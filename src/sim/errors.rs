@@ -34,17 +34,17 @@ const fn bits(numbers: &[u16]) -> u32 {
 pub(super) struct Errors(u32);
 
 impl Errors {
-    /// Whether the manuals know an error of this number.
+    /// True if the manuals know an error of this number.
     pub(super) fn is_one(number: u16) -> bool {
         number < 32 && (CAUSE | ALARM | PLAY | PASSING) >> number & 1 == 1
     }
 
-    /// Whether none stands.
+    /// True if none stands.
     pub(super) const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether one stands that stops the play: any but a full memory.
+    /// True if one stands that stops the play: any but a full memory.
     pub(super) const fn stop_play(self) -> bool {
         self.0 & !PASSING != 0
     }
@@ -83,12 +83,12 @@ impl Errors {
         self.0 = 0;
     }
 
-    /// Whether a drive cannot be spoken to, `axis` counted from 0.
+    /// True if a drive cannot be spoken to, `axis` counted from 0.
     pub(super) const fn unreachable(self, axis: usize) -> bool {
         axis < 6 && self.0 >> (axis + 1) & 1 == 1
     }
 
-    /// Whether a drive has an alarm, `axis` counted from 0.
+    /// True if a drive has an alarm, `axis` counted from 0.
     pub(super) const fn alarm(self, axis: usize) -> bool {
         axis < 6 && self.0 >> (axis + 10) & 1 == 1
     }

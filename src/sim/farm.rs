@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 
 use serde::Serialize;
 
-use super::keeper::{DELAYED, Keeper, Order, wait_for};
+use super::event_loop::{DELAYED, EventLoop, Order, wait_for};
 use super::log::Logs;
 use super::station::{Station, listen};
 use super::{Command, CommandError, Counts, Options, Setup};
@@ -96,7 +96,7 @@ impl Farm {
         let (epoll, bell) = wait_for(&stations).map_err(|error| system(error.into()))?;
         let bell = Arc::new(bell);
         let (sender, orders) = mpsc::channel();
-        let keeper = Keeper {
+        let event_loop = EventLoop {
             stations,
             epoll,
             bell: Arc::clone(&bell),
@@ -107,7 +107,7 @@ impl Farm {
             due: start,
         };
         let thread = std::thread::Builder::new().name("kinocue-sim".to_owned());
-        let thread = thread.spawn(move || keeper.run()).map_err(system)?;
+        let thread = thread.spawn(move || event_loop.run()).map_err(system)?;
         Ok(Self { addresses, remote: Remote { orders: sender, bell }, thread: Some(thread) })
     }
 

@@ -31,7 +31,7 @@ impl Inputs {
         self.active
     }
 
-    /// Whether all of `mask` have been active for as long as the filter asks; never for none.
+    /// True if all of `mask` have been active for as long as the filter asks; never for none.
     pub(super) const fn all(&self, mask: u16) -> bool {
         mask != 0 && self.filtered & mask == mask
     }

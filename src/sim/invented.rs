@@ -7,7 +7,7 @@ use crate::wire::VibrationPort;
 /// Answers to what the manuals leave open. The defaults are guesses; each can be played the other way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invented {
-    /// Commands that wait at most; one more is Err21.
+    /// Commands that can be queued; one more is Err21.
     pub queue_depth: usize,
     /// How long a controller homes.
     pub homing: Duration,
@@ -22,7 +22,7 @@ pub struct Invented {
     pub auto_reset_unit: Duration,
     /// Which commands put off the automatic reset (PA0d).
     pub auto_reset: Commands,
-    /// Whether registers that the manuals do not name can be read, as 0.
+    /// True if registers that the manuals do not name can be read, as 0.
     pub unused_read: bool,
     /// Pulses in one turn of a motor.
     pub pulses_per_turn: u16,
@@ -34,7 +34,7 @@ pub struct Invented {
     pub servo_alarm: u16,
     /// Registers of a drive, from 0 on.
     pub servo_registers: u16,
-    /// How many octets Port Out takes in vibration frames, and the inputs in the answers.
+    /// How many bytes Port Out takes in vibration frames, and the inputs in the answers.
     pub vibration_port: VibrationPort,
     /// Major and minor version (DPFF, DPFE).
     pub version: [u16; 2],

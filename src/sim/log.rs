@@ -33,7 +33,7 @@ impl Logs {
         }
     }
 
-    /// Whether frames are logged.
+    /// True if frames are logged.
     pub(super) const fn want_frames(&self) -> bool {
         self.frames.is_some()
     }

@@ -31,9 +31,9 @@ pub const RESET_WAY: u8 = 0x0e;
 pub const KEEP: u8 = 0x0f;
 /// The first of four registers with the controller's address.
 pub const ADDRESS: u8 = 0x10;
-/// The third octet of the address: the station's column.
+/// The third byte of the address: the station's column.
 pub const COLUMN: u8 = 0x12;
-/// The fourth octet of the address: the station's row.
+/// The fourth byte of the address: the station's row.
 pub const ROW: u8 = 0x13;
 /// The controller's port.
 pub const PORT: u8 = 0x14;

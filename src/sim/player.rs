@@ -103,7 +103,7 @@ impl Player {
         self.record.get_or_insert_default();
     }
 
-    /// The moves that ended since they were last asked for, in their order; none where no record is kept.
+    /// The moves that ended since they were last asked for, in their order; `None` if no record is kept.
     pub(super) fn take_record(&mut self) -> impl Iterator<Item = Executed> {
         self.record.as_mut().map(|record| record.drain(..)).into_iter().flatten()
     }
@@ -224,7 +224,7 @@ impl Player {
         self.current.end()
     }
 
-    /// Whether nothing moves and nothing waits.
+    /// True if nothing moves and nothing waits.
     pub(super) fn idle(&self) -> bool {
         self.current.arrived && self.waiting.is_empty()
     }

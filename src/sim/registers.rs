@@ -18,13 +18,13 @@ pub(super) const MS_PER_MINUTE: f64 = 60_000.0;
 /// The interval of commands without a time where PA09 is 0, ms.
 const INTERVAL_MS: u16 = 100;
 
-/// Whether a controller of `dialect` has this register and takes this value.
+/// True if a controller of `dialect` has this register and takes this value.
 pub(super) fn takes(register: Address, value: u16, dialect: Dialect) -> bool {
     let register = table().get(register).filter(|register| register.dialect.has(dialect));
     register.is_some_and(|register| register.range().contains(&value))
 }
 
-/// Whether a controller of `dialect` has this register.
+/// True if a controller of `dialect` has this register.
 pub(super) fn has(register: Address, dialect: Dialect) -> bool {
     table().get(register).is_some_and(|register| register.dialect.has(dialect))
 }
@@ -52,8 +52,8 @@ impl Registers {
                 factory[usize::from(number)] = value;
             }
         }
-        for (octet, value) in address.ip().octets().into_iter().enumerate() {
-            factory[usize::from(pa::ADDRESS) + octet] = u16::from(value);
+        for (byte, value) in address.ip().octets().into_iter().enumerate() {
+            factory[usize::from(pa::ADDRESS) + byte] = u16::from(value);
         }
         factory[usize::from(pa::PORT)] = address.port();
         let mut now = factory;
@@ -123,7 +123,7 @@ impl Registers {
     /// The station's own code (PA12, PA13).
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "an octet each; the upper half of the register means nothing"
+        reason = "a byte each; the upper half of the register means nothing"
     )]
     pub(super) const fn station(&self) -> Code {
         let (column, row) = (self.get(pa::COLUMN) as u8, self.get(pa::ROW) as u8);
@@ -133,7 +133,7 @@ impl Registers {
     /// An address and its port, from five registers; none without a port.
     #[expect(clippy::cast_possible_truncation, reason = "the upper half of the registers means nothing")]
     pub(super) fn socket(&self, first: u8) -> Option<SocketAddrV4> {
-        let [a, b, c, d] = std::array::from_fn(|octet| self.now[usize::from(first) + octet] as u8);
+        let [a, b, c, d] = std::array::from_fn(|byte| self.now[usize::from(first) + byte] as u8);
         let port = self.now[usize::from(first) + 4];
         (port != 0).then(|| SocketAddrV4::new(Ipv4Addr::new(a, b, c, d), port))
     }
@@ -196,7 +196,7 @@ impl Registers {
     }
 }
 
-/// Whether a parameter is one of those that can outlast a power cycle.
+/// True if a parameter is one of those that can outlast a power cycle.
 fn saved(register: u8) -> bool {
     table().get(Address::Pa(register)).is_none_or(|register| register.saved)
 }

@@ -39,7 +39,7 @@ struct Parcel {
     to: SocketAddrV4,
     copies: u8,
     len: usize,
-    octets: [u8; MAX_LEN],
+    bytes: [u8; MAX_LEN],
 }
 
 impl Station {
@@ -110,11 +110,11 @@ impl Station {
     pub(super) fn run_due(&mut self, at: MonoTime, room: &mut usize) {
         while let Some(parcel) = self.delayed.pop_front_if(|parcel| parcel.due <= at) {
             *room += 1;
-            self.send(parcel.to, parcel.copies, &parcel.octets[..parcel.len]);
+            self.send(parcel.to, parcel.copies, &parcel.bytes[..parcel.len]);
         }
         let mut buf = [0; MAX_LEN];
-        if let Some((to, octets)) = self.controller.report(at, &mut buf) {
-            let len = octets.len();
+        if let Some((to, bytes)) = self.controller.report(at, &mut buf) {
+            let len = bytes.len();
             let fate = self.report_link.fate();
             self.post(fate, to, &buf[..len], at, room);
         }
@@ -137,7 +137,7 @@ impl Station {
     }
 
     /// Sends a datagram, now or when it is due, unless the link loses it. Parcels never overtake each other.
-    fn post(&mut self, fate: Fate, to: SocketAddrV4, octets: &[u8], at: MonoTime, room: &mut usize) {
+    fn post(&mut self, fate: Fate, to: SocketAddrV4, bytes: &[u8], at: MonoTime, room: &mut usize) {
         let copies = match fate {
             Fate::LostOnTheWay | Fate::AnswerLost => {
                 self.extra.lost_replies += 1;
@@ -150,7 +150,7 @@ impl Station {
             }
         };
         if self.delay.is_zero() && self.delayed.is_empty() {
-            return self.send(to, copies, octets);
+            return self.send(to, copies, bytes);
         }
         if *room == 0 {
             self.extra.send_failed += 1;
@@ -159,14 +159,14 @@ impl Station {
         *room -= 1;
         let before = self.delayed.back().map_or(at, |last| last.due);
         let mut parcel =
-            Parcel { due: before.max(at + self.delay), to, copies, len: octets.len(), octets: [0; MAX_LEN] };
-        parcel.octets[..octets.len()].copy_from_slice(octets);
+            Parcel { due: before.max(at + self.delay), to, copies, len: bytes.len(), bytes: [0; MAX_LEN] };
+        parcel.bytes[..bytes.len()].copy_from_slice(bytes);
         self.delayed.push_back(parcel);
     }
 
-    fn send(&mut self, to: SocketAddrV4, copies: u8, octets: &[u8]) {
+    fn send(&mut self, to: SocketAddrV4, copies: u8, bytes: &[u8]) {
         for _ in 0..copies {
-            self.extra.send_failed += u64::from(self.socket.send_to(octets, to).is_err());
+            self.extra.send_failed += u64::from(self.socket.send_to(bytes, to).is_err());
         }
     }
 

@@ -1,30 +1,30 @@
 //! Requests by persons.
 
-use super::{Cause, Goal, Latch, Machine, Readiness, Refusal, Request, Ride, State, Why};
+use super::{Cause, Goal, Latch, Machine, PlayMode, Readiness, Refusal, State, Transition, Why};
 use crate::time::MonoTime;
 
 impl Machine {
-    /// Takes a request. One that would change nothing is taken; [`Request::Stop`] always is.
+    /// Takes a request. One that would change nothing is taken; [`Transition::Stop`] always is.
     ///
-    /// [`Request::Seek`] is taken while the hall is armed, playing or paused; only while it plays does it change the state.
+    /// [`Transition::Seek`] is taken while the hall is armed, playing or paused; only while it plays does it change the state.
     ///
     /// # Errors
     /// [`Refusal`] where the state does not allow it; nothing has changed then.
-    pub fn request(&mut self, request: Request, now: MonoTime) -> Result<(), Refusal> {
+    pub fn request(&mut self, request: Transition, now: MonoTime) -> Result<(), Refusal> {
         let taken = match request {
-            Request::Home => self.home(now),
-            Request::Arm | Request::HomeAndArm => self.arm(request, now),
-            Request::Disarm => self.disarm(now),
-            Request::Go => self.go(now),
-            Request::Pause => self.pause(now),
-            Request::Resume => self.resume(now),
-            Request::Seek => self.seek(now),
-            Request::Stop => {
+            Transition::Home => self.home(now),
+            Transition::Arm | Transition::HomeAndArm => self.arm(request, now),
+            Transition::Disarm => self.disarm(now),
+            Transition::Go => self.go(now),
+            Transition::Pause => self.pause(now),
+            Transition::Resume => self.resume(now),
+            Transition::Seek => self.seek(now),
+            Transition::Stop => {
                 self.stop(now);
                 Ok(())
             }
-            Request::Park => self.park(now),
-            Request::Clear => self.clear(now),
+            Transition::Park => self.park(now),
+            Transition::Clear => self.clear(now),
         };
         taken.map_err(|why| Refusal { state: self.state, asked: request, why })
     }
@@ -34,20 +34,20 @@ impl Machine {
             State::Homing => Ok(()),
             State::Parked | State::Recovering if !self.facts.identified => Err(Why::NotIdentified),
             State::Parked | State::Recovering => {
-                self.begin_homing(Goal::Parked, Request::Home, now);
+                self.begin_homing(Goal::Parked, Transition::Home, now);
                 Ok(())
             }
             state => Err(in_the_way(state)),
         }
     }
 
-    fn begin_homing(&mut self, goal: Goal, asked: Request, now: MonoTime) {
+    fn begin_homing(&mut self, goal: Goal, asked: Transition, now: MonoTime) {
         self.goal = goal;
         self.facts.homed = false;
         self.enter(State::Homing, Cause::Asked(asked), now);
     }
 
-    fn arm(&mut self, asked: Request, now: MonoTime) -> Result<(), Why> {
+    fn arm(&mut self, asked: Transition, now: MonoTime) -> Result<(), Why> {
         match self.state {
             State::Homing if self.goal == Goal::Armed => return Ok(()),
             State::Parked | State::Armed => {}
@@ -58,7 +58,7 @@ impl Machine {
         }
         if self.facts.homed {
             self.enter(State::Armed, Cause::Asked(asked), now);
-        } else if asked == Request::HomeAndArm {
+        } else if asked == Transition::HomeAndArm {
             self.begin_homing(Goal::Armed, asked, now);
         } else {
             return Err(Why::HomesFirst);
@@ -68,7 +68,7 @@ impl Machine {
 
     fn disarm(&mut self, now: MonoTime) -> Result<(), Why> {
         match self.state {
-            State::Armed => self.enter(State::Parked, Cause::Asked(Request::Disarm), now),
+            State::Armed => self.enter(State::Parked, Cause::Asked(Transition::Disarm), now),
             State::Homing => self.goal = Goal::Parked,
             State::Parked => {}
             state => return Err(in_the_way(state)),
@@ -79,7 +79,7 @@ impl Machine {
     fn go(&mut self, now: MonoTime) -> Result<(), Why> {
         match self.state {
             State::Armed => {
-                self.enter(State::Playing(Ride::Joining), Cause::Asked(Request::Go), now);
+                self.enter(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Go), now);
                 Ok(())
             }
             State::Playing(_) => Err(Why::PlaysAlready),
@@ -91,7 +91,7 @@ impl Machine {
 
     fn pause(&mut self, now: MonoTime) -> Result<(), Why> {
         match self.state {
-            State::Playing(_) => self.enter(State::Paused, Cause::Asked(Request::Pause), now),
+            State::Playing(_) => self.enter(State::Paused, Cause::Asked(Transition::Pause), now),
             State::Paused => {}
             state => return Err(nothing_plays(state)),
         }
@@ -101,7 +101,7 @@ impl Machine {
     fn resume(&mut self, now: MonoTime) -> Result<(), Why> {
         match self.state {
             State::Paused => {
-                self.enter(State::Playing(Ride::Joining), Cause::Asked(Request::Resume), now);
+                self.enter(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Resume), now);
             }
             State::Playing(_) => {}
             state => return Err(nothing_plays(state)),
@@ -112,7 +112,7 @@ impl Machine {
     fn seek(&mut self, now: MonoTime) -> Result<(), Why> {
         match self.state {
             State::Playing(_) => {
-                self.enter(State::Playing(Ride::Joining), Cause::Asked(Request::Seek), now);
+                self.enter(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Seek), now);
             }
             State::Armed | State::Paused => {}
             state => return Err(nothing_plays(state)),
@@ -123,7 +123,7 @@ impl Machine {
     fn stop(&mut self, now: MonoTime) {
         let cause = match self.state {
             State::Homing => Cause::StoppedHoming,
-            _ => Cause::Asked(Request::Stop),
+            _ => Cause::Asked(Transition::Stop),
         };
         let cause = *self.stop.get_or_insert(cause);
         match self.state {
@@ -134,7 +134,7 @@ impl Machine {
     }
 
     fn park(&mut self, now: MonoTime) -> Result<(), Why> {
-        let cause = Cause::Asked(Request::Park);
+        let cause = Cause::Asked(Transition::Park);
         match self.state {
             State::Playing(_) | State::Paused => self.enter(State::Parking, cause, now),
             State::Armed => self.enter(State::Parked, cause, now),

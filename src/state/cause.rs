@@ -1,6 +1,6 @@
 //! Why a hall is in the state it is in.
 
-use super::{Readiness, Request};
+use super::{Readiness, Transition};
 
 /// Why a hall is in the state it is in. Its words are [`Cause::words`]; which controller or group they speak of is
 /// [`Cause::whose`], for whoever knows the names.
@@ -15,7 +15,7 @@ pub enum Cause {
     /// All seats are at their park poses.
     FoundParked,
     /// A person asked for it.
-    Asked(Request),
+    Asked(Transition),
     /// A person asked for a stop while the controllers homed, which no frame can end.
     StoppedHoming,
     /// The seats are home.
@@ -57,7 +57,7 @@ pub enum Trouble {
     Controller {
         /// Which, counted from 0.
         controller: usize,
-        /// Its error number; 0 where it gave none.
+        /// Its error number; 0 if it gave none.
         error: u16,
     },
     /// A drive has an alarm.
@@ -67,8 +67,8 @@ pub enum Trouble {
         /// Its error number.
         error: u16,
     },
-    /// The last gate held motion back three times in a second.
-    Gate,
+    /// The limiter held motion back three times in a second.
+    Limiter,
     /// A move could not be planned.
     Planner,
     /// Replies are no longer read: nobody would hear of an emergency stop.
@@ -93,7 +93,7 @@ pub enum Whose {
 }
 
 impl Cause {
-    /// Which controller or group it speaks of; none where it is the whole hall.
+    /// Which controller or group it speaks of; `None` if it is the whole hall.
     #[must_use]
     pub const fn whose(self) -> Option<Whose> {
         match self {
@@ -114,11 +114,11 @@ impl Trouble {
             | Self::Drive { controller, .. }
             | Self::Homing(controller)
             | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
-            Self::Gate | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
+            Self::Limiter | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
         }
     }
 
-    /// Whether it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
+    /// True if it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
     #[must_use]
     pub const fn lasts(self) -> bool {
         matches!(self, Self::Controller { .. } | Self::Drive { .. })

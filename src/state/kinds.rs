@@ -18,7 +18,7 @@ pub enum State {
     /// Ready to go, for ten minutes.
     Armed,
     /// The seats move with the cue.
-    Playing(Ride),
+    Playing(PlayMode),
     /// The seats hold; hold frames are sent.
     Paused,
     /// The seats decelerate, to [`State::Stopped`] or to [`State::Fault`].
@@ -33,13 +33,13 @@ pub enum State {
 
 /// How seats move with the cue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Ride {
+pub enum PlayMode {
     /// On their way onto the moving cue.
     Joining,
     /// On the cue.
     Following,
     /// They hold after a gap, and will join again by themselves.
-    Freewheeling,
+    Holding,
 }
 
 impl State {
@@ -50,9 +50,9 @@ impl State {
         Self::Parked,
         Self::Homing,
         Self::Armed,
-        Self::Playing(Ride::Joining),
-        Self::Playing(Ride::Following),
-        Self::Playing(Ride::Freewheeling),
+        Self::Playing(PlayMode::Joining),
+        Self::Playing(PlayMode::Following),
+        Self::Playing(PlayMode::Holding),
         Self::Paused,
         Self::Parking,
         Self::Stopping,
@@ -60,7 +60,7 @@ impl State {
         Self::Fault,
     ];
 
-    /// How long it lasts at the most; none where it does not end by itself.
+    /// How long it lasts at the most; `None` if it does not end by itself.
     #[must_use]
     pub const fn lasts(self) -> Option<Duration> {
         Some(match self {
@@ -73,13 +73,13 @@ impl State {
         })
     }
 
-    /// Whether motion frames may leave.
+    /// True if motion frames may leave.
     #[must_use]
     pub const fn may_send_motion(self) -> bool {
         matches!(self, Self::Playing(_) | Self::Paused | Self::Stopping | Self::Parking)
     }
 
-    /// Whether only a person gets the hall out of it.
+    /// True if only a person gets the hall out of it.
     #[must_use]
     pub const fn is_latched(self) -> bool {
         matches!(self, Self::Stopped | Self::Fault)
@@ -88,13 +88,13 @@ impl State {
 
 /// What a person can ask for. Who it is, and whether they may, is settled before it comes here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Request {
+pub enum Transition {
     /// Let the controllers find their zero. The seats move over their whole stroke by themselves: whoever asks has made
     /// sure that nobody sits on them.
     Home,
     /// Make ready to go. Refused where a position is unknown: nothing moves by this.
     Arm,
-    /// The same, and where a position is unknown the seats are homed first, as [`Request::Home`] does it and under the same
+    /// The same, and where a position is unknown the seats are homed first, as [`Transition::Home`] does it and under the same
     /// condition.
     HomeAndArm,
     /// No longer ready to go.
@@ -115,7 +115,7 @@ pub enum Request {
     Clear,
 }
 
-impl Request {
+impl Transition {
     /// Every request there is.
     pub const ALL: [Self; 11] = [
         Self::Home,
@@ -132,7 +132,7 @@ impl Request {
     ];
 }
 
-/// Whether a cue can be armed, as far as files, limits and preflight tell.
+/// True if a cue can be armed, as far as files, limits and preflight tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Readiness {
     /// No cue is loaded.
@@ -161,7 +161,7 @@ pub enum Event {
     Identified(Finding),
     /// The positions of all seats were read (again).
     PositionsRead,
-    /// Whether a seat that frames may go to rests elsewhere than at park.
+    /// True if a seat that frames may go to rests elsewhere than at park.
     Astray(bool),
     /// A controller has rebooted or was reset: its position is unknown until it is homed. Counted from 0.
     Rebooted(usize),
@@ -193,13 +193,13 @@ pub enum Event {
     Trouble(Trouble),
     /// No controller and no drive reports an error any more.
     ErrorsGone,
-    /// Whether controllers that take part stand stopped or in error, and wait for a person to clear them.
+    /// True if controllers that take part stand stopped or in error, and wait for a person to clear them.
     Latched(Latch),
     /// Every controller that takes part knows its position again: the one that did not was homed, or is out.
     ZerosKnown,
 }
 
-/// Whether controllers that take part are held by an emergency stop or an error, whatever the hall is in.
+/// True if controllers that take part are held by an emergency stop or an error, whatever the hall is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Latch {
     /// None is.

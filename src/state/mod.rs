@@ -24,7 +24,7 @@ mod words;
 use std::time::Duration;
 
 pub use cause::{Cause, Trouble, Whose};
-pub use kinds::{Demand, Event, Finding, Latch, Readiness, Request, Ride, State};
+pub use kinds::{Demand, Event, Finding, Latch, PlayMode, Readiness, State, Transition};
 pub use next::Next;
 pub use refusal::{Refusal, Why};
 
@@ -132,7 +132,7 @@ impl Machine {
         self.since
     }
 
-    /// Whether motion frames may leave.
+    /// True if motion frames may leave.
     #[must_use]
     pub const fn may_send_motion(&self) -> bool {
         self.state.may_send_motion()
@@ -144,37 +144,37 @@ impl Machine {
         self.fault
     }
 
-    /// Whether a cue can be armed, as far as files, limits and preflight tell.
+    /// True if a cue can be armed, as far as files, limits and preflight tell.
     #[must_use]
     pub const fn readiness(&self) -> Readiness {
         self.facts.readiness
     }
 
-    /// Whether every controller has said what it is.
+    /// True if every controller has said what it is.
     #[must_use]
     pub const fn is_identified(&self) -> bool {
         self.facts.identified
     }
 
-    /// Whether every controller knows its position.
+    /// True if every controller knows its position.
     #[must_use]
     pub const fn is_homed(&self) -> bool {
         self.facts.homed
     }
 
-    /// Whether the positions were read since the program started or the hall was cleared.
+    /// True if the positions were read since the program started or the hall was cleared.
     #[must_use]
     pub const fn is_measured(&self) -> bool {
         self.facts.measured
     }
 
-    /// Whether an emergency stop is in effect.
+    /// True if an emergency stop is in effect.
     #[must_use]
     pub const fn is_pressed(&self) -> bool {
         self.facts.pressed
     }
 
-    /// Whether a controller or a drive still has an error.
+    /// True if a controller or a drive still has an error.
     #[must_use]
     pub const fn has_errors(&self) -> bool {
         self.facts.errors
@@ -186,7 +186,7 @@ impl Machine {
         self.clears
     }
 
-    /// When the state ends by itself; none where it does not. For a hall that is armed or paused, worth showing.
+    /// When the state ends by itself; `None` if it does not. For a hall that is armed or paused, worth showing.
     #[must_use]
     pub fn lapses(&self) -> Option<MonoTime> {
         Some(self.since + self.state.lasts()?)

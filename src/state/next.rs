@@ -1,6 +1,6 @@
 //! What a person does next.
 
-use super::{Cause, Latch, Machine, Readiness, Ride, State, Trouble};
+use super::{Cause, Latch, Machine, PlayMode, Readiness, State, Trouble};
 
 /// What a person does next; worded by its `Display`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,7 +95,7 @@ impl Machine {
             State::Parked => self.next_parked(),
             State::Homing => Next::AwaitHome,
             State::Armed => Next::Go,
-            State::Playing(Ride::Freewheeling) => Next::AwaitJoin,
+            State::Playing(PlayMode::Holding) => Next::AwaitJoin,
             State::Playing(_) => Next::Watch,
             State::Paused => Next::Resume,
             State::Stopping | State::Parking => Next::AwaitRest,
@@ -142,7 +142,7 @@ impl Machine {
         }
         match self.cause {
             Cause::StoppedHoming => Next::AwaitStandstill,
-            Cause::Trouble(Trouble::Gate) => Next::CheckCue,
+            Cause::Trouble(Trouble::Limiter) => Next::CheckCue,
             Cause::Trouble(Trouble::Homing(_) | Trouble::HomingTime) => Next::LookAtSeat,
             Cause::Trouble(Trouble::OtherMaster(_)) => Next::StopOtherMaster,
             Cause::Trouble(Trouble::Deaf) => Next::Restart,

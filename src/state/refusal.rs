@@ -1,6 +1,6 @@
 //! Requests that are not taken, with what would have to be done first.
 
-use super::{Request, State};
+use super::{State, Transition};
 
 /// Why a request was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -10,7 +10,7 @@ pub struct Refusal {
     /// The state it met.
     pub state: State,
     /// What was asked.
-    pub asked: Request,
+    pub asked: Transition,
     /// Why not.
     pub why: Why,
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Cause, Demand, Event, Finding, Goal, Machine, Readiness, Ride, SLEPT, SLEPT_LONG, State};
+use super::{Cause, Demand, Event, Finding, Goal, Machine, PlayMode, Readiness, SLEPT, SLEPT_LONG, State};
 use crate::time::MonoTime;
 
 impl Machine {
@@ -15,14 +15,14 @@ impl Machine {
             Event::Rebooted(controller) => self.rebooted(controller, now),
             Event::Readiness(readiness) => self.ready(readiness, now),
             Event::Homed => self.homed(now),
-            Event::JoinBegun if self.state == State::Playing(Ride::Freewheeling) => {
-                self.enter(State::Playing(Ride::Joining), Cause::GapOver, now);
+            Event::JoinBegun if self.state == State::Playing(PlayMode::Holding) => {
+                self.enter(State::Playing(PlayMode::Joining), Cause::GapOver, now);
             }
-            Event::Joined if self.rides() && self.state != State::Playing(Ride::Following) => {
-                self.enter(State::Playing(Ride::Following), Cause::Joined, now);
+            Event::Joined if self.rides() && self.state != State::Playing(PlayMode::Following) => {
+                self.enter(State::Playing(PlayMode::Following), Cause::Joined, now);
             }
-            Event::Late if self.rides() && self.state != State::Playing(Ride::Freewheeling) => {
-                self.enter(State::Playing(Ride::Freewheeling), Cause::Late, now);
+            Event::Late if self.rides() && self.state != State::Playing(PlayMode::Holding) => {
+                self.enter(State::Playing(PlayMode::Holding), Cause::Late, now);
             }
             Event::CueEnded if self.rides() => self.enter(State::Parking, Cause::CueEnded, now),
             Event::AtRest if self.state == State::Stopping => self.end_stopping(now),

@@ -13,25 +13,27 @@ const DRIVE: Trouble = Trouble::Drive { controller: 3, error: 10 };
 
 /// What leads from the start of the program to a state.
 fn way_to(state: State) -> (Vec<Step>, State) {
-    use Request::{Arm, Clear, Go, Home, Park, Pause, Stop};
+    use Transition::{Arm, Clear, Go, Home, Park, Pause, Stop};
     let found = [Step::Tell(Event::Identified(PARKED)), Step::Tell(Event::Readiness(Readiness::Ready))];
     let then = |steps: &[Step]| found.iter().chain(steps).copied().collect::<Vec<_>>();
-    let go = [Step::Ask(Arm), Step::Ask(Go)];
+    let go = [Step::Command(Arm), Step::Command(Go)];
     let going = |steps: &[Step]| then(&[&go, steps].concat());
     let way = match state {
         State::Boot => vec![],
-        State::Recovering => then(&[Step::Ask(Stop), Step::Ask(Clear), Step::Tell(Event::PositionsRead)]),
+        State::Recovering => {
+            then(&[Step::Command(Stop), Step::Command(Clear), Step::Tell(Event::PositionsRead)])
+        }
         State::Parked => then(&[]),
-        State::Homing => then(&[Step::Ask(Home)]),
-        State::Armed => then(&[Step::Ask(Arm)]),
-        State::Playing(Ride::Joining) => going(&[]),
-        State::Playing(Ride::Following) => going(&[Step::Tell(Event::Joined)]),
-        State::Playing(Ride::Freewheeling) => going(&[Step::Tell(Event::Late)]),
-        State::Paused => going(&[Step::Ask(Pause)]),
-        State::Parking => going(&[Step::Ask(Park)]),
-        State::Stopping => going(&[Step::Ask(Stop)]),
-        State::Stopped => then(&[Step::Ask(Stop)]),
-        State::Fault => then(&[Step::Tell(Event::Trouble(Trouble::Gate))]),
+        State::Homing => then(&[Step::Command(Home)]),
+        State::Armed => then(&[Step::Command(Arm)]),
+        State::Playing(PlayMode::Joining) => going(&[]),
+        State::Playing(PlayMode::Following) => going(&[Step::Tell(Event::Joined)]),
+        State::Playing(PlayMode::Holding) => going(&[Step::Tell(Event::Late)]),
+        State::Paused => going(&[Step::Command(Pause)]),
+        State::Parking => going(&[Step::Command(Park)]),
+        State::Stopping => going(&[Step::Command(Stop)]),
+        State::Stopped => then(&[Step::Command(Stop)]),
+        State::Fault => then(&[Step::Tell(Event::Trouble(Trouble::Limiter))]),
     };
     (way, state)
 }
@@ -39,13 +41,13 @@ fn way_to(state: State) -> (Vec<Step>, State) {
 /// A request or an event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Step {
-    Ask(Request),
+    Command(Transition),
     Tell(Event),
 }
 
 fn take(hall: &mut Machine, step: Step, now: MonoTime) -> Result<(), Refusal> {
     match step {
-        Step::Ask(request) => hall.request(request, now),
+        Step::Command(request) => hall.request(request, now),
         Step::Tell(event) => {
             hall.event(event, now);
             Ok(())
@@ -66,7 +68,7 @@ fn hall(state: State) -> Machine {
 
 /// The hall in `from` after a request that it has to take.
 #[track_caller]
-fn asked(from: State, request: Request) -> Machine {
+fn asked(from: State, request: Transition) -> Machine {
     let mut hall = hall(from);
     hall.request(request, s(1)).unwrap();
     hall
@@ -81,7 +83,7 @@ fn told(from: State, event: Event) -> Machine {
 }
 
 #[track_caller]
-fn why(from: State, request: Request) -> Why {
+fn why(from: State, request: Transition) -> Why {
     let mut hall = hall(from);
     let refusal = hall.request(request, s(1)).unwrap_err();
     assert_eq!((hall.state(), hall.since()), (from, s(0)), "a refused request changes nothing");
@@ -90,7 +92,7 @@ fn why(from: State, request: Request) -> Why {
 }
 
 fn riding() -> [State; 3] {
-    [Ride::Joining, Ride::Following, Ride::Freewheeling].map(State::Playing)
+    [PlayMode::Joining, PlayMode::Following, PlayMode::Holding].map(State::Playing)
 }
 
 #[test]
@@ -106,12 +108,12 @@ fn a_start_leads_to_parked_only_where_the_seats_are_found_so_after_an_orderly_en
 #[test]
 fn a_show_goes_from_arm_to_go_to_the_cue_to_its_end_to_park() {
     let mut hall = hall(State::Parked);
-    hall.request(Request::Arm, s(1)).unwrap();
-    assert_eq!((hall.state(), hall.cause()), (State::Armed, Cause::Asked(Request::Arm)));
-    hall.request(Request::Go, s(2)).unwrap();
-    assert_eq!((hall.state(), hall.since()), (State::Playing(Ride::Joining), s(2)));
+    hall.request(Transition::Arm, s(1)).unwrap();
+    assert_eq!((hall.state(), hall.cause()), (State::Armed, Cause::Asked(Transition::Arm)));
+    hall.request(Transition::Go, s(2)).unwrap();
+    assert_eq!((hall.state(), hall.since()), (State::Playing(PlayMode::Joining), s(2)));
     hall.event(Event::Joined, s(4));
-    assert_eq!((hall.state(), hall.cause()), (State::Playing(Ride::Following), Cause::Joined));
+    assert_eq!((hall.state(), hall.cause()), (State::Playing(PlayMode::Following), Cause::Joined));
     hall.event(Event::CueEnded, s(90));
     assert_eq!((hall.state(), hall.cause()), (State::Parking, Cause::CueEnded));
     hall.event(Event::Parked, s(93));
@@ -120,9 +122,9 @@ fn a_show_goes_from_arm_to_go_to_the_cue_to_its_end_to_park() {
 
 #[test]
 fn a_second_go_is_refused() {
-    assert_eq!(riding().map(|state| why(state, Request::Go)), [Why::PlaysAlready; 3]);
-    assert_eq!(why(State::Paused, Request::Go), Why::PausedNow);
-    assert_eq!(why(State::Parked, Request::Go), Why::NotArmed);
+    assert_eq!(riding().map(|state| why(state, Transition::Go)), [Why::PlaysAlready; 3]);
+    assert_eq!(why(State::Paused, Transition::Go), Why::PausedNow);
+    assert_eq!(why(State::Parked, Transition::Go), Why::NotArmed);
 }
 
 #[test]
@@ -133,7 +135,7 @@ fn a_cue_is_armed_only_when_all_is_ready() {
         (Readiness::NotPreflighted, Why::NotPreflighted),
     ] {
         let mut hall = told(State::Parked, Event::Readiness(readiness));
-        assert_eq!(hall.request(Request::Arm, s(2)).unwrap_err().why, expected);
+        assert_eq!(hall.request(Transition::Arm, s(2)).unwrap_err().why, expected);
         assert_eq!(told(State::Armed, Event::Readiness(readiness)).state(), State::Parked);
     }
 }
@@ -141,13 +143,13 @@ fn a_cue_is_armed_only_when_all_is_ready() {
 #[test]
 fn arming_homes_first_where_a_position_is_unknown_and_the_seats_are_empty_and_not_otherwise() {
     let mut hall = told(State::Parked, Event::Rebooted(2));
-    assert_eq!(hall.request(Request::Arm, s(2)).unwrap_err().why, Why::HomesFirst);
+    assert_eq!(hall.request(Transition::Arm, s(2)).unwrap_err().why, Why::HomesFirst);
     assert_eq!(hall.state(), State::Parked, "somebody may sit there");
-    hall.request(Request::HomeAndArm, s(2)).unwrap();
+    hall.request(Transition::HomeAndArm, s(2)).unwrap();
     assert_eq!(hall.state(), State::Homing);
     hall.event(Event::Homed, s(20));
     assert_eq!((hall.state(), hall.cause()), (State::Armed, Cause::Homed));
-    for request in [Request::Arm, Request::HomeAndArm] {
+    for request in [Transition::Arm, Transition::HomeAndArm] {
         assert_eq!(asked(State::Parked, request).state(), State::Armed);
     }
 }
@@ -156,8 +158,8 @@ fn arming_homes_first_where_a_position_is_unknown_and_the_seats_are_empty_and_no
 fn homing_by_itself_ends_in_parked_and_so_does_arming_that_is_taken_back() {
     assert_eq!(told(State::Homing, Event::Homed).state(), State::Parked);
     let mut hall = told(State::Parked, Event::Rebooted(2));
-    hall.request(Request::HomeAndArm, s(2)).unwrap();
-    hall.request(Request::Disarm, s(3)).unwrap();
+    hall.request(Transition::HomeAndArm, s(2)).unwrap();
+    hall.request(Transition::Disarm, s(3)).unwrap();
     hall.event(Event::Homed, s(20));
     assert_eq!(hall.state(), State::Parked);
 }
@@ -175,7 +177,7 @@ fn arming_lapses_after_ten_minutes_and_arming_again_begins_them_anew() {
     let mut hall = hall(State::Armed);
     hall.tick(s(599));
     assert_eq!(hall.state(), State::Armed);
-    hall.request(Request::Arm, s(599)).unwrap();
+    hall.request(Transition::Arm, s(599)).unwrap();
     hall.tick(s(1_198));
     assert_eq!(hall.state(), State::Armed);
     hall.tick(s(1_199));
@@ -185,7 +187,7 @@ fn arming_lapses_after_ten_minutes_and_arming_again_begins_them_anew() {
 #[test]
 fn a_pause_of_five_minutes_parks() {
     let mut hall = hall(State::Paused);
-    hall.request(Request::Seek, s(100)).unwrap();
+    hall.request(Transition::Seek, s(100)).unwrap();
     hall.tick(s(299));
     assert_eq!(hall.state(), State::Paused);
     hall.tick(s(300));
@@ -203,21 +205,21 @@ fn a_clock_that_goes_back_ends_nothing() {
 
 #[test]
 fn resume_and_seek_join() {
-    assert_eq!(asked(State::Paused, Request::Resume).state(), State::Playing(Ride::Joining));
+    assert_eq!(asked(State::Paused, Transition::Resume).state(), State::Playing(PlayMode::Joining));
     for state in riding() {
-        assert_eq!(asked(state, Request::Seek).state(), State::Playing(Ride::Joining));
-        assert_eq!(asked(state, Request::Resume).state(), state, "it plays");
+        assert_eq!(asked(state, Transition::Seek).state(), State::Playing(PlayMode::Joining));
+        assert_eq!(asked(state, Transition::Resume).state(), state, "it plays");
     }
 }
 
 #[test]
 fn a_late_frame_holds_and_joins_again_by_itself() {
-    let mut hall = told(State::Playing(Ride::Following), Event::Late);
-    assert_eq!((hall.state(), hall.cause()), (State::Playing(Ride::Freewheeling), Cause::Late));
+    let mut hall = told(State::Playing(PlayMode::Following), Event::Late);
+    assert_eq!((hall.state(), hall.cause()), (State::Playing(PlayMode::Holding), Cause::Late));
     hall.event(Event::JoinBegun, s(2));
-    assert_eq!((hall.state(), hall.cause()), (State::Playing(Ride::Joining), Cause::GapOver));
+    assert_eq!((hall.state(), hall.cause()), (State::Playing(PlayMode::Joining), Cause::GapOver));
     hall.event(Event::Joined, s(4));
-    assert_eq!(hall.state(), State::Playing(Ride::Following));
+    assert_eq!(hall.state(), State::Playing(PlayMode::Following));
     for state in [State::Paused, State::Parking, State::Stopping, State::Armed] {
         assert_eq!(told(state, Event::Late).state(), state);
     }
@@ -226,13 +228,13 @@ fn a_late_frame_holds_and_joins_again_by_itself() {
 #[test]
 fn a_stop_decelerates_what_moves_and_is_stopped_at_once_where_nothing_does() {
     for state in State::ALL {
-        let stopped = asked(state, Request::Stop);
+        let stopped = asked(state, Transition::Stop);
         let expected = if state.may_send_motion() { State::Stopping } else { State::Stopped };
         assert_eq!(stopped.state(), expected, "from {state}");
     }
-    let mut hall = asked(State::Playing(Ride::Following), Request::Stop);
+    let mut hall = asked(State::Playing(PlayMode::Following), Transition::Stop);
     hall.event(Event::AtRest, s(2));
-    assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Request::Stop)));
+    assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Transition::Stop)));
 }
 
 #[test]
@@ -246,7 +248,7 @@ fn seats_that_never_tell_of_rest_are_sent_no_more_after_five_seconds() {
 
 #[test]
 fn a_stop_while_homing_says_that_no_frame_can_end_homing() {
-    let hall = asked(State::Homing, Request::Stop);
+    let hall = asked(State::Homing, Transition::Stop);
     assert_eq!(hall.cause(), Cause::StoppedHoming);
     assert!(hall.cause().words().contains("hard-wired"));
     assert!(!hall.is_homed());
@@ -274,24 +276,24 @@ fn an_emergency_stop_during_a_stop_gives_the_seats_no_more_time() {
 
 #[test]
 fn only_a_person_clears_and_only_when_every_emergency_stop_is_released() {
-    let mut hall = told(State::Playing(Ride::Following), Event::EmergencyStop(4));
+    let mut hall = told(State::Playing(PlayMode::Following), Event::EmergencyStop(4));
     hall.event(Event::AtRest, s(1));
     assert_eq!(hall.next(), Next::Release);
-    assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::StillPressed);
+    assert_eq!(hall.request(Transition::Clear, s(2)).unwrap_err().why, Why::StillPressed);
     hall.event(Event::AllReleased, s(3));
     hall.tick(s(30_000));
     assert_eq!(hall.state(), State::Stopped);
-    hall.request(Request::Clear, s(30_000)).unwrap();
+    hall.request(Transition::Clear, s(30_000)).unwrap();
     assert_eq!((hall.state(), hall.cause()), (State::Recovering, Cause::Cleared));
 }
 
 #[test]
 fn after_clearing_the_positions_are_read_anew_before_the_seats_park() {
-    let mut hall = asked(State::Stopped, Request::Clear);
-    assert_eq!(hall.request(Request::Park, s(2)).unwrap_err().why, Why::PositionsNotRead);
+    let mut hall = asked(State::Stopped, Transition::Clear);
+    assert_eq!(hall.request(Transition::Park, s(2)).unwrap_err().why, Why::PositionsNotRead);
     assert_eq!(hall.next(), Next::AwaitPositions);
     hall.event(Event::PositionsRead, s(3));
-    hall.request(Request::Park, s(4)).unwrap();
+    hall.request(Transition::Park, s(4)).unwrap();
     assert_eq!(hall.state(), State::Parking);
 }
 
@@ -328,12 +330,12 @@ fn a_pause_that_was_slept_through_begins_anew() {
 #[test]
 fn controllers_that_were_held_while_nothing_moved_are_cleared_once_that_is_over() {
     for state in [State::Parked, State::Recovering] {
-        assert_eq!(why(state, Request::Clear), Why::NothingToClear);
+        assert_eq!(why(state, Transition::Clear), Why::NothingToClear);
         let mut hall = told(state, Event::Latched(Latch::Held));
-        assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::StillWrong);
+        assert_eq!(hall.request(Transition::Clear, s(2)).unwrap_err().why, Why::StillWrong);
         hall.event(Event::Latched(Latch::Over), s(2));
         assert_eq!(hall.next(), Next::Clear);
-        hall.request(Request::Clear, s(3)).unwrap();
+        hall.request(Transition::Clear, s(3)).unwrap();
         assert_eq!((hall.state(), hall.cause()), (State::Recovering, Cause::Cleared));
         assert!(!hall.is_measured() && hall.clears() > 0);
     }
@@ -341,10 +343,10 @@ fn controllers_that_were_held_while_nothing_moved_are_cleared_once_that_is_over(
 
 #[test]
 fn what_is_stopped_is_not_cleared_before_every_controller_has_told() {
-    let mut hall = asked(State::Boot, Request::Stop);
-    assert_eq!(hall.request(Request::Clear, s(2)).unwrap_err().why, Why::NotIdentified);
+    let mut hall = asked(State::Boot, Transition::Stop);
+    assert_eq!(hall.request(Transition::Clear, s(2)).unwrap_err().why, Why::NotIdentified);
     hall.event(Event::Identified(PARKED), s(3));
-    hall.request(Request::Clear, s(4)).unwrap();
+    hall.request(Transition::Clear, s(4)).unwrap();
 }
 
 #[test]
@@ -352,7 +354,7 @@ fn a_hall_whose_unknown_seat_is_taken_out_knows_its_positions_again() {
     let mut hall = told(State::Recovering, Event::Rebooted(1));
     assert_eq!(hall.next(), Next::Home);
     hall.event(Event::ZerosKnown, s(2));
-    hall.request(Request::Park, s(3)).unwrap();
+    hall.request(Transition::Park, s(3)).unwrap();
     let mut unknown = told(State::Boot, Event::ZerosKnown);
     assert!(!unknown.is_homed(), "nobody has told");
     unknown.event(Event::Identified(Finding { homed: false, ..PARKED }), s(2));
@@ -362,9 +364,9 @@ fn a_hall_whose_unknown_seat_is_taken_out_knows_its_positions_again() {
 #[test]
 fn a_seat_of_unknown_position_is_homed_and_not_parked() {
     let mut hall = told(State::Recovering, Event::Rebooted(1));
-    assert_eq!(hall.request(Request::Park, s(2)).unwrap_err().why, Why::PositionUnknown);
+    assert_eq!(hall.request(Transition::Park, s(2)).unwrap_err().why, Why::PositionUnknown);
     assert_eq!(hall.next(), Next::Home);
-    hall.request(Request::Home, s(2)).unwrap();
+    hall.request(Transition::Home, s(2)).unwrap();
     hall.event(Event::Homed, s(9));
     assert_eq!(hall.state(), State::Parked);
 }
@@ -384,22 +386,22 @@ fn a_fault_while_the_seats_move_decelerates_them_first() {
 
 #[test]
 fn stopped_goes_before_fault_and_keeps_it_known() {
-    let mut hall = told(State::Playing(Ride::Following), Event::Trouble(DRIVE));
-    hall.request(Request::Stop, s(2)).unwrap();
+    let mut hall = told(State::Playing(PlayMode::Following), Event::Trouble(DRIVE));
+    hall.request(Transition::Stop, s(2)).unwrap();
     hall.event(Event::AtRest, s(2));
-    assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Request::Stop)));
+    assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Transition::Stop)));
     assert_eq!(hall.fault(), Some(DRIVE));
-    assert_eq!(hall.request(Request::Clear, s(3)).unwrap_err().why, Why::StillWrong);
+    assert_eq!(hall.request(Transition::Clear, s(3)).unwrap_err().why, Why::StillWrong);
     hall.event(Event::ErrorsGone, s(4));
-    hall.request(Request::Clear, s(5)).unwrap();
+    hall.request(Transition::Clear, s(5)).unwrap();
     assert_eq!(hall.fault(), None);
-    assert_eq!(asked(State::Fault, Request::Stop).state(), State::Stopped);
+    assert_eq!(asked(State::Fault, Transition::Stop).state(), State::Stopped);
 }
 
 #[test]
 fn the_first_thing_that_went_wrong_is_the_one_named() {
     let mut hall = told(State::Parked, Event::Trouble(DRIVE));
-    hall.event(Event::Trouble(Trouble::Gate), s(2));
+    hall.event(Event::Trouble(Trouble::Limiter), s(2));
     assert_eq!((hall.cause(), hall.since()), (Cause::Trouble(DRIVE), s(1)));
 }
 
@@ -429,19 +431,19 @@ fn the_policy_of_the_hall_only_leads_down() {
 
 #[test]
 fn parking_an_armed_hall_only_disarms_it() {
-    assert_eq!(asked(State::Armed, Request::Park).state(), State::Parked);
+    assert_eq!(asked(State::Armed, Transition::Park).state(), State::Parked);
 }
 
 #[test]
 fn parking_a_parked_hall_brings_down_a_seat_that_is_up_and_moves_nothing_else() {
     let mut hall = told(State::Parked, Event::Astray(true));
     assert_eq!((hall.state(), hall.next()), (State::Parked, Next::ParkOrStart), "nothing moves by itself");
-    hall.request(Request::Park, s(2)).unwrap();
-    assert_eq!((hall.state(), hall.cause()), (State::Parking, Cause::Asked(Request::Park)));
+    hall.request(Transition::Park, s(2)).unwrap();
+    assert_eq!((hall.state(), hall.cause()), (State::Parking, Cause::Asked(Transition::Park)));
     hall.event(Event::Parked, s(5));
     hall.event(Event::Astray(false), s(5));
     assert_eq!((hall.state(), hall.next()), (State::Parked, Next::Arm));
-    hall.request(Request::Park, s(6)).unwrap();
+    hall.request(Transition::Park, s(6)).unwrap();
     assert_eq!((hall.state(), hall.since()), (State::Parked, s(5)));
 }
 
@@ -449,8 +451,8 @@ fn parking_a_parked_hall_brings_down_a_seat_that_is_up_and_moves_nothing_else() 
 fn a_refusal_says_what_was_asked_in_which_state_why_not_and_what_to_do() {
     let mut hall = hall(State::Stopped);
     assert_eq!(
-        hall.request(Request::Arm, s(1)).unwrap_err().to_string(),
-        "cannot arm while stopped: it stays so until it is cleared; clear first"
+        hall.request(Transition::Arm, s(1)).unwrap_err().to_string(),
+        "cannot arm while stopped: it is latched; clear it first"
     );
 }
 
@@ -464,5 +466,5 @@ fn every_state_says_what_comes_next() {
         "load a cue, then arm"
     );
     assert_eq!(told(State::Armed, Event::Trouble(DRIVE)).next(), Next::PutRight);
-    assert_eq!(asked(State::Homing, Request::Stop).next(), Next::AwaitStandstill);
+    assert_eq!(asked(State::Homing, Transition::Stop).next(), Next::AwaitStandstill);
 }

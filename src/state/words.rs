@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Cause, Next, Readiness, Refusal, Request, Ride, State, Trouble, Why};
+use super::{Cause, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why};
 
 impl State {
     /// The state in one word, as every surface shows it.
@@ -14,9 +14,9 @@ impl State {
             Self::Parked => "parked",
             Self::Homing => "homing",
             Self::Armed => "armed",
-            Self::Playing(Ride::Joining) => "joining",
-            Self::Playing(Ride::Following) => "playing",
-            Self::Playing(Ride::Freewheeling) => "freewheeling",
+            Self::Playing(PlayMode::Joining) => "joining",
+            Self::Playing(PlayMode::Following) => "playing",
+            Self::Playing(PlayMode::Holding) => "holding",
             Self::Paused => "paused",
             Self::Stopping => "stopping",
             Self::Stopped => "stopped",
@@ -32,7 +32,7 @@ impl fmt::Display for State {
     }
 }
 
-impl fmt::Display for Request {
+impl fmt::Display for Transition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Home => "home",
@@ -70,17 +70,17 @@ impl fmt::Display for Next {
             Self::ArmAndHome => "arm, with nobody on the seats: they home first",
             Self::Go => "go, or disarm",
             Self::Watch => "nothing; pause, park or stop as needed",
-            Self::AwaitJoin => "nothing; the seats join again by themselves",
+            Self::AwaitJoin => "nothing; the seats rejoin by themselves",
             Self::Resume => "resume, or park",
             Self::Release => {
-                "release the emergency stop, then clear; or disable a seat that cannot tell that it is"
+                "release the emergency-stop button, then clear; or disable a seat that cannot tell that it is"
             }
 
-            Self::PutRight => "put the error right at the controller, then clear; or disable its seat",
+            Self::PutRight => "clear the error at the controller, then clear the hall; or disable its seat",
 
             Self::AwaitStandstill => "wait until the seats stand still, then clear and home",
             Self::CheckCue => "check the cue against the seats, then clear",
-            Self::LookAtSeat => "look at the seat, then clear and home again",
+            Self::LookAtSeat => "inspect the seat, then clear and home again",
             Self::StopOtherMaster => "stop the other master, then clear",
             Self::Clear => "clear, then park or home",
             Self::Restart => {
@@ -97,8 +97,8 @@ impl Next {
         Some(match self {
             Self::Home | Self::ArmAndHome => "leave, then `kinocue home` with nobody on the seats",
             Self::ParkOrHome => "park",
-            Self::Release => "release the emergency stop, then clear",
-            Self::PutRight => "put the error right at the controller, then clear",
+            Self::Release => "release the emergency-stop button, then clear",
+            Self::PutRight => "clear the error at the controller, then clear the hall",
             Self::AwaitAnswers => "wait until every controller has answered, or leave",
             Self::StopOtherMaster => "stop the other master, then leave and start the play anew",
             Self::Clear => "clear, then park",
@@ -114,8 +114,8 @@ impl Refusal {
     pub fn by_keys(&self) -> String {
         let remedy = match self.why {
             Why::PositionUnknown | Why::HomesFirst => "leave, then `kinocue home` with nobody on the seats",
-            Why::StillPressed => "release it at its place",
-            Why::StillWrong => "put it right there",
+            Why::StillPressed => "release its button",
+            Why::StillWrong => "clear the error there",
             Why::NotIdentified => "wait until they answer, or leave",
             why => why.remedy(),
         };
@@ -128,12 +128,10 @@ impl Trouble {
         match self {
             Self::Controller { .. } => "a controller has an error",
             Self::Drive { .. } => "a drive has an alarm",
-            Self::Gate => "the limits held motion back three times in a second",
+            Self::Limiter => "the limits held motion back three times in a second",
             Self::Planner => "a move could not be planned",
-            Self::Deaf => {
-                "replies were not read for too long, and nobody would have heard of an emergency stop"
-            }
-            Self::Homing(_) => "a seat did not get home",
+            Self::Deaf => "replies were not read for too long; an emergency stop would have gone unnoticed",
+            Self::Homing(_) => "a seat failed to home",
             Self::HomingTime => "homing took too long",
             Self::ParkingTime => "parking took too long",
             Self::OtherMaster(_) => "another master sends frames to a controller",
@@ -185,18 +183,18 @@ impl Cause {
     }
 }
 
-const fn asked(request: Request) -> &'static str {
+const fn asked(request: Transition) -> &'static str {
     match request {
-        Request::Home => "homed by the operator",
-        Request::Arm | Request::HomeAndArm => "armed by the operator",
-        Request::Disarm => "disarmed by the operator",
-        Request::Go => "started by the operator",
-        Request::Pause => "paused by the operator",
-        Request::Resume => "resumed by the operator",
-        Request::Seek => "sent elsewhere in the cue by the operator",
-        Request::Stop => "stopped by the operator",
-        Request::Park => "parked by the operator",
-        Request::Clear => "cleared by the operator",
+        Transition::Home => "homed by the operator",
+        Transition::Arm | Transition::HomeAndArm => "armed by the operator",
+        Transition::Disarm => "disarmed by the operator",
+        Transition::Go => "started by the operator",
+        Transition::Pause => "paused by the operator",
+        Transition::Resume => "resumed by the operator",
+        Transition::Seek => "moved to another place by the operator",
+        Transition::Stop => "stopped by the operator",
+        Transition::Park => "parked by the operator",
+        Transition::Clear => "cleared by the operator",
     }
 }
 
@@ -211,8 +209,8 @@ impl Why {
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
-            Self::NotIdentified => "not every controller has said what it is",
-            Self::PositionsNotRead => "where the seats stand has not been read since they stopped",
+            Self::NotIdentified => "not every controller has been identified",
+            Self::PositionsNotRead => "the seats' positions have not been read since they stopped",
             Self::PositionUnknown => "a controller does not know its position",
             Self::HomesFirst => "the seats have to home first, and move over their whole stroke",
             Self::NoCue => Readiness::NoCue.words(),
@@ -226,7 +224,7 @@ impl Why {
             Self::HomingNow => "the seats are homing",
             Self::ParkingNow => "the seats are on their way to park",
             Self::StoppingNow => "the seats are coming to rest",
-            Self::Latched => "it stays so until it is cleared",
+            Self::Latched => "it is latched",
             Self::SeatsAnywhere => "the seats may be anywhere",
             Self::ArmedNow => "the hall is armed",
             Self::StillPressed => "an emergency stop is still in effect",
@@ -239,7 +237,7 @@ impl Why {
     #[must_use]
     pub const fn remedy(self) -> &'static str {
         match self {
-            Self::NotIdentified => "wait until they answer, or disable the one that does not",
+            Self::NotIdentified => "wait until they answer, or disable the seat that does not",
             Self::PositionsNotRead => "wait until the controllers have answered",
             Self::PositionUnknown => "home first, with nobody on the seats, or disable that seat",
             Self::HomesFirst => {
@@ -249,18 +247,18 @@ impl Why {
             Self::NotProved => "check it against the seats",
             Self::NotPreflighted => "run it",
             Self::NotArmed => "arm first",
-            Self::PlaysAlready => "use seek to go elsewhere in it",
+            Self::PlaysAlready => "seek to another position in it",
             Self::PausedNow => "resume, or park first",
             Self::Riding => "park first",
             Self::NothingPlays => "arm and go",
             Self::HomingNow => "wait until they are home",
             Self::ParkingNow => "wait until they are there",
             Self::StoppingNow => "wait, then clear",
-            Self::Latched => "clear first",
+            Self::Latched => "clear it first",
             Self::SeatsAnywhere => "park or home first",
             Self::ArmedNow => "disarm first",
-            Self::StillPressed => "release it at its place, or disable a seat that cannot tell that it is",
-            Self::StillWrong => "put it right there, or disable its seat",
+            Self::StillPressed => "release its button, or disable a seat that cannot tell that it is",
+            Self::StillWrong => "clear the error there, or disable its seat",
             Self::NothingToClear => "go on",
         }
     }

@@ -9,7 +9,7 @@ use std::ptr;
 /// The most datagrams that one call takes.
 pub const SLOTS: usize = 32;
 
-/// Octets kept of each datagram; the protocol's longest is far shorter, and a longer one is marked as truncated.
+/// Bytes kept of each datagram; the protocol's longest is far shorter, and a longer one is marked as truncated.
 pub const DATAGRAM_LEN: usize = 2_048;
 
 /// Room for the one control message asked for, a `timespec`, twice over.
@@ -25,9 +25,9 @@ struct Control([u8; CONTROL_LEN]);
 pub struct Datagram<'a> {
     /// Who sent it.
     pub from: SocketAddrV4,
-    /// What was sent; the first [`DATAGRAM_LEN`] octets where there were more.
-    pub octets: &'a [u8],
-    /// Whether octets past [`DATAGRAM_LEN`] were thrown away.
+    /// What was sent; the first [`DATAGRAM_LEN`] bytes where there were more.
+    pub bytes: &'a [u8],
+    /// True if bytes past [`DATAGRAM_LEN`] were thrown away.
     pub truncated: bool,
     /// Wall clock at which the kernel received it, nanoseconds since 1970; only from a socket given to
     /// [`stamp_arrivals`].
@@ -88,7 +88,7 @@ impl Batch {
     pub fn datagrams(&self) -> impl Iterator<Item = Datagram<'_>> {
         self.arrivals[..self.filled].iter().zip(&self.buffers).map(|(arrival, buffer)| Datagram {
             from: arrival.from,
-            octets: &buffer[..arrival.len.min(DATAGRAM_LEN)],
+            bytes: &buffer[..arrival.len.min(DATAGRAM_LEN)],
             truncated: arrival.truncated,
             stamp_ns: arrival.stamp_ns,
         })
@@ -98,11 +98,11 @@ impl Batch {
 /// Has the kernel note the wall clock at which each datagram of this socket arrives (`SO_TIMESTAMPNS`).
 ///
 /// # Errors
-/// Where the kernel refuses.
+/// If the kernel refuses.
 #[expect(unsafe_code, reason = "no safe wrapper of this option exists among our dependencies")]
 pub fn stamp_arrivals(socket: impl AsFd) -> io::Result<()> {
     let on: libc::c_int = 1;
-    let len = libc::socklen_t::try_from(size_of_val(&on)).expect("four octets");
+    let len = libc::socklen_t::try_from(size_of_val(&on)).expect("four bytes");
     // SAFETY: the descriptor is borrowed and so open; the option's value is a live `int` of the length told.
     let answer = unsafe {
         libc::setsockopt(
@@ -124,7 +124,7 @@ fn receive(
     buffers: &mut [[u8; DATAGRAM_LEN]],
     arrivals: &mut [Arrival; SLOTS],
 ) -> io::Result<usize> {
-    // SAFETY: all three are plain C structures of integers and pointers, for which all-zero octets are a valid value.
+    // SAFETY: all three are plain C structures of integers and pointers, for which all-zero bytes are a valid value.
     let (mut headers, mut names, mut vectors): (
         [libc::mmsghdr; SLOTS],
         [libc::sockaddr_in; SLOTS],
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_batch_holds_source_octets_and_stamp_of_each_datagram() {
+    fn a_batch_holds_source_bytes_and_stamp_of_each_datagram() {
         let (a, b) = pair();
         stamp_arrivals(&b).unwrap();
         let before = wall_now_ns();
@@ -236,7 +236,7 @@ mod tests {
             assert!(!datagram.truncated);
             let stamp = datagram.stamp_ns.unwrap();
             assert!(before <= stamp && stamp <= wall_now_ns(), "{before} {stamp}");
-            datagram.octets.to_vec()
+            datagram.bytes.to_vec()
         });
         assert_eq!(got, [&b"one"[..], b""]);
     }
@@ -245,7 +245,7 @@ mod tests {
     fn a_datagram_too_long_is_cut_and_says_so() {
         let (a, b) = pair();
         a.send(&[7; DATAGRAM_LEN + 1]).unwrap();
-        let got = take(&b, 1, |datagram| (datagram.octets.len(), datagram.truncated, datagram.stamp_ns));
+        let got = take(&b, 1, |datagram| (datagram.bytes.len(), datagram.truncated, datagram.stamp_ns));
         assert_eq!(got, [(DATAGRAM_LEN, true, None)]);
     }
 
@@ -266,7 +266,7 @@ mod tests {
         for n in 0..=SLOTS {
             a.send(&[u8::try_from(n).unwrap()]).unwrap();
         }
-        let got = take(&b, SLOTS + 1, |datagram| usize::from(datagram.octets[0]));
+        let got = take(&b, SLOTS + 1, |datagram| usize::from(datagram.bytes[0]));
         assert!(got.into_iter().eq(0..=SLOTS));
     }
 }

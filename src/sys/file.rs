@@ -1,4 +1,4 @@
-//! Files that are files: what holds octets that are all there. A pipe or a device in a file's place may never end, or never
+//! Files that are files: what holds bytes that are all there. A pipe or a device in a file's place may never end, or never
 //! begin.
 
 use std::fs::{File, OpenOptions};

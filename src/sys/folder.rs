@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// What tells one content of a file from another without reading it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Stamp {
-    /// Octets.
+    /// Bytes.
     pub(crate) size: u64,
     /// When it was last written: seconds and nanoseconds since 1970.
     mtime: (i64, u64),
@@ -27,7 +27,7 @@ impl Stamp {
         Ok(Self { size: metadata.len(), mtime, inode: metadata.ino() })
     }
 
-    /// Whether `other` was written after this.
+    /// True if `other` was written after this.
     pub(crate) fn is_before(&self, other: &Self) -> bool {
         self.mtime < other.mtime
     }
@@ -65,7 +65,7 @@ impl Folder {
         Ok(names)
     }
 
-    /// Opens a regular file to read it; none where there is nothing of that name, or something else.
+    /// Opens a regular file to read it; `None` if there is nothing of that name, or something else.
     pub(crate) fn file(&self, name: &str) -> io::Result<Option<(File, Stamp)>> {
         // Without NONBLOCK, opening a pipe would wait for somebody to write to it.
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -82,7 +82,7 @@ impl Folder {
         Ok(Some((file, stamp)))
     }
 
-    /// The stamp of a regular file; none where there is no such.
+    /// The stamp of a regular file; `None` if there is no such.
     pub(crate) fn stamp(&self, name: &str) -> io::Result<Option<Stamp>> {
         Ok(self.file(name)?.map(|(_, stamp)| stamp))
     }
@@ -117,7 +117,7 @@ impl Folder {
         rustix::fs::flock(&self.fd, FlockOperation::NonBlockingLockExclusive).is_ok()
     }
 
-    /// Whether somebody has claimed the folder.
+    /// True if somebody has claimed the folder.
     pub(crate) fn is_claimed(&self) -> bool {
         let shared = rustix::fs::flock(&self.fd, FlockOperation::NonBlockingLockShared);
         if shared.is_ok() {

@@ -12,7 +12,7 @@ use super::realtime::set_scheduler;
 /// What the process may take from now on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
-    /// Address space, octets.
+    /// Address space, bytes.
     pub memory: u64,
     /// Processor time of all its threads, s.
     pub cpu_s: u64,
@@ -21,7 +21,7 @@ pub struct Bounds {
 /// Lowers the calling process for good; to be called before it starts a thread. It writes no files and dumps no core.
 ///
 /// # Errors
-/// Where the system refuses a bound. A refused priority is no error: nothing is at stake but the time of others.
+/// If the system refuses a bound. A refused priority is no error: nothing is at stake but the time of others.
 pub fn lower(bounds: Bounds) -> io::Result<()> {
     let _ = set_scheduler(libc::SCHED_IDLE, 0);
     let _ = setpriority_process(None, 19);

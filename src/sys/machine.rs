@@ -14,7 +14,7 @@ use super::realtime::{PRIORITY, Policy, scheduler, set_scheduler};
 /// What came of asking for real-time scheduling, on a thread that has ended since.
 #[derive(Debug)]
 pub struct Trial {
-    /// Whether whoever started the process gave the asking thread a real-time policy; then none was asked for.
+    /// True if whoever started the process gave the asking thread a real-time policy; then none was asked for.
     pub given: bool,
     /// Policy and priority that a play would have; the priority is 0 where the policy has none.
     pub in_force: (Policy, u8),
@@ -22,7 +22,7 @@ pub struct Trial {
     pub refusal: Option<io::Error>,
     /// Timer slack that a thread of this process begins with, ns; `None` where the kernel does not tell.
     pub slack_ns: Option<u64>,
-    /// Whether a timer slack of 1 ns was accepted.
+    /// True if a timer slack of 1 ns was accepted.
     pub slack_settable: bool,
 }
 
@@ -31,10 +31,10 @@ pub struct Trial {
 /// keeps; another thread might be refused it, so it is not asked for.
 ///
 /// # Errors
-/// Where no thread can be started.
+/// If no thread can be started.
 ///
 /// # Panics
-/// Where the thread panicked, which nothing in it does.
+/// If the thread panicked, which nothing in it does.
 pub fn try_realtime() -> io::Result<Trial> {
     let own = scheduler();
     let given = own.0 != Policy::Other;
@@ -53,7 +53,7 @@ pub fn try_realtime() -> io::Result<Trial> {
 /// Locks the memory that the process has now, and unlocks it again.
 ///
 /// # Errors
-/// Where the kernel refuses.
+/// If the kernel refuses.
 pub fn try_memory_lock() -> io::Result<()> {
     mlockall(MlockAllFlags::CURRENT)?;
     munlockall()?;
@@ -74,7 +74,7 @@ pub struct Limit {
 pub struct Limits {
     /// The highest real-time priority without a right (`RLIMIT_RTPRIO`).
     pub priority: Limit,
-    /// Octets that may be locked without a right (`RLIMIT_MEMLOCK`).
+    /// Bytes that may be locked without a right (`RLIMIT_MEMLOCK`).
     pub locked: Limit,
     /// Files open at once (`RLIMIT_NOFILE`).
     pub files: Limit,
@@ -97,7 +97,7 @@ pub fn limits() -> Limits {
 /// How well the wall clock is held to the true time, as the kernel has it from whoever disciplines it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockSync {
-    /// Whether anything disciplines it: neither `TIME_ERROR` nor `STA_UNSYNC`.
+    /// True if anything disciplines it: neither `TIME_ERROR` nor `STA_UNSYNC`.
     pub synchronised: bool,
     /// The most that it may be wrong by, µs; grows while nobody disciplines it.
     pub max_error_us: u64,
@@ -106,10 +106,10 @@ pub struct ClockSync {
 /// Asks how well the wall clock is held; sets nothing (`adjtimex` with no modes).
 ///
 /// # Errors
-/// Where the kernel, or a filter of the container, refuses to tell.
+/// If the kernel, or a filter of the container, refuses to tell.
 #[expect(unsafe_code, reason = "no safe wrapper of this call exists among our dependencies")]
 pub fn clock_sync() -> io::Result<ClockSync> {
-    // SAFETY: `timex` is a plain C structure of integers, for which all-zero octets are a valid value; so `modes` is 0.
+    // SAFETY: `timex` is a plain C structure of integers, for which all-zero bytes are a valid value; so `modes` is 0.
     let mut told: libc::timex = unsafe { mem::zeroed() };
     // SAFETY: `told` is a live, writable `timex` and outlives the call.
     let state = unsafe { libc::adjtimex(&raw mut told) };

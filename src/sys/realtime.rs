@@ -41,9 +41,9 @@ impl fmt::Display for Policy {
 pub struct RealTime {
     /// Scheduling policy of the calling thread.
     pub policy: Policy,
-    /// Its real-time priority, 1 to 99; 0 where the policy has none.
+    /// Its real-time priority, 1 to 99; 0 if the policy has none.
     pub priority: u8,
-    /// Whether the memory of the process is kept from being paged out.
+    /// True if the memory of the process is kept from being paged out.
     pub memory_locked: bool,
     /// Each thing that was refused: what, why, and what to change; a sentence for a person.
     pub refusals: Vec<String>,
@@ -71,7 +71,7 @@ pub fn request() -> RealTime {
 /// Gives the calling thread ordinary scheduling, for helper threads of one that may be real-time: a policy is inherited.
 ///
 /// # Errors
-/// Where the kernel refuses; giving up priority needs no right, so that is not to be expected.
+/// If the kernel refuses; giving up priority needs no right, so that is not to be expected.
 pub fn normal_priority() -> io::Result<()> {
     set_scheduler(libc::SCHED_OTHER, 0)
 }
@@ -148,7 +148,7 @@ fn lock_memory() -> Result<(), String> {
         Err(cause) => cause.to_string(),
     };
     Err(format!(
-        "locking the memory was refused: {cause} (the limit is {} octets); set LimitMEMLOCK=infinity in the unit, or \
+        "locking the memory was refused: {cause} (the limit is {} bytes); set LimitMEMLOCK=infinity in the unit, or \
          `ulimit -l unlimited`",
         words(limit)
     ))
@@ -167,7 +167,7 @@ fn not_in_force(status: io::Result<String>) -> Option<String> {
     }
 }
 
-/// Locked memory, in KiB; 0 where the kernel does not tell.
+/// Locked memory, in KiB; 0 if the kernel does not tell.
 fn vm_lck(status: &str) -> u64 {
     let line = status.lines().find_map(|line| line.strip_prefix("VmLck:"));
     line.and_then(|value| value.trim().strip_suffix("kB")?.trim().parse().ok()).unwrap_or(0)

@@ -3,10 +3,10 @@
 use std::mem::MaybeUninit;
 use std::{io, ptr};
 
-/// Whether a signal is ignored, as `nohup` leaves SIGHUP: who wanted that does not want it handled either.
+/// True if a signal is ignored, as `nohup` leaves SIGHUP: who wanted that does not want it handled either.
 ///
 /// # Errors
-/// Where there is no such signal.
+/// If there is no such signal.
 #[expect(unsafe_code, reason = "no safe wrapper of sigaction exists among our dependencies")]
 pub fn is_ignored(signal: i32) -> io::Result<bool> {
     let mut present = MaybeUninit::<libc::sigaction>::uninit();

@@ -50,7 +50,7 @@ impl Keyboard {
         Some(keyboard)
     }
 
-    /// Reads what is typed into `keys`, waiting for it no longer than `wait`; returns how many octets came, 0 where none
+    /// Reads what is typed into `keys`, waiting for it no longer than `wait`; returns how many bytes came, 0 if none
     /// did, or where the terminal is at present another job's.
     ///
     /// # Errors
@@ -83,7 +83,7 @@ impl Drop for Keyboard {
     }
 }
 
-/// Whether we may set and read the terminal: it is another's where job control gave it to another process group.
+/// True if we may set and read the terminal: it is another's where job control gave it to another process group.
 fn is_ours() -> bool {
     // One that is not the controlling terminal knows no jobs.
     tcgetpgrp(stdin()).map_or(true, |group| group == getpgrp())
@@ -102,7 +102,7 @@ fn restore() {
 /// signal, because what a signal does is done in the order of these calls.
 ///
 /// # Errors
-/// Where the signal cannot be handled.
+/// If the signal cannot be handled.
 #[expect(unsafe_code, reason = "a program that a signal ends at once drops nothing")]
 pub fn restore_on(signal: i32, when: Arc<AtomicBool>) -> io::Result<()> {
     let act = move || {

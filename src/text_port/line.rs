@@ -1,7 +1,7 @@
-//! A line of text into what it asks.
+//! Parses a line of text into a command.
 
 use crate::config::{GearWord, parse_level};
-use crate::hall::{Ask, Code, LevelsChange, Problem};
+use crate::control::{Code, Command, LevelsChange, Problem};
 use crate::time::{parse_time, parse_trim};
 
 /// The lines that there are, as a refusal lists them.
@@ -12,7 +12,7 @@ const LINES: &str = "go, pause, resume, stop, park, status, seek 12:30, trim +80
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Order {
     /// Of the hall.
-    Ask(Ask),
+    Command(Command),
     /// How it is.
     Status,
 }
@@ -37,22 +37,22 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
     let text = str::from_utf8(line).ok().filter(|text| text.is_ascii());
     let no_ascii = || Fault::NoOrder(value("the line is not ASCII".to_owned(), "send plain ASCII"));
     let words: Vec<&str> = text.ok_or_else(no_ascii)?.split_ascii_whitespace().collect();
-    let order = Order::Ask(match words[..] {
+    let order = Order::Command(match words[..] {
         ["status"] => return Ok(Order::Status),
-        [stop] if stop.eq_ignore_ascii_case("stop") => Ask::Stop,
-        ["go"] => Ask::Go,
-        ["pause"] => Ask::Pause,
-        ["resume"] => Ask::Resume,
-        ["park"] => Ask::Park,
-        ["seek", at] => Ask::Seek(parse_time(at).map_err(|why| argument(at, &why))?),
-        ["trim", trim] => Ask::Trim(parse_trim(trim).map_err(|why| argument(trim, &why))?),
+        [stop] if stop.eq_ignore_ascii_case("stop") => Command::Stop,
+        ["go"] => Command::Go,
+        ["pause"] => Command::Pause,
+        ["resume"] => Command::Resume,
+        ["park"] => Command::Park,
+        ["seek", at] => Command::Seek(parse_time(at).map_err(|why| argument(at, &why))?),
+        ["trim", trim] => Command::Trim(parse_trim(trim).map_err(|why| argument(trim, &why))?),
         ["level", all] => level(all, |all| (Some(all), Some(all)))?,
         ["level", "motion", motion] => level(motion, |motion| (Some(motion), None))?,
         ["level", "vibration", vibration] => level(vibration, |vibration| (None, Some(vibration)))?,
         ["effect", name, "on"] => effect(name, true),
         ["effect", name, "off"] => effect(name, false),
-        ["enable", name] => Ask::Enable(name.to_owned()),
-        ["disable", name] => Ask::Disable { name: name.to_owned(), why: None },
+        ["enable", name] => Command::Enable(name.to_owned()),
+        ["disable", name] => Command::Disable { name: name.to_owned(), why: None },
         [word @ ("arm" | "disarm" | "home" | "clear" | "load"), ..] => {
             let detail = format!("lines of text may never {word}");
             return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
@@ -67,7 +67,7 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
 
 /// An order, where the configuration allows it.
 fn allowed(order: Order, allow: &[GearWord]) -> Result<Order, Fault> {
-    let Order::Ask(ask) = &order else { return Ok(order) };
+    let Order::Command(ask) = &order else { return Ok(order) };
     if ask.gear_word().is_none_or(|word| allow.contains(&word)) {
         return Ok(order);
     }
@@ -75,13 +75,13 @@ fn allowed(order: Order, allow: &[GearWord]) -> Result<Order, Fault> {
     Err(Problem::new(Code::Role, detail, "list it in `allow` of [text]").into())
 }
 
-fn level(text: &str, of: impl FnOnce(f64) -> (Option<f64>, Option<f64>)) -> Result<Ask, Problem> {
+fn level(text: &str, of: impl FnOnce(f64) -> (Option<f64>, Option<f64>)) -> Result<Command, Problem> {
     let (motion, vibration) = of(parse_level(text).map_err(|why| argument(text, &why))?);
-    Ok(Ask::Levels(LevelsChange { motion, vibration, ..LevelsChange::default() }))
+    Ok(Command::Levels(LevelsChange { motion, vibration, ..LevelsChange::default() }))
 }
 
-fn effect(name: &str, on: bool) -> Ask {
-    Ask::Levels(LevelsChange { effects: [(name.to_owned(), on)].into(), ..LevelsChange::default() })
+fn effect(name: &str, on: bool) -> Command {
+    Command::Levels(LevelsChange { effects: [(name.to_owned(), on)].into(), ..LevelsChange::default() })
 }
 
 /// A refusal of one word of a line; `why` says what is wrong and, where it has one, what to write.
@@ -105,33 +105,34 @@ mod tests {
         order(line, &GearWord::ALL.map(|(_, word)| word))
     }
 
-    fn asked(line: &str) -> Ask {
+    fn asked(line: &str) -> Command {
         match ordered(line.as_bytes()) {
-            Ok(Order::Ask(ask)) => ask,
+            Ok(Order::Command(ask)) => ask,
             other => panic!("{line}: {other:?}"),
         }
     }
 
     #[test]
     fn each_line_asks_what_it_says() {
-        let levels = |motion, vibration| Ask::Levels(LevelsChange { motion, vibration, ..<_>::default() });
+        let levels =
+            |motion, vibration| Command::Levels(LevelsChange { motion, vibration, ..<_>::default() });
         for (line, ask) in [
-            ("go", Ask::Go),
-            ("  pause ", Ask::Pause),
-            ("resume", Ask::Resume),
-            ("stop", Ask::Stop),
-            (" STOP ", Ask::Stop),
-            ("park", Ask::Park),
-            ("seek 12:30", Ask::Seek(ShowTime::from_millis(750_000))),
-            ("trim +80ms", Ask::Trim(80)),
-            ("trim -80ms", Ask::Trim(-80)),
+            ("go", Command::Go),
+            ("  pause ", Command::Pause),
+            ("resume", Command::Resume),
+            ("stop", Command::Stop),
+            (" STOP ", Command::Stop),
+            ("park", Command::Park),
+            ("seek 12:30", Command::Seek(ShowTime::from_millis(750_000))),
+            ("trim +80ms", Command::Trim(80)),
+            ("trim -80ms", Command::Trim(-80)),
             ("level 60%", levels(Some(0.6), Some(0.6))),
             ("level motion 60%", levels(Some(0.6), None)),
             ("level  vibration\t60%", levels(None, Some(0.6))),
             ("effect water off", effect("water", false)),
             ("effect water on", effect("water", true)),
-            ("enable F4", Ask::Enable("F4".to_owned())),
-            ("disable F4", Ask::Disable { name: "F4".to_owned(), why: None }),
+            ("enable F4", Command::Enable("F4".to_owned())),
+            ("disable F4", Command::Disable { name: "F4".to_owned(), why: None }),
         ] {
             assert_eq!(asked(line), ask, "{line}");
         }
@@ -148,9 +149,9 @@ mod tests {
 
     #[test]
     fn what_is_not_listed_is_not_allowed_but_stop_is() {
-        assert_eq!(order(b"stop", &[]), Ok(Order::Ask(Ask::Stop)));
+        assert_eq!(order(b"stop", &[]), Ok(Order::Command(Command::Stop)));
         assert_eq!(order(b"status", &[]), Ok(Order::Status));
-        assert_eq!(order(b"go", &[GearWord::Go]), Ok(Order::Ask(Ask::Go)));
+        assert_eq!(order(b"go", &[GearWord::Go]), Ok(Order::Command(Command::Go)));
         let fault = order(b"park", &[GearWord::Go]).unwrap_err();
         assert!(matches!(fault, Fault::Refused(Problem { code: Code::Role, .. })), "{fault:?}");
     }
@@ -187,10 +188,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_octets_panic_and_none_arm(octets in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
-            let line = [word.as_bytes(), b" ", &octets].concat();
-            for line in [octets.as_slice(), line.as_slice()] {
-                if let Ok(Order::Ask(ask)) = ordered(line) {
+        fn no_bytes_panic_and_none_arm(bytes in proptest::collection::vec(any::<u8>(), 0..60), word in "[a-z]{2,7}") {
+            let line = [word.as_bytes(), b" ", &bytes].concat();
+            for line in [bytes.as_slice(), line.as_slice()] {
+                if let Ok(Order::Command(ask)) = ordered(line) {
                     prop_assert!(!["arm", "disarm", "home", "clear", "load"].contains(&ask.word()));
                 }
             }

@@ -1,4 +1,4 @@
-//! Lines of plain text over TCP: what a show controller can type in, asks of the hall out, one line back for each.
+//! Lines of plain text over TCP: text commands in, commands to the hall out, one line of reply for each.
 //! Control plane.
 //!
 //! ```text
@@ -26,7 +26,7 @@ use std::time::Duration;
 use tokio::task::JoinSet;
 
 use crate::config::TextPort;
-use crate::hall::{Handle, Places, Role, Surface, Who};
+use crate::control::{Handle, Places, Role, Surface, Who};
 use talk::Talk;
 
 /// Connections at the most; of more the one that was silent longest goes, before all one that never asked anything.
@@ -72,7 +72,7 @@ impl Text {
     /// Where it listens.
     ///
     /// # Errors
-    /// Where the system does not say.
+    /// If the system does not say.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
@@ -81,7 +81,7 @@ impl Text {
     /// and network.
     ///
     /// # Errors
-    /// Where the socket cannot be served; it never ends otherwise.
+    /// If the socket cannot be served; it never ends otherwise.
     pub async fn serve(self) -> io::Result<Infallible> {
         let Self { listener, config, hall, idle } = self;
         let listener = tokio::net::TcpListener::from_std(listener)?;

@@ -13,14 +13,14 @@ use tokio::time::timeout;
 
 use super::line::{Fault, Order, order};
 use crate::config::GearWord;
-use crate::hall::{Ask, Code, Handle, Place, Posted, Problem, Status, Who};
+use crate::control::{Code, Command, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
-/// Octets of a line at the most, its end included.
+/// Bytes of a line at the most, its end included.
 const LONGEST: u64 = 256;
 /// Lines that may wait for their answers; of who sends more ahead nothing but a stop is heard any more.
 const AHEAD: usize = 16;
-/// Of what came behind the last line so much is read, octets, and waited for so long.
+/// Of what came behind the last line so much is read, bytes, and waited for so long.
 const REST: u64 = 64 << 10;
 const PARTING: Duration = Duration::from_secs(1);
 /// How long a peer may take to read its answer.
@@ -39,7 +39,7 @@ pub(super) struct Talk {
     pub(super) hall: Handle,
     pub(super) who: Who,
     pub(super) allow: Vec<GearWord>,
-    /// SHA-256 of the token that the first line shows; none where none is wanted.
+    /// SHA-256 of the token that the first line shows; `None` if none is wanted.
     pub(super) token: Option<[u8; 32]>,
     /// A connection without a line for so long is closed.
     pub(super) idle: Duration,
@@ -121,7 +121,7 @@ impl Talk {
         let read = match order {
             Order::Status => Read::Answered(Ok(self.hall.status())),
             // A stop is done with this; its answer is for the journal and the peer.
-            Order::Ask(ask) => match self.hall.post(self.who.clone(), ask) {
+            Order::Command(ask) => match self.hall.post(self.who.clone(), ask) {
                 Ok(posted) => Read::Posted(posted),
                 Err(problem) => Read::Answered(Err(problem)),
             },
@@ -131,7 +131,7 @@ impl Talk {
 
     /// The first lines where a token is wanted: it, or a stop, which waits for none.
     fn first(&self, line: &[u8], wanted: &mut Option<[u8; 32]>) -> (Read, Then) {
-        if matches!(order(line, &[]), Ok(Order::Ask(Ask::Stop))) {
+        if matches!(order(line, &[]), Ok(Order::Command(Command::Stop))) {
             return self.take(line);
         }
         let token = line.strip_prefix(b"token ").map(|token| Sha256::digest(token.trim_ascii()));
@@ -147,7 +147,7 @@ impl Talk {
     }
 
     fn hear_a_stop(&self, line: &[u8]) {
-        if matches!(order(line, &[]), Ok(Order::Ask(Ask::Stop))) {
+        if matches!(order(line, &[]), Ok(Order::Command(Command::Stop))) {
             self.hall.stop();
             self.hall.note_stop(self.who.clone());
         }
@@ -191,7 +191,7 @@ pub(super) fn reply(answer: &Answer) -> String {
 fn too_long() -> Problem {
     Problem::new(
         Code::Value,
-        format!("the line is longer than {LONGEST} octets"),
+        format!("the line is longer than {LONGEST} bytes"),
         "end each line with LF or CRLF",
     )
 }

@@ -1,4 +1,4 @@
-//! The port with real connections over loopback, before a hall that a double of its keeper keeps.
+//! The port with real connections over loopback, before a hall that a double of its supervisor keeps.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, TcpStream};
@@ -10,7 +10,7 @@ use tokio::runtime::Builder;
 
 use super::{CONNECTIONS, open};
 use crate::config::{GearWord, TextPort};
-use crate::hall::{Ask, Code, Inbox, Problem, Role, ShowStatus, Status, Surface, handle};
+use crate::control::{Code, Command, Inbox, Problem, Role, ShowStatus, Status, Surface, handle};
 use crate::rt::Desk;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
@@ -51,7 +51,7 @@ impl Stage {
     }
 
     /// What the hall is asked next, and the way to answer it.
-    fn asked(&self) -> crate::hall::Asked {
+    fn asked(&self) -> crate::control::Asked {
         let asked = self.inbox.next(PATIENCE).expect("something is asked");
         assert_eq!((asked.desired.who.role, asked.desired.who.surface), (Role::Operate, Surface::Text));
         asked
@@ -61,11 +61,11 @@ impl Stage {
 struct Peer(BufReader<TcpStream>);
 
 impl Peer {
-    fn send(&mut self, octets: &[u8]) {
-        self.0.get_mut().write_all(octets).unwrap();
+    fn send(&mut self, bytes: &[u8]) {
+        self.0.get_mut().write_all(bytes).unwrap();
     }
 
-    /// The next line; empty where the port closed the connection.
+    /// The next line; empty if the port closed the connection.
     fn line(&mut self) -> String {
         let mut line = String::new();
         self.0.read_line(&mut line).unwrap();
@@ -94,7 +94,7 @@ fn a_line_is_asked_and_answered_with_state_and_position() {
     let mut peer = stage.connect();
     peer.send(b"go\r\n");
     let asked = stage.asked();
-    assert_eq!(asked.desired.ask, Ask::Go);
+    assert_eq!(asked.desired.ask, Command::Go);
     asked.answer(Ok(Arc::new(playing())));
     assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
     peer.send(b"pause\n");
@@ -123,7 +123,7 @@ fn a_stop_is_read_while_an_answer_is_waited_for() {
     let mut peer = stage.connect();
     peer.send(b"park\nstop\n");
     let (park, stop) = (stage.asked(), stage.asked());
-    assert_eq!((&park.desired.ask, &stop.desired.ask), (&Ask::Park, &Ask::Stop));
+    assert_eq!((&park.desired.ask, &stop.desired.ask), (&Command::Park, &Command::Stop));
     assert!(stage.desk.take_stop(), "before anything is answered");
     stop.answer(Err(Problem::new(Code::State, "second", "-")));
     park.answer(Err(Problem::new(Code::State, "first", "-")));
@@ -150,7 +150,7 @@ fn a_line_without_end_and_lines_without_number_end_the_connection() {
     let stage = Stage::new();
     let mut peer = stage.connect();
     peer.send(&[b'a'; 256]);
-    assert!(peer.line().starts_with("error value the line is longer than 256 octets"));
+    assert!(peer.line().starts_with("error value the line is longer than 256 bytes"));
     assert_eq!(peer.line(), "");
     let mut peer = stage.connect();
     peer.send(&b"park\n".repeat(100));
@@ -193,7 +193,7 @@ fn an_order_with_a_value_that_is_none_is_answered_and_the_next_is_heard() {
     let mut peer = stage.connect();
     peer.send(b"trim 501\nstop\n");
     assert!(peer.line().starts_with("error value \"501\": a trim is"));
-    assert_eq!(stage.asked().desired.ask, Ask::Stop);
+    assert_eq!(stage.asked().desired.ask, Command::Stop);
 }
 
 #[test]
@@ -208,12 +208,12 @@ fn where_a_token_is_wanted_nothing_but_a_stop_is_taken_without_it() {
     assert!(stage.inbox.next(Duration::ZERO).is_none());
     let mut peer = stage.connect();
     peer.send(b"stop\n");
-    assert_eq!(stage.asked().desired.ask, Ask::Stop);
+    assert_eq!(stage.asked().desired.ask, Command::Stop);
     assert!(stage.desk.take_stop());
     let mut peer = stage.connect();
     peer.send(b"token hush\r\ngo\r\n");
     assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
-    assert_eq!(stage.asked().desired.ask, Ask::Go);
+    assert_eq!(stage.asked().desired.ask, Command::Go);
 }
 
 #[test]
@@ -225,11 +225,11 @@ fn idle_connections_keep_no_stop_out() {
     let mut idle: Vec<Peer> = (0..2 * CONNECTIONS).map(|_| stage.connect()).collect();
     let mut peer = stage.connect();
     peer.send(b"stop\n");
-    assert_eq!(stage.asked().desired.ask, Ask::Stop);
+    assert_eq!(stage.asked().desired.ask, Command::Stop);
     assert!(stage.desk.take_stop());
     assert_eq!(idle[0].line(), "", "the one that was silent longest has made room");
     gear.send(b"stop\n");
-    assert_eq!(stage.asked().desired.ask, Ask::Stop, "who has asked something keeps a place");
+    assert_eq!(stage.asked().desired.ask, Command::Stop, "who has asked something keeps a place");
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn a_stop_behind_too_many_lines_is_heard() {
     peer.send(&b"park\n".repeat(100));
     peer.send(b"stop\n");
     let stops =
-        std::iter::from_fn(|| stage.inbox.next(PATIENCE)).find(|asked| asked.desired.ask == Ask::Stop);
+        std::iter::from_fn(|| stage.inbox.next(PATIENCE)).find(|asked| asked.desired.ask == Command::Stop);
     assert!(stops.is_some() && stage.desk.take_stop());
 }
 

@@ -98,7 +98,7 @@ fn sexagesimal(text: &str) -> Option<u128> {
 
 /// Digits alone, at most 12 of them: no sign, no spaces.
 fn whole(text: &str) -> Option<u128> {
-    let digits = !text.is_empty() && text.len() <= 12 && text.bytes().all(|octet| octet.is_ascii_digit());
+    let digits = !text.is_empty() && text.len() <= 12 && text.bytes().all(|byte| byte.is_ascii_digit());
     if digits { text.parse().ok() } else { None }
 }
 

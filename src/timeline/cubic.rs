@@ -33,7 +33,7 @@ impl Cubic {
         Self([c0, c1 * unit, c2 * unit * unit, c3 * unit * unit * unit])
     }
 
-    /// Whether the curve may be farther than `size` from 0 somewhere within 0 to 1; where not, it surely is not.
+    /// True if the curve may be farther than `size` from 0 somewhere within 0 to 1; where not, it surely is not.
     pub(crate) fn may_leave(self, size: f64) -> bool {
         const THIRD: f64 = 1.0 / 3.0;
         let [c0, c1, c2, c3] = self.0;

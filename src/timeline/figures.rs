@@ -1,4 +1,4 @@
-//! What a cue switches, and how often it says something: figures that people judge it by. Control thread.
+//! Statistics of a cue's effects and rows, for people to judge it by. Control thread.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Whether a curve stays within a seat's stroke.
+//! Decides if a curve stays within a seat's stroke.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::time::ShowTime;
 /// at an end always dips.
 pub const HELD_BACK: f64 = 0.001;
 
-/// Whether a cue's axes stay within a stroke.
+/// True if a cue's axes stay within a stroke.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StrokeFit {
     /// Rows outside the stroke, and stretches between rows more than [`HELD_BACK`] of it outside.

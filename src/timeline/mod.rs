@@ -137,13 +137,13 @@ impl Timeline {
         all
     }
 
-    /// Whether anything ever vibrates.
+    /// True if anything ever vibrates.
     #[must_use]
     pub const fn has_vibration(&self) -> bool {
         self.vibrates
     }
 
-    /// Whether an axis, counted from 0, ever vibrates.
+    /// True if an axis, counted from 0, ever vibrates.
     #[must_use]
     pub fn vibrates(&self, axis: usize) -> bool {
         self.cue
@@ -152,7 +152,7 @@ impl Timeline {
             .is_some_and(|steps| steps.as_slice().iter().any(|step| moves(step.value)))
     }
 
-    /// The farthest swing of an axis, counted from 0, and the first show time from which it holds; none where the axis
+    /// The farthest swing of an axis, counted from 0, and the first show time from which it holds; `None` if the axis
     /// never vibrates.
     #[must_use]
     pub fn strongest_vibration(&self, axis: usize) -> Option<(ShowTime, Vibration)> {
@@ -171,7 +171,7 @@ impl Timeline {
         }
     }
 
-    /// The names of the effects, in the order of their bits; none where the cue carries raw output words.
+    /// The names of the effects, in the order of their bits; `None` if the cue carries raw output words.
     #[must_use]
     pub fn effect_names(&self) -> &[String] {
         match self.cue.effects() {

@@ -4,7 +4,7 @@ use super::curve::seconds;
 use crate::cue::{Cue, Interpolation};
 use crate::motion::MAX_AXES;
 
-/// Second derivatives `[row][axis]`, per second squared; empty where the cue's curve is no spline. Not-a-knot ends from
+/// Second derivatives `[row][axis]`, per second squared; empty if the cue's curve is no spline. Not-a-knot ends from
 /// four rows on, the parabola through three, the line through two.
 pub(super) fn solve(cue: &Cue) -> Vec<f32> {
     if cue.interpolation() != Interpolation::Spline {

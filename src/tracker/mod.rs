@@ -1,5 +1,5 @@
-//! What became of every frame: told of sends and replies, it keeps the books of each controller and the latency of its
-//! acks. Ack thread; pure: it is told the time, and all its memory is made at the start.
+//! The fate of every frame: from sends and replies it keeps the account of each controller and the latency of its
+//! acks. Ack thread; pure: the time is an argument, and all memory is allocated at the start.
 //!
 //! A frame that asks for a reply ends in exactly one account: acked, refused or lost. A reply ends in exactly one as
 //! well: acked, refused, duplicate, stale or stray.
@@ -114,7 +114,7 @@ impl Tracker {
         }
     }
 
-    /// Whether a record of this frame, or of one after it, has come.
+    /// True if a record of this frame, or of one after it, has come.
     #[must_use]
     pub fn recorded(&self, controller: usize, frame: FrameNo) -> bool {
         self.accounts[controller].recorded(frame)
@@ -145,7 +145,7 @@ impl Tracker {
         self.accounts[controller].last_ack
     }
 
-    /// Whether the controller was lost when the sending ended: it was asked, and acked none of the frames of the last
+    /// True if the controller was lost when the sending ended: it was asked, and acked none of the frames of the last
     /// second that asked, or of the last ten that did if those are more. A frame that the kernel did not take was not acked either, and a
     /// refusal is no ack. To be asked after [`Tracker::finish`].
     #[must_use]

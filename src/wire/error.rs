@@ -1,21 +1,21 @@
-//! Why octets are no message, and what the numbers mean that a controller puts into its replies.
+//! Why bytes are no message, and what the numbers mean that a controller puts into its replies.
 
 use std::fmt;
 
-/// Why octets are not a message of the protocol, and at which octet (counted from 0) that shows.
+/// Why bytes are not a message of the protocol, and at which byte (counted from 0) that shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WireError {
     /// It ends inside its header.
-    #[error("octet {len}: ends after {len} octets, inside the header; {need} are needed")]
+    #[error("byte {len}: ends after {len} bytes, inside the header; {need} are needed")]
     Short {
-        /// Octets there are.
+        /// Bytes there are.
         len: usize,
-        /// Octets the header takes.
+        /// Bytes the header takes.
         need: usize,
     },
     /// It does not open with the confirm code of its function.
-    #[error("octet 0: confirm code {found:04x} where {expected:04x} belongs")]
+    #[error("byte 0: confirm code {found:04x} where {expected:04x} belongs")]
     Confirm {
         /// What it opens with.
         found: u16,
@@ -23,19 +23,19 @@ pub enum WireError {
         expected: u16,
     },
     /// The pass code is not zero.
-    #[error("octet 2: pass code {found:04x} where 0000 belongs")]
+    #[error("byte 2: pass code {found:04x} where 0000 belongs")]
     Pass {
         /// What stands there.
         found: u16,
     },
     /// No function, or not one of those asked for.
-    #[error("octet 4: function code {found:04x} is none that belongs here")]
+    #[error("byte 4: function code {found:04x} is none that belongs here")]
     Function {
         /// What stands there.
         found: u16,
     },
     /// The object channel, or the count of axes, fits no number of axes from 1 to 12.
-    #[error("octet {at}: {found} names no number of axes; 3 to 12 axes are possible")]
+    #[error("byte {at}: {found} names no number of axes; 3 to 12 axes are possible")]
     Axes {
         /// Where the channel or count stands.
         at: usize,
@@ -43,23 +43,23 @@ pub enum WireError {
         found: u16,
     },
     /// It is shorter than its function, channel and counts say.
-    #[error("octet {len}: ends after {len} octets; this message takes {need}")]
+    #[error("byte {len}: ends after {len} bytes; this message takes {need}")]
     Length {
-        /// Octets there are.
+        /// Bytes there are.
         len: usize,
-        /// Octets its layout takes.
+        /// Bytes its layout takes.
         need: usize,
     },
     /// It is longer than its layout, where nothing may follow.
-    #[error("octet {need}: goes on to {len} octets; this message takes {need}")]
+    #[error("byte {need}: goes on to {len} bytes; this message takes {need}")]
     Surplus {
-        /// Octets there are.
+        /// Bytes there are.
         len: usize,
-        /// Octets its layout takes.
+        /// Bytes its layout takes.
         need: usize,
     },
     /// It counts more registers than the controller has.
-    #[error("octet {at}: {found} registers at once; at most {max} are possible")]
+    #[error("byte {at}: {found} registers at once; at most {max} are possible")]
     Count {
         /// Where the count stands.
         at: usize,
@@ -71,7 +71,7 @@ pub enum WireError {
 }
 
 impl WireError {
-    /// The octet at which the fault shows, counted from 0.
+    /// The byte at which the fault shows, counted from 0.
     #[must_use]
     pub const fn offset(self) -> usize {
         match self {

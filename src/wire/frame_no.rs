@@ -18,7 +18,7 @@ impl FrameNo {
         Self(self.0.wrapping_add(1))
     }
 
-    /// Whether this is one of the frames that ask, where each `every`-th does from the first on; where 0, none does.
+    /// True if this is one of the frames that ask, where each `every`-th does from the first on; where 0, none does.
     /// It hangs on nothing but the number, so that whoever missed the frame knows it too.
     #[must_use]
     pub const fn asks(self, every: u32) -> bool {
@@ -44,7 +44,7 @@ impl FrameNo {
     }
 }
 
-/// How many numbers in `range` are multiples of `of`; none where that is 0.
+/// How many numbers in `range` are multiples of `of`; `None` if that is 0.
 fn multiples(of: u32, range: Range<u64>) -> u64 {
     if of == 0 { 0 } else { range.end.div_ceil(of.into()) - range.start.div_ceil(of.into()) }
 }

@@ -1,9 +1,9 @@
-//! The 12 octets that open every message but the status report (SMC manual 2.2.1 and 2.2.2.1), and the codes in them.
+//! The 12 bytes that open every message but the status report (SMC manual 2.2.1 and 2.2.2.1), and the codes in them.
 
 use std::fmt;
 
 use super::WireError;
-use super::octets::{put_u16, u16_at};
+use super::bytes::{put_u16, u16_at};
 
 mod field {
     pub(super) const CONFIRM: usize = 0; // u16
@@ -14,7 +14,7 @@ mod field {
     pub(super) const REPLY: usize = 10; // u16
 }
 
-/// Octets of the header.
+/// Bytes of the header.
 pub(super) const LEN: usize = 12;
 /// Where the object channel, servo or error number stands.
 pub(super) const SLOT: usize = field::SLOT;
@@ -24,8 +24,8 @@ pub(super) const CONFIRM_CONTROLLER: u16 = 0x55aa;
 /// Opens messages about servo drives, and the status report.
 pub(super) const CONFIRM_SERVO: u16 = 0x33cc;
 
-/// Who a message is for, or who shall answer: a column (the third octet of a station's address) and a row (the last
-/// octet), each `ff` for all of them (SMC manual 2.2.1).
+/// Who a message is for, or who shall answer: a column (the third byte of a station's address) and a row (the last
+/// byte), each `ff` for all of them (SMC manual 2.2.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Code(pub u16);
 
@@ -35,13 +35,13 @@ impl Code {
     /// Nobody.
     pub const NONE: Self = Self(0);
 
-    /// The code of the station at an IPv4 address: its last two octets (PA12, PA13).
+    /// The code of the station at an IPv4 address: its last two bytes (PA12, PA13).
     #[must_use]
     pub const fn station(ip: [u8; 4]) -> Self {
         Self(u16::from_be_bytes([ip[2], ip[3]]))
     }
 
-    /// Whether this code means `station`.
+    /// True if this code means `station`.
     #[must_use]
     pub const fn matches(self, station: Self) -> bool {
         let ([column, row], [own_column, own_row]) = (self.0.to_be_bytes(), station.0.to_be_bytes());
@@ -55,7 +55,7 @@ impl fmt::Display for Code {
     }
 }
 
-/// What a reply says, by the low octet of its function code (SMC manual 2.2.1).
+/// What a reply says, by the low byte of its function code (SMC manual 2.2.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[repr(u8)]
 pub enum ReplyCode {
@@ -71,10 +71,10 @@ pub enum ReplyCode {
 }
 
 impl ReplyCode {
-    /// The reply code of a function's low octet; none for requests and unknown values.
+    /// The reply code of a function's low byte; none for requests and unknown values.
     #[must_use]
-    pub const fn from_octet(octet: u8) -> Option<Self> {
-        match octet {
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        match byte {
             2 => Some(Self::Running),
             3 => Some(Self::Fault),
             4 => Some(Self::EmergencyStop),
@@ -83,7 +83,7 @@ impl ReplyCode {
         }
     }
 
-    /// Whether the frame was refused (x = 3, 4, 5).
+    /// True if the frame was refused (x = 3, 4, 5).
     #[must_use]
     pub const fn refused(self) -> bool {
         !matches!(self, Self::Running)
@@ -101,11 +101,11 @@ pub enum Dialect {
     Mbox,
 }
 
-/// The first 12 octets of a message, pass code and confirm code checked; tells whom even a message is for that is
+/// The first 12 bytes of a message, pass code and confirm code checked; tells whom even a message is for that is
 /// broken after them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// High octet: the function; low octet: 1 for a request or report, else the reply code.
+    /// High byte: the function; low byte: 1 for a request or report, else the reply code.
     pub function: u16,
     /// Object channel, servo number, or the error number of an SMC reply with x over 2.
     pub slot: u16,
@@ -116,42 +116,42 @@ pub struct Header {
 }
 
 impl Header {
-    /// Reads the header at the front of `octets`; functions that do not exist pass.
+    /// Reads the header at the front of `bytes`; functions that do not exist pass.
     ///
     /// # Errors
     /// [`WireError::Short`], [`WireError::Confirm`] or [`WireError::Pass`].
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        if octets.len() < LEN {
-            return Err(WireError::Short { len: octets.len(), need: LEN });
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        if bytes.len() < LEN {
+            return Err(WireError::Short { len: bytes.len(), need: LEN });
         }
-        let function = function_at(octets)?;
+        let function = function_at(bytes)?;
         Ok(Self {
             function,
-            slot: u16_at(octets, field::SLOT),
-            accept: Code(u16_at(octets, field::ACCEPT)),
-            reply: Code(u16_at(octets, field::REPLY)),
+            slot: u16_at(bytes, field::SLOT),
+            accept: Code(u16_at(bytes, field::ACCEPT)),
+            reply: Code(u16_at(bytes, field::REPLY)),
         })
     }
 
-    /// Writes the header to the front of `octets`.
-    pub(super) fn emit(self, octets: &mut [u8]) {
-        open(octets, self.function);
-        put_u16(octets, field::SLOT, self.slot);
-        put_u16(octets, field::ACCEPT, self.accept.0);
-        put_u16(octets, field::REPLY, self.reply.0);
+    /// Writes the header to the front of `bytes`.
+    pub(super) fn emit(self, bytes: &mut [u8]) {
+        open(bytes, self.function);
+        put_u16(bytes, field::SLOT, self.slot);
+        put_u16(bytes, field::ACCEPT, self.accept.0);
+        put_u16(bytes, field::REPLY, self.reply.0);
     }
 
-    /// The function without its low octet.
+    /// The function without its low byte.
     pub(super) const fn family(self) -> u8 {
         self.function.to_be_bytes()[0]
     }
 
     /// The reply code, where the message is a reply.
     pub(super) const fn reply_code(self) -> Option<ReplyCode> {
-        ReplyCode::from_octet(self.function.to_be_bytes()[1])
+        ReplyCode::from_byte(self.function.to_be_bytes()[1])
     }
 
-    /// Whether the message is a request, or a report.
+    /// True if the message is a request, or a report.
     pub(super) const fn is_request(self) -> bool {
         self.function.to_be_bytes()[1] == 1
     }
@@ -162,24 +162,24 @@ impl Header {
     }
 }
 
-/// Writes the six octets that open every message.
-pub(super) fn open(octets: &mut [u8], function: u16) {
-    put_u16(octets, field::CONFIRM, confirm_of(function));
-    put_u16(octets, field::PASS, 0);
-    put_u16(octets, field::FUNCTION, function);
+/// Writes the six bytes that open every message.
+pub(super) fn open(bytes: &mut [u8], function: u16) {
+    put_u16(bytes, field::CONFIRM, confirm_of(function));
+    put_u16(bytes, field::PASS, 0);
+    put_u16(bytes, field::FUNCTION, function);
 }
 
-/// The function code, with the six octets that open every message checked; `octets` holds at least those.
-pub(super) fn function_at(octets: &[u8]) -> Result<u16, WireError> {
-    let confirm = u16_at(octets, field::CONFIRM);
+/// The function code, with the six bytes that open every message checked; `bytes` holds at least those.
+pub(super) fn function_at(bytes: &[u8]) -> Result<u16, WireError> {
+    let confirm = u16_at(bytes, field::CONFIRM);
     if confirm != CONFIRM_CONTROLLER && confirm != CONFIRM_SERVO {
         return Err(WireError::Confirm { found: confirm, expected: CONFIRM_CONTROLLER });
     }
-    let pass = u16_at(octets, field::PASS);
+    let pass = u16_at(bytes, field::PASS);
     if pass != 0 {
         return Err(WireError::Pass { found: pass });
     }
-    let function = u16_at(octets, field::FUNCTION);
+    let function = u16_at(bytes, field::FUNCTION);
     let expected = confirm_of(function);
     if confirm != expected {
         return Err(WireError::Confirm { found: confirm, expected });

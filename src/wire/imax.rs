@@ -1,9 +1,9 @@
-//! Messages as the IMAX manual prints them: motion without a frame number and with four octets of outputs (2.2.2.6,
+//! Messages as the IMAX manual prints them: motion without a frame number and with four bytes of outputs (2.2.2.6,
 //! 2.2.2.7), registers of 32 bits (2.3). No program is known to send them, so they are only read, to put a capture in
 //! words.
 
+use super::bytes::{i32_at, u32_at};
 use super::header::{self, Header};
-use super::octets::{i32_at, u32_at};
 use super::{Access, Code, PerAxis, ReplyCode, Timing, WireError, register, words};
 use crate::motion::{MAX_AXES, Pulses};
 
@@ -42,8 +42,8 @@ impl ImaxMotion {
     /// # Errors
     /// [`WireError::Axes`], [`WireError::Length`] or [`WireError::Surplus`] unless channel and length agree exactly,
     /// and those of a broken header or another function.
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         let timing = match header.family() {
             0x13 => Timing::Absolute,
             0x14 => Timing::Relative,
@@ -53,8 +53,8 @@ impl ImaxMotion {
         if code.is_none() && !header.is_request() {
             return Err(header.foreign());
         }
-        let axes = axes(header.slot, octets.len())?;
-        let (len, need) = (octets.len(), Self::len(axes));
+        let axes = axes(header.slot, bytes.len())?;
+        let (len, need) = (bytes.len(), Self::len(axes));
         if len < need {
             return Err(WireError::Length { len, need });
         }
@@ -68,25 +68,25 @@ impl ImaxMotion {
             channel: header.slot,
             accept: header.accept,
             reply: header.reply,
-            time_ms: u32_at(octets, field::TIME),
-            positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(octets, field::POSITIONS + 4 * axis))),
-            port: u32_at(octets, port),
-            dac: u32_at(octets, port + 4),
+            time_ms: u32_at(bytes, field::TIME),
+            positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(bytes, field::POSITIONS + 4 * axis))),
+            port: u32_at(bytes, port),
+            dac: u32_at(bytes, port + 4),
         })
     }
 
-    /// Octets for `axes` axes: 36 for three, 48 for six.
+    /// Bytes for `axes` axes: 36 for three, 48 for six.
     #[must_use]
     pub const fn len(axes: usize) -> usize {
         field::POSITIONS + 4 * axes + field::TAIL_LEN
     }
 }
 
-fn axes(channel: u16, octets: usize) -> Result<usize, WireError> {
+fn axes(channel: u16, bytes: usize) -> Result<usize, WireError> {
     match channel {
         0 => Ok(3),
         1 => Ok(6),
-        2 => Ok((octets.saturating_sub(ImaxMotion::len(0)) / 4).clamp(1, MAX_AXES)),
+        2 => Ok((bytes.saturating_sub(ImaxMotion::len(0)) / 4).clamp(1, MAX_AXES)),
         found => Err(WireError::Axes { at: header::SLOT, found }),
     }
 }
@@ -111,29 +111,29 @@ impl<'a> ImaxRegisters<'a> {
     /// Reads 0x110x and 0x120x.
     ///
     /// # Errors
-    /// [`WireError::Length`] or [`WireError::Surplus`] unless x = 2 has four octets for each register, and those of a
+    /// [`WireError::Length`] or [`WireError::Surplus`] unless x = 2 has four bytes for each register, and those of a
     /// broken header or another function.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         let access = match header.family() {
             register::READ => Access::Read,
             register::WRITE => Access::Write,
             _ => return Err(header.foreign()),
         };
         let code = header.reply_code().ok_or(header.foreign())?;
-        let (start, num) = words::ask(octets)?;
-        let (len, need) = (octets.len(), words::HEAD_LEN + 4 * usize::from(num));
+        let (start, num) = words::ask(bytes)?;
+        let (len, need) = (bytes.len(), words::HEAD_LEN + 4 * usize::from(num));
         if code == ReplyCode::Running && len < need {
             return Err(WireError::Length { len, need });
         }
         if code == ReplyCode::Running && len > need {
             return Err(WireError::Surplus { len, need });
         }
-        let data = &octets[words::HEAD_LEN..];
+        let data = &bytes[words::HEAD_LEN..];
         Ok(Self { access, code, channel: header.slot, start, num, data })
     }
 
-    /// Whether it tells registers, each of 32 bits: no reply with words of 16 has that length.
+    /// True if it tells registers, each of 32 bits: no reply with words of 16 has that length.
     #[must_use]
     pub fn is_wide(&self) -> bool {
         self.code == ReplyCode::Running && self.num > 0

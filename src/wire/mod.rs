@@ -1,15 +1,15 @@
-//! The protocol of the IMAX, SMC and MBOX controllers: octets to messages and back, as host and as controller. Any
-//! thread; neither way allocates, writing cannot fail, and reading takes any octets without a panic.
+//! The protocol of the IMAX, SMC and MBOX controllers: bytes to messages and back, as host and as controller. Any
+//! thread; neither way allocates, writing cannot fail, and reading takes any bytes without a panic.
 //!
 //! Numbers are big-endian throughout; one message is one datagram. Sources are the SMC manual (2.2 and 2.3) and the
 //! IMAX manual (2.2 and 2.3); where they are silent or disagree, what public programs send.
 
+mod bytes;
 mod error;
 mod frame_no;
 mod header;
 mod imax;
 mod motion;
-mod octets;
 mod per_axis;
 mod position;
 mod register;
@@ -37,7 +37,7 @@ pub use vibration::{Vibration, VibrationPort};
 pub use word_order::{WordOrder, word_order};
 pub use words::{MAX_WORDS, Words};
 
-/// Octets that hold any message we write; the longest carries a whole table of registers.
+/// Bytes that hold any message we write; the longest carries a whole table of registers.
 pub const MAX_LEN: usize = words::HEAD_LEN + 2 * MAX_WORDS;
 
 /// Any message of the protocol, read from a datagram.
@@ -69,36 +69,36 @@ impl<'a> Message<'a> {
     /// Reads any message of the SMC and MBOX layout.
     ///
     /// # Errors
-    /// At which octet, and why, these octets are none.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        Self::parse_as(VibrationPort::Two, octets)
+    /// At which byte, and why, these bytes are none.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        Self::parse_as(VibrationPort::Two, bytes)
     }
 
     /// The same where Port Out is so in vibration frames.
     ///
     /// # Errors
     /// As [`Message::parse`].
-    pub fn parse_as(port: VibrationPort, octets: &'a [u8]) -> Result<Self, WireError> {
-        if octets.len() < header::SLOT {
-            return Err(WireError::Short { len: octets.len(), need: header::LEN });
+    pub fn parse_as(port: VibrationPort, bytes: &'a [u8]) -> Result<Self, WireError> {
+        if bytes.len() < header::SLOT {
+            return Err(WireError::Short { len: bytes.len(), need: header::LEN });
         }
-        let found = header::function_at(octets)?;
+        let found = header::function_at(bytes)?;
         let [family, low] = found.to_be_bytes();
         match (family, low) {
             (family, 1) if motion::is_motion(family) => {
-                MotionRequest::parse_as(port, octets).map(Self::Motion)
+                MotionRequest::parse_as(port, bytes).map(Self::Motion)
             }
             (family, _) if motion::is_motion(family) => {
-                MotionReply::parse_as(port, octets).map(Self::MotionReply)
+                MotionReply::parse_as(port, bytes).map(Self::MotionReply)
             }
-            (register::READ, 1) => ReadRequest::parse(octets).map(Self::Read),
-            (register::WRITE, 1) => WriteRequest::parse(octets).map(Self::Write),
-            (register::READ | register::WRITE, _) => RegisterReply::parse(octets).map(Self::RegisterReply),
-            (servo::READ, 1) => ServoRead::parse(octets).map(Self::ServoRead),
-            (servo::WRITE, 1) => ServoWrite::parse(octets).map(Self::ServoWrite),
-            (servo::READ | servo::WRITE, _) => ServoReply::parse(octets).map(Self::ServoReply),
-            (status::FAMILY, _) => Status::parse(octets).map(Self::Status),
-            (report::FAMILY, _) => Report::parse(octets).map(Self::Report),
+            (register::READ, 1) => ReadRequest::parse(bytes).map(Self::Read),
+            (register::WRITE, 1) => WriteRequest::parse(bytes).map(Self::Write),
+            (register::READ | register::WRITE, _) => RegisterReply::parse(bytes).map(Self::RegisterReply),
+            (servo::READ, 1) => ServoRead::parse(bytes).map(Self::ServoRead),
+            (servo::WRITE, 1) => ServoWrite::parse(bytes).map(Self::ServoWrite),
+            (servo::READ | servo::WRITE, _) => ServoReply::parse(bytes).map(Self::ServoReply),
+            (status::FAMILY, _) => Status::parse(bytes).map(Self::Status),
+            (report::FAMILY, _) => Report::parse(bytes).map(Self::Report),
             _ => Err(WireError::Function { found }),
         }
     }

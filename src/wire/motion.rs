@@ -1,8 +1,8 @@
 //! Motion of all axes: 0x1301 absolute and 0x1401 relative time, 0x1801 and 0x1901 the same with vibration, and the
 //! replies of each (SMC manual 2.2.2.5 to 2.2.2.12).
 
+use super::bytes::{i32_at, put_i32, put_u16, put_u32, u16_at, u32_at};
 use super::header::{self, Header, reply_function, request_function};
-use super::octets::{i32_at, put_i32, put_u16, put_u32, u16_at, u32_at};
 use super::{Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, VibrationPort, WireError, vibration};
 use crate::motion::{MAX_AXES, Pulses};
 
@@ -40,7 +40,7 @@ pub const fn motion_channel_and_slots(axes: usize) -> (u16, usize) {
     }
 }
 
-/// A motion frame to send, host to controller: 38 octets for three axes, 50 for six, 66 for ten, 74 for twelve, with
+/// A motion frame to send, host to controller: 38 bytes for three axes, 50 for six, 66 for ten, 74 for twelve, with
 /// vibration 46 for three and 70 for six, or two more. Extend, which switches analogue outputs, is always 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Motion<'a> {
@@ -112,28 +112,28 @@ pub struct MotionRequest {
 }
 
 impl MotionRequest {
-    /// Reads a frame; octets after its layout are let pass, as controllers do.
+    /// Reads a frame; bytes after its layout are let pass, as controllers do.
     ///
     /// # Errors
     /// [`WireError::Axes`] for a channel that means no number of axes, [`WireError::Length`] where it is shorter
     /// than its axes need, and those of a broken header or another function.
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        Self::parse_as(VibrationPort::Two, octets)
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        Self::parse_as(VibrationPort::Two, bytes)
     }
 
     /// The same, of a host that has Port Out so in vibration frames.
     ///
     /// # Errors
     /// As [`MotionRequest::parse`].
-    pub fn parse_as(port: VibrationPort, octets: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse_as(port: VibrationPort, bytes: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         let (timing, vibrating) = layout(header.family()).ok_or(header.foreign())?;
         let vibrating = vibrating.then_some(port);
         if !header.is_request() {
             return Err(header.foreign());
         }
-        let axes = axes_of_request(header.slot, octets.len(), vibrating)?;
-        let body = read(octets, axes, vibrating)?;
+        let axes = axes_of_request(header.slot, bytes.len(), vibrating)?;
+        let body = read(bytes, axes, vibrating)?;
         Ok(Self {
             timing,
             channel: header.slot,
@@ -174,7 +174,7 @@ impl MotionRequest {
         request_function(family(self.timing, self.vibration.is_some()))
     }
 
-    /// Octets of its layout; what a datagram has beyond them is surplus.
+    /// Bytes of its layout; what a datagram has beyond them is surplus.
     #[must_use]
     pub fn layout_len(&self, port: VibrationPort) -> usize {
         motion_len(self.positions.len(), self.vibration.map(|_| port))
@@ -213,20 +213,20 @@ impl MotionReply {
     /// # Errors
     /// [`WireError::Function`] for requests and any other function, [`WireError::Axes`] or [`WireError::Length`]
     /// where not even one axis fits, and those of a broken header.
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        Self::parse_as(VibrationPort::Two, octets)
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        Self::parse_as(VibrationPort::Two, bytes)
     }
 
     /// The same, of a controller that has the inputs so in its answers to vibration frames.
     ///
     /// # Errors
     /// As [`MotionReply::parse`].
-    pub fn parse_as(port: VibrationPort, octets: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse_as(port: VibrationPort, bytes: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         let (timing, vibrating) = layout(header.family()).ok_or(header.foreign())?;
         let code = header.reply_code().ok_or(header.foreign())?;
         let vibrating = vibrating.then_some(port);
-        let body = read(octets, axes_that_fit(octets.len(), vibrating), vibrating)?;
+        let body = read(bytes, axes_that_fit(bytes.len(), vibrating), vibrating)?;
         let running = code == ReplyCode::Running;
         Ok(Self {
             timing,
@@ -245,10 +245,10 @@ impl MotionReply {
     /// The answer to a frame that is broken, but not before its Time ends: its number, and zeros for positions. None
     /// for anything else.
     #[must_use]
-    pub fn to_broken(octets: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
-        let header = Header::parse(octets).ok().filter(|header| header.is_request())?;
+    pub fn to_broken(bytes: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
+        let header = Header::parse(bytes).ok().filter(|header| header.is_request())?;
         let (timing, vibrating) = layout(header.family())?;
-        if octets.len() < field::POSITIONS {
+        if bytes.len() < field::POSITIONS {
             return None;
         }
         let axes = if header.slot == 0 { 3 } else { 6 };
@@ -257,8 +257,8 @@ impl MotionReply {
             code,
             channel: 0,
             error,
-            frame: FrameNo(u32_at(octets, field::FRAME)),
-            time_ms: u32_at(octets, field::TIME),
+            frame: FrameNo(u32_at(bytes, field::FRAME)),
+            time_ms: u32_at(bytes, field::TIME),
             positions: PerAxis::from_fn(axes, |_| Pulses(0)),
             inputs: 0,
             extend: 0,
@@ -286,14 +286,14 @@ impl MotionReply {
         body.emit(Header { function, slot, accept: Code::NONE, reply: Code::NONE }, port, buf)
     }
 
-    /// Octets of its layout; what a datagram has beyond them is surplus.
+    /// Bytes of its layout; what a datagram has beyond them is surplus.
     #[must_use]
     pub fn layout_len(&self, port: VibrationPort) -> usize {
         motion_len(self.positions.len(), self.vibration.map(|_| port))
     }
 }
 
-/// Octets of a motion frame, or of its reply, with so many positions, and with vibration where `vibrating` says how wide its
+/// Bytes of a motion frame, or of its reply, with so many positions, and with vibration where `vibrating` says how wide its
 /// port is.
 #[must_use]
 pub const fn motion_len(axes: usize, vibrating: Option<VibrationPort>) -> usize {
@@ -328,28 +328,24 @@ const fn layout(family: u8) -> Option<(Timing, bool)> {
     }
 }
 
-/// Whether a function belongs here.
+/// True if a function belongs here.
 pub(super) const fn is_motion(family: u8) -> bool {
     layout(family).is_some()
 }
 
-/// The most axes that fit into `octets` octets.
-const fn axes_that_fit(octets: usize, vibrating: Option<VibrationPort>) -> usize {
+/// The most axes that fit into `bytes` bytes.
+const fn axes_that_fit(bytes: usize, vibrating: Option<VibrationPort>) -> usize {
     let per_axis = if vibrating.is_some() { 4 + vibration::LEN } else { 4 };
-    let axes = octets.saturating_sub(motion_len(0, vibrating)) / per_axis;
+    let axes = bytes.saturating_sub(motion_len(0, vibrating)) / per_axis;
     if axes > MAX_AXES { MAX_AXES } else { axes }
 }
 
 /// Manuals and programs disagree on channel 2 and above: 2 is taken from the length, 3 to 12 at their word.
-fn axes_of_request(
-    channel: u16,
-    octets: usize,
-    vibrating: Option<VibrationPort>,
-) -> Result<usize, WireError> {
+fn axes_of_request(channel: u16, bytes: usize, vibrating: Option<VibrationPort>) -> Result<usize, WireError> {
     match channel {
         0 => Ok(3),
         1 => Ok(6),
-        2 => Ok(axes_that_fit(octets, vibrating)),
+        2 => Ok(axes_that_fit(bytes, vibrating)),
         3..=12 => Ok(usize::from(channel)),
         found => Err(WireError::Axes { at: header::SLOT, found }),
     }
@@ -401,19 +397,19 @@ struct ReadBody {
     vibration: Option<PerAxis<Vibration>>,
 }
 
-fn read(octets: &[u8], axes: usize, vibrating: Option<VibrationPort>) -> Result<ReadBody, WireError> {
+fn read(bytes: &[u8], axes: usize, vibrating: Option<VibrationPort>) -> Result<ReadBody, WireError> {
     let need = motion_len(axes.max(1), vibrating);
-    if octets.len() < need {
-        return Err(WireError::Length { len: octets.len(), need });
+    if bytes.len() < need {
+        return Err(WireError::Length { len: bytes.len(), need });
     }
     let tail = field::POSITIONS + 4 * axes + port_len(vibrating);
     Ok(ReadBody {
-        frame: FrameNo(u32_at(octets, field::FRAME)),
-        time_ms: u32_at(octets, field::TIME),
-        positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(octets, field::POSITIONS + 4 * axis))),
-        port: u16_at(octets, tail - 2),
-        extend: if vibrating.is_some() { 0 } else { u32_at(octets, tail) },
+        frame: FrameNo(u32_at(bytes, field::FRAME)),
+        time_ms: u32_at(bytes, field::TIME),
+        positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(bytes, field::POSITIONS + 4 * axis))),
+        port: u16_at(bytes, tail - 2),
+        extend: if vibrating.is_some() { 0 } else { u32_at(bytes, tail) },
         vibration: vibrating
-            .map(|_| PerAxis::from_fn(axes, |axis| Vibration::at(octets, tail + vibration::LEN * axis))),
+            .map(|_| PerAxis::from_fn(axes, |axis| Vibration::at(bytes, tail + vibration::LEN * axis))),
     })
 }

@@ -19,7 +19,7 @@ pub fn position_reads(axes: usize, accept: Code, reply: Code) -> impl Iterator<I
     let axes = axes.min(DP_POSITIONS.len());
     (0..axes).step_by(AXES_PER_BLOCK).map(move |first| {
         let num = if axes - first < AXES_PER_BLOCK { axes - first } else { AXES_PER_BLOCK };
-        let num = super::octets::count(2 * num);
+        let num = super::bytes::count(2 * num);
         ReadRequest { channel: 0, accept, reply, start: DP_POSITIONS[first], num }
     })
 }

@@ -65,16 +65,16 @@ impl ReadRequest {
         words::emit_ask(buf, self.start, self.num)
     }
 
-    /// Reads a request; octets after it are let pass ("extra data").
+    /// Reads a request; bytes after it are let pass ("extra data").
     ///
     /// # Errors
     /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         if header.family() != READ || !header.is_request() {
             return Err(header.foreign());
         }
-        let (start, num) = words::ask(octets)?;
+        let (start, num) = words::ask(bytes)?;
         Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, num })
     }
 }
@@ -102,17 +102,17 @@ impl<'a> WriteRequest<'a> {
         words::emit_all(buf, self.start, self.data)
     }
 
-    /// Reads a request; octets after it are let pass.
+    /// Reads a request; bytes after it are let pass.
     ///
     /// # Errors
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         if header.family() != WRITE || !header.is_request() {
             return Err(header.foreign());
         }
-        let (start, data) = words::all(octets)?;
+        let (start, data) = words::all(bytes)?;
         Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, data })
     }
 }
@@ -148,14 +148,14 @@ pub struct RegisterReply<'a> {
 impl<'a> RegisterReply<'a> {
     /// The answer to a request that is broken, but not before its count ends. None for anything else.
     #[must_use]
-    pub fn to_broken(octets: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
-        let header = Header::parse(octets).ok().filter(|header| header.is_request())?;
+    pub fn to_broken(bytes: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
+        let header = Header::parse(bytes).ok().filter(|header| header.is_request())?;
         let access = match header.family() {
             READ => Access::Read,
             WRITE => Access::Write,
             _ => return None,
         };
-        let (start, num) = words::ask(octets).ok()?;
+        let (start, num) = words::ask(bytes).ok()?;
         Some(Self { access, code, channel: 0, error, start, num, data: Words::EMPTY })
     }
 
@@ -187,8 +187,8 @@ impl<'a> RegisterReply<'a> {
     /// # Errors
     /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Surplus`] where it goes on,
     /// [`WireError::Count`] for more than 256 words, and those of a broken header or another function.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         let access = match header.family() {
             READ => Access::Read,
             WRITE => Access::Write,
@@ -196,11 +196,11 @@ impl<'a> RegisterReply<'a> {
         };
         let code = header.reply_code().ok_or(header.foreign())?;
         let running = code == ReplyCode::Running;
-        let (start, num, data) = if running { words::answer(octets)? } else { words::refusal(octets)? };
+        let (start, num, data) = if running { words::answer(bytes)? } else { words::refusal(bytes)? };
         // A refusal may bring an error number in place of its words.
         let need = words::HEAD_LEN + 2 * usize::from(if running { num } else { num.max(1) });
-        if octets.len() > need {
-            return Err(WireError::Surplus { len: octets.len(), need });
+        if bytes.len() > need {
+            return Err(WireError::Surplus { len: bytes.len(), need });
         }
         Ok(Self {
             access,

@@ -4,7 +4,7 @@ use super::header::{Header, request_function};
 use super::words::{self, Words};
 use super::{Code, MAX_LEN, WireError};
 
-/// High octet of the function.
+/// High byte of the function.
 pub(super) const FAMILY: u8 = 0x10;
 
 /// The monitor register DPFE: which alarm the drives of an IMAX or MBOX controller have, 0 for none. On SMC it is the minor
@@ -34,17 +34,17 @@ impl<'a> Report<'a> {
         words::emit_all(buf, self.start, self.data)
     }
 
-    /// Reads a report; octets after it are let pass.
+    /// Reads a report; bytes after it are let pass.
     ///
     /// # Errors
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         if header.family() != FAMILY || !header.is_request() {
             return Err(header.foreign());
         }
-        let (start, data) = words::all(octets)?;
+        let (start, data) = words::all(bytes)?;
         Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, data })
     }
 }

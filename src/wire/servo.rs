@@ -34,16 +34,16 @@ impl ServoRead {
         words::emit_ask(buf, self.start, self.num)
     }
 
-    /// Reads a request; octets after it are let pass.
+    /// Reads a request; bytes after it are let pass.
     ///
     /// # Errors
     /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         if header.family() != READ || !header.is_request() {
             return Err(header.foreign());
         }
-        let (start, num) = words::ask(octets)?;
+        let (start, num) = words::ask(bytes)?;
         Ok(Self { servo: header.slot, accept: header.accept, reply: header.reply, start, num })
     }
 }
@@ -71,17 +71,17 @@ impl<'a> ServoWrite<'a> {
         words::emit_all(buf, self.start, self.data)
     }
 
-    /// Reads a request; octets after it are let pass.
+    /// Reads a request; bytes after it are let pass.
     ///
     /// # Errors
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         if header.family() != WRITE || !header.is_request() {
             return Err(header.foreign());
         }
-        let (start, data) = words::all(octets)?;
+        let (start, data) = words::all(bytes)?;
         Ok(Self { servo: header.slot, accept: header.accept, reply: header.reply, start, data })
     }
 }
@@ -118,13 +118,13 @@ impl<'a> ServoReply<'a> {
         words::emit_some(buf, self.start, self.num, self.data)
     }
 
-    /// Reads a reply, x = 2 to 5; octets after it are let pass.
+    /// Reads a reply, x = 2 to 5; bytes after it are let pass.
     ///
     /// # Errors
     /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Count`] for more than 256,
     /// and those of a broken header or another function.
-    pub fn parse(octets: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(octets)?;
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+        let header = Header::parse(bytes)?;
         let access = match header.family() {
             READ => Access::Read,
             WRITE => Access::Write,
@@ -132,7 +132,7 @@ impl<'a> ServoReply<'a> {
         };
         let code = header.reply_code().ok_or(header.foreign())?;
         let running = code == ReplyCode::Running;
-        let (start, num, data) = if running { words::answer(octets)? } else { words::refusal(octets)? };
+        let (start, num, data) = if running { words::answer(bytes)? } else { words::refusal(bytes)? };
         Ok(Self {
             access,
             code,

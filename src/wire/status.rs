@@ -1,7 +1,7 @@
 //! The status report of an SMC controller, 0x3101, sent unasked (SMC manual 2.2.2.15).
 
+use super::bytes::{count, i32_at, put_i32, put_u16, u16_at};
 use super::header;
-use super::octets::{count, i32_at, put_i32, put_u16, u16_at};
 use super::{Code, MAX_LEN, PerAxis, WireError};
 use crate::motion::{MAX_AXES, Pulses};
 
@@ -9,11 +9,11 @@ mod field {
     pub(super) const ID: usize = 6; // u16, PA12 and PA13
     pub(super) const AXES: usize = 8; // u16
     pub(super) const POSITIONS: usize = 10; // n x i32
-    pub(super) const TAIL_LEN: usize = 6; // after 8 octets for each axis: error, outputs, inputs, u16 each
+    pub(super) const TAIL_LEN: usize = 6; // after 8 bytes for each axis: error, outputs, inputs, u16 each
 }
 
 const FUNCTION: u16 = 0x3101;
-/// High octet of the function.
+/// High byte of the function.
 pub(super) const FAMILY: u8 = 0x31;
 
 /// Controller to host: positions, forces and errors of all axes.
@@ -36,7 +36,7 @@ pub struct Status {
 }
 
 impl Status {
-    /// Octets for `axes` axes: 40 for three, 64 for six, 112 for twelve.
+    /// Bytes for `axes` axes: 40 for three, 64 for six, 112 for twelve.
     #[must_use]
     pub const fn len(axes: usize) -> usize {
         field::POSITIONS + 8 * axes + field::TAIL_LEN
@@ -66,20 +66,20 @@ impl Status {
     /// # Errors
     /// [`WireError::Axes`] unless it counts 1 to 12 axes, [`WireError::Length`] or [`WireError::Surplus`] unless its
     /// length fits them exactly (the manual's table can be read in two ways), and those of a broken opening.
-    pub fn parse(octets: &[u8]) -> Result<Self, WireError> {
-        if octets.len() < field::POSITIONS {
-            return Err(WireError::Short { len: octets.len(), need: field::POSITIONS });
+    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+        if bytes.len() < field::POSITIONS {
+            return Err(WireError::Short { len: bytes.len(), need: field::POSITIONS });
         }
-        let found = header::function_at(octets)?;
+        let found = header::function_at(bytes)?;
         if found != FUNCTION {
             return Err(WireError::Function { found });
         }
-        let counted = u16_at(octets, field::AXES);
+        let counted = u16_at(bytes, field::AXES);
         let axes = usize::from(counted);
         if axes == 0 || axes > MAX_AXES {
             return Err(WireError::Axes { at: field::AXES, found: counted });
         }
-        let (len, need) = (octets.len(), Self::len(axes));
+        let (len, need) = (bytes.len(), Self::len(axes));
         if len < need {
             return Err(WireError::Length { len, need });
         }
@@ -88,13 +88,13 @@ impl Status {
         }
         let (forces, errors, tail) = places(axes);
         Ok(Self {
-            station: Code(u16_at(octets, field::ID)),
-            positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(octets, field::POSITIONS + 4 * axis))),
-            forces: PerAxis::from_fn(axes, |axis| u16_at(octets, forces + 2 * axis).cast_signed()),
-            servo_errors: PerAxis::from_fn(axes, |axis| u16_at(octets, errors + 2 * axis)),
-            error: u16_at(octets, tail),
-            outputs: u16_at(octets, tail + 2),
-            inputs: u16_at(octets, tail + 4),
+            station: Code(u16_at(bytes, field::ID)),
+            positions: PerAxis::from_fn(axes, |axis| Pulses(i32_at(bytes, field::POSITIONS + 4 * axis))),
+            forces: PerAxis::from_fn(axes, |axis| u16_at(bytes, forces + 2 * axis).cast_signed()),
+            servo_errors: PerAxis::from_fn(axes, |axis| u16_at(bytes, errors + 2 * axis)),
+            error: u16_at(bytes, tail),
+            outputs: u16_at(bytes, tail + 2),
+            inputs: u16_at(bytes, tail + 4),
         })
     }
 }

@@ -1,13 +1,13 @@
 //! Vibration of an axis, the "shark data" of 0x1801 and 0x1901 (SMC manual 2.2.2.9 to 2.2.2.12).
 
-use super::octets::{put_u16, u16_at};
+use super::bytes::{put_u16, u16_at};
 
-/// Octets of one axis.
+/// Bytes of one axis.
 pub(super) const LEN: usize = 4;
 /// Steps of a period in one second: 0.125 ms each.
 const STEPS_PER_SECOND: f64 = 8_000.0;
 
-/// How many octets Port Out takes in a frame with vibration, and the inputs in the answer to it. The SMC manual prints 4
+/// How many bytes Port Out takes in a frame with vibration, and the inputs in the answer to it. The SMC manual prints 4
 /// (2.2.2.9), but so it does for other messages, in which everybody sends and answers 2. Nobody is known to have seen one with
 /// vibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -15,15 +15,15 @@ pub enum VibrationPort {
     /// As in frames without vibration.
     #[default]
     Two,
-    /// As printed: bit 0 = Y01 in the last octet, the first two mean nothing.
+    /// As printed: bit 0 = Y01 in the last byte, the first two mean nothing.
     Four,
 }
 
 impl VibrationPort {
-    /// The one of so many octets; none where that is neither 2 nor 4.
+    /// The one of so many bytes; `None` if that is neither 2 nor 4.
     #[must_use]
-    pub const fn of_octets(octets: u8) -> Option<Self> {
-        match octets {
+    pub const fn of_bytes(bytes: u8) -> Option<Self> {
+        match bytes {
             2 => Some(Self::Two),
             4 => Some(Self::Four),
             _ => None,
@@ -38,7 +38,7 @@ impl VibrationPort {
     }
 }
 
-/// What shakes an axis about its position; none where either number is 0.
+/// What shakes an axis about its position; `None` if either number is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Vibration {
     /// Length of one swing to and fro, in steps of 0.125 ms.
@@ -70,21 +70,21 @@ impl Vibration {
         Self { period, amplitude }
     }
 
-    /// Swings per second; none where the axis does not vibrate.
+    /// Swings per second; `None` if the axis does not vibrate.
     #[must_use]
     pub fn hz(self) -> Option<f64> {
         (self.period != 0 && self.amplitude != 0).then(|| STEPS_PER_SECOND / f64::from(self.period))
     }
 
-    /// Writes the four octets of one axis.
-    pub(super) fn put(self, octets: &mut [u8], at: usize) {
-        put_u16(octets, at, self.period);
-        put_u16(octets, at + 2, self.amplitude);
+    /// Writes the four bytes of one axis.
+    pub(super) fn put(self, bytes: &mut [u8], at: usize) {
+        put_u16(bytes, at, self.period);
+        put_u16(bytes, at + 2, self.amplitude);
     }
 
-    /// Reads the four octets of one axis.
-    pub(super) fn at(octets: &[u8], at: usize) -> Self {
-        Self { period: u16_at(octets, at), amplitude: u16_at(octets, at + 2) }
+    /// Reads the four bytes of one axis.
+    pub(super) fn at(bytes: &[u8], at: usize) -> Self {
+        Self { period: u16_at(bytes, at), amplitude: u16_at(bytes, at + 2) }
     }
 }
 

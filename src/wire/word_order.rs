@@ -1,5 +1,5 @@
 //! Which of the two words of a position is the high one: asked of what they tell, since the manuals disagree and a wrong
-//! order makes another place of the same octets.
+//! order makes another place of the same bytes.
 
 use super::{Dialect, position};
 use crate::motion::{Pulses, in_stroke};

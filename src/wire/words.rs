@@ -1,7 +1,7 @@
 //! The 16-bit words of registers, and the part after the header that all register messages share: first register,
 //! count, words.
 
-use super::octets::{count, put_u16, u16_at};
+use super::bytes::{count, put_u16, u16_at};
 use super::{MAX_LEN, WireError};
 
 mod field {
@@ -10,7 +10,7 @@ mod field {
     pub(super) const DATA: usize = 16; // num x u16
 }
 
-/// Octets up to the words.
+/// Bytes up to the words.
 pub(super) const HEAD_LEN: usize = field::DATA;
 /// The most words of one message: a whole table of registers.
 pub const MAX_WORDS: usize = 256;
@@ -21,7 +21,7 @@ pub struct Words<'a>(Source<'a>);
 
 #[derive(Clone, Copy)]
 enum Source<'a> {
-    Octets(&'a [u8]),
+    Bytes(&'a [u8]),
     Native(&'a [u16]),
 }
 
@@ -33,12 +33,12 @@ impl<'a> Words<'a> {
     #[must_use]
     pub const fn len(self) -> usize {
         match self.0 {
-            Source::Octets(octets) => octets.len() / 2,
+            Source::Bytes(bytes) => bytes.len() / 2,
             Source::Native(words) => words.len(),
         }
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.len() == 0
@@ -48,7 +48,7 @@ impl<'a> Words<'a> {
     #[must_use]
     pub fn get(self, index: usize) -> Option<u16> {
         match self.0 {
-            Source::Octets(octets) => (index < octets.len() / 2).then(|| u16_at(octets, 2 * index)),
+            Source::Bytes(bytes) => (index < bytes.len() / 2).then(|| u16_at(bytes, 2 * index)),
             Source::Native(words) => words.get(index).copied(),
         }
     }
@@ -101,35 +101,35 @@ pub(super) fn emit_some<'b>(buf: &'b mut [u8; MAX_LEN], start: u16, num: u16, da
 }
 
 /// First register and count.
-pub(super) fn ask(octets: &[u8]) -> Result<(u16, u16), WireError> {
-    if octets.len() < HEAD_LEN {
-        return Err(WireError::Length { len: octets.len(), need: HEAD_LEN });
+pub(super) fn ask(bytes: &[u8]) -> Result<(u16, u16), WireError> {
+    if bytes.len() < HEAD_LEN {
+        return Err(WireError::Length { len: bytes.len(), need: HEAD_LEN });
     }
-    Ok((u16_at(octets, field::START), u16_at(octets, field::NUM)))
+    Ok((u16_at(bytes, field::START), u16_at(bytes, field::NUM)))
 }
 
 /// First register and as many words as the count says.
-pub(super) fn all(octets: &[u8]) -> Result<(u16, Words<'_>), WireError> {
-    let (start, _, data) = answer(octets)?;
+pub(super) fn all(bytes: &[u8]) -> Result<(u16, Words<'_>), WireError> {
+    let (start, _, data) = answer(bytes)?;
     Ok((start, data))
 }
 
 /// First register, count and as many words as that says.
-pub(super) fn answer(octets: &[u8]) -> Result<(u16, u16, Words<'_>), WireError> {
-    let (start, num) = ask(octets)?;
+pub(super) fn answer(bytes: &[u8]) -> Result<(u16, u16, Words<'_>), WireError> {
+    let (start, num) = ask(bytes)?;
     let words = usize::from(num);
     if words > MAX_WORDS {
         return Err(WireError::Count { at: field::NUM, found: num, max: count(MAX_WORDS) });
     }
     let need = field::DATA + 2 * words;
-    let data = octets.get(field::DATA..need).ok_or(WireError::Length { len: octets.len(), need })?;
-    Ok((start, num, Words(Source::Octets(data))))
+    let data = bytes.get(field::DATA..need).ok_or(WireError::Length { len: bytes.len(), need })?;
+    Ok((start, num, Words(Source::Bytes(data))))
 }
 
 /// First register, count and the words there are, which may be fewer than the count.
-pub(super) fn refusal(octets: &[u8]) -> Result<(u16, u16, Words<'_>), WireError> {
-    let (start, num) = ask(octets)?;
-    let there = (octets.len() - field::DATA) / 2;
+pub(super) fn refusal(bytes: &[u8]) -> Result<(u16, u16, Words<'_>), WireError> {
+    let (start, num) = ask(bytes)?;
+    let there = (bytes.len() - field::DATA) / 2;
     let words = there.min(usize::from(num)).min(MAX_WORDS);
-    Ok((start, num, Words(Source::Octets(&octets[field::DATA..field::DATA + 2 * words]))))
+    Ok((start, num, Words(Source::Bytes(&bytes[field::DATA..field::DATA + 2 * words]))))
 }

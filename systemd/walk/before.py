@@ -139,7 +139,7 @@ def library(terminal, table):
 def preflight(terminal, table, booth):
     """A dead controller is found while the hall is dark, and named; then all is well."""
     named(table, booth, "while all seats rest")
-    booth.until("B4 back", lambda status: standing(status, "B4") == "ok", 10)
+    booth.until("B4 back", lambda status: health(status, "B4") == "ok", 10)
     plug("8@mute=1")
     begin = time.monotonic()
     said = terminal.run("kinocue preflight", user="anna", fails=True)
@@ -148,7 +148,7 @@ def preflight(terminal, table, booth):
     found = all(word in line for word in ("row B", "127.0.0.1:7415"))
     table.saw(3, "preflight with B4 unplugged", f"failed after {took:.1f} s: {' '.join(line.split())}", found and took < 10)
     plug("8@mute=0")
-    booth.until("B4 back", lambda status: standing(status, "B4") == "ok", 10)
+    booth.until("B4 back", lambda status: health(status, "B4") == "ok", 10)
     said = terminal.readme("kinocue preflight", user="anna")
     table.saw(3, "preflight with it plugged in", said.strip().splitlines()[-1], "passed" in said)
 
@@ -158,12 +158,12 @@ def named(table, tablet, when):
     pulled = plug("8@mute=1")
 
     def is_named(status):
-        return standing(status, "B4") == "lost" and any(one["controller"] == "B4" for one in status["warnings"])
+        return health(status, "B4") == "lost" and any(one["controller"] == "B4" for one in status["warnings"])
 
     status, _ = tablet.until("B4 lost", is_named, 5)
     took = time.time() - pulled
     warning = next(one for one in status["warnings"] if one["controller"] == "B4")
-    others = [one["name"] for one in status["controllers"] if one["name"] != "B4" and one["standing"] != "ok"]
+    others = [one["name"] for one in status["controllers"] if one["name"] != "B4" and one["health"] != "ok"]
     said = f"named after {1000 * took:.0f} ms ({warning['text']}); {status['state']}, others that suffer: {others or 'none'}"
     table.saw(3, f"pulled B4's plug {when}", said, took < 1.0 and not others)
     plug("8@mute=0")
@@ -196,8 +196,8 @@ def guests(table, booth, tablet):
     table.saw(21, f"opened http://{ADDRESS}/", f"one page and {len(scripts)} files of this machine alone", alive and not far)
 
 
-def standing(status, name):
-    return next(one["standing"] for one in status["controllers"] if one["name"] == name)
+def health(status, name):
+    return next(one["health"] for one in status["controllers"] if one["name"] == name)
 
 
 def main_pid():

@@ -82,7 +82,7 @@ class Browser:
         raise TimeoutError("chromedriver does not answer")
 
     def _ask(self, method, path, body):
-        octets = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(f"http://127.0.0.1:9515{path}", octets, {"Content-Type": "application/json"}, method=method)
+        bytes = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(f"http://127.0.0.1:9515{path}", bytes, {"Content-Type": "application/json"}, method=method)
         with urllib.request.urlopen(request, timeout=60) as reply:
             return json.load(reply)["value"]

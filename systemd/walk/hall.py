@@ -116,7 +116,7 @@ class Tablet:
         def is_there(status):
             show = status["show"]
             there = show and show["cue"] == cue and show["position_s"] >= position_s
-            return there and status["state"] in ("playing", "freewheeling")
+            return there and status["state"] in ("playing", "holding")
 
         return self.until(f"playing {cue} at {position_s} s", is_there, seconds)
 

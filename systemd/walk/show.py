@@ -72,7 +72,7 @@ def hold_up(table, sim, tablet):
     sim.send_signal(signal.SIGCONT)
 
     def are_well(status):
-        return all(one["standing"] == "ok" for one in status["controllers"])
+        return all(one["health"] == "ok" for one in status["controllers"])
 
     time.sleep(0.3)
     status, took = tablet.until("all back", are_well, 5)
@@ -103,8 +103,8 @@ def gear(table, tablet):
 
 
 def osc_message(address):
-    octets = address.encode() + b"\0"
-    return octets + b"\0" * (-len(octets) % 4) + b",\0\0\0"
+    bytes = address.encode() + b"\0"
+    return bytes + b"\0" * (-len(bytes) % 4) + b",\0\0\0"
 
 
 def stops(terminal, table, booth, tablet):

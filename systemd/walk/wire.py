@@ -45,20 +45,20 @@ def capture(path):
         print("ready", flush=True)
         try:
             while True:
-                octets, ancillary, _, address = tap.recvmsg(2048, 64)
-                if address[2] == socket.PACKET_HOST and is_ours(octets):  # each passes twice, going out and coming in
+                bytes, ancillary, _, address = tap.recvmsg(2048, 64)
+                if address[2] == socket.PACKET_HOST and is_ours(bytes):  # each passes twice, going out and coming in
                     seconds, nanoseconds = struct.unpack("=qq", ancillary[0][2])
-                    file.write(struct.pack("=IIII", seconds, nanoseconds, len(octets), len(octets)) + octets)
+                    file.write(struct.pack("=IIII", seconds, nanoseconds, len(bytes), len(bytes)) + bytes)
         except SystemExit:
             pass
     _, dropped = struct.unpack("=II", tap.getsockopt(SOL_PACKET, PACKET_STATISTICS, 8))
     return dropped
 
 
-def is_ours(octets):
-    if len(octets) < UDP_AT + 8 or octets[IP_AT + 9] != socket.IPPROTO_UDP:
+def is_ours(bytes):
+    if len(bytes) < UDP_AT + 8 or bytes[IP_AT + 9] != socket.IPPROTO_UDP:
         return False
-    source, destination = struct.unpack_from("!HH", octets, UDP_AT)
+    source, destination = struct.unpack_from("!HH", bytes, UDP_AT)
     return source in PORTS or destination in PORTS
 
 

@@ -1,11 +1,11 @@
-//! A hall in virtual time: the loops of the program, stepped by turns, and what a keeper does beside them.
+//! A hall in virtual time: the loops of the program, stepped by turns, and what a supervisor does beside them.
 
-use kinocue::app::Staged;
-use kinocue::app::house::{House, Loops, Numbers, Reins};
+use kinocue::app::StagedShow;
+use kinocue::app::runtime::{Loops, Numbers, Runtime, RuntimeHandle};
 use kinocue::engine::{Mix, Show};
 use kinocue::net::{DrainGrid, over};
 use kinocue::rt::{Command, Line, News, Order, Ticked};
-use kinocue::state::{Event, Readiness, Request, State, Trouble};
+use kinocue::state::{Event, Readiness, State, Transition, Trouble};
 use kinocue::time::{MonoTime, Rate, ShowTime};
 use kinocue::wire::Dialect;
 
@@ -17,7 +17,7 @@ use super::ether::Ether;
 use super::judge::Breach;
 use super::seat::{MS, Settings};
 
-/// How often the keeper looks.
+/// How often the supervisor looks.
 const LOOK: u64 = 20 * MS;
 /// What comes sooner than this after a homing may be from before it, and how long is waited for the rest.
 const STALE: u64 = 300 * MS;
@@ -49,7 +49,7 @@ pub(crate) struct Hall<'h, 'l> {
     pub(crate) ether: Ether,
     pub(crate) kind: Kind,
     book: &'static Book,
-    pub(crate) reins: Reins,
+    pub(crate) runtime: RuntimeHandle,
     line: Line,
     loops: &'h mut Loops<'l, Ether>,
     drains: DrainGrid,
@@ -88,16 +88,16 @@ pub(crate) fn open<T>(
     let book = kind.book();
     ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
     let halves = over(Arc::new(ether.clone()));
-    let house = House::over(Arc::clone(&book.config), crashed, numbers, &Arc::default(), halves)
+    let runtime = Runtime::over(Arc::clone(&book.config), crashed, numbers, &Arc::default(), halves)
         .expect("the hall opens");
     let origin = MonoTime::from_nanos(ether.ns() + 20 * MS);
     let period = Rate::from_hz(kind.hz).period();
-    house.stepped(ether, origin, |reins, line, loops| {
+    runtime.stepped(ether, origin, |runtime, line, loops| {
         let mut hall = Hall {
             ether: ether.clone(),
             kind,
             book,
-            reins,
+            runtime,
             line,
             loops,
             drains: DrainGrid::new(origin, period),
@@ -216,9 +216,9 @@ impl Hall<'_, '_> {
         }
     }
 
-    /// What the keeper does.
+    /// What the supervisor does.
     fn look(&mut self) {
-        while let Ok(news) = self.reins.news.pop() {
+        while let Ok(news) = self.runtime.news.pop() {
             match news {
                 News::Refused(refusal) => {
                     if !self.state.may_send_motion() {
@@ -259,7 +259,7 @@ impl Hall<'_, '_> {
             Some(Homing::UnderWay { .. }) => {
                 self.line.open(false);
                 for lane in lanes {
-                    let _ = self.reins.orders.push(Order::Homed(lane as u16));
+                    let _ = self.runtime.orders.push(Order::Homed(lane as u16));
                 }
                 self.homing = Some(Homing::Settling { since: now });
             }
@@ -283,7 +283,7 @@ impl Hall<'_, '_> {
     }
 
     fn settle(&mut self, since: u64) {
-        let table = self.reins.live.table();
+        let table = self.runtime.live.table();
         let stale = MonoTime::from_nanos(since + STALE);
         let open = table
             .iter()
@@ -304,11 +304,11 @@ impl Hall<'_, '_> {
     }
 
     fn takes_part(&self, lane: usize) -> bool {
-        self.reins.desk.mix(lane).on
+        self.runtime.desk.mix(lane).on
     }
 
     fn command(&mut self, command: Command) {
-        drop(self.reins.commands.push(command));
+        drop(self.runtime.commands.push(command));
     }
 
     /// Makes the show anew from what is set, and hands it over.
@@ -320,8 +320,8 @@ impl Hall<'_, '_> {
         let config = &self.book.config;
         let rate = Rate::from_hz(config.show.rate_hz);
         let show = Show { rate, timing: config.show.timing, start: self.start, plays: 1 };
-        let mixes: Vec<Mix> = (0..self.kind.axes.len()).map(|lane| self.reins.desk.mix(lane)).collect();
-        match Staged::mixed(config, timeline, headroom.clone(), show, &mixes, false) {
+        let mixes: Vec<Mix> = (0..self.kind.axes.len()).map(|lane| self.runtime.desk.mix(lane)).collect();
+        match StagedShow::mixed(config, timeline, headroom.clone(), show, &mixes, false) {
             Ok(staged) => self.command(Command::Load(staged.loaded())),
             Err(error) => self.note(|| format!("not staged: {error}")),
         }
@@ -341,14 +341,14 @@ impl Hall<'_, '_> {
     }
 
     /// Somebody asks for something.
-    pub(crate) fn ask(&mut self, request: Request) {
+    pub(crate) fn ask(&mut self, request: Transition) {
         self.note(|| format!("asks: {request:?}"));
-        if matches!(request, Request::Go | Request::Resume | Request::Park) {
+        if matches!(request, Transition::Go | Transition::Resume | Transition::Park) {
             let (now, world) = (self.ether.ns(), &mut *self.ether.world());
             (world.asked, world.asked_at) = (true, now);
         }
-        if request == Request::Stop {
-            self.reins.desk.stop();
+        if request == Transition::Stop {
+            self.runtime.desk.stop();
         } else {
             self.command(Command::Request(request));
         }
@@ -368,7 +368,7 @@ impl Hall<'_, '_> {
     /// Somebody sets what a lane makes of the cue.
     pub(crate) fn set(&mut self, lane: usize, mix: Mix) {
         self.note(|| format!("seat {} is set {mix:?}", lane + 1));
-        self.reins.desk.set(lane, mix);
+        self.runtime.desk.set(lane, mix);
         if !self.state.may_send_motion() {
             self.stage();
         }
@@ -376,7 +376,7 @@ impl Hall<'_, '_> {
 
     pub(crate) fn trim(&mut self, ms: i32) {
         self.note(|| format!("trim {ms} ms"));
-        self.reins.desk.set_trim_ms(ms);
+        self.runtime.desk.set_trim_ms(ms);
     }
 
     /// A thread stands still for so many milliseconds. Whoever was asleep for seconds waits for somebody to go on.
@@ -402,7 +402,7 @@ impl Hall<'_, '_> {
     /// Somebody wants the hall to close.
     pub(crate) fn leave(&mut self) {
         self.note(|| "the hall is to close".to_owned());
-        self.reins.leave.store(true, Ordering::Relaxed);
+        self.runtime.leave.store(true, Ordering::Relaxed);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kinocue::state::{Request, Ride, State};
+use kinocue::state::{PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind};
 use super::ether::{Ether, Weather};
@@ -58,38 +58,38 @@ impl Hall<'_, '_> {
         self.load(cue);
         assert!(self.comes_to(|state| state == State::Parked, 5_000), "{:?}", self.state);
         self.pass(300);
-        self.ask(Request::Arm);
+        self.ask(Transition::Arm);
         if !self.comes_to(|state| state == State::Armed, 1_000) {
             // It wants to know more of its zero.
-            self.ask(Request::HomeAndArm);
+            self.ask(Transition::HomeAndArm);
         }
         assert!(self.comes_to(|state| state == State::Armed, 10_000), "{:?}", self.state);
-        self.ask(Request::Go);
+        self.ask(Transition::Go);
         self.follows(8_000);
     }
 
     #[track_caller]
     fn follows(&mut self, within_ms: u64) {
-        let follows = self.comes_to(|state| state == State::Playing(Ride::Following), within_ms);
+        let follows = self.comes_to(|state| state == State::Playing(PlayMode::Following), within_ms);
         assert!(follows, "{:?}", self.state);
     }
 
     #[track_caller]
     fn stops(&mut self) {
-        self.ask(Request::Stop);
+        self.ask(Transition::Stop);
         assert!(self.comes_to(|state| state == State::Stopped, 6_000), "{:?}", self.state);
     }
 
     #[track_caller]
     fn is_cleared(&mut self) {
-        self.ask(Request::Clear);
+        self.ask(Transition::Clear);
         assert!(self.comes_to(|state| state == State::Recovering, 1_000), "{:?}", self.state);
     }
 
     /// Asks for park until the seats are on their way, and waits until they are there; says whether they are.
     fn parks(&mut self) -> bool {
         for _ in 0..20 {
-            self.ask(Request::Park);
+            self.ask(Transition::Park);
             if self.comes_to(|state| matches!(state, State::Parking | State::Parked), 300) {
                 break;
             }
@@ -141,9 +141,9 @@ fn an_axis_that_no_cue_has_and_that_is_jogged_between_shows_is_not_yanked_by_the
         let now = hall.ether.ns();
         assert!(hall.ether.world().lines[0].seat.jog(4, 40.0, now));
         hall.pass(4_000);
-        hall.ask(Request::Arm);
+        hall.ask(Transition::Arm);
         hall.pass(300);
-        hall.ask(Request::Go);
+        hall.ask(Transition::Go);
         hall.pass(3_000);
     });
     assert_no_breach(&ether);
@@ -220,12 +220,12 @@ fn a_seat_that_was_jogged_just_before_go_is_not_yanked() {
             hall.load(0);
             assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
             hall.pass(300);
-            hall.ask(Request::Arm);
+            hall.ask(Transition::Arm);
             assert!(hall.comes_to(|state| state == State::Armed, 1_000), "{:?}", hall.state);
             hall.pass(500);
             assert!(hall.ether.jog(0, 3, 11.0, hall.ether.ns()));
             hall.pass(passes);
-            hall.ask(Request::Go);
+            hall.ask(Transition::Go);
             hall.pass(1_000);
         });
         assert_no_breach(&ether);
@@ -274,9 +274,9 @@ fn wrong_place(place_mm: f64, set: impl Fn(&mut Settings)) {
         if hall.state == State::Recovering {
             hall.parks();
         }
-        hall.ask(Request::Arm);
+        hall.ask(Transition::Arm);
         hall.pass(500);
-        hall.ask(Request::Go);
+        hall.ask(Transition::Go);
         hall.pass(3_000);
     });
     assert_no_breach(&ether);
@@ -361,9 +361,9 @@ fn a_seat_whose_frames_are_held_back_is_not_joined_from_what_it_reports_before_t
             hall.load(0);
             assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
             hall.pass(300);
-            hall.ask(Request::Arm);
+            hall.ask(Transition::Arm);
             assert!(hall.comes_to(|state| state == State::Armed, 1_000), "{:?}", hall.state);
-            hall.ask(Request::Go);
+            hall.ask(Transition::Go);
             hall.pass(at);
             hall.ether.turns(0, Weather::Held, 700);
             hall.pass(3_000);
@@ -379,7 +379,7 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
         hall.ride(0);
         hall.pass(600);
         hall.ether.turns(0, Weather::Lost, 180);
-        hall.ask(Request::Park);
+        hall.ask(Transition::Park);
         hall.pass(4_000);
     });
     assert_no_breach(&ether);
@@ -393,7 +393,7 @@ fn a_seat_whose_power_went_is_sent_nothing_when_it_comes_back_with_another_zero(
             hall.ride(0);
             hall.pass(400);
             if park {
-                hall.ask(Request::Park);
+                hall.ask(Transition::Park);
             }
             let now = hall.ether.ns();
             hall.ether.world().lines[0].seat.reboot(now, 1_000 * MS);
@@ -461,14 +461,14 @@ fn paused(kind: Kind, hurry: bool, park: bool) -> (u32, f64) {
         hall.ride(0);
         for _ in 0..2 {
             hall.pass(200);
-            hall.ask(Request::Pause);
+            hall.ask(Transition::Pause);
             // So that it resumes at another phase of what it sends while it holds.
             hall.pass(1_530);
             if park {
-                hall.ask(Request::Park);
+                hall.ask(Transition::Park);
                 break;
             }
-            hall.ask(Request::Resume);
+            hall.ask(Transition::Resume);
             hall.follows(6_000);
         }
         hall.pass(1_000);

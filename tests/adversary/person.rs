@@ -1,7 +1,7 @@
 //! A person, or a day, of whom nothing sensible can be expected.
 
 use kinocue::engine::Mix;
-use kinocue::state::{Request, State};
+use kinocue::state::{State, Transition};
 
 use super::bent::Bent;
 use super::dice::Dice;
@@ -78,28 +78,36 @@ impl Person {
     /// Something that leads somewhere from where the hall is, more often than not.
     fn ask(&mut self, hall: &mut Hall<'_, '_>) {
         let leads = match hall.state {
-            State::Boot => &[Request::Park, Request::Stop][..],
-            State::Recovering => &[Request::Park, Request::Park, Request::Park, Request::Home],
-            State::Parked => &[Request::Arm, Request::Arm, Request::Arm, Request::Park, Request::HomeAndArm],
-            State::Armed => &[Request::Go, Request::Go, Request::Go, Request::Disarm],
-            State::Playing(_) => &[Request::Pause, Request::Stop, Request::Park],
-            State::Paused => {
-                &[Request::Resume, Request::Resume, Request::Resume, Request::Park, Request::Stop]
+            State::Boot => &[Transition::Park, Transition::Stop][..],
+            State::Recovering => &[Transition::Park, Transition::Park, Transition::Park, Transition::Home],
+            State::Parked => {
+                &[Transition::Arm, Transition::Arm, Transition::Arm, Transition::Park, Transition::HomeAndArm]
             }
-            State::Stopped | State::Fault => &[Request::Clear, Request::Clear, Request::Park],
-            State::Homing | State::Stopping | State::Parking => &[Request::Stop, Request::Pause, Request::Go],
+            State::Armed => &[Transition::Go, Transition::Go, Transition::Go, Transition::Disarm],
+            State::Playing(_) => &[Transition::Pause, Transition::Stop, Transition::Park],
+            State::Paused => &[
+                Transition::Resume,
+                Transition::Resume,
+                Transition::Resume,
+                Transition::Park,
+                Transition::Stop,
+            ],
+            State::Stopped | State::Fault => &[Transition::Clear, Transition::Clear, Transition::Park],
+            State::Homing | State::Stopping | State::Parking => {
+                &[Transition::Stop, Transition::Pause, Transition::Go]
+            }
         };
         let request =
-            if self.dice.one_in(12) { self.dice.pick(&Request::ALL) } else { self.dice.pick(leads) };
+            if self.dice.one_in(12) { self.dice.pick(&Transition::ALL) } else { self.dice.pick(leads) };
         // A ride is left alone for a while, or nothing would be far from park.
         if matches!(hall.state, State::Playing(_) | State::Parking) && !self.dice.one_in(4) {
             return;
         }
-        if request == Request::Seek {
+        if request == Transition::Seek {
             return hall.seek(self.dice.range(0, 5_900) as i64);
         }
         hall.ask(request);
-        if request == Request::Clear && self.dice.one_in(3) {
+        if request == Transition::Clear && self.dice.one_in(3) {
             hall.load(self.dice.range(0, 3) as usize);
         }
     }
@@ -139,9 +147,11 @@ impl Person {
                 hall.note(|| format!("seat {}: its power goes for {dark} ms", seat + 1));
                 hall.ether.world().lines[seat].seat.reboot(now, dark * MS);
             }
-            2 | 3 => hall.set(seat, Mix { on: self.dice.one_in(2), ..hall.reins.desk.mix(seat) }),
-            4 => hall
-                .set(seat, Mix { motion: self.dice.range(2, 11) as f64 / 10.0, ..hall.reins.desk.mix(seat) }),
+            2 | 3 => hall.set(seat, Mix { on: self.dice.one_in(2), ..hall.runtime.desk.mix(seat) }),
+            4 => hall.set(
+                seat,
+                Mix { motion: self.dice.range(2, 11) as f64 / 10.0, ..hall.runtime.desk.mix(seat) },
+            ),
             _ => {
                 let axis = self.dice.range(0, hall.kind.axes[seat] as u64) as usize;
                 let mm = self.dice.range(0, 120) as f64 - 60.0;

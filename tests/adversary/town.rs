@@ -74,7 +74,7 @@ fn live(ether: &Ether, index: usize, socket: &UdpSocket, over: &AtomicBool) {
                 let ago = datagram.stamp_ns.map_or(0, |stamp| wall_now_ns().saturating_sub(stamp));
                 host = Some(datagram.from);
                 ether.pass_to(now());
-                let _ = ether.take_in(index, datagram.octets, now().saturating_sub(ago));
+                let _ = ether.take_in(index, datagram.bytes, now().saturating_sub(ago));
             }
         }
         ether.pass_to(now());

@@ -1,6 +1,6 @@
 //! Who may do what, and from where.
 
-use kinocue::hall::{Ask, Role, Surface};
+use kinocue::control::{Command, Role, Surface};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::{Hall, TOKENS};
@@ -36,7 +36,10 @@ fn each_role_may_do_what_is_its_own_and_no_more() {
     let asked = hall.asked.lock().unwrap();
     assert!(asked.iter().all(|one| one.who.surface == Surface::Http));
     assert!(
-        asked.iter().filter(|one| matches!(one.ask, Ask::Arm { .. })).all(|one| one.who.name == "engineer's")
+        asked
+            .iter()
+            .filter(|one| matches!(one.ask, Command::Arm { .. }))
+            .all(|one| one.who.name == "engineer's")
     );
 }
 

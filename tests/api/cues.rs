@@ -115,12 +115,12 @@ fn reports_of_a_great_day_are_bounded_whole_and_made_in_turn() {
     }
     // One that is not read to its end keeps the others waiting for a while at the most.
     let mut slow = hall.socket().connect();
-    slow.write_all(&Request::new("GET", "/api/v1/reports/2026-01-31").octets(&hall.socket())).unwrap();
+    slow.write_all(&Request::new("GET", "/api/v1/reports/2026-01-31").bytes(&hall.socket())).unwrap();
     drop(slow);
     let report = hall.socket().get("/api/v1/reports/2026-01-31");
     assert_eq!(report.status, 200, "{}", report.text());
     assert_eq!(report.header("content-type"), Some("application/json"));
-    assert!(report.body.len() < 5_000 * 600, "{} octets", report.body.len());
+    assert!(report.body.len() < 5_000 * 600, "{} bytes", report.body.len());
     let report: serde_json::Value = serde_json::from_slice(&unchunked(&report.body)).unwrap();
     assert_eq!(report["actions"].as_array().unwrap().len(), 5_000);
     assert_eq!(
@@ -131,14 +131,14 @@ fn reports_of_a_great_day_are_bounded_whole_and_made_in_turn() {
 
 /// What is in the chunks of a body.
 fn unchunked(mut body: &[u8]) -> Vec<u8> {
-    let mut octets = Vec::new();
+    let mut bytes = Vec::new();
     loop {
         let end = body.windows(2).position(|two| two == b"\r\n").unwrap();
         let length = usize::from_str_radix(std::str::from_utf8(&body[..end]).unwrap(), 16).unwrap();
         if length == 0 {
-            return octets;
+            return bytes;
         }
-        octets.extend_from_slice(&body[end + 2..end + 2 + length]);
+        bytes.extend_from_slice(&body[end + 2..end + 2 + length]);
         body = &body[end + 4 + length..];
     }
 }

@@ -13,7 +13,7 @@ struct Events(BufReader<Box<dyn Connection>>);
 impl Events {
     fn open(to: &To) -> Self {
         let mut connection = to.connect();
-        connection.write_all(&Request::new("GET", "/api/v1/events").octets(to)).unwrap();
+        connection.write_all(&Request::new("GET", "/api/v1/events").bytes(to)).unwrap();
         Self(BufReader::new(connection))
     }
 
@@ -59,7 +59,7 @@ fn of_many_changes_no_more_than_ten_a_second_are_pushed() {
 fn who_reads_nothing_is_cut_off_and_the_others_go_on() {
     let hall = Hall::with(long_status(), |api| api);
     let mut slow = hall.socket().connect();
-    slow.write_all(&Request::new("GET", "/api/v1/events").octets(&hall.socket())).unwrap();
+    slow.write_all(&Request::new("GET", "/api/v1/events").bytes(&hall.socket())).unwrap();
     let mut quick = Events::open(&hall.socket());
     // More than any buffer holds in between, and longer than a stall may last.
     for _ in 0..70 {
@@ -90,14 +90,14 @@ fn there_is_room_for_so_many_and_a_place_is_free_again_when_one_goes() {
 #[test]
 fn viewers_who_watch_do_not_shut_the_booth_out() {
     let hall = Hall::with(long_status(), |api| kinocue::config::Api {
-        open_role: Some(kinocue::hall::Role::View),
+        open_role: Some(kinocue::control::Role::View),
         ..api
     });
     let watch = |token: Option<&str>| {
         let request = Request::new("GET", "/api/v1/events");
         let request = token.into_iter().fold(request, Request::token);
         let mut connection = hall.port().connect();
-        connection.write_all(&request.octets(&hall.port())).unwrap();
+        connection.write_all(&request.bytes(&hall.port())).unwrap();
         Events(BufReader::new(connection))
     };
     let mut viewers: Vec<_> = (0..16).map(|_| watch(None)).collect();

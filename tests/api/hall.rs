@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use kinocue::api::{self, Running, Setup, StopSocket};
 use kinocue::config::{self, ApiToken};
-use kinocue::hall::{
-    Ask, Code, ControllerStatus, Desired, Handle, Inbox, JournalLine, Problem, Role, Status, StatusSource,
-    handle,
+use kinocue::control::{
+    Code, Command, ControllerStatus, Desired, Handle, Inbox, JournalLine, Problem, Role, Status,
+    StatusSource, handle,
 };
 use kinocue::library::{self, Bounds, Library};
 use kinocue::log::Log;
@@ -42,7 +42,7 @@ pub struct Hall {
     running: Option<Running>,
     _stop: StopSocket,
     ends: Arc<AtomicBool>,
-    keeper: Option<JoinHandle<()>>,
+    supervisor: Option<JoinHandle<()>>,
 }
 
 impl Hall {
@@ -76,9 +76,9 @@ impl Hall {
         let stop = api::stop_socket(&dir.path().join("stop.sock"), handle.clone()).unwrap();
         let [ends, asleep, awake] = [false, false, true].map(|flag| Arc::new(AtomicBool::new(flag)));
         let asked = Arc::<Mutex<Vec<Desired>>>::default();
-        let keeper = Keeper { inbox, source, handle: handle.clone(), asked: Arc::clone(&asked) };
+        let supervisor = Supervisor { inbox, source, handle: handle.clone(), asked: Arc::clone(&asked) };
         let [of_ends, of_awake, of_asleep] = [&ends, &awake, &asleep].map(Arc::clone);
-        let keeper = thread::spawn(move || keeper.keep(&of_ends, &of_awake, &of_asleep));
+        let supervisor = thread::spawn(move || supervisor.run(&of_ends, &of_awake, &of_asleep));
         Self {
             dir,
             handle,
@@ -89,7 +89,7 @@ impl Hall {
             running: Some(running),
             _stop: stop,
             ends,
-            keeper: Some(keeper),
+            supervisor: Some(supervisor),
         }
     }
 
@@ -113,7 +113,7 @@ impl Hall {
     }
 
     /// What was asked so far.
-    pub fn asks(&self) -> Vec<Ask> {
+    pub fn asks(&self) -> Vec<Command> {
         self.asked.lock().unwrap().iter().map(|desired| desired.ask.clone()).collect()
     }
 
@@ -139,20 +139,20 @@ impl Drop for Hall {
     fn drop(&mut self) {
         self.close();
         self.ends.store(true, Ordering::Relaxed);
-        self.keeper.take().unwrap().join().unwrap();
+        self.supervisor.take().unwrap().join().unwrap();
     }
 }
 
 /// Takes what is asked and answers it.
-struct Keeper {
+struct Supervisor {
     inbox: Inbox,
     source: StatusSource,
     handle: Handle,
     asked: Arc<Mutex<Vec<Desired>>>,
 }
 
-impl Keeper {
-    fn keep(self, ends: &AtomicBool, awake: &AtomicBool, asleep: &AtomicBool) {
+impl Supervisor {
+    fn run(self, ends: &AtomicBool, awake: &AtomicBool, asleep: &AtomicBool) {
         while !ends.load(Ordering::Relaxed) {
             let mut status = Status::clone(&self.handle.status());
             status.ticks += 1;
@@ -169,16 +169,18 @@ impl Keeper {
         }
     }
 
-    fn answer(&self, ask: &Ask) -> Result<Arc<Status>, Problem> {
+    fn answer(&self, ask: &Command) -> Result<Arc<Status>, Problem> {
         let state = match ask {
-            Ask::Load { cue } if cue == "bad" => {
+            Command::Load { cue } if cue == "bad" => {
                 let faults = vec!["bad.csv:2:1: a1".to_owned(), "bad.csv:3:1: a1".to_owned()];
                 return Err(Problem::new(Code::Check, "the cue bad is refused", "mend it").with(faults));
             }
-            Ask::Resume => return Err(Problem::new(Code::State, "cannot resume while armed", "arm and go")),
-            Ask::Arm { .. } => "armed",
-            Ask::Go => "joining",
-            Ask::Stop => "stopping",
+            Command::Resume => {
+                return Err(Problem::new(Code::State, "cannot resume while armed", "arm and go"));
+            }
+            Command::Arm { .. } => "armed",
+            Command::Go => "joining",
+            Command::Stop => "stopping",
             _ => "parked",
         };
         let status =
@@ -210,7 +212,7 @@ pub fn with_controller() -> Status {
         address: "127.0.0.1:7408".to_owned(),
         group: "A1".to_owned(),
         enabled: true,
-        standing: "ok",
+        health: "ok",
         why: String::new(),
         heard_s: None,
         ack_rate: None,
@@ -242,7 +244,7 @@ fn hash(token: &str) -> [u8; 32] {
 fn library(dir: &Path) -> Library {
     let config = dir.join("hall.toml");
     fs::write(&config, CONFIG).unwrap();
-    let bounds = Bounds { max_octets: 100_000, ..Bounds::default() };
+    let bounds = Bounds { max_bytes: 100_000, ..Bounds::default() };
     let hall = library::Hall { config, program: env!("CARGO_BIN_EXE_kinocue").into(), bounds };
     Library::open(&dir.join("cues"), hall).unwrap()
 }

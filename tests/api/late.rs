@@ -1,6 +1,6 @@
 //! What comes twice, and what comes late.
 
-use kinocue::hall::Ask;
+use kinocue::control::Command;
 
 use crate::client::{Request, problem};
 use crate::hall::Hall;
@@ -22,7 +22,7 @@ fn of_two_requests_with_one_key_the_second_does_nothing() {
         "the first reply, though the hall is elsewhere"
     );
     assert_eq!(again.header("content-type"), Some("application/json"));
-    assert_eq!(hall.asks(), [Ask::Go, Ask::Pause]);
+    assert_eq!(hall.asks(), [Command::Go, Command::Pause]);
     keyed("b").send(&hall.socket());
     assert_eq!(hall.asks().len(), 3, "another key is another go");
     let other = Request::new("POST", "/api/v1/show/park").header("Idempotency-Key", "a");
@@ -63,7 +63,7 @@ fn two_at_once_with_one_key_are_one() {
         let threads: Vec<_> = (0..8).map(|_| scope.spawn(send)).collect();
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
-    assert_eq!(hall.asks(), [Ask::Go]);
+    assert_eq!(hall.asks(), [Command::Go]);
     assert!(replies.iter().all(|reply| *reply == replies[0]));
 }
 

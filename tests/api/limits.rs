@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::thread;
 
-use kinocue::hall::{Ask, Role};
+use kinocue::control::{Command, Role};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::Hall;
@@ -48,7 +48,7 @@ fn a_head_without_end_is_cut_off_before_it_fills_the_memory() {
 #[test]
 fn heads_and_requests_that_are_none_end_their_connections_alone() {
     let hall = Hall::open();
-    for octets in [
+    for bytes in [
         &b"\x16\x03\x01\x02\x00"[..],
         b"GET / HTTP/9.9\r\n\r\n",
         b"GET\r\n\r\n",
@@ -58,10 +58,10 @@ fn heads_and_requests_that_are_none_end_their_connections_alone() {
         b"POST /api/v1/show/go HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
     ] {
         let mut connection = hall.socket().connect();
-        connection.write_all(octets).unwrap();
+        connection.write_all(bytes).unwrap();
         let mut reply = String::new();
         connection.read_to_string(&mut reply).unwrap();
-        assert!(reply.is_empty() || reply.starts_with("HTTP/1.1 4"), "{octets:?}: {reply}");
+        assert!(reply.is_empty() || reply.starts_with("HTTP/1.1 4"), "{bytes:?}: {reply}");
     }
     assert!(hall.asks().is_empty());
     assert_eq!(hall.socket().get("/api/v1/status").status, 200);
@@ -84,7 +84,8 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
     hall.sleep();
     thread::scope(|scope| {
         // One after the other asks, until nothing more fits into the queue.
-        let stuffed: Vec<_> = (0..64).map(|_| hall.handle.post(engineer(), Ask::Pause).unwrap()).collect();
+        let stuffed: Vec<_> =
+            (0..64).map(|_| hall.handle.post(engineer(), Command::Pause).unwrap()).collect();
         assert_eq!(hall.socket().post("/api/v1/show/pause").problem(), problem(429, "busy"));
         let _idle: Vec<_> = (0..64).map(|_| hall.socket().connect()).collect();
         let _floods: Vec<_> =
@@ -103,10 +104,10 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
     });
 }
 
-fn engineer() -> kinocue::hall::Who {
-    kinocue::hall::Who {
+fn engineer() -> kinocue::control::Who {
+    kinocue::control::Who {
         role: Role::Engineer,
-        surface: kinocue::hall::Surface::Schedule,
+        surface: kinocue::control::Surface::Schedule,
         name: "test".to_owned(),
     }
 }
@@ -150,15 +151,15 @@ fn what_is_answered_before_its_body_is_read_is_answered_whole() {
     let known = go.body(body.clone());
     let stranger = Request::new("POST", "/api/v1/show/go").body(body);
     for (request, status) in [(stop, 200), (known, 200), (stranger, 401)] {
-        let octets = request.octets(&to);
-        let head = octets.windows(4).position(|four| four == b"\r\n\r\n").unwrap() + 4;
+        let bytes = request.bytes(&to);
+        let head = bytes.windows(4).position(|four| four == b"\r\n\r\n").unwrap() + 4;
         let mut connection = std::net::TcpStream::connect(hall.address()).unwrap();
-        connection.write_all(&octets[..head]).unwrap();
+        connection.write_all(&bytes[..head]).unwrap();
         // Who answers at once has done so now, and closed: what comes behind it would reset the connection.
         connection.set_read_timeout(Some(std::time::Duration::from_millis(50))).unwrap();
         let mut reply = Vec::new();
         connection.read_to_end(&mut reply).expect_err("the other end still listens");
-        connection.write_all(&octets[head..]).unwrap();
+        connection.write_all(&bytes[head..]).unwrap();
         connection.set_read_timeout(None).unwrap();
         connection.read_to_end(&mut reply).expect("an answer, and no reset");
         let reply = String::from_utf8(reply).unwrap();

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use kinocue::hall::{Ask, LevelsChange, Role, Surface};
+use kinocue::control::{Command, LevelsChange, Role, Surface};
 use kinocue::time::ShowTime;
 
 use crate::client::{Reply, Request, problem};
@@ -27,38 +27,38 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
         ..LevelsChange::default()
     };
     let requests = [
-        (plain("/api/v1/show/home"), Ask::Home),
-        (post("/api/v1/show/load", r#"{"cue":"storm_2"}"#), Ask::Load { cue: "storm_2".to_owned() }),
-        (plain("/api/v1/show/arm"), Ask::Arm { seats_empty: false }),
-        (post("/api/v1/show/arm", "{}"), Ask::Arm { seats_empty: false }),
-        (post("/api/v1/show/arm", r#"{"seats_empty":true}"#), Ask::Arm { seats_empty: true }),
-        (plain("/api/v1/show/go"), Ask::Go),
-        (post("/api/v1/show/go", r#"{"from_s":12.5}"#), Ask::GoFrom(ShowTime::from_millis(12_500))),
-        (post("/api/v1/show/pause", "{}"), Ask::Pause),
-        (post("/api/v1/show/seek", r#"{"position_s":750.5}"#), Ask::Seek(ShowTime::from_millis(750_500))),
-        (plain("/api/v1/show/stop"), Ask::Stop),
-        (plain("/api/v1/show/park"), Ask::Park),
-        (plain("/api/v1/show/disarm"), Ask::Disarm),
-        (plain("/api/v1/show/clear"), Ask::Clear),
-        (put("/api/v1/trim", r#"{"offset_s":0.08}"#), Ask::Trim(80)),
+        (plain("/api/v1/show/home"), Command::Home),
+        (post("/api/v1/show/load", r#"{"cue":"storm_2"}"#), Command::Load { cue: "storm_2".to_owned() }),
+        (plain("/api/v1/show/arm"), Command::Arm { seats_empty: false }),
+        (post("/api/v1/show/arm", "{}"), Command::Arm { seats_empty: false }),
+        (post("/api/v1/show/arm", r#"{"seats_empty":true}"#), Command::Arm { seats_empty: true }),
+        (plain("/api/v1/show/go"), Command::Go),
+        (post("/api/v1/show/go", r#"{"from_s":12.5}"#), Command::GoFrom(ShowTime::from_millis(12_500))),
+        (post("/api/v1/show/pause", "{}"), Command::Pause),
+        (post("/api/v1/show/seek", r#"{"position_s":750.5}"#), Command::Seek(ShowTime::from_millis(750_500))),
+        (plain("/api/v1/show/stop"), Command::Stop),
+        (plain("/api/v1/show/park"), Command::Park),
+        (plain("/api/v1/show/disarm"), Command::Disarm),
+        (plain("/api/v1/show/clear"), Command::Clear),
+        (put("/api/v1/trim", r#"{"offset_s":0.08}"#), Command::Trim(80)),
         (
             put("/api/v1/levels", r#"{"motion":0.6,"effects":{"water":false},"rows":{"A":0}}"#),
-            Ask::Levels(levels),
+            Command::Levels(levels),
         ),
-        (plain("/api/v1/presets/kids"), Ask::Preset("kids".to_owned())),
-        (plain("/api/v1/controllers/A%201/disable"), Ask::Disable { name: "A 1".to_owned(), why: None }),
+        (plain("/api/v1/presets/kids"), Command::Preset("kids".to_owned())),
+        (plain("/api/v1/controllers/A%201/disable"), Command::Disable { name: "A 1".to_owned(), why: None }),
         (
             post("/api/v1/controllers/A1/disable", r#"{"why":"broken leg"}"#),
-            Ask::Disable { name: "A1".to_owned(), why: Some("broken leg".to_owned()) },
+            Command::Disable { name: "A1".to_owned(), why: Some("broken leg".to_owned()) },
         ),
-        (plain("/api/v1/controllers/A1/enable"), Ask::Enable("A1".to_owned())),
-        (plain("/api/v1/preflight"), Ask::Preflight),
-        (post("/api/v1/test", r#"{"rows":["A","B"]}"#), Ask::Test { rows: vec!["A".into(), "B".into()] }),
-        (post("/api/v1/test", "{}"), Ask::Test { rows: Vec::new() }),
-        (put("/api/v1/playlist", r#"{"id":"today"}"#), Ask::Playlist { id: Some("today".to_owned()) }),
-        (put("/api/v1/playlist", r#"{"id":null}"#), Ask::Playlist { id: None }),
-        (post("/api/v1/playlist/select", r#"{"entry":2}"#), Ask::Select { entry: 2 }),
-        (plain("/api/v1/reload"), Ask::Reload),
+        (plain("/api/v1/controllers/A1/enable"), Command::Enable("A1".to_owned())),
+        (plain("/api/v1/preflight"), Command::Preflight),
+        (post("/api/v1/test", r#"{"rows":["A","B"]}"#), Command::Test { rows: vec!["A".into(), "B".into()] }),
+        (post("/api/v1/test", "{}"), Command::Test { rows: Vec::new() }),
+        (put("/api/v1/playlist", r#"{"id":"today"}"#), Command::Playlist { id: Some("today".to_owned()) }),
+        (put("/api/v1/playlist", r#"{"id":null}"#), Command::Playlist { id: None }),
+        (post("/api/v1/playlist/select", r#"{"entry":2}"#), Command::Select { entry: 2 }),
+        (plain("/api/v1/reload"), Command::Reload),
     ];
     for (request, ask) in &requests {
         let reply = request.send(&hall.socket());
@@ -175,10 +175,10 @@ fn a_connection_is_good_for_one_request_after_another() {
     let mut connection = hall.socket().connect();
     let first = b"POST /api/v1/show/pause HTTP/1.1\r\nHost: localhost\r\n\r\n";
     connection.write_all(first).unwrap();
-    connection.write_all(&Request::new("POST", "/api/v1/show/park").octets(&hall.socket())).unwrap();
+    connection.write_all(&Request::new("POST", "/api/v1/show/park").bytes(&hall.socket())).unwrap();
     let both = String::from_utf8(Reply::read(&mut *connection).body).unwrap();
     assert!(both.contains("asked: pause") && both.contains("asked: park"), "{both}");
-    assert_eq!(hall.asks(), [Ask::Pause, Ask::Park]);
+    assert_eq!(hall.asks(), [Command::Pause, Command::Park]);
 }
 
 #[test]

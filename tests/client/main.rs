@@ -19,8 +19,8 @@ fn hall(state: &str) -> Value {
         "show": {"cue": "coaster", "title": null, "length_s": 200.0, "position_s": 70.12},
         "levels": {"motion": 0.6, "vibration": 1.0, "effects": {"air": true, "water": false}, "rows": {"A": 1.0}},
         "controllers": [
-            {"name": "A1", "row": "A", "enabled": true, "standing": "ok", "ack_rate": 1.0, "ack_p50_us": 40.0},
-            {"name": "A2", "row": "A", "enabled": true, "standing": "lost", "why": "no ack for 3 s"},
+            {"name": "A1", "row": "A", "enabled": true, "health": "ok", "ack_rate": 1.0, "ack_p50_us": 40.0},
+            {"name": "A2", "row": "A", "enabled": true, "health": "lost", "why": "no ack for 3 s"},
         ],
         "warnings": [{"id": "controller-lost", "severity": "error", "controller": "A2", "text": "it is lost",
             "remedy": "look at its plug"}],

@@ -91,8 +91,8 @@ impl Request {
         Self { body: body.into(), ..self }
     }
 
-    /// Its octets, before which its connection is told to end with it.
-    pub fn octets(&self, to: &To) -> Vec<u8> {
+    /// Its bytes, before which its connection is told to end with it.
+    pub fn bytes(&self, to: &To) -> Vec<u8> {
         let host = match (&self.host, to) {
             (Some(host), _) => host.clone(),
             (None, To::Tcp(address)) => address.to_string(),
@@ -106,15 +106,15 @@ impl Request {
         if !self.body.is_empty() {
             text += &format!("Content-Length: {}\r\n", self.body.len());
         }
-        let mut octets = (text + "\r\n").into_bytes();
-        octets.extend_from_slice(&self.body);
-        octets
+        let mut bytes = (text + "\r\n").into_bytes();
+        bytes.extend_from_slice(&self.body);
+        bytes
     }
 
     pub fn send(&self, to: &To) -> Reply {
         let mut connection = to.connect();
         // What is refused before it is whole is not read to its end.
-        let _ = connection.write_all(&self.octets(to));
+        let _ = connection.write_all(&self.bytes(to));
         Reply::read(&mut *connection)
     }
 }
@@ -130,21 +130,21 @@ pub struct Reply {
 impl Reply {
     /// Reads until the connection ends.
     pub fn read(connection: &mut dyn Connection) -> Self {
-        let mut octets = Vec::new();
-        match connection.read_to_end(&mut octets) {
+        let mut bytes = Vec::new();
+        match connection.read_to_end(&mut bytes) {
             Err(error) if error.kind() != io::ErrorKind::ConnectionReset => panic!("no whole reply: {error}"),
             _ => {}
         }
-        let end = octets.windows(4).position(|four| four == b"\r\n\r\n");
-        let end = end.unwrap_or_else(|| panic!("no head: {:?}", String::from_utf8_lossy(&octets)));
-        let head = std::str::from_utf8(&octets[..end]).unwrap();
+        let end = bytes.windows(4).position(|four| four == b"\r\n\r\n");
+        let end = end.unwrap_or_else(|| panic!("no head: {:?}", String::from_utf8_lossy(&bytes)));
+        let head = std::str::from_utf8(&bytes[..end]).unwrap();
         let mut lines = head.lines();
         let status = lines.next().unwrap().split(' ').nth(1).unwrap().parse().unwrap();
         let headers = lines.map(|line| {
             let (name, value) = line.split_once(": ").unwrap();
             (name.to_ascii_lowercase(), value.to_owned())
         });
-        Self { status, headers: headers.collect(), body: octets[end + 4..].to_vec() }
+        Self { status, headers: headers.collect(), body: bytes[end + 4..].to_vec() }
     }
 
     pub fn header(&self, name: &str) -> Option<&str> {

@@ -22,18 +22,18 @@ impl Pcap {
         self.packet(at, &ethernet(from, to, payload, 0), usize::MAX);
     }
 
-    /// A packet of which at most `kept` octets were captured.
-    pub fn packet(&mut self, at: Duration, octets: &[u8], kept: usize) {
-        let kept = &octets[..kept.min(octets.len())];
+    /// A packet of which at most `kept` bytes were captured.
+    pub fn packet(&mut self, at: Duration, bytes: &[u8], kept: usize) {
+        let kept = &bytes[..kept.min(bytes.len())];
         let number = |n: usize| u32::try_from(n).expect("a small number");
         let seconds = u32::try_from(at.as_secs()).expect("a small number");
-        for number in [seconds, at.subsec_micros(), number(kept.len()), number(octets.len())] {
+        for number in [seconds, at.subsec_micros(), number(kept.len()), number(bytes.len())] {
             self.0.extend(number.to_le_bytes());
         }
         self.0.extend(kept);
     }
 
-    pub fn octets(&self) -> &[u8] {
+    pub fn bytes(&self) -> &[u8] {
         &self.0
     }
 }

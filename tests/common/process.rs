@@ -42,7 +42,7 @@ impl Run {
 
 impl From<Output> for Run {
     fn from(output: Output) -> Self {
-        let text = |octets| String::from_utf8(octets).expect("UTF-8");
+        let text = |bytes| String::from_utf8(bytes).expect("UTF-8");
         Self { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
     }
 }
@@ -142,10 +142,10 @@ impl Playing {
     pub(crate) fn wait_for(&mut self, text: &str) -> String {
         let child = self.0.child.as_mut().expect("it was not taken");
         let stderr = child.stderr.as_mut().expect("piped");
-        let (mut said, mut octet) = (String::new(), [0]);
+        let (mut said, mut byte) = (String::new(), [0]);
         while !said.contains(text) {
-            assert_eq!(stderr.read(&mut octet).expect("it can be read"), 1, "it ended: {said}");
-            said.push(char::from(octet[0]));
+            assert_eq!(stderr.read(&mut byte).expect("it can be read"), 1, "it ended: {said}");
+            said.push(char::from(byte[0]));
         }
         said
     }
@@ -324,9 +324,9 @@ impl Relay {
         self.pulled.store(false, Ordering::Release);
     }
 
-    /// Sends octets as if the controller had.
-    pub(crate) fn send(&self, octets: &[u8], to: SocketAddr) {
-        self.socket.send_to(octets, to).expect("loopback takes it");
+    /// Sends bytes as if the controller had.
+    pub(crate) fn send(&self, bytes: &[u8], to: SocketAddr) {
+        self.socket.send_to(bytes, to).expect("loopback takes it");
     }
 }
 
@@ -345,9 +345,9 @@ fn relay(
     seen: &Sender<(SocketAddr, MotionRequest)>,
 ) {
     let mut host = None;
-    let mut octets = [0; 2048];
+    let mut bytes = [0; 2048];
     while !over.load(Ordering::Acquire) {
-        let Ok((len, from)) = socket.recv_from(&mut octets) else { continue };
+        let Ok((len, from)) = socket.recv_from(&mut bytes) else { continue };
         if pulled.load(Ordering::Acquire) {
             continue;
         }
@@ -357,9 +357,9 @@ fn relay(
         }
         let to = if answer { host } else { Some(controller) };
         if let Some(to) = to {
-            let _ = socket.send_to(&octets[..len], to); // who is gone is gone
+            let _ = socket.send_to(&bytes[..len], to); // who is gone is gone
         }
-        if let (false, Ok(frame)) = (answer, MotionRequest::parse(&octets[..len])) {
+        if let (false, Ok(frame)) = (answer, MotionRequest::parse(&bytes[..len])) {
             let _ = seen.send((from, frame)); // nobody may be looking any more
         }
     }

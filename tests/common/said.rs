@@ -12,7 +12,7 @@ pub(crate) struct Said {
 
 impl Said {
     pub(crate) fn of(output: Output) -> Self {
-        let text = |octets: Vec<u8>| String::from_utf8(octets).expect("text");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
         Self {
             exit: output.status.code().expect("it ends by itself"),
             out: text(output.stdout),

@@ -165,8 +165,8 @@ impl Browser {
     /// Keeps a picture of the page in `target/console-shots`.
     pub(crate) fn shot(&self, name: &str) {
         let picture = self.ask("GET", &format!("{}/screenshot", self.session), &Value::Null);
-        let octets = STANDARD.decode(picture.as_str().expect("a picture")).expect("base64");
-        std::fs::write(self.shots.join(format!("{name}.png")), octets).expect("it can be written");
+        let bytes = STANDARD.decode(picture.as_str().expect("a picture")).expect("base64");
+        std::fs::write(self.shots.join(format!("{name}.png")), bytes).expect("it can be written");
     }
 
     /// What the browser complains of, replies of the server that are errors left out.
@@ -215,9 +215,9 @@ impl Browser {
                 break;
             }
         }
-        let mut octets = vec![0; length];
-        reader.read_exact(&mut octets)?;
-        Ok((status, serde_json::from_slice(&octets)?))
+        let mut bytes = vec![0; length];
+        reader.read_exact(&mut bytes)?;
+        Ok((status, serde_json::from_slice(&bytes)?))
     }
 }
 

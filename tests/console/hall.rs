@@ -90,7 +90,7 @@ fn swell() -> String {
 }
 
 fn write_api(config: &mut String, open_role: &str) {
-    let sha256: String = Sha256::digest(TOKEN).iter().map(|octet| format!("{octet:02x}")).collect();
+    let sha256: String = Sha256::digest(TOKEN).iter().map(|byte| format!("{byte:02x}")).collect();
     write!(
         config,
         "[api]\nlisten = [\"127.0.0.1:0\"]\nopen_role = \"{open_role}\"\n\n\

@@ -133,7 +133,7 @@ fn a_controller_that_is_out_for_good_gets_no_datagram_and_is_waited_for_by_nobod
     let mut hall = Hall::closed(&[], |config| config + "enabled = false\n");
     hall.serve();
     let status = hall.comes_to("parked");
-    assert_eq!((&seat(&status, 1)["name"], &seat(&status, 1)["standing"]), (&"A2".into(), &"out".into()));
+    assert_eq!((&seat(&status, 1)["name"], &seat(&status, 1)["health"]), (&"A2".into(), &"out".into()));
     let refused = hall.run(&["enable", "A2"]);
     assert!(refused.code == Some(75) && refused.stderr.contains("out for good"), "{refused:?}");
     hall.play("night");
@@ -156,9 +156,9 @@ fn a_controller_that_is_out_for_good_gets_no_datagram_and_is_waited_for_by_nobod
 fn a_controller_goes_out_for_good_and_comes_back_with_another_configuration() {
     let hall = Hall::open();
     hall.done(&["load", "ride"]);
-    let reads = |status: &Value, standing: &str| {
-        let all = [seat(status, 0), seat(status, 1)].map(|one| one["standing"].as_str().unwrap());
-        status["state"] == "parked" && status["show"]["cue"] == "ride" && all == ["ok", standing]
+    let reads = |status: &Value, health: &str| {
+        let all = [seat(status, 0), seat(status, 1)].map(|one| one["health"].as_str().unwrap());
+        status["state"] == "parked" && status["show"]["cue"] == "ride" && all == ["ok", health]
     };
     hall.rewrite(|config| config + "enabled = false\n");
     hall.done(&["reload"]);

@@ -22,12 +22,12 @@ fn closed() -> Hall {
     })
 }
 
-fn standing(status: &Value, controller: usize) -> &str {
-    status["controllers"][controller]["standing"].as_str().expect("a word")
+fn health(status: &Value, controller: usize) -> &str {
+    status["controllers"][controller]["health"].as_str().expect("a word")
 }
 
 fn all_stand(status: &Value, word: &str) -> bool {
-    [0, 1].iter().all(|one| standing(status, *one) == word)
+    [0, 1].iter().all(|one| health(status, *one) == word)
 }
 
 /// What the status says of a controller that is out.
@@ -59,7 +59,7 @@ fn a_hall_of_mbox_controllers_rests_homes_and_plays_and_is_well_all_the_while() 
     stays_well(&hall, 2);
     hall.done(&["go"]);
     hall.wait(|status| {
-        assert!([0, 1].iter().all(|one| ["ok", "degraded"].contains(&standing(status, *one))), "{status}");
+        assert!([0, 1].iter().all(|one| ["ok", "degraded"].contains(&health(status, *one))), "{status}");
         status["cause"] == "the seats have parked"
     });
     hall.wait(|status| all_stand(status, "ok"));
@@ -78,8 +78,8 @@ fn a_hall_of_mbox_controllers_rests_homes_and_plays_and_is_well_all_the_while() 
 fn an_mbox_controller_that_reboots_between_shows_is_out_until_it_was_homed() {
     let hall = open();
     hall.happens("2@reboot");
-    let out = hall.wait(|status| standing(status, 1) == "excluded");
-    assert_eq!((out["state"].as_str(), standing(&out, 0)), (Some("parked"), "ok"));
+    let out = hall.wait(|status| health(status, 1) == "excluded");
+    assert_eq!((out["state"].as_str(), health(&out, 0)), (Some("parked"), "ok"));
     assert!(told(&out, "A2").contains("it may have rebooted"), "{out}");
     hall.done(&["home", "--seats-empty"]);
     hall.wait(|status| status["state"] == "parked" && all_stand(status, "ok"));
@@ -92,13 +92,13 @@ fn an_alarm_of_the_servo_drives_is_named_and_parks_a_hall_of_mbox_controllers() 
     hall.play("night");
     hall.rises(0);
     hall.happens("2@err=12");
-    hall.wait(|status| standing(status, 1) == "error");
+    hall.wait(|status| health(status, 1) == "error");
     hall.comes_to("parked");
     hall.wait(|status| told(status, "A2").contains("alarm of the servo drives, kind 12 (DPFE)"));
-    hall.wait(|status| standing(status, 0) == "ok");
+    hall.wait(|status| health(status, 0) == "ok");
     // Between shows the same alarm is found by the next look.
     hall.happens("1@err=11");
-    let out = hall.wait(|status| standing(status, 0) == "error");
+    let out = hall.wait(|status| health(status, 0) == "error");
     assert!(told(&out, "A1").contains("alarm of the servo drives, kind 11"), "{out}");
 }
 
@@ -107,19 +107,19 @@ fn an_emergency_stop_of_an_mbox_controller_is_seen_by_its_input_pressed_and_rele
     let hall = open();
     hall.play("night");
     hall.happens("2@X1=1");
-    let pressed = hall.wait(|status| standing(status, 1) == "stopped");
+    let pressed = hall.wait(|status| health(status, 1) == "stopped");
     assert_eq!(pressed["controllers"][1]["emergency_stop"], true, "{pressed}");
     hall.comes_to("stopped");
     hall.happens("2@X1=0");
     hall.wait(|status| status["controllers"][1]["emergency_stop"] == false);
     hall.done(&["clear"]);
-    hall.wait(|status| status["state"] == "recovering" && standing(status, 1) == "rejoining");
+    hall.wait(|status| status["state"] == "recovering" && health(status, 1) == "rejoining");
     // It holds until a reset (PA91 = 2).
     hall.done(&["home", "--seats-empty"]);
     hall.wait(|status| status["state"] == "parked" && all_stand(status, "ok"));
     // Pressed at rest it is shown at rest, though no frame goes.
     hall.happens("1@X1=1");
-    let pressed = hall.wait(|status| standing(status, 0) == "stopped");
+    let pressed = hall.wait(|status| health(status, 0) == "stopped");
     assert_eq!(pressed["controllers"][0]["emergency_stop"], true, "{pressed}");
 }
 
@@ -129,10 +129,10 @@ fn wide_controller() -> String {
     socket.set_read_timeout(Some(PATIENCE)).expect("it is longer than nothing");
     let address = socket.local_addr().expect("it is bound").to_string();
     std::thread::spawn(move || {
-        let mut octets = [0; 2048];
-        while let Ok((len, from)) = socket.recv_from(&mut octets) {
-            let Ok(read) = ReadRequest::parse(&octets[..len]) else { continue };
-            let mut answer = octets[..16].to_vec();
+        let mut bytes = [0; 2048];
+        while let Ok((len, from)) = socket.recv_from(&mut bytes) {
+            let Ok(read) = ReadRequest::parse(&bytes[..len]) else { continue };
+            let mut answer = bytes[..16].to_vec();
             answer[5] = 2;
             answer[8..12].fill(0);
             answer.resize(16 + 4 * usize::from(read.num), 0);
@@ -149,7 +149,7 @@ fn a_controller_with_registers_of_32_bits_is_out_in_words_and_nothing_moves() {
     hall.rewrite(|config| config.replace(&before, &wide));
     hall.launch();
     hall.serving().heard(|line| line.contains("registers of 32 bits").then_some(()));
-    let out = hall.wait(|status| standing(status, 1) == "error");
+    let out = hall.wait(|status| health(status, 1) == "error");
     assert!(told(&out, "A2").contains("answers with registers of 32 bits"), "{out}");
     assert_eq!(hall.run(&["arm"]).code, Some(75));
     assert_eq!(hall.relay(0).count(), 0, "no motion frame");

@@ -4,14 +4,14 @@ use serde_json::Value;
 
 use crate::hall::Hall;
 
-fn standing(status: &Value, controller: usize) -> &str {
-    status["controllers"][controller]["standing"].as_str().expect("a word")
+fn health(status: &Value, controller: usize) -> &str {
+    status["controllers"][controller]["health"].as_str().expect("a word")
 }
 
 /// Stopped by an emergency stop at the first controller, of which its replies alone tell.
 fn pressed_at_rest() -> Hall {
     let hall = Hall::open();
-    hall.wait(|status| [0, 1].iter().all(|one| standing(status, *one) == "ok"));
+    hall.wait(|status| [0, 1].iter().all(|one| health(status, *one) == "ok"));
     // It is over as soon as it is released.
     hall.happens("pa91=0");
     hall.happens("1@estop=1");
@@ -77,7 +77,7 @@ fn a_dead_controller_holds_up_neither_clear_nor_park_of_the_others_be_it_out_or_
     hall.play("night");
     hall.rises(0);
     hall.relay(1).pull();
-    hall.wait(|status| standing(status, 1) == "lost");
+    hall.wait(|status| health(status, 1) == "lost");
     hall.done(&["stop"]);
     hall.comes_to("stopped");
     cleared_and_parked(&hall);
@@ -85,7 +85,7 @@ fn a_dead_controller_holds_up_neither_clear_nor_park_of_the_others_be_it_out_or_
     hall.done(&["stop"]);
     cleared_and_parked(&hall);
     let seen = hall.status();
-    assert_eq!((standing(&seen, 0), standing(&seen, 1)), ("ok", "lost"));
+    assert_eq!((health(&seen, 0), health(&seen, 1)), ("ok", "lost"));
 }
 
 #[test]
@@ -94,30 +94,30 @@ fn an_emergency_stop_at_a_seat_that_is_out_holds_up_nobody_and_the_seat_stays_ou
     hall.done(&["disable", "A1"]);
     cleared_and_parked(&hall);
     let refused = hall.run(&["enable", "A1"]);
-    assert!(refused.code == Some(75) && refused.stderr.contains("release it at its place"), "{refused:?}");
+    assert!(refused.code == Some(75) && refused.stderr.contains("release its button"), "{refused:?}");
     hall.happens("1@estop=0");
     hall.wait(|status| status["controllers"][0]["emergency_stop"] == false);
     hall.done(&["enable", "A1"]);
     cleared_and_parked(&hall);
-    hall.wait(|status| standing(status, 0) == "ok");
+    hall.wait(|status| health(status, 0) == "ok");
 }
 
 #[test]
 fn an_error_while_parked_is_put_right_and_cleared_and_preflight_blames_nobody_else() {
     let hall = Hall::open();
     hall.happens("1@err=12");
-    let put_right = "put the error right at the controller, then clear; or disable its seat";
+    let put_right = "clear the error at the controller, then clear the hall; or disable its seat";
     let wrong = hall.wait(|status| status["next"] == put_right);
     assert_eq!((wrong["state"].as_str(), wrong["may_clear"].as_bool()), (Some("parked"), Some(false)));
-    assert_eq!(standing(&wrong, 0), "error");
+    assert_eq!(health(&wrong, 0), "error");
     let refused = hall.run(&["clear"]);
-    assert!(refused.code == Some(75) && refused.stderr.contains("put it right there"), "{refused:?}");
+    assert!(refused.code == Some(75) && refused.stderr.contains("clear the error there"), "{refused:?}");
     let preflight = hall.run(&["preflight"]);
     assert!(!preflight.stdout.contains("other-master"), "{preflight:?}");
     hall.happens("1@err=0");
     hall.wait(|status| status["may_clear"] == true);
     cleared_and_parked(&hall);
-    hall.wait(|status| standing(status, 0) == "ok");
+    hall.wait(|status| health(status, 0) == "ok");
     hall.arm("ride");
 }
 
@@ -132,11 +132,11 @@ fn an_emergency_stop_that_its_controller_holds_until_a_reset_is_cleared_and_its_
     hall.happens("1@X1=0");
     hall.wait(|status| status["next"] == "clear, then park or home");
     hall.done(&["clear"]);
-    let out = hall.wait(|status| standing(status, 0) == "excluded");
+    let out = hall.wait(|status| health(status, 0) == "excluded");
     assert!(out["controllers"][0]["why"].as_str().expect("text").contains("until a reset"), "{out}");
     hall.wait(|status| status["next"].as_str().is_some_and(|next| next.starts_with("home, with nobody")));
     hall.done(&["home", "--seats-empty"]);
-    hall.wait(|status| status["state"] == "parked" && standing(status, 0) == "ok");
+    hall.wait(|status| status["state"] == "parked" && health(status, 0) == "ok");
     hall.arm("ride");
     hall.done(&["go"]);
     hall.wait(|status| status["cause"] == "the seats have parked");

@@ -35,8 +35,7 @@ fn a_configuration_is_read_anew_upon_a_signal_and_what_was_set_stays() {
     hall.done(&["load", "ride"]);
     hall.rewrite(|config| config.replace("Hall 1", "Hall 2"));
     hall.serving().signal(Signal::HUP);
-    let is_well =
-        |status: &Value| status["state"] == "parked" && status["controllers"][1]["standing"] == "ok";
+    let is_well = |status: &Value| status["state"] == "parked" && status["controllers"][1]["health"] == "ok";
     let anew = hall.wait(|status| status["hall"] == "Hall 2" && is_well(status));
     assert_eq!(anew["levels"]["motion"], 0.6);
     hall.wait(|status| status["show"]["cue"] == "ride");

@@ -51,7 +51,7 @@ fn by(token: &str, address: SocketAddr, path: &str) -> Reply {
 fn a_token_does_what_its_role_may_and_no_more() {
     let hall = Hall::open_with(|config| {
         let tokens = ["view", "operate", "engineer"].map(|role| {
-            let sha256: String = Sha256::digest(role).iter().map(|octet| format!("{octet:02x}")).collect();
+            let sha256: String = Sha256::digest(role).iter().map(|byte| format!("{byte:02x}")).collect();
             format!("[[api.token]]\nname = \"{role}\"\nrole = \"{role}\"\nsha256 = \"{sha256}\"\n")
         });
         config + "[api]\nlisten = [\"127.0.0.1:0\"]\n" + &tokens.concat()

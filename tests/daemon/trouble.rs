@@ -14,8 +14,8 @@ use crate::hall::Hall;
 /// A rival that asks would see that it is not alone, and not begin.
 const UNASKING: [&str; 1] = ["--no-acks"];
 
-fn standing(status: &Value, controller: usize) -> &str {
-    status["controllers"][controller]["standing"].as_str().expect("a word")
+fn health(status: &Value, controller: usize) -> &str {
+    status["controllers"][controller]["health"].as_str().expect("a word")
 }
 
 /// Connections that send half a request and stay, and are made anew when there are many, until this is dropped.
@@ -53,7 +53,7 @@ impl Drop for Flood {
 
 /// Whether frames still go to it; acks may come late where the machine is busy.
 fn plays_on(status: &Value, controller: usize) -> bool {
-    ["ok", "degraded"].contains(&standing(status, controller))
+    ["ok", "degraded"].contains(&health(status, controller))
 }
 
 /// The warning about a controller that is no more than news.
@@ -91,7 +91,7 @@ fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_a
     let hall = Hall::open();
     hall.play("night");
     hall.relay(1).pull();
-    let lost = hall.wait(|status| standing(status, 1) == "lost");
+    let lost = hall.wait(|status| health(status, 1) == "lost");
     assert!(lost["state"] == "playing" && plays_on(&lost, 0), "{lost}");
     let told = warning(&lost, "A2").expect("it is told");
     assert!(told["text"].as_str().unwrap().contains("missing for over 50 ms"), "{told}");
@@ -102,7 +102,7 @@ fn a_plug_pulled_in_mid_show_is_named_the_others_play_on_and_put_back_it_joins_a
     assert!(acked(&later) > acked(&lost) && later["state"] == "playing", "{later}");
 
     hall.relay(1).put_back();
-    let back = hall.wait(|status| standing(status, 1) == "ok");
+    let back = hall.wait(|status| health(status, 1) == "ok");
     assert!(warning(&back, "A2").is_none(), "{back}");
     hall.relay(1).count();
     hall.relay(1).wait_for(|_| true);
@@ -119,7 +119,7 @@ fn a_seat_whose_plug_was_pulled_in_mid_show_and_is_put_back_after_it_comes_down_
     hall.comes_to("parked");
     hall.relay(1).put_back();
     let down = "park, or start a show: it joins slowly";
-    let up = hall.wait(|status| status["next"] == down && standing(status, 1) == "rejoining");
+    let up = hall.wait(|status| status["next"] == down && health(status, 1) == "rejoining");
     let warnings = up["warnings"].as_array().expect("a list");
     let told = warnings.iter().find(|one| one["id"] == "controller-rejoining").expect("it is told");
     assert_eq!((told["controller"].as_str(), told["remedy"].as_str()), (Some("A2"), Some(down)));
@@ -129,7 +129,7 @@ fn a_seat_whose_plug_was_pulled_in_mid_show_and_is_put_back_after_it_comes_down_
 
     assert_eq!(hall.done(&["park"]).code, Some(0));
     hall.relay(1).wait_for(|frame| frame.positions[0].0 == 0);
-    hall.wait(|status| status["state"] == "parked" && standing(status, 1) == "ok");
+    hall.wait(|status| status["state"] == "parked" && health(status, 1) == "ok");
     assert_ne!(hall.status()["next"], down);
     assert!(hall.end().rest_in_park());
 }
@@ -138,13 +138,13 @@ fn a_seat_whose_plug_was_pulled_in_mid_show_and_is_put_back_after_it_comes_down_
 fn a_plug_pulled_between_shows_is_seen_and_put_back_it_is_well_again() {
     let hall = Hall::open();
     // How the controllers stand may be told a moment later than the state.
-    hall.wait(|status| [0, 1].iter().all(|one| standing(status, *one) == "ok"));
+    hall.wait(|status| [0, 1].iter().all(|one| health(status, *one) == "ok"));
     hall.relay(0).pull();
-    let lost = hall.wait(|status| standing(status, 0) == "lost");
-    assert_eq!((lost["state"].as_str(), standing(&lost, 1)), (Some("parked"), "ok"));
+    let lost = hall.wait(|status| health(status, 0) == "lost");
+    assert_eq!((lost["state"].as_str(), health(&lost, 1)), (Some("parked"), "ok"));
     assert!(warning(&lost, "A1").is_some(), "{lost}");
     hall.relay(0).put_back();
-    let back = hall.wait(|status| standing(status, 0) == "ok");
+    let back = hall.wait(|status| health(status, 0) == "ok");
     assert!(warning(&back, "A1").is_none(), "{back}");
     hall.arm("ride");
     assert_eq!(hall.end().motion(), 0);
@@ -156,7 +156,7 @@ fn a_controller_that_reboots_in_mid_show_is_out_until_a_person_homes_it() {
     hall.play("night");
     hall.lives_on(200);
     hall.happens("2@reboot");
-    let out = hall.wait(|status| standing(status, 1) == "excluded");
+    let out = hall.wait(|status| health(status, 1) == "excluded");
     assert!(out["state"] == "playing" && plays_on(&out, 0), "{out}");
     let told = warning(&out, "A2").expect("it is told");
     assert!(told["remedy"].as_str().unwrap().contains("home it"), "{told}");
@@ -167,7 +167,7 @@ fn a_controller_that_reboots_in_mid_show_is_out_until_a_person_homes_it() {
     hall.done(&["park"]);
     hall.comes_to("parked");
     hall.done(&["home", "--seats-empty"]);
-    let home = hall.wait(|status| status["state"] == "parked" && standing(status, 1) == "ok");
+    let home = hall.wait(|status| status["state"] == "parked" && health(status, 1) == "ok");
     assert!(warning(&home, "A2").is_none(), "{home}");
     hall.arm("ride");
     hall.done(&["go"]);
@@ -182,10 +182,10 @@ fn a_controller_that_reboots_between_shows_is_out_until_a_person_homes_it() {
     (0..4).for_each(|_| drop(hall.done(&["preflight"])));
     hall.lives_on(50);
     hall.happens("1@reboot");
-    let out = hall.wait(|status| standing(status, 0) == "excluded");
-    assert_eq!((out["state"].as_str(), standing(&out, 1)), (Some("parked"), "ok"));
+    let out = hall.wait(|status| health(status, 0) == "excluded");
+    assert_eq!((out["state"].as_str(), health(&out, 1)), (Some("parked"), "ok"));
     hall.done(&["home", "--seats-empty"]);
-    hall.wait(|status| status["state"] == "parked" && standing(status, 0) == "ok");
+    hall.wait(|status| status["state"] == "parked" && health(status, 0) == "ok");
     assert_eq!(hall.end().motion(), 0);
 }
 
@@ -198,7 +198,7 @@ fn another_machine_that_drives_a_seat_at_rest_is_a_fault_and_the_seat_is_homed_b
     assert!(fault["cause"].as_str().expect("text").contains("another master sends frames"), "{fault}");
     assert_eq!(fault["next"], "stop the other master, then clear");
     assert_eq!(hall.run(&["go"]).code, Some(75));
-    let excluded = hall.wait(|status| [0, 1].map(|one| standing(status, one)) == ["excluded"; 2]);
+    let excluded = hall.wait(|status| [0, 1].map(|one| health(status, one)) == ["excluded"; 2]);
     let remedy = warning(&excluded, "A1").expect("it is told")["remedy"].as_str().expect("text");
     assert!(remedy.starts_with("stop the other machine"), "{remedy}");
     assert!(rival.wait().expect("it is ours").success());
@@ -225,7 +225,7 @@ fn the_halls_homing_refuses_a_controller_that_would_not_search_its_zero() {
         texts.filter(|text| text.contains("without searching it (PA0e = 1)")).count() == 2
     };
     let status = hall.wait(|status| status["state"] == "fault" && told(status));
-    assert_eq!(status["cause"], "A1: a seat did not get home");
+    assert_eq!(status["cause"], "A1: a seat failed to home");
 }
 
 #[test]

@@ -11,10 +11,10 @@ use std::time::Duration;
 use counting::Calls;
 use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
-use kinocue::health::{Groups, Health, Notice};
+use kinocue::health::{Groups, HealthTable, Notice};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
-use kinocue::state::{Event, Machine, Request, Ride, State, Why};
+use kinocue::state::{Event, Machine, PlayMode, State, Transition, Why};
 use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::FrameNo;
 use stage::{CONTROLLERS, Deed, Outcome, PERIOD, play};
@@ -54,11 +54,11 @@ fn everything() -> Vec<(u64, Deed)> {
     let mut found = [0.0; MAX_AXES];
     found[..3].copy_from_slice(&[0.2, 0.5, 0.3]);
     vec![
-        (1_700, ask(Request::Pause)),
+        (1_700, ask(Transition::Pause)),
         (2_100, Deed::Seek(ShowTime::from_millis(1_000))),
-        (2_200, ask(Request::Resume)),
-        (2_300, ask(Request::Pause)), // in the middle of the join
-        (2_700, ask(Request::Resume)),
+        (2_200, ask(Transition::Resume)),
+        (2_300, ask(Transition::Pause)), // in the middle of the join
+        (2_700, ask(Transition::Resume)),
         (4_500, Deed::Seek(ShowTime::from_millis(500))),
         (4_600, Deed::Seek(ShowTime::from_millis(200))),
         (6_400, Deed::Mix(0, Mix { motion: 0.4, vibration: 0.5, ..Mix::FULL })),
@@ -72,11 +72,11 @@ fn everything() -> Vec<(u64, Deed)> {
         (14_600, Deed::Found(1, found)),
         (17_000, Deed::Oversleep(80)),
         (17_010, Deed::Stop),
-        (17_500, ask(Request::Resume)), // refused: a stop is latched
+        (17_500, ask(Transition::Resume)), // refused: a stop is latched
         (17_550, Deed::Load),
-        (17_600, ask(Request::Clear)),
+        (17_600, ask(Transition::Clear)),
         (17_700, Deed::See(Alarm::Event(Event::PositionsRead))),
-        (17_800, ask(Request::Park)),
+        (17_800, ask(Transition::Park)),
     ]
 }
 
@@ -86,7 +86,7 @@ fn commands_alarms_levels_and_a_stop_neither_allocate_nor_free_on_the_tick_threa
     assert_eq!(calls, NOTHING);
     assert_eq!((ended.missed, ended.unposted), (80, 0), "{ended:?}");
     let states: Vec<State> = news.iter().filter_map(entered).collect();
-    let following = State::Playing(Ride::Following);
+    let following = State::Playing(PlayMode::Following);
     for state in [following, State::Paused, State::Stopping, State::Stopped, State::Recovering, State::Parked]
     {
         assert!(states.contains(&state), "{state:?} of {states:?}");
@@ -137,7 +137,7 @@ fn the_allocator_counts_its_own_thread_and_no_other() {
 fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_start() {
     let mut now = MonoTime::default() + PERIOD;
     let mut hall = Machine::new(now);
-    let mut health = Health::new(Groups::named(["A", "A", "B"]), LossPolicy::Park, 1, PERIOD);
+    let mut health = HealthTable::new(Groups::named(["A", "A", "B"]), LossPolicy::Park, 1, PERIOD);
     let mut notices = 0;
     let before = Calls::so_far();
     for tick in 1..=10_000_u32 {
@@ -155,7 +155,7 @@ fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_s
             }
         });
         hall.event(Event::Late, now);
-        let _refused = hall.request(Request::Go, now);
+        let _refused = hall.request(Transition::Go, now);
         hall.tick(now);
     }
     assert_eq!(Calls::so_far().since(before), Calls { allocations: 0, frees: 0 });

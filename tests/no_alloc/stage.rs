@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::app::Staged;
+use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
@@ -21,7 +21,7 @@ use kinocue::rt::{
     Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
     Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
 };
-use kinocue::state::Request;
+use kinocue::state::Transition;
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
@@ -41,7 +41,7 @@ pub(crate) enum Deed {
     /// The tick thread sleeps that many periods too long.
     Oversleep(u32),
     /// Somebody asks for something.
-    Ask(Request),
+    Ask(Transition),
     /// Somebody wants to go on elsewhere in the film.
     Seek(ShowTime),
     /// The show is exchanged for another one.
@@ -203,10 +203,10 @@ impl Clock for Drains<'_> {
 
 /// A controller that answers every frame, until it is sent an empty datagram.
 fn answer(peer: &UdpSocket, pace: &Pace) {
-    let (mut octets, mut buf) = ([0; MAX_LEN], [0; MAX_LEN]);
+    let (mut bytes, mut buf) = ([0; MAX_LEN], [0; MAX_LEN]);
     loop {
-        let (len, from) = peer.recv_from(&mut octets).expect("loopback works");
-        let Ok(frame) = MotionRequest::parse(&octets[..len]) else { return };
+        let (len, from) = peer.recv_from(&mut bytes).expect("loopback works");
+        let Ok(frame) = MotionRequest::parse(&bytes[..len]) else { return };
         let MotionRequest { timing, channel, frame, time_ms, positions, extend, vibration, .. } = frame;
         let code = ReplyCode::Running;
         let reply = MotionReply {
@@ -241,13 +241,13 @@ fn ride() -> Timeline {
 }
 
 /// The ride to a controller of six axes and one of three, in loops until it is stopped.
-fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (Staged, Vec<Watched>) {
+fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (StagedShow, Vec<Watched>) {
     let timeline = ride();
     let tos = [format!("{},axes=6", addresses[0]), format!("{},axes=3", addresses[1])];
     let config = from_to_args(&tos, &[], timeline.axes()).expect("the addresses differ");
     let show =
         Show { rate: Rate::from_hz(1000.0), timing: Timing::Absolute, start: ShowTime::ZERO, plays: 0 };
-    let staged = Staged::new(&config, timeline, show, Manner { level: 1.0, silent: false })
+    let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false })
         .expect("the ride is gentle");
     (staged, config.controllers.iter().map(Watched::of).collect())
 }

@@ -52,7 +52,7 @@ fn a_mute_controller_is_homed_and_unavailable() {
     let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json"]).report_of(69);
     let one = first(&report);
     assert_eq!(
-        (&one["homing"], &one["lost"], &one["port_closed"]),
+        (&one["park_frames"], &one["lost"], &one["port_closed"]),
         (&1.into(), &one["sent"], &0.into()),
         "{one}"
     );
@@ -126,9 +126,9 @@ fn strangers_and_strays_are_counted_and_disturb_nothing() {
     let playing = Playing::start(&folder.nod(&[0.1]), &[relay.to()], &["--json"]);
     let host = relay.wait_for(|frame| frame.frame.0 == 10);
     let stranger = UdpSocket::bind("127.0.0.1:0").expect("a free port");
-    for octets in [&b"hello"[..], &[0x55, 0xaa, 0, 0, 0x14, 2], &[]] {
-        stranger.send_to(octets, host).expect("loopback takes it");
-        relay.send(octets, host);
+    for bytes in [&b"hello"[..], &[0x55, 0xaa, 0, 0, 0x14, 2], &[]] {
+        stranger.send_to(bytes, host).expect("loopback takes it");
+        relay.send(bytes, host);
     }
     let report = playing.finish().report_of(0);
     let one = first(&report);

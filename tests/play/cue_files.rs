@@ -10,7 +10,7 @@ use super::{Folder, pulses, shipped};
 fn what_is_bad_is_refused_before_anything_moves_with_its_place_and_exit_code() {
     let folder = Folder::new();
     let sim = Sim::start(1, &[]);
-    let file = |name: &str, octets: &[u8]| folder.write(name, octets);
+    let file = |name: &str, bytes: &[u8]| folder.write(name, bytes);
     let whole = std::fs::read(shipped("storm.mcap")).expect("it ships");
     let long_line = format!("time_ms,a1\n0,0\n10,{}\n", "0".repeat(70_000));
     let thirteen: String = (1..=13).map(|axis| format!(",a{axis}")).collect();
@@ -102,10 +102,10 @@ fn rows_of_a_motion_editor_play_and_each_is_reached_when_its_time_is_over() {
 #[test]
 fn twenty_bytes_a_second_play_once_they_are_converted() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
-    let octets: Vec<u8> = (0..34_u8)
+    let bytes: Vec<u8> = (0..34_u8)
         .flat_map(|row| [29_u8.saturating_sub(row).min(row) * 2, 29_u8.saturating_sub(row).min(row), 0])
         .collect();
-    let (raw, cue) = (folder.write("ride.bin", octets), folder.path("ride.csv"));
+    let (raw, cue) = (folder.write("ride.bin", bytes), folder.path("ride.csv"));
     let [raw, cue_text] = [&raw, &cue].map(|path| path.to_str().expect("text"));
     let run = kinocue(&["convert", raw, cue_text, "--from", "u8", "--axes", "3", "--rate", "20"]);
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -165,7 +165,7 @@ fn a_seat_that_is_not_asked_is_brought_to_its_own_park_pose_and_told_where_that_
     let [cue, config] = [&cue, &config].map(|path| path.to_str().expect("text"));
     let run = kinocue(&["play", cue, "--config", config, "--json", "--no-acks"]);
     let report = run.report_of(0);
-    let slow = [0, 1].map(|index| report["controllers"][index]["homing"].as_u64());
+    let slow = [0, 1].map(|index| report["controllers"][index]["park_frames"].as_u64());
     assert_eq!(slow, [Some(1); 2], "where they are nobody asked");
     let notes: Vec<&str> = run.stderr.lines().filter(|line| line.contains("PA0b")).collect();
     assert!(matches!(notes[..], [note] if note.contains("A1") && note.contains("200 mm")), "{notes:?}");

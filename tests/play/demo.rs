@@ -105,7 +105,7 @@ fn assert_all_acked(report: &Value) {
     let controllers = report["controllers"].as_array().expect("a list");
     assert_eq!(controllers.len(), 4);
     for one in controllers {
-        assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()), "{one}");
+        assert_eq!((&one["acked"], &one["park_frames"]), (&one["sent"], &0.into()), "{one}");
     }
 }
 

@@ -72,7 +72,7 @@ fn ten_and_twelve_axes_go_in_one_frame_each_to_seats_that_are_homed_first() {
         assert_eq!(seen.rows[0].commanded.len(), axes);
         assert_eq!(seen.rows[0].time_ms, 3000, "axes past the sixth cannot tell where they are");
     }
-    assert_eq!(report["controllers"][0]["homing"], 1);
+    assert_eq!(report["controllers"][0]["park_frames"], 1);
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn absolute_time_goes_on_by_one_period_from_frame_to_frame() {
 }
 
 #[test]
-fn a_controller_whose_port_out_takes_four_octets_with_vibration_shakes_and_switches() {
+fn a_controller_whose_port_out_takes_four_bytes_with_vibration_shakes_and_switches() {
     let folder = Folder::new();
     let row = |at_ms: u32| format!("{at_ms},0.1{}\n", if at_ms < 2_200 { ",0,0,0" } else { ",20,0.003,1" });
     let rows: String = (0..=2_400).step_by(10).map(row).collect();

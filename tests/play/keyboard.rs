@@ -90,7 +90,7 @@ pub(super) fn terminal(columns: u16) -> (File, OwnedFd) {
 pub(super) fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String> {
     let (written, read) = channel();
     std::thread::spawn(move || {
-        let mut octets = [0; 4096];
+        let mut bytes = [0; 4096];
         loop {
             let mut both = [
                 PollFd::new(&terminal, PollFlags::IN),
@@ -100,8 +100,8 @@ pub(super) fn read_all(mut terminal: File, open: PipeReader) -> Receiver<String>
             if !both[1].revents().is_empty() {
                 return;
             }
-            let Ok(count @ 1..) = terminal.read(&mut octets) else { return };
-            let _ = written.send(String::from_utf8_lossy(&octets[..count]).into_owned()); // nobody may be waiting
+            let Ok(count @ 1..) = terminal.read(&mut bytes) else { return };
+            let _ = written.send(String::from_utf8_lossy(&bytes[..count]).into_owned()); // nobody may be waiting
         }
     });
     read
@@ -135,7 +135,7 @@ fn level_trim_seeks_and_help_show_on_the_live_lines() {
     terminal.press("?");
     terminal.wait_for("the emergency stop is hard-wired");
     terminal.press("\u{1b}[C\u{1b}[C");
-    terminal.wait_for("joining: sent elsewhere in the cue by the operator");
+    terminal.wait_for("joining: moved to another place by the operator");
     terminal.wait_for(": 00:1"); // ten seconds on
     terminal.press("p");
     terminal.wait_for("parking: parked by the operator");
@@ -150,7 +150,7 @@ fn a_stop_stays_until_it_is_cleared_and_the_seats_park_once_they_have_been_read_
     terminal.press("s");
     terminal.wait_for("stopped: stopped by the operator; next: clear, then park");
     terminal.press("p");
-    terminal.wait_for("cannot park while stopped: it stays so until it is cleared; clear first");
+    terminal.wait_for("cannot park while stopped: it is latched; clear it first");
     terminal.press("c");
     terminal.wait_for("recovering: cleared by the operator; next: park");
     terminal.press("p");

@@ -34,9 +34,9 @@ impl Folder {
         self.0.path().join(name)
     }
 
-    fn write(&self, name: &str, octets: impl AsRef<[u8]>) -> PathBuf {
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
-        std::fs::write(&path, octets).expect("the folder is ours");
+        std::fs::write(&path, bytes).expect("the folder is ours");
         path
     }
 

@@ -75,7 +75,7 @@ fn a_start_in_the_middle_joins_the_cue_within_the_seats_limits() {
     let (folder, sim) = (Folder::new(), Sim::one(&["--pa", "06=0"]));
     let report = play(&swing(&folder), &sim.to(), &["--json", "--start", "00:01.2"]).report_of(0);
     let one = &report["controllers"][0];
-    assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()));
+    assert_eq!((&one["acked"], &one["park_frames"]), (&one["sent"], &0.into()));
     let seen = sim.end();
     let (commanded, executed) = fastest(&seen.rows);
     assert!(commanded < LIMIT * SLACK && executed < LIMIT * SLACK, "{commanded}, {executed}");

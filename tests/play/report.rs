@@ -31,7 +31,7 @@ fn assert_balanced(one: &Value, ticks: &Value) {
     assert!(one["name"].is_string() && one["address"].is_string(), "{one}");
     assert_eq!(count("asked"), count("acked") + count("refused") + count("lost"), "{one}");
     let sent = count("sent") + count("send_failed");
-    assert_eq!(sent, ticks.as_u64().expect("a count") + count("homing"), "{one}");
+    assert_eq!(sent, ticks.as_u64().expect("a count") + count("park_frames"), "{one}");
     assert!(count("asked") <= count("sent"), "{one}");
     for field in ["duplicate", "stale", "stray", "port_closed"] {
         count(field);
@@ -60,12 +60,15 @@ fn a_play_accounts_for_every_frame_in_a_report_with_every_field() {
         (&report["cue"], &report["result"]),
         (&cue.to_str().expect("text").into(), &"completed".into())
     );
-    assert_eq!((&report["rate_hz"], &report["strangers"]), (&100.0.into(), &0.into()));
+    assert_eq!(
+        (&report["format"], &report["rate_hz"], &report["strangers"]),
+        (&2.into(), &100.0.into(), &0.into())
+    );
     assert!(report["lateness_us"]["max"].is_number());
     for (one, name) in report["controllers"].as_array().expect("a list").iter().zip(["A1", "c2"]) {
         assert_eq!(one["name"], name);
         assert_eq!((&one["asked"], &one["acked"]), (&one["sent"], &one["sent"]), "{one}");
-        for field in ["homing", "duplicate", "stale", "stray", "send_failed", "port_closed"] {
+        for field in ["park_frames", "duplicate", "stale", "stray", "send_failed", "port_closed"] {
             assert_eq!(one[field], 0, "{field}: {one}");
         }
         assert!(one["ack_us"]["p50"].as_f64() > Some(0.0), "{one}");
@@ -90,7 +93,7 @@ fn people_read_the_report_on_stderr_and_stdout_stays_empty() {
     }
     let table = run.stderr.lines().find(|line| line.contains("controller ")).expect("a table");
     let columns: Vec<&str> = table.split_whitespace().collect();
-    let counts = "sent asked acked refused lost homing dup stale stray failed closed";
+    let counts = "sent asked acked refused lost park dup stale stray failed closed";
     assert!(columns.join(" ").contains(counts), "{table}");
     assert!(!run.stderr.contains('\r') && !run.stderr.contains('\u{1b}'), "no progress in a pipe");
 }
@@ -117,7 +120,7 @@ fn a_controller_that_answers_no_frame_is_missed_though_few_ask() {
     let report = run.report_of(69);
     let one = &report["controllers"][0];
     assert_eq!((&one["acked"], &one["lost"]), (&0.into(), &one["asked"]), "{one}");
-    assert_eq!(one["sent"], one["homing"], "where it is nobody knows, so it is not led anywhere: {one}");
+    assert_eq!(one["sent"], one["park_frames"], "where it is nobody knows, so it is not led anywhere: {one}");
 }
 
 #[test]
@@ -161,7 +164,7 @@ fn without_acks_nothing_is_asked_read_or_judged_and_every_seat_is_homed() {
         assert_eq!(one[field], 0, "{field}: {one}");
     }
     assert_eq!(
-        (&one["homing"], &one["ack_us"]["p50"], &one["ack_us"]["max"]),
+        (&one["park_frames"], &one["ack_us"]["p50"], &one["ack_us"]["max"]),
         (&1.into(), &Value::Null, &Value::Null)
     );
     let seen = sim.end();

@@ -41,7 +41,7 @@ fn ctrl_c_and_sigterm_park_the_seats_turn_effects_off_and_report_a_stop() {
                     let line = format!("kinocue: {line}\n");
                     assert_eq!(run.stderr.matches(&line).count(), 1, "{line}: {}", run.stderr);
                 }
-                assert_eq!((&one["acked"], &one["homing"]), (&one["sent"], &0.into()), "{one}");
+                assert_eq!((&one["acked"], &one["park_frames"]), (&one["sent"], &0.into()), "{one}");
                 let seen = sim.end();
                 assert!(seen.rest_in_park(), "{:?}", seen.controllers);
                 assert_eq!(seen.farthest(0), pulses(0.15), "it was at its top");
@@ -77,7 +77,7 @@ fn a_second_ctrl_c_ends_at_once_and_the_next_play_joins_from_where_that_left_the
     assert_eq!((run.code, run.stdout.as_str()), (Some(130), ""), "{run:?}");
     let report = play(&folder.nod(&[0.1, 0.1]), &sim.to(), &["--json", "--time", "absolute"]).report_of(0);
     let one = &report["controllers"][0];
-    assert_eq!((&one["homing"], &one["acked"]), (&0.into(), &one["sent"]), "{one}");
+    assert_eq!((&one["park_frames"], &one["acked"]), (&0.into(), &one["sent"]), "{one}");
     let seen = sim.end();
     let home = seen.rows.iter().rposition(|row| row.frame == 1).expect("two plays");
     let first = &seen.rows[home];
@@ -96,7 +96,7 @@ fn a_stop_while_the_seats_are_brought_home_ends_without_playing() {
     playing.signal(Signal::INT);
     let report = playing.finish().report_of(0);
     assert_eq!(
-        (&report["result"], &report["controllers"][0]["homing"]),
+        (&report["result"], &report["controllers"][0]["park_frames"]),
         (&"stopped".into(), &Value::from(1))
     );
     assert_eq!(report["ticks"], 0);

@@ -1,6 +1,6 @@
 -- Messages of the IMAX, SMC and MBOX motion controllers for Wireshark and tshark, both directions.
 --
--- Sources: SMC manual 2.2 and 2.3, IMAX manual 2.2 and 2.3. Where a message is refused, it is refused at the same octet
+-- Sources: SMC manual 2.2 and 2.3, IMAX manual 2.2 and 2.3. Where a message is refused, it is refused at the same byte
 -- as by `kinocue decode`. Runs with Lua 5.1 to 5.4, so without bit operators.
 
 local HOST_PORT, CONTROLLER_PORT = 8410, 7408
@@ -15,7 +15,7 @@ local EVERY_STATION = 0xffff
 
 local RUNNING = 2
 
--- What a message is, by the high octet of its function code.
+-- What a message is, by the high byte of its function code.
 local FAMILIES = {
   [0x10] = { kind = "report", report = "report of registers" },
   [0x11] = { kind = "read", request = "read registers" },
@@ -79,9 +79,9 @@ kinocue.prefs.dialect = Pref.enum(
   false
 )
 
--- Nobody is known to have seen a frame with vibration; the SMC manual prints four octets (2.2.2.9).
+-- Nobody is known to have seen a frame with vibration; the SMC manual prints four bytes (2.2.2.9).
 kinocue.prefs.vibration_port_octets = Pref.enum(
-  "Octets of Port Out with vibration",
+  "Bytes of Port Out with vibration",
   2,
   "Of the outputs in frames with vibration, and of the inputs in the answers",
   { { 1, "2", 2 }, { 2, "4", 4 } },
@@ -116,10 +116,10 @@ local f = {
   axes = ProtoField.uint16("kinocue.axes", "Axes", base.DEC),
   force = ProtoField.int16("kinocue.force", "Force", base.DEC),
   servo_error = ProtoField.uint16("kinocue.servo.error", "Servo error", base.DEC),
-  surplus = ProtoField.bytes("kinocue.surplus", "Octets after the layout"),
+  surplus = ProtoField.bytes("kinocue.surplus", "Bytes after the layout"),
   answers = ProtoField.framenum("kinocue.answers", "Answers", base.NONE, frametype.REQUEST),
   latency = ProtoField.double("kinocue.latency", "Ack latency (ms)"),
-  bad_octet = ProtoField.uint32("kinocue.malformed.octet", "Malformed at octet", base.DEC),
+  bad_byte = ProtoField.uint32("kinocue.malformed.byte", "Malformed at byte", base.DEC),
   bad_why = ProtoField.string("kinocue.malformed.why", "Malformed because"),
 }
 
@@ -167,7 +167,7 @@ local e = {
   ),
   surplus = ProtoExpert.new(
     "kinocue.surplus.expert",
-    "Octets after the layout, which controllers let pass",
+    "Bytes after the layout, which controllers let pass",
     expert.group.PROTOCOL,
     expert.severity.NOTE
   ),
@@ -184,20 +184,20 @@ local function u16(tvb, at)
   return tvb(at, 2):uint()
 end
 
-local function fault(octet, why, ...)
-  return nil, { octet = octet, why = string.format(why, ...) }
+local function fault(byte, why, ...)
+  return nil, { byte = byte, why = string.format(why, ...) }
 end
 
-local function no_axes(octet, found)
-  return fault(octet, "%d names no number of axes; 3 to 12 axes are possible", found)
+local function no_axes(byte, found)
+  return fault(byte, "%d names no number of axes; 3 to 12 axes are possible", found)
 end
 
 local function ends(len, need)
-  return fault(len, "ends after %d octets; this message takes %d", len, need)
+  return fault(len, "ends after %d bytes; this message takes %d", len, need)
 end
 
 local function goes_on(len, need)
-  return fault(need, "goes on to %d octets; this message takes %d", len, need)
+  return fault(need, "goes on to %d bytes; this message takes %d", len, need)
 end
 
 local function port_len(vibrating)
@@ -292,10 +292,10 @@ local function read_status(tvb, message)
   return message
 end
 
--- The message in a datagram; or nil, and at which octet and why there is none.
+-- The message in a datagram; or nil, and at which byte and why there is none.
 local function read(tvb)
   local len = tvb:len()
-  local short = "ends after %d octets, inside the header; %d are needed"
+  local short = "ends after %d bytes, inside the header; %d are needed"
   if len < 6 then
     return fault(len, short, len, HEADER_LEN)
   end
@@ -580,20 +580,20 @@ local function show(tree, tvb, message)
   if tvb:len() > message.len then
     local range = tvb(message.len)
     tree:add(f.surplus, range):add_proto_expert_info(e.surplus)
-    table.insert(note, string.format("%d octets after the layout", range:len()))
+    table.insert(note, string.format("%d bytes after the layout", range:len()))
   end
   return FUNCTIONS[message.code] .. ": " .. table.concat(note, ", ")
 end
 
--- What can be said of octets that are no message.
+-- What can be said of bytes that are no message.
 local function show_malformed(tree, tvb, bad)
   if tvb:len() >= 6 then
     tree:add(f.confirm, tvb(0, 2))
     tree:add(f.pass, tvb(2, 2))
     tree:add(f.code, tvb(4, 2))
   end
-  local words = string.format("octet %d: %s", bad.octet, bad.why)
-  tree:add(f.bad_octet, bad.octet):set_generated()
+  local words = string.format("byte %d: %s", bad.byte, bad.why)
+  tree:add(f.bad_byte, bad.byte):set_generated()
   tree:add(f.bad_why, bad.why):set_generated()
   tree:add_proto_expert_info(e.malformed, words)
   return "malformed: " .. words
@@ -604,7 +604,7 @@ function kinocue.dissector(tvb, pinfo, tree)
   local subtree = tree:add(kinocue, tvb())
   local info
   if tvb:len() < tvb:reported_len() then
-    info = string.format("cut: the capture kept %d of %d octets", tvb:len(), tvb:reported_len())
+    info = string.format("cut: the capture kept %d of %d bytes", tvb:len(), tvb:reported_len())
     subtree:add_proto_expert_info(e.cut, info)
   else
     local message, bad = read(tvb)

@@ -20,7 +20,7 @@ use crate::sys;
 
 /// How long an upload and its proof may take.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// Octets that are read of the file at a time.
+/// Bytes that are read of the file at a time.
 const PIECE: usize = 64 << 10;
 
 /// The commands of the library.
@@ -29,9 +29,9 @@ pub(in crate::cli) enum Command {
     /// Lists the cues of the daemon's library.
     #[command(after_help = "Examples:\n  kinocue cues\n  kinocue cues --json")]
     Cues(ServerArgs),
-    /// Puts a cue file into the daemon's library.
+    /// Uploads a cue file to the daemon's library.
     ///
-    /// It is checked and its limits are proved first; a bad one is not taken.
+    /// The file is checked and proved first; a bad one is rejected.
     #[command(after_help = "\
 Examples:
   kinocue upload coaster.csv
@@ -66,7 +66,7 @@ struct Cue {
     proof: Proved,
 }
 
-/// Whether it keeps the limits of the hall.
+/// True if it keeps the limits of the hall.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct Proved {
@@ -128,7 +128,7 @@ fn upload(args: &UploadArgs) -> Result<Exit, Failure> {
 
 /// The name of the file without its ending, where that can be an id.
 fn id_of(file: &Path) -> Result<String, Failure> {
-    let fits = |octet: u8| octet.is_ascii_lowercase() || octet.is_ascii_digit() || b"_-".contains(&octet);
+    let fits = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"_-".contains(&byte);
     let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     if (1..=64).contains(&stem.len()) && stem.bytes().all(fits) {
         return Ok(stem.to_owned());

@@ -17,7 +17,7 @@ use crate::cli::{Exit, Failure, OrExit as _};
 pub(super) const QUIET: Duration = Duration::from_secs(2);
 /// How long it may take to begin.
 const BEGINNING: Duration = Duration::from_secs(5);
-/// The longest event, octets.
+/// The longest event, bytes.
 const LONGEST: usize = 64 << 20;
 
 /// A stream of events.
@@ -67,7 +67,7 @@ impl Events {
 /// What has come of the stream and is no event yet.
 #[derive(Debug, Default)]
 struct Lines {
-    octets: Vec<u8>,
+    bytes: Vec<u8>,
     /// How much of that has been looked through.
     seen: usize,
     /// The data of the event that is under way.
@@ -76,17 +76,17 @@ struct Lines {
 
 impl Lines {
     fn take(&mut self, piece: &[u8]) -> Result<(), &'static str> {
-        self.octets.drain(..self.seen);
+        self.bytes.drain(..self.seen);
         self.seen = 0;
-        self.octets.extend_from_slice(piece);
+        self.bytes.extend_from_slice(piece);
         let data = self.data.as_ref().map_or(0, String::len);
-        if self.octets.len() + data > LONGEST { Err("it sends an event without end") } else { Ok(()) }
+        if self.bytes.len() + data > LONGEST { Err("it sends an event without end") } else { Ok(()) }
     }
 
     /// The data of the next event that is whole. Names of events, ids and comments are of no use to us.
     fn event(&mut self) -> Option<String> {
-        while let Some(len) = self.octets[self.seen..].iter().position(|&octet| octet == b'\n') {
-            let line = &self.octets[self.seen..self.seen + len];
+        while let Some(len) = self.bytes[self.seen..].iter().position(|&byte| byte == b'\n') {
+            let line = &self.bytes[self.seen..self.seen + len];
             self.seen += len + 1;
             let line = line.strip_suffix(b"\r").unwrap_or(line);
             if line.is_empty() {

@@ -20,7 +20,7 @@ use crate::sys::clock::wall_now_ns;
 
 /// How long the socket may take to let us in.
 const ENTRY: Duration = Duration::from_secs(2);
-/// The longest reply that is read, octets.
+/// The longest reply that is read, bytes.
 const LONGEST: usize = 64 << 20;
 
 /// A reply, whole.

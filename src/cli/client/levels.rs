@@ -10,16 +10,16 @@ use super::server::{ServerArgs, in_path};
 use super::view::Status;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
-use crate::hall::LevelsChange;
+use crate::control::LevelsChange;
 use crate::time::parse_trim;
 
 /// The commands that set what lasts.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum Command {
-    /// Moves the motion against the film, later or earlier.
+    /// Offsets the motion against the film, later or earlier.
     #[command(after_help = "Examples:\n  kinocue trim +80ms\n  kinocue trim -120\n  kinocue trim 0")]
     Trim(TrimArgs),
-    /// Sets how much of the motion and the vibration the seats make.
+    /// Sets the level of motion and vibration.
     #[command(
         override_usage = "kinocue level [motion|vibration] <LEVEL> [OPTIONS]",
         after_help = "\
@@ -33,22 +33,22 @@ Examples:
 A row has one level for its motion and its vibration together."
     )]
     Level(LevelArgs),
-    /// Lets effects be on, or keeps them off.
+    /// Enables or disables effects.
     #[command(after_help = "\
 Examples:
   kinocue effects off water
   kinocue effects on water air
   kinocue effects off")]
     Effects(EffectsArgs),
-    /// Sets levels and effects as a preset of the configuration says.
+    /// Applies a preset of the configuration: levels and effects.
     #[command(after_help = "Example:\n  kinocue preset kids")]
     Preset(NameArgs),
-    /// Takes the seat of a controller in.
+    /// Puts a seat back into the show.
     ///
-    /// It joins by a move within its limits, with all controllers that share it.
+    /// The seat joins by a move within its limits, with all controllers that share it.
     #[command(after_help = "Example:\n  kinocue enable F4")]
     Enable(NameArgs),
-    /// Takes the seat of a controller out.
+    /// Takes a seat out of the show.
     ///
     /// It parks, with all controllers that share it; the others play on.
     #[command(after_help = "\
@@ -90,7 +90,7 @@ pub(in crate::cli) struct LevelArgs {
 /// Effects.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct EffectsArgs {
-    /// Whether they may be on.
+    /// True if they may be on.
     #[arg(value_name = "on|off", value_parser = ["on", "off"])]
     switch: String,
     /// Their names [default: all].

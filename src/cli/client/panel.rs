@@ -74,7 +74,7 @@ fn film(show: &Show) -> String {
 
 /// How many are well, and those that are not.
 fn controllers(all: &[Controller]) -> Vec<String> {
-    let is_well = |one: &&Controller| one.standing == "ok" && one.enabled;
+    let is_well = |one: &&Controller| one.health == "ok" && one.enabled;
     let part = all.iter().filter(|one| !one.is_out_for_good()).count();
     let mut lines = vec![format!("{} of {part} controllers ok", all.iter().filter(is_well).count())];
     let ill = all.iter().filter(|one| !is_well(one)).map(|one| {
@@ -103,14 +103,14 @@ mod tests {
     fn the_panel_names_who_is_not_well_and_no_more_than_a_few() {
         let lost = |n: u32| Controller {
             name: format!("A{n}"),
-            standing: "lost".into(),
+            health: "lost".into(),
             enabled: true,
             ..<_>::default()
         };
         let mut controllers: Vec<Controller> = (0..9).map(lost).collect();
         controllers.push(Controller {
             name: "B1".into(),
-            standing: "ok".into(),
+            health: "ok".into(),
             enabled: true,
             ..<_>::default()
         });

@@ -12,7 +12,7 @@ use crate::cli::{Exit, Failure, print};
 pub(in crate::cli) enum Command {
     /// Loads a cue of the daemon's library.
     ///
-    /// It is read and proved before the command ends.
+    /// The cue is read and proved before the command ends.
     #[command(after_help = "\
 Examples:
   kinocue load coaster
@@ -27,7 +27,7 @@ Examples:
   kinocue playlist
   kinocue playlist --none")]
     Playlist(PlaylistArgs),
-    /// Makes an entry of the playlist the next to be played.
+    /// Selects the playlist entry to play next.
     ///
     /// Counted from 1, as `kinocue playlist` shows it.
     #[command(after_help = "Example:\n  kinocue select 2")]

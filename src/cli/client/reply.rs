@@ -40,7 +40,7 @@ pub(super) fn done(reply: &Reply) -> Result<(), Failure> {
 impl Problem {
     fn text(&self, status: u16) -> String {
         if self.detail.is_empty() {
-            return format!("the daemon replied {status} without a word; look into its log");
+            return format!("the daemon sent {status} with an empty body; see its log");
         }
         let Self { detail, remedy, faults, hall, .. } = self;
         let mut text = format!("{detail}; {remedy}");
@@ -69,7 +69,7 @@ fn exit(code: &str, status: u16) -> Exit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hall::Code;
+    use crate::control::Code;
 
     fn failure(status: u16, text: &str) -> Failure {
         done(&Reply { status, text: text.to_owned() }).unwrap_err()

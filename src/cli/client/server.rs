@@ -26,7 +26,7 @@ pub(in crate::cli) struct ServerArgs {
     /// The control socket of the daemon [default: that of KINOCUE_SOCKET, or /run/kinocue/control.sock].
     #[arg(long, value_name = "PATH")]
     pub(super) socket: Option<PathBuf>,
-    /// Print the JSON of the reply as it came.
+    /// Print the reply as JSON, unchanged.
     #[arg(long)]
     pub(in crate::cli) json: bool,
 }
@@ -105,11 +105,10 @@ impl ServerArgs {
     }
 }
 
-/// A name as a part of a path: whatever is no plain letter or digit is written as octets.
+/// A name as a part of a path: whatever is no plain letter or digit is written as bytes.
 pub(super) fn in_path(name: &str) -> String {
-    let plain = |octet: &u8| octet.is_ascii_alphanumeric() || b"-_.~".contains(octet);
-    let written =
-        |octet: u8| if plain(&octet) { char::from(octet).to_string() } else { format!("%{octet:02X}") };
+    let plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_.~".contains(byte);
+    let written = |byte: u8| if plain(&byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
     name.bytes().map(written).collect()
 }
 

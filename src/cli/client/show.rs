@@ -16,7 +16,7 @@ const FAILS: &str = "error";
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
 pub(in crate::cli) enum Command {
-    /// Gets the hall ready to go.
+    /// Arms the hall: ready to go.
     ///
     /// A cue is loaded, its limits proved, preflight passed. It lapses after ten minutes.
     #[command(after_help = "\
@@ -30,7 +30,7 @@ by themselves then, so that is not done without --seats-empty.
 
 Exit codes: 0 armed, or homing first, 75 not ready (what is missing is said), 77 not allowed, 69 no daemon")]
     Arm(ArmArgs),
-    /// Stands down: nothing can start until a person arms again.
+    /// Disarms the hall: nothing can start until a person arms it again.
     #[command(after_help = "Example:\n  kinocue disarm")]
     Disarm(ServerArgs),
     /// Starts what is loaded and armed. The seats move.
@@ -47,12 +47,12 @@ Exit codes: 0 it plays, 75 not armed or too late, 77 not allowed, 69 no daemon")
     /// Holds the seats where they are; the film waits.
     #[command(after_help = "Example:\n  kinocue pause")]
     Pause(ServerArgs),
-    /// Goes on from a pause.
+    /// Resumes a paused show.
     #[command(after_help = "Example:\n  kinocue resume")]
     Resume(ServerArgs),
-    /// Goes on elsewhere in the cue.
+    /// Jumps to another position in the cue.
     ///
-    /// The seats get there by a move within their limits.
+    /// The seats reach it by a move within their limits.
     #[command(after_help = "\
 Examples:
   kinocue seek 12:30
@@ -62,24 +62,24 @@ Examples:
     /// Brings the seats to their park poses, and ends the show.
     #[command(after_help = "Example:\n  kinocue park")]
     Park(ServerArgs),
-    /// Leaves a stop or a fault, once what caused it is gone.
+    /// Clears a latched stop or fault, once what caused it is gone.
     #[command(after_help = "\
 Example:
   kinocue status && kinocue clear
 
 All positions are read anew before anything moves.")]
     Clear(ServerArgs),
-    /// Has the daemon read its configuration anew.
+    /// Reloads the daemon's configuration.
     ///
     /// It does so while nothing is armed; a bad one changes nothing.
     #[command(after_help = "Example:\n  kinocue check /etc/kinocue/kinocue.toml && kinocue reload")]
     Reload(ServerArgs),
 }
 
-/// Whether the seats may home first, and where the daemon is.
+/// Permission to home first, and the daemon's socket.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct ArmArgs {
-    /// Nobody sits on the seats and nothing lies on or under them: they may home first.
+    /// Confirm that nobody sits on the seats and nothing lies on or under them: they may home first.
     #[arg(long)]
     seats_empty: bool,
     #[command(flatten)]
@@ -89,7 +89,7 @@ pub(in crate::cli) struct ArmArgs {
 /// From where on, and where the daemon is.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct GoArgs {
-    /// Begin there in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24 [default: its beginning, or where seek set it].
+    /// Start there in the cue: SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24 [default: its beginning, or where seek set it].
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     from: Option<ShowTime>,
     #[command(flatten)]

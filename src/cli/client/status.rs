@@ -6,7 +6,7 @@ use super::table::table;
 use super::view::{Controller, Playlist, Show, Status, percent, time, us};
 use crate::cli::{Exit, Failure, print};
 
-/// Shows how the hall is.
+/// Shows the hall's status.
 ///
 /// State with its cause and the next action, what is loaded, levels, controllers, warnings.
 #[derive(Debug, clap::Args)]
@@ -108,7 +108,7 @@ fn controllers(all: &[Controller]) -> String {
             why.clone(),
         ]
     };
-    table(["controller", "row", "standing", "acks", "p50 µs", "p99 µs", "lost", ""], all.iter().map(row))
+    table(["controller", "row", "health", "acks", "p50 µs", "p99 µs", "lost", ""], all.iter().map(row))
 }
 
 #[cfg(test)]
@@ -121,8 +121,8 @@ mod tests {
             r#"{"hall":"Hall 1","version":"0.1.0","state":"armed","cause":"by anna","next":"go","since_s":4.2,
                 "lapses_s":595.8,"show":{"cue":"coaster","title":"Coaster","length_s":60.0,"position_s":0.0},
                 "levels":{"motion":1.0,"vibration":1.0},"rate_hz":100.0,"realtime":{"policy":"fifo","priority":50},
-                "controllers":[{"name":"A1","row":"A","enabled":true,"standing":"ok","ack_rate":0.999,"lost":2},
-                    {"name":"A2","enabled":false,"standing":"lost","why":"no ack for 3 s"}],
+                "controllers":[{"name":"A1","row":"A","enabled":true,"health":"ok","ack_rate":0.999,"lost":2},
+                    {"name":"A2","enabled":false,"health":"lost","why":"no ack for 3 s"}],
                 "warnings":[{"id":"controller-lost","severity":"error","controller":"A2","text":"lost","remedy":"look"}]}"#,
         )
         .unwrap();

@@ -43,7 +43,7 @@ struct Sweep {
     /// The rows whose seats move, as A, A,C or A-C [default: all].
     #[arg(long, value_name = "ROWS")]
     rows: Option<String>,
-    /// Nobody sits on the seats and nothing lies on or under them: do not ask.
+    /// Confirm that nobody sits on the seats and nothing lies on or under them; do not ask.
     #[arg(long)]
     seats_empty: bool,
     #[command(flatten)]

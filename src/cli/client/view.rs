@@ -109,7 +109,7 @@ pub(super) struct Controller {
     pub(super) row: Option<String>,
     pub(super) address: String,
     pub(super) enabled: bool,
-    pub(super) standing: String,
+    pub(super) health: String,
     pub(super) why: String,
     pub(super) ack_rate: Option<f64>,
     pub(super) ack_p50_us: Option<f64>,
@@ -204,12 +204,12 @@ impl Controller {
     /// How it stands, and whether it is out.
     pub(super) fn stands(&self) -> String {
         let off = if self.enabled || self.is_out_for_good() { "" } else { ", off" };
-        format!("{}{off}", self.standing)
+        format!("{}{off}", self.health)
     }
 
-    /// Whether the configuration has it out, so that nobody counts it.
+    /// True if the configuration has it out, so that nobody counts it.
     pub(super) fn is_out_for_good(&self) -> bool {
-        self.standing == "out"
+        self.health == "out"
     }
 }
 

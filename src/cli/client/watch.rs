@@ -163,8 +163,8 @@ fn changes(before: Option<&Status>, now: &Status) -> Vec<String> {
     }
     for controller in &now.controllers {
         let known = was.controllers.iter().find(|one| one.name == controller.name);
-        let Controller { name, enabled, standing, why, .. } = controller;
-        if known.map(|one| (one.enabled, &one.standing)) != Some((*enabled, standing)) {
+        let Controller { name, enabled, health, why, .. } = controller;
+        if known.map(|one| (one.enabled, &one.health)) != Some((*enabled, health)) {
             let why = if why.is_empty() { String::new() } else { format!(": {why}") };
             lines.push(format!("{name} {}{why}", controller.stands()));
         }
@@ -208,12 +208,12 @@ mod tests {
     #[test]
     fn what_changed_is_said_once() {
         let before = status(
-            r#"{"state":"playing","cause":"go","controllers":[{"name":"A1","enabled":true,"standing":"ok"}],
+            r#"{"state":"playing","cause":"go","controllers":[{"name":"A1","enabled":true,"health":"ok"}],
                 "warnings":[{"id":"not-real-time","severity":"warning","text":"t"}]}"#,
         );
         let now = status(
             r#"{"state":"paused","cause":"pause by anna","next":"resume","levels":{"motion":0.5,"vibration":1.0},
-                "controllers":[{"name":"A1","enabled":true,"standing":"lost","why":"no ack"}],
+                "controllers":[{"name":"A1","enabled":true,"health":"lost","why":"no ack"}],
                 "warnings":[{"id":"controller-lost","severity":"error","controller":"A1","text":"lost","remedy":"look"}]}"#,
         );
         assert_eq!(

@@ -10,13 +10,13 @@ use anyhow::{Context as _, anyhow, bail};
 use crate::capture::{MAGIC_LEN, is_capture};
 use crate::cli::{Exit, Failure, OrExit as _};
 
-/// The most octets a datagram can carry; more hex than that is none.
-pub(super) const MAX_OCTETS: usize = 65_507;
+/// The most bytes a datagram can carry; more hex than that is none.
+pub(super) const MAX_BYTES: usize = 65_507;
 
 /// How messages open; in hex, such a word begins another message.
 const OPENINGS: [&str; 2] = ["55aa0000", "33cc0000"];
 
-/// Octets that are read ahead.
+/// Bytes that are read ahead.
 const AHEAD: usize = 1 << 16;
 
 /// Where messages are read from.
@@ -46,10 +46,10 @@ impl Input {
     }
 }
 
-/// Whether a word is meant as a file: no hex, and either there is one or it looks like its name.
+/// True if a word is meant as a file: no hex, and either there is one or it looks like its name.
 fn is_file(word: &OsString) -> bool {
     let Some(text) = word.to_str() else { return true };
-    octets(text).is_err() && (text.contains(['.', '/']) || Path::new(word).exists())
+    bytes(text).is_err() && (text.contains(['.', '/']) || Path::new(word).exists())
 }
 
 fn messages(words: &[OsString]) -> anyhow::Result<Vec<Vec<u8>>> {
@@ -65,11 +65,11 @@ fn messages(words: &[OsString]) -> anyhow::Result<Vec<Vec<u8>>> {
             _ => messages.push(word.to_owned()),
         }
     }
-    messages.iter().map(|message| octets(message)).collect()
+    messages.iter().map(|message| bytes(message)).collect()
 }
 
-/// The octets that hex digits mean.
-pub(super) fn octets(text: &str) -> anyhow::Result<Vec<u8>> {
+/// The bytes that hex digits mean.
+pub(super) fn bytes(text: &str) -> anyhow::Result<Vec<u8>> {
     let mut digits = Vec::new();
     for word in text.split(|c: char| c.is_whitespace() || matches!(c, ':' | ',' | '-')) {
         for c in digits_of(word).chars() {
@@ -83,10 +83,10 @@ pub(super) fn octets(text: &str) -> anyhow::Result<Vec<u8>> {
         }
     }
     if digits.is_empty() || digits.len() % 2 != 0 {
-        bail!("{} hex digits are no whole octets; give two for each octet", digits.len());
+        bail!("{} hex digits are no whole bytes; give two for each byte", digits.len());
     }
-    if digits.len() > 2 * MAX_OCTETS {
-        bail!("{} octets are more than a datagram holds; give at most {MAX_OCTETS}", digits.len() / 2);
+    if digits.len() > 2 * MAX_BYTES {
+        bail!("{} bytes are more than a datagram holds; give at most {MAX_BYTES}", digits.len() / 2);
     }
     Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }
@@ -130,9 +130,9 @@ impl Stream {
     }
 }
 
-/// Whether hex may open so; what is neither hex nor a capture is best refused as a capture.
+/// True if hex may open so; what is neither hex nor a capture is best refused as a capture.
 fn is_text(opening: [u8; MAGIC_LEN]) -> bool {
-    opening.iter().all(|octet| octet.is_ascii_graphic() || octet.is_ascii_whitespace())
+    opening.iter().all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace())
 }
 
 #[cfg(test)]
@@ -147,15 +147,15 @@ mod tests {
     #[test]
     fn hex_is_taken_however_it_is_spelt() {
         for text in ["55aa0001", "55 AA 00 01", "55:aa:00:01", "0x55 0xaa, 0x0001\n", "55-aa-00-01"] {
-            assert_eq!(octets(text).unwrap(), [0x55, 0xaa, 0, 1], "{text}");
+            assert_eq!(bytes(text).unwrap(), [0x55, 0xaa, 0, 1], "{text}");
         }
     }
 
     #[test]
     fn what_is_no_hex_is_named_with_its_place() {
-        assert!(octets("55 ag").unwrap_err().to_string().starts_with("'g' after 3 hex digits"));
-        assert!(octets("55a").unwrap_err().to_string().starts_with("3 hex digits"));
-        assert!(octets(" ").is_err());
+        assert!(bytes("55 ag").unwrap_err().to_string().starts_with("'g' after 3 hex digits"));
+        assert!(bytes("55a").unwrap_err().to_string().starts_with("3 hex digits"));
+        assert!(bytes(" ").is_err());
     }
 
     #[test]

@@ -27,53 +27,53 @@ impl Reading {
 /// The fields of a message.
 ///
 /// # Errors
-/// At which octet, and why, these octets are none.
-pub(super) fn sheet(octets: &[u8], reading: Reading, port: VibrationPort) -> Result<Sheet, WireError> {
+/// At which byte, and why, these bytes are none.
+pub(super) fn sheet(bytes: &[u8], reading: Reading, port: VibrationPort) -> Result<Sheet, WireError> {
     let mut sheet = Sheet::default();
     if reading == Reading::Imax {
-        if let Ok(motion) = ImaxMotion::parse(octets) {
-            sheet.imax_motion(octets, &motion);
+        if let Ok(motion) = ImaxMotion::parse(bytes) {
+            sheet.imax_motion(bytes, &motion);
             return Ok(sheet);
         }
-        if let Ok(reply) = ImaxRegisters::parse(octets) {
-            sheet.imax_registers(octets, &reply);
+        if let Ok(reply) = ImaxRegisters::parse(bytes) {
+            sheet.imax_registers(bytes, &reply);
             return Ok(sheet);
         }
     }
-    let message = Message::parse_as(port, octets)?;
-    sheet.message(octets, &message, reading.dialect(), port);
+    let message = Message::parse_as(port, bytes)?;
+    sheet.message(bytes, &message, reading.dialect(), port);
     Ok(sheet)
 }
 
-/// Octets of a message about registers before its words.
+/// Bytes of a message about registers before its words.
 const WORDS: usize = 16;
 
 impl Sheet {
-    fn message(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect, port: VibrationPort) {
+    fn message(&mut self, bytes: &[u8], message: &Message<'_>, dialect: Dialect, port: VibrationPort) {
         match message {
             Message::Motion(motion) => {
-                self.motion(octets, motion);
-                self.surplus(octets, motion.layout_len(port));
+                self.motion(bytes, motion);
+                self.surplus(bytes, motion.layout_len(port));
             }
             Message::MotionReply(reply) => {
-                self.motion_reply(octets, reply, dialect);
-                self.surplus(octets, reply.layout_len(port));
+                self.motion_reply(bytes, reply, dialect);
+                self.surplus(bytes, reply.layout_len(port));
             }
             Message::Read(read) => {
-                self.head(octets, "read registers", true);
+                self.head(bytes, "read registers", true);
                 self.codes(read.accept, read.reply);
                 let space = Space::of_read(read.channel);
                 self.channel(read.channel, space_name(space));
                 self.asked(read.start, read.num, space);
-                self.surplus(octets, WORDS);
+                self.surplus(bytes, WORDS);
             }
             Message::Write(write) => {
-                self.head(octets, "write registers", true);
+                self.head(bytes, "write registers", true);
                 self.codes(write.accept, write.reply);
                 let space = Space::of_write(write.channel, dialect);
                 self.channel(write.channel, space_name(space));
                 self.registers(write.start, write.data, space);
-                self.surplus(octets, WORDS + 2 * write.data.len());
+                self.surplus(bytes, WORDS + 2 * write.data.len());
             }
             Message::RegisterReply(reply) => {
                 let (what, space) = match reply.access {
@@ -81,31 +81,31 @@ impl Sheet {
                     Access::Write => ("reply to write registers", Space::of_write(reply.channel, dialect)),
                 };
                 let space = space.filter(|_| reply.code == ReplyCode::Running);
-                self.head(octets, what, false);
+                self.head(bytes, what, false);
                 self.answer(reply.code, dialect);
                 self.slot(reply.code, reply.channel, space_name(space), reply.error, dialect);
                 self.told(reply.start, reply.num, reply.data, space);
                 if reply.access == Access::Read && space == Some(Space::Monitor) {
                     self.monitored_positions(reply.start, reply.data, dialect);
                 }
-                self.surplus(octets, WORDS + 2 * reply.data.len());
+                self.surplus(bytes, WORDS + 2 * reply.data.len());
             }
             Message::ServoRead(_) | Message::ServoWrite(_) | Message::ServoReply(_) => {
-                self.servo(octets, message, dialect);
+                self.servo(bytes, message, dialect);
             }
-            Message::Status(status) => self.status(octets, status),
+            Message::Status(status) => self.status(bytes, status),
             Message::Report(report) => {
-                self.head(octets, "report of registers", false);
+                self.head(bytes, "report of registers", false);
                 let space = Space::of_read(report.channel);
                 self.channel(report.channel, space_name(space));
                 self.registers(report.start, report.data, space);
-                self.surplus(octets, WORDS + 2 * report.data.len());
+                self.surplus(bytes, WORDS + 2 * report.data.len());
             }
         }
     }
 
-    fn motion(&mut self, octets: &[u8], motion: &MotionRequest) {
-        self.head(octets, motion_name(motion.timing, motion.vibration.is_some()), true);
+    fn motion(&mut self, bytes: &[u8], motion: &MotionRequest) {
+        self.head(bytes, motion_name(motion.timing, motion.vibration.is_some()), true);
         self.codes(motion.accept, motion.reply);
         self.channel(motion.channel, &format!("{} axes", motion.positions.len()));
         self.numbered("frame", motion.frame.0);
@@ -115,9 +115,9 @@ impl Sheet {
         self.tail(motion.extend, motion.vibration.as_deref());
     }
 
-    fn motion_reply(&mut self, octets: &[u8], reply: &MotionReply, dialect: Dialect) {
+    fn motion_reply(&mut self, bytes: &[u8], reply: &MotionReply, dialect: Dialect) {
         let what = format!("reply to {}", motion_name(reply.timing, reply.vibration.is_some()));
-        self.head(octets, &what, false);
+        self.head(bytes, &what, false);
         self.answer(reply.code, dialect);
         let axes = format!("{} axes", reply.positions.len());
         self.slot(reply.code, reply.channel, &axes, reply.error, dialect);
@@ -128,10 +128,10 @@ impl Sheet {
         self.tail(reply.extend, reply.vibration.as_deref());
     }
 
-    fn servo(&mut self, octets: &[u8], message: &Message<'_>, dialect: Dialect) {
+    fn servo(&mut self, bytes: &[u8], message: &Message<'_>, dialect: Dialect) {
         match message {
             Message::ServoRead(read) => {
-                self.head(octets, "read servo registers", true);
+                self.head(bytes, "read servo registers", true);
                 self.codes(read.accept, read.reply);
                 self.numbered("servo", u32::from(read.servo));
                 self.asked(read.start, read.num, None);
@@ -141,21 +141,21 @@ impl Sheet {
                         format!("a controller answers at most {MAX_SERVO_READ} registers at once"),
                     );
                 }
-                self.surplus(octets, WORDS);
+                self.surplus(bytes, WORDS);
             }
             Message::ServoWrite(write) => {
-                self.head(octets, "write servo registers", true);
+                self.head(bytes, "write servo registers", true);
                 self.codes(write.accept, write.reply);
                 self.numbered("servo", u32::from(write.servo));
                 self.registers(write.start, write.data, None);
-                self.surplus(octets, WORDS + 2 * write.data.len());
+                self.surplus(bytes, WORDS + 2 * write.data.len());
             }
             Message::ServoReply(reply) => {
                 let what = match reply.access {
                     Access::Read => "reply to read servo registers",
                     Access::Write => "reply to write servo registers",
                 };
-                self.head(octets, what, false);
+                self.head(bytes, what, false);
                 self.answer(reply.code, dialect);
                 if reply.code == ReplyCode::Running {
                     self.numbered("servo", u32::from(reply.servo));
@@ -163,14 +163,14 @@ impl Sheet {
                     self.error(reply.error);
                 }
                 self.told(reply.start, reply.num, reply.data, None);
-                self.surplus(octets, WORDS + 2 * reply.data.len());
+                self.surplus(bytes, WORDS + 2 * reply.data.len());
             }
             _ => {}
         }
     }
 
-    fn status(&mut self, octets: &[u8], status: &Status) {
-        self.head(octets, "status report", false);
+    fn status(&mut self, bytes: &[u8], status: &Status) {
+        self.head(bytes, "status report", false);
         self.station(status.station);
         self.positions(&status.positions);
         self.forces(&status.forces);
@@ -183,11 +183,11 @@ impl Sheet {
         self.bits("inputs", 'X', u32::from(status.inputs));
     }
 
-    fn imax_motion(&mut self, octets: &[u8], motion: &ImaxMotion) {
+    fn imax_motion(&mut self, bytes: &[u8], motion: &ImaxMotion) {
         let name = motion_name(motion.timing, false);
         let reply = if motion.code.is_some() { "reply to " } else { "" };
         self.head(
-            octets,
+            bytes,
             &format!("{reply}{name}, IMAX layout without a frame number"),
             motion.code.is_none(),
         );
@@ -205,12 +205,12 @@ impl Sheet {
         self.field("analogue outputs", format!("0x{:08x}", motion.dac), motion.dac);
     }
 
-    fn imax_registers(&mut self, octets: &[u8], reply: &ImaxRegisters<'_>) {
+    fn imax_registers(&mut self, bytes: &[u8], reply: &ImaxRegisters<'_>) {
         let what = match reply.access {
             Access::Read => "reply to read registers, IMAX layout of 32 bits",
             Access::Write => "reply to write registers, IMAX layout of 32 bits",
         };
-        self.head(octets, what, false);
+        self.head(bytes, what, false);
         self.answer(reply.code, Dialect::Mbox);
         self.field("channel", reply.channel, reply.channel);
         self.asked(reply.start, reply.num, None);
@@ -225,9 +225,9 @@ mod tests {
     use super::*;
 
     fn read(hex: &str, reading: Reading) -> Sheet {
-        let octets: Vec<u8> =
+        let bytes: Vec<u8> =
             (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect();
-        sheet(&octets, reading, VibrationPort::Two).unwrap()
+        sheet(&bytes, reading, VibrationPort::Two).unwrap()
     }
 
     #[test]
@@ -243,7 +243,7 @@ mod tests {
 message    motion with vibration, relative time
 function   0x1901
 direction  host to controller
-octets     46
+bytes      46
 accept     ffff: every station
 reply      0000: nobody answers
 channel    0: 3 axes

@@ -62,14 +62,14 @@ impl Sheet {
         self.object.insert(name.replace(' ', "_"), value.into());
     }
 
-    pub(super) fn head(&mut self, octets: &[u8], what: &str, from_host: bool) {
-        self.function = u16::from_be_bytes([octets[4], octets[5]]);
+    pub(super) fn head(&mut self, bytes: &[u8], what: &str, from_host: bool) {
+        self.function = u16::from_be_bytes([bytes[4], bytes[5]]);
         let direction = if from_host { "host to controller" } else { "controller to host" };
         let function = format!("0x{:04x}", self.function);
         self.field("message", what, what);
         self.field("function", &function, function.clone());
         self.field("direction", direction, direction);
-        self.field("octets", octets.len(), octets.len());
+        self.field("bytes", bytes.len(), bytes.len());
     }
 
     pub(super) fn codes(&mut self, accept: Code, reply: Code) {
@@ -198,10 +198,10 @@ impl Sheet {
     }
 
     /// What a datagram has beyond the layout of its message.
-    pub(super) fn surplus(&mut self, octets: &[u8], layout: usize) {
-        let Some(surplus) = octets.get(layout..).filter(|surplus| !surplus.is_empty()) else { return };
-        let hex: String = surplus.iter().map(|octet| format!("{octet:02x}")).collect();
-        let text = format!("{} octets after the layout", surplus.len());
+    pub(super) fn surplus(&mut self, bytes: &[u8], layout: usize) {
+        let Some(surplus) = bytes.get(layout..).filter(|surplus| !surplus.is_empty()) else { return };
+        let hex: String = surplus.iter().map(|byte| format!("{byte:02x}")).collect();
+        let text = format!("{} bytes after the layout", surplus.len());
         self.field("surplus", format!("{text}: {hex}"), hex.clone());
         self.brief.push(text);
     }

@@ -13,7 +13,7 @@ use super::sheet::Sheet;
 pub(super) struct Tally {
     /// By function code: what it is called, and how many there were.
     messages: BTreeMap<u16, (String, u64)>,
-    /// Octets that are no message.
+    /// Bytes that are no message.
     pub(super) malformed: u64,
     /// Lines that are no hex.
     pub(super) not_hex: u64,
@@ -49,7 +49,7 @@ impl Tally {
         at.as_secs_f64() - first.as_secs_f64()
     }
 
-    /// Whether all messages could be read.
+    /// True if all messages could be read.
     pub(super) const fn is_clean(&self) -> bool {
         self.malformed == 0 && self.not_hex == 0 && self.cut == 0
     }

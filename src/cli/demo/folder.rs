@@ -40,12 +40,12 @@ impl Folder {
     ///
     /// # Errors
     /// Those of the system.
-    pub(super) fn write(&self, name: &str, octets: &[u8]) -> io::Result<PathBuf> {
+    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> io::Result<PathBuf> {
         let path = self.path(name);
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent)?;
         }
-        fs::write(&path, octets)?;
+        fs::write(&path, bytes)?;
         Ok(path)
     }
 

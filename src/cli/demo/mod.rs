@@ -9,21 +9,21 @@ use anyhow::Context as _;
 use super::play;
 use super::token::Token;
 use super::{Exit, Failure, OrExit as _, print};
-use crate::app::keeper::Signals;
 use crate::app::serve::{Parts, Places, serve};
-use crate::hall::Role;
+use crate::app::supervisor::Signals;
+use crate::control::Role;
 use crate::log::Log;
 use crate::sim::{Farm, Options};
 use crate::{config, console};
 
 mod folder;
-mod guide;
 mod screen;
+mod script;
 mod seats;
 
 use folder::Folder;
-use guide::Guide;
 use screen::Screen;
+use script::Script;
 use seats::SEATS;
 
 /// The cue as the report names it.
@@ -34,7 +34,7 @@ const CUE: &[u8] = include_bytes!("../../../cues/bench-ride.csv");
 
 /// Plays the bench ride to four virtual controllers, with nothing to set up.
 ///
-/// It is the daemon at work, with its web console: the address is said at once. On a terminal the console stays up after the
+/// It is the daemon itself, with its web console, whose address is printed at once. On a terminal the console stays up after the
 /// ride until Ctrl-C, to arm and go again there. Two of the controllers are a pair that shares one frame (PA95). Everything
 /// stays on this machine, in a folder that is gone at the end.
 #[derive(Debug, clap::Args)]
@@ -67,14 +67,14 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let log = Log::start(move |line| lines.tell(line)).or_exit(Exit::System)?;
     let parts = Parts { config, places, pages: console::page, signals: signals.clone(), log };
     drop(port);
-    let mut guide = None;
+    let mut script = None;
     let served = serve(parts, |handle, addresses| {
         let console = addresses.first().map(|address| link(*address, &token.token)).unwrap_or_default();
         welcome(&farm.addresses(), &console);
-        guide = Some(Guide::start(handle, signals, screen, on_terminal.then_some(console)));
+        script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console)));
     });
     // Over by now, as nothing of the hall is left.
-    let guided = guide.transpose().or_exit(Exit::System)?.map_or(Ok(()), Guide::finish);
+    let guided = script.transpose().or_exit(Exit::System)?.map_or(Ok(()), Script::finish);
     let reported = play::tell(&served?.sum_up(CUE_NAME.to_owned()), args.json);
     farm.stop().or_exit(Exit::Io)?;
     folder.remove().context("the folder of the demo is left").or_exit(Exit::Io)?;
@@ -99,9 +99,9 @@ fn welcome(controllers: &[SocketAddrV4], console: &str) {
 
 /// Puts everything that the daemon reads where it reads it.
 fn furnish(folder: &Folder, hall: &str) -> Result<Places, Failure> {
-    let put = |name: &str, octets: &[u8]| {
+    let put = |name: &str, bytes: &[u8]| {
         folder
-            .write(name, octets)
+            .write(name, bytes)
             .with_context(|| format!("cannot write {name} of the demo"))
             .or_exit(Exit::Io)
     };

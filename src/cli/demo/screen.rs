@@ -7,13 +7,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tokio::sync::watch;
 
 use crate::cli::print;
-use crate::hall::Status;
+use crate::control::Status;
 use crate::time::ShowTime;
 
 /// Where it is seen. Clones share it.
 #[derive(Debug, Clone)]
 pub(super) struct Screen {
-    /// None where the standard error output is no terminal.
+    /// `None` if the standard error output is no terminal.
     bar: Option<ProgressBar>,
 }
 

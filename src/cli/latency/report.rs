@@ -42,7 +42,7 @@ pub(super) struct Report<'a> {
     /// The rate and the controllers, in words.
     about: &'a str,
     seconds: u32,
-    /// Whether the controllers were virtual ones of the program's own.
+    /// True if the controllers were virtual ones of the program's own.
     #[serde(rename = "virtual")]
     of_our_own: bool,
     lateness_us: Percentiles,

@@ -39,7 +39,7 @@ p        park the seats, and end
 q        park as far as the seats may move, and leave; Ctrl-C does the same, a second one
          half a second later or more ends at once";
 
-/// Where in the octets of one key we are.
+/// Where in the bytes of one key we are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Within {
     /// In none.
@@ -51,19 +51,19 @@ enum Within {
     Sequence,
 }
 
-/// Puts octets together to keys.
+/// Puts bytes together to keys.
 #[derive(Debug, Default)]
 pub(super) struct Decoder(Within);
 
 impl Decoder {
-    /// Takes the next octet; the action, if it ends a key that has one.
-    pub(super) const fn take(&mut self, octet: u8) -> Option<Action> {
-        match (self.0, octet) {
+    /// Takes the next byte; the action, if it ends a key that has one.
+    pub(super) const fn take(&mut self, byte: u8) -> Option<Action> {
+        match (self.0, byte) {
             (_, 0x1b) => self.0 = Within::Escape,
             (Within::Escape, b'[' | b'O') => self.0 = Within::Sequence,
             (Within::Sequence, b'@'..=b'~') => {
                 self.0 = Within::None;
-                return match octet {
+                return match byte {
                     b'C' => Some(Action::Jump(5)),
                     b'D' => Some(Action::Jump(-5)),
                     _ => None,
@@ -73,7 +73,7 @@ impl Decoder {
             // A key after Esc is that key: an Esc typed by mistake must not swallow a stop.
             (Within::Escape | Within::None, _) => {
                 self.0 = Within::None;
-                return of_letter(octet);
+                return of_letter(byte);
             }
         }
         None
@@ -85,8 +85,8 @@ impl Decoder {
     }
 }
 
-const fn of_letter(octet: u8) -> Option<Action> {
-    Some(match octet.to_ascii_lowercase() {
+const fn of_letter(byte: u8) -> Option<Action> {
+    Some(match byte.to_ascii_lowercase() {
         b' ' => Action::PauseOrResume,
         b's' => Action::Stop,
         b'c' => Action::Clear,
@@ -105,9 +105,9 @@ const fn of_letter(octet: u8) -> Option<Action> {
 mod tests {
     use super::*;
 
-    fn typed(octets: &[u8]) -> Vec<Action> {
+    fn typed(bytes: &[u8]) -> Vec<Action> {
         let mut decoder = Decoder::default();
-        octets.iter().filter_map(|octet| decoder.take(*octet)).collect()
+        bytes.iter().filter_map(|byte| decoder.take(*byte)).collect()
     }
 
     #[test]
@@ -132,8 +132,8 @@ mod tests {
 
     #[test]
     fn a_stop_is_a_stop_also_with_caps_lock_on_or_after_an_escape() {
-        for octets in ["S", "\u{1b}s", "\u{1b}\u{1b}s"] {
-            assert_eq!(typed(octets.as_bytes()), [Action::Stop], "{octets:?}");
+        for bytes in ["S", "\u{1b}s", "\u{1b}\u{1b}s"] {
+            assert_eq!(typed(bytes.as_bytes()), [Action::Stop], "{bytes:?}");
         }
     }
 
@@ -147,8 +147,8 @@ mod tests {
     #[test]
     fn other_keys_do_nothing_not_even_by_the_letters_they_are_sent_as() {
         // Delete, page up, F5, the arrows up and down, u umlaut, tab, backspace.
-        for octets in ["\u{1b}[3~", "\u{1b}[5~", "\u{1b}[15~", "\u{1b}OA\u{1b}[B", "ü", "\t", "\u{7f}"] {
-            assert_eq!(typed(octets.as_bytes()), [], "{octets:?}");
+        for bytes in ["\u{1b}[3~", "\u{1b}[5~", "\u{1b}[15~", "\u{1b}OA\u{1b}[B", "ü", "\t", "\u{7f}"] {
+            assert_eq!(typed(bytes.as_bytes()), [], "{bytes:?}");
         }
     }
 

@@ -11,11 +11,11 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use rtrb::{Consumer, Producer};
 
+use super::health::HealthMessages;
+use super::keyboard::{self, Leader};
 use super::keys;
-use super::leader::{self, Leader};
-use super::said::Said;
-use super::standings::Standings;
-use crate::app::Reins;
+use super::messages::Messages;
+use crate::app::PlayHandle;
 use crate::cli::print;
 use crate::rt::{Command, News, Phase};
 use crate::state::{Next, State};
@@ -29,7 +29,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// What a first Ctrl-C does, and what a second one will.
 const LEAVING: &str = "the seats park as far as they may move, and the play ends; half a second from now on Ctrl-C again would end it at once";
 
-/// The threads; none where the system starts no further one, which is no reason to fail.
+/// The threads; `None` if the system starts no further one, which is no reason to fail.
 pub(super) struct Progress {
     over: Arc<AtomicBool>,
     teller: Option<JoinHandle<()>>,
@@ -40,7 +40,7 @@ pub(super) struct Progress {
 
 impl Progress {
     /// Begins to speak, and where standard input and standard error are a terminal, to listen.
-    pub(super) fn start(said: Said, for_ever: bool) -> Self {
+    pub(super) fn start(said: Messages, for_ever: bool) -> Self {
         let over = Arc::new(AtomicBool::new(false));
         let (news, news_end) = channel();
         let (commands, commands_end) = channel();
@@ -48,7 +48,7 @@ impl Progress {
         let on_terminal = std::io::stderr().is_terminal();
         let keys = on_terminal.then(Keyboard::take).flatten().and_then(|keyboard| {
             let leader = Leader::new(said.control.clone(), said.length);
-            leader::start(leader, keyboard, commands_end, notes, Arc::clone(&over)).ok()
+            keyboard::start(leader, keyboard, commands_end, notes, Arc::clone(&over)).ok()
         });
         let led = keys.is_some();
         let mut teller = Teller {
@@ -59,7 +59,7 @@ impl Progress {
             pressed: 0,
             phase: Phase::Asking,
             now: None,
-            standings: Standings::default(),
+            standings: HealthMessages::default(),
         };
         let done = Arc::clone(&over);
         let teller = Builder::new()
@@ -68,10 +68,10 @@ impl Progress {
         Self { over, teller: teller.ok(), keys, news, commands }
     }
 
-    /// Takes the reins; whether anybody holds them.
-    pub(super) fn lead(&self, reins: Reins) -> bool {
-        let _ = self.news.send(reins.news); // without a teller nobody wants it
-        self.commands.send(reins.commands).is_ok()
+    /// Takes the handle; whether anybody holds them.
+    pub(super) fn lead(&self, handle: PlayHandle) -> bool {
+        let _ = self.news.send(handle.news); // without a teller nobody wants it
+        self.commands.send(handle.commands).is_ok()
     }
 
     /// Says what is left to say, and gives the terminal back.
@@ -86,7 +86,7 @@ impl Progress {
 
 /// Collects what there is to say, and says it.
 struct Teller {
-    said: Said,
+    said: Messages,
     news_end: Receiver<Consumer<News>>,
     /// What the keys have to say.
     notes: Receiver<&'static str>,
@@ -99,7 +99,7 @@ struct Teller {
     /// The state of the hall and the next action, once it plays.
     now: Option<(State, Next)>,
     /// How the controllers stood when they were looked at last.
-    standings: Standings,
+    standings: HealthMessages,
 }
 
 impl Teller {

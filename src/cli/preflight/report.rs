@@ -35,7 +35,7 @@ struct ControllerReport {
     row: Option<String>,
     address: SocketAddrV4,
     answered: bool,
-    /// Of reads; null where none was answered.
+    /// Of reads; null if none was answered.
     round_trip_us: Option<RoundTrip>,
     /// What was read, by the manuals' names.
     registers: BTreeMap<String, u16>,
@@ -83,7 +83,7 @@ impl Report {
         self.passed
     }
 
-    /// Whether that fails.
+    /// True if that fails.
     pub(super) fn fails(&self, check: Check) -> bool {
         let mut findings = self.controllers.iter().flat_map(|one| &one.findings);
         findings.any(|one| one.finding.check == check && one.finding.fails())

@@ -36,7 +36,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut troubles = Troubles::default();
     let found = read_values(&mut talk, &targets, &wanted, &mut troubles);
     if !troubles.none() {
-        return Err(anyhow!("nothing was saved, as not all told all")).or_exit(troubles.exit());
+        return Err(anyhow!("nothing saved: some controllers did not return all registers"))
+            .or_exit(troubles.exit());
     }
     let saved: Vec<Saved> = (targets.controllers.iter().zip(found))
         .map(|(controller, found)| Saved {

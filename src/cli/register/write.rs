@@ -64,9 +64,9 @@ struct Change {
     register: Address,
     old: u16,
     new: u16,
-    /// Whether the controller took it.
+    /// True if the controller took it.
     written: bool,
-    /// What it read afterwards; null where it was not written, not read back, or keeps no value.
+    /// What it read afterwards; null if it was not written, not read back, or keeps no value.
     reads: Option<u16>,
 }
 

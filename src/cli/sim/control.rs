@@ -11,7 +11,7 @@ use crate::sim::Remote;
 
 /// Connections at a time.
 const CONNECTIONS: usize = 16;
-/// Octets of a line.
+/// Bytes of a line.
 const LINE: u64 = 1_024;
 
 /// A control socket; its file goes with it.
@@ -47,7 +47,7 @@ impl Drop for Control {
     }
 }
 
-/// Whether it is a socket that nobody listens to.
+/// True if it is a socket that nobody listens to.
 fn is_stale(path: &Path) -> bool {
     UnixStream::connect(path).is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
 }
@@ -98,7 +98,7 @@ fn serve(stream: &UnixStream, remote: &Remote) -> io::Result<()> {
             return Ok(());
         }
         if line.last() != Some(&b'\n') && line.len() as u64 == LINE {
-            return writeln!(&*stream, "error a line has at most {LINE} octets");
+            return writeln!(&*stream, "error a line has at most {LINE} bytes");
         }
         let answer = match carry_out(&line, remote) {
             Ok(()) => "ok".to_owned(),

@@ -12,11 +12,11 @@ use crate::wire::VibrationPort;
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "What the manuals leave open")]
 pub(super) struct Leeway {
-    /// Commands that wait at most; one more is Err21.
+    /// Commands that can be queued; one more is Err21.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..))]
     queue_depth: u16,
 
-    /// How long homing takes, ms.
+    /// Duration of homing, ms.
     #[arg(long, value_name = "MS", default_value_t = 500)]
     homing_ms: u32,
 
@@ -40,7 +40,7 @@ pub(super) struct Leeway {
     #[arg(long, value_enum, default_value_t = Requests::Motion)]
     auto_reset_counts: Requests,
 
-    /// Whether registers that the manuals do not name read 0 or are refused.
+    /// True if registers not named in the manuals read 0 or are refused.
     #[arg(long, value_enum, default_value_t = Unused::Zero)]
     unused_registers: Unused,
 
@@ -56,7 +56,7 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "RPM", default_value_t = 60, value_parser = clap::value_parser!(u16).range(1..))]
     jog_rpm: u16,
 
-    /// What a drive with an alarm (Err10 to 15) reports as its own error.
+    /// Error number that a drive with an alarm (Err10 to 15) reports.
     #[arg(long, value_name = "N", default_value_t = 1)]
     servo_alarm: u16,
 
@@ -64,7 +64,7 @@ pub(super) struct Leeway {
     #[arg(long, value_name = "N", default_value_t = 1_000)]
     servo_registers: u16,
 
-    /// Octets of Port Out in vibration frames, and of the inputs in the answers: 2 or 4.
+    /// Bytes of Port Out in vibration frames, and of the inputs in the answers: 2 or 4.
     #[arg(long, value_name = "N", default_value = "2", value_parser = vibration_port)]
     vibration_port_octets: VibrationPort,
 

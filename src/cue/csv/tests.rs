@@ -172,7 +172,7 @@ fn text_that_is_none_is_refused() {
     );
     assert_eq!(faults("time_ms,a1\n0,0\n1,\"0\n"), "3:3: a quote that is not closed in its line");
     let long = format!("time_ms,a1\n0,0\n1,{}\n2,7\n", "0".repeat(70_000));
-    assert_eq!(faults(long), "3:1: over 65536 octets long, the most that is read");
+    assert_eq!(faults(long), "3:1: over 65536 bytes long, the most that is read");
 }
 
 #[test]
@@ -194,8 +194,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn nothing_from_outside_panics(octets in proptest::collection::vec(any::<u8>(), 0..2048)) {
-        let _ = read(Path::new("t.csv"), octets.as_slice());
+    fn nothing_from_outside_panics(bytes in proptest::collection::vec(any::<u8>(), 0..2048)) {
+        let _ = read(Path::new("t.csv"), bytes.as_slice());
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::motion::MAX_AXES;
 use crate::plain::escaped;
 use crate::time::ShowTime;
 
-/// How much is told of why a message is none, octets.
+/// How much is told of why a message is none, bytes.
 const REASON_TOLD: usize = 200;
 
 /// Reads an MCAP cue; `path` names it in faults.

@@ -19,7 +19,7 @@ const MAX_RECORD: usize = 64 * 1024 * 1024;
 /// How much is read at a time, whatever a length in the file asks for.
 const READ: usize = 256 * 1024;
 
-/// How much is told of what the reader met, octets.
+/// How much is told of what the reader met, bytes.
 const REASON_TOLD: usize = 200;
 
 /// Hands every record, its opcode and body, to `take`; stops at its first error or the file's, with its place: that of the
@@ -30,7 +30,7 @@ pub(super) fn each(
 ) -> Result<(), (Place, Problem)> {
     let mut walk = Walk::new();
     each_of(input, &mut walk, take).map_err(|problem| match problem {
-        Problem::Damaged(_) => (Place::Octet(walk.record()), problem),
+        Problem::Damaged(_) => (Place::Byte(walk.record()), problem),
         _ => (Place::File, problem),
     })
 }
@@ -48,25 +48,25 @@ fn each_of(
         .with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);
     reader.add_decompressor(Zstd::new()).map_err(|error| problem(&error, 0, false))?;
-    // No octet is read before it is asked for, so that the walk is where the reader is.
+    // No byte is read before it is asked for, so that the walk is where the reader is.
     let mut input = BufReader::with_capacity(READ, input);
     let (mut unpacked, mut begun) = (0_u64, false);
     while let Some(event) = reader.next_event() {
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 let space = reader.insert(wanted.clamp(1, READ));
-                let octets = input.read(space).map_err(|error| Problem::Unread(error.to_string()))?;
-                walk.pass(&space[..octets]).map_err(Problem::Damaged)?;
-                reader.notify_read(octets);
+                let bytes = input.read(space).map_err(|error| Problem::Unread(error.to_string()))?;
+                walk.pass(&space[..bytes]).map_err(Problem::Damaged)?;
+                reader.notify_read(bytes);
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
                 begun = true;
                 unpacked += data.len() as u64 + 9; // opcode and length
                 take(opcode, data)?;
             }
-            Err(error) => return Err(problem(&error, walk.octets(), begun)),
+            Err(error) => return Err(problem(&error, walk.bytes(), begun)),
         }
-        if walk.octets() > MAX_FILE || unpacked > MAX_FILE {
+        if walk.bytes() > MAX_FILE || unpacked > MAX_FILE {
             return Err(Problem::FileTooLarge);
         }
     }
@@ -118,7 +118,7 @@ pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
     let mut body = Body(body);
     let name = body.text()?;
     let length = body.u32()?;
-    let mut entries = Body(body.octets(length)?);
+    let mut entries = Body(body.bytes(length)?);
     let mut map = BTreeMap::new();
     while !entries.0.is_empty() {
         map.insert(entries.text()?, entries.text()?);
@@ -130,7 +130,7 @@ pub(super) fn metadata(body: &[u8]) -> Option<(&str, BTreeMap<&str, &str>)> {
 struct Body<'a>(&'a [u8]);
 
 impl<'a> Body<'a> {
-    fn octets(&mut self, count: u32) -> Option<&'a [u8]> {
+    fn bytes(&mut self, count: u32) -> Option<&'a [u8]> {
         let (front, rest) = self.0.split_at_checked(usize::try_from(count).ok()?)?;
         self.0 = rest;
         Some(front)
@@ -156,6 +156,6 @@ impl<'a> Body<'a> {
 
     fn text(&mut self) -> Option<&'a str> {
         let length = self.u32()?;
-        str::from_utf8(self.octets(length)?).ok()
+        str::from_utf8(self.bytes(length)?).ok()
     }
 }

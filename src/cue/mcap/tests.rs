@@ -30,12 +30,12 @@ fn csv_of(cue: &Cue) -> String {
     String::from_utf8(text).unwrap()
 }
 
-fn load(octets: &[u8]) -> Result<Cue, CueFaults> {
-    cue::read(Path::new("t.mcap"), octets, &Source::Native)
+fn load(bytes: &[u8]) -> Result<Cue, CueFaults> {
+    cue::read(Path::new("t.mcap"), bytes, &Source::Native)
 }
 
-fn faults(octets: &[u8]) -> String {
-    load(octets).expect_err("no fault was found").to_string().replace("t.mcap: ", "")
+fn faults(bytes: &[u8]) -> String {
+    load(bytes).expect_err("no fault was found").to_string().replace("t.mcap: ", "")
 }
 
 /// A file made by hand: metadata, then messages of topic, log time and JSON.
@@ -169,7 +169,7 @@ fn messages_that_are_not_what_they_should_be_are_refused() {
     let long = format!(r#"{{"a":[0,0{}]}}"#, " ".repeat(70_000));
     assert!(
         faults_behind_rows(&[("/cue/axes", 20, &long)])
-            .ends_with("over 65536 octets long, the most that is read")
+            .ends_with("over 65536 bytes long, the most that is read")
     );
     let end = faults_behind_rows(&[("/cue/axes", u64::MAX, r#"{"a":[0,0]}"#)]);
     assert!(
@@ -201,9 +201,9 @@ fn foreign_files_are_refused() {
 }
 
 #[test]
-fn an_mcap_is_known_by_its_first_octets_whatever_its_name() {
-    let octets = mcap_of(&csv(CUE));
-    assert!(cue::read(Path::new("storm.dat"), octets.as_slice(), &Source::Native).is_ok());
+fn an_mcap_is_known_by_its_first_bytes_whatever_its_name() {
+    let bytes = mcap_of(&csv(CUE));
+    assert!(cue::read(Path::new("storm.dat"), bytes.as_slice(), &Source::Native).is_ok());
 }
 
 #[test]
@@ -211,12 +211,12 @@ fn a_cut_file_is_refused_for_play_and_its_complete_messages_are_saved() {
     let rows: String =
         (0..5000).map(|k| format!("{},{}\n", k * 10, (f64::from(k) * 0.618).fract())).collect();
     let whole = csv(&format!("time_ms,a1\n{rows}"));
-    let octets = mcap_of(&whole);
+    let bytes = mcap_of(&whole);
     assert!(
-        recover(Path::new("t"), octets.as_slice())
+        recover(Path::new("t"), bytes.as_slice())
             .is_ok_and(|(cue, lost)| lost.is_none() && cue.rows() == 5000)
     );
-    let cut = &octets[..octets.len() / 2];
+    let cut = &bytes[..bytes.len() / 2];
     assert!(faults(cut).starts_with("the file is cut short; `kinocue convert --recover`"));
     let (saved, lost) = recover(Path::new("t"), cut).unwrap();
     assert_eq!(lost, Some(Problem::CutShort));
@@ -226,20 +226,20 @@ fn a_cut_file_is_refused_for_play_and_its_complete_messages_are_saved() {
 
 #[test]
 fn every_cut_is_refused_and_none_panics() {
-    let octets = mcap_of(&csv(CUE));
-    for length in 0..octets.len() {
-        assert!(load(&octets[..length]).is_err(), "{length}");
-        let _ = recover(Path::new("t"), &octets[..length]);
+    let bytes = mcap_of(&csv(CUE));
+    for length in 0..bytes.len() {
+        assert!(load(&bytes[..length]).is_err(), "{length}");
+        let _ = recover(Path::new("t"), &bytes[..length]);
     }
 }
 
 #[test]
-fn every_changed_octet_is_survived() {
+fn every_changed_byte_is_survived() {
     for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
-        let octets = file_packed(compression, FRACTION, &ROWS);
-        for at in 0..octets.len() {
+        let bytes = file_packed(compression, FRACTION, &ROWS);
+        for at in 0..bytes.len() {
             for flip in [0x01, 0x80, 0xff] {
-                let mut changed = octets.clone();
+                let mut changed = bytes.clone();
                 changed[at] ^= flip;
                 let _ = load(&changed);
                 let _ = recover(Path::new("t"), changed.as_slice());
@@ -252,8 +252,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
-    fn nothing_from_outside_panics(octets in proptest::collection::vec(any::<u8>(), 0..2048)) {
-        let _ = load(&[MAGIC, &octets].concat());
+    fn nothing_from_outside_panics(bytes in proptest::collection::vec(any::<u8>(), 0..2048)) {
+        let _ = load(&[MAGIC, &bytes].concat());
     }
 
     #[test]
@@ -279,7 +279,7 @@ fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode], (body.len() as u64).to_le_bytes().as_slice(), body].concat()
 }
 
-/// A chunk that says that it unpacks to so many octets.
+/// A chunk that says that it unpacks to so many bytes.
 fn chunk(compression: &str, unpacked: u64, packed: &[u8]) -> Vec<u8> {
     let name = u32::try_from(compression.len()).unwrap().to_le_bytes();
     let front =
@@ -300,29 +300,29 @@ fn a_chunk_that_unpacks_to_more_than_any_cue_is_refused_before_it_is_unpacked() 
     struct Counting<'a>(&'a [u8], u64);
     impl std::io::Read for Counting<'_> {
         fn read(&mut self, space: &mut [u8]) -> std::io::Result<usize> {
-            let octets = self.0.read(space)?;
-            self.1 += octets as u64;
-            Ok(octets)
+            let bytes = self.0.read(space)?;
+            self.1 += bytes as u64;
+            Ok(bytes)
         }
     }
     let packed = vec![0; 1 << 20];
     for (compression, unpacked) in [("zstd", 2 << 30), ("lz4", 1 << 40), ("zstd", u64::MAX), ("", 1 << 40)] {
-        let octets = file_of(&[&chunk(compression, unpacked, &packed)], 0, 0);
-        let mut input = Counting(&octets, 0);
+        let bytes = file_of(&[&chunk(compression, unpacked, &packed)], 0, 0);
+        let mut input = Counting(&bytes, 0);
         let told = cue::read(Path::new("t.mcap"), &mut input, &Source::Native).unwrap_err().to_string();
-        assert!(told.starts_with("t.mcap: octet 25: damaged: a chunk "), "{told}");
+        assert!(told.starts_with("t.mcap: byte 25: damaged: a chunk "), "{told}");
         assert!(told.contains(&unpacked.to_string()), "{told}");
-        assert!(input.1 < 1 << 20, "{} octets were read of it", input.1);
+        assert!(input.1 < 1 << 20, "{} bytes were read of it", input.1);
     }
 }
 
 #[test]
 fn records_that_are_none_are_refused_at_the_first() {
-    let octets = file_of(&[&[0; 90]], 0, 0);
-    assert!(faults(&octets).starts_with("octet 25: damaged: a record of opcode 0"), "{}", faults(&octets));
+    let bytes = file_of(&[&[0; 90]], 0, 0);
+    assert!(faults(&bytes).starts_with("byte 25: damaged: a record of opcode 0"), "{}", faults(&bytes));
     let zeros = chunk("", 90, &[0; 90]);
     let told = faults(&file_of(&[&zeros], 0, 0));
-    assert!(told.starts_with("octet 25: damaged: a record of opcode 0"), "{told}");
+    assert!(told.starts_with("byte 25: damaged: a record of opcode 0"), "{told}");
 }
 
 #[test]
@@ -332,17 +332,17 @@ fn a_footer_that_points_past_itself_is_refused_with_its_place() {
     assert_eq!(whole[footer], 0x02);
     for (field, what) in [(9, "summary"), (17, "summary offsets")] {
         for at in [footer as u64 + 1, 1 << 40, u64::MAX, 3] {
-            let mut octets = whole.clone();
-            octets[footer + field..][..8].copy_from_slice(&at.to_le_bytes());
-            octets[footer + 25..][..4].fill(0); // its sum is not to be looked at
+            let mut bytes = whole.clone();
+            bytes[footer + field..][..8].copy_from_slice(&at.to_le_bytes());
+            bytes[footer + 25..][..4].fill(0); // its sum is not to be looked at
             assert_eq!(
-                faults(&octets),
+                faults(&bytes),
                 format!(
-                    "octet {footer}: damaged: a footer that looks for the {what} at octet {at}, and stands at {footer} \
+                    "byte {footer}: damaged: a footer that looks for the {what} at byte {at}, and stands at {footer} \
                      itself; `kinocue convert --recover` saves the complete messages before the damage"
                 )
             );
-            let (saved, lost) = recover(Path::new("t"), octets.as_slice()).unwrap();
+            let (saved, lost) = recover(Path::new("t"), bytes.as_slice()).unwrap();
             assert!(lost.is_some() && saved.rows() == 3, "all messages stand before it");
         }
     }
@@ -363,7 +363,7 @@ fn a_channel_whose_schema_is_missing_is_refused_with_its_place() {
     let at = 25 + schema.len();
     let told = faults(&missing);
     assert!(
-        told.starts_with(&format!("octet {at}: damaged: /cue/axes has schema 8, which does not")),
+        told.starts_with(&format!("byte {at}: damaged: /cue/axes has schema 8, which does not")),
         "{told}"
     );
     for good in [channel(7, "/cue/axes"), channel(0, "/cue/axes"), channel(8, "/somebody/else")] {
@@ -394,17 +394,17 @@ fn rows_that_repeat_for_an_hour_are_no_bomb() {
         }
         writer.finish().unwrap();
         drop(writer);
-        let octets = out.into_inner();
-        assert_eq!(load(&octets).unwrap().rows(), cue.rows(), "{chunk_size} in {} octets", octets.len());
+        let bytes = out.into_inner();
+        assert_eq!(load(&bytes).unwrap().rows(), cue.rows(), "{chunk_size} in {} bytes", bytes.len());
     }
 }
 
-/// A frame of zstd (RFC 8878) that holds these octets, in blocks of at most so many.
-fn frame(octets: &[u8], longest: usize, checksum: bool) -> Vec<u8> {
+/// A frame of zstd (RFC 8878) that holds these bytes, in blocks of at most so many.
+fn frame(bytes: &[u8], longest: usize, checksum: bool) -> Vec<u8> {
     let mut packed = [&[0x28, 0xb5, 0x2f, 0xfd, u8::from(checksum) << 2][..], &[0]].concat(); // a window of 1 KiB
-    let blocks = octets.len().div_ceil(longest);
-    for (n, block) in octets.chunks(longest).enumerate() {
-        let repeated = block.iter().all(|octet| *octet == block[0]);
+    let blocks = bytes.len().div_ceil(longest);
+    for (n, block) in bytes.chunks(longest).enumerate() {
+        let repeated = block.iter().all(|byte| *byte == block[0]);
         let (kind, content) = if repeated { (1, &block[..1]) } else { (0, block) };
         let header = u32::from(n + 1 == blocks) | kind << 1 | u32::try_from(block.len()).unwrap() << 3;
         packed.extend_from_slice(&header.to_le_bytes()[..3]);

@@ -1,4 +1,4 @@
-//! The outline of an MCAP file while its octets go by: where each record begins, and whether what the file says of its own
+//! The outline of an MCAP file while its bytes go by: where each record begins, and whether what the file says of its own
 //! layout can be so (mcap.dev/spec, "Records"). The `mcap` crate believes some of that unseen.
 
 use mcap::records::op;
@@ -10,11 +10,11 @@ use super::MAGIC;
 const SLACK: u64 = 16 << 20;
 /// How many times its packed size a chunk may unpack to.
 const MAX_RATIO: u64 = 200;
-/// Octets of opcode and length.
+/// Bytes of opcode and length.
 const HEAD: usize = 9;
-/// Octets of a chunk up to the name of its compression.
+/// Bytes of a chunk up to the name of its compression.
 const CHUNK: usize = 32;
-/// Octets of a footer.
+/// Bytes of a footer.
 const FOOTER: usize = 20;
 /// The longest name of a compression that is looked at; those that are known are shorter.
 const MAX_NAME: usize = 32;
@@ -22,13 +22,13 @@ const MAX_NAME: usize = 32;
 /// How far into a file it is.
 #[derive(Debug)]
 pub(super) struct Walk {
-    /// Octets that went by.
+    /// Bytes that went by.
     at: u64,
-    /// Where the record begins in which the last octet lies.
+    /// Where the record begins in which the last byte lies.
     record: u64,
     /// What was kept of that record: what has to be looked at.
     head: Vec<u8>,
-    /// Octets of the record that need no look.
+    /// Bytes of the record that need no look.
     left: u64,
     /// Behind the footer there are no records.
     over: bool,
@@ -46,38 +46,37 @@ impl Walk {
         self.record
     }
 
-    /// Octets that went by so far.
-    pub(super) const fn octets(&self) -> u64 {
+    /// Bytes that went by so far.
+    pub(super) const fn bytes(&self) -> u64 {
         self.at
     }
 
-    /// Goes by the next octets.
+    /// Goes by the next bytes.
     ///
     /// # Errors
     /// What cannot be so, in words; [`Self::record`] is then where.
-    pub(super) fn pass(&mut self, mut octets: &[u8]) -> Result<(), String> {
-        while !octets.is_empty() && !self.over {
+    pub(super) fn pass(&mut self, mut bytes: &[u8]) -> Result<(), String> {
+        while !bytes.is_empty() && !self.over {
             let room = if self.left > 0 { self.left } else { (self.wanted() - self.head.len()) as u64 };
-            let (taken, rest) =
-                octets.split_at(usize::try_from(room).unwrap_or(usize::MAX).min(octets.len()));
+            let (taken, rest) = bytes.split_at(usize::try_from(room).unwrap_or(usize::MAX).min(bytes.len()));
             if self.left > 0 {
                 self.left -= taken.len() as u64;
             } else {
                 self.keep(taken)?;
             }
             self.at += taken.len() as u64;
-            octets = rest;
+            bytes = rest;
         }
-        self.at += octets.len() as u64;
+        self.at += bytes.len() as u64;
         Ok(())
     }
 
-    /// Keeps the next octets of a record's head, and looks at it once it is all there.
-    fn keep(&mut self, octets: &[u8]) -> Result<(), String> {
+    /// Keeps the next bytes of a record's head, and looks at it once it is all there.
+    fn keep(&mut self, bytes: &[u8]) -> Result<(), String> {
         if self.head.is_empty() {
             self.record = self.at;
         }
-        self.head.extend_from_slice(octets);
+        self.head.extend_from_slice(bytes);
         if self.head.len() < self.wanted() {
             return Ok(());
         }
@@ -134,10 +133,10 @@ impl Walk {
         let (unpacked, packed) = (self.u64(HEAD + 16), self.u64(HEAD + CHUNK + name));
         let most = packed.saturating_mul(MAX_RATIO).saturating_add(SLACK).min(MAX_FILE);
         if unpacked > most {
-            return Err(format!("a chunk of {packed} octets that unpacks to {unpacked}; the most is {most}"));
+            return Err(format!("a chunk of {packed} bytes that unpacks to {unpacked}; the most is {most}"));
         }
         if name == 0 && packed != unpacked {
-            return Err(format!("a chunk that is not packed, of {packed} octets where it says {unpacked}"));
+            return Err(format!("a chunk that is not packed, of {packed} bytes where it says {unpacked}"));
         }
         Ok(())
     }
@@ -148,7 +147,7 @@ impl Walk {
             if at != 0 && !(MAGIC.len() as u64..=self.record).contains(&at) {
                 let footer = self.record;
                 return Err(format!(
-                    "a footer that looks for the {what} at octet {at}, and stands at {footer} itself"
+                    "a footer that looks for the {what} at byte {at}, and stands at {footer} itself"
                 ));
             }
         }

@@ -8,25 +8,25 @@ use mcap::{McapError, McapResult};
 use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
-// RFC 8878, section 3.1.1, octets.
+// RFC 8878, section 3.1.1, bytes.
 const BLOCK_HEADER: usize = 3;
 const CHECKSUM: usize = 4;
 const LONGEST_BLOCK: usize = 128 * 1024;
 /// Magic number and length of a frame that holds nothing for us.
 const SKIP_HEADER: usize = 8;
 
-/// Where in a chunk the next octets belong.
+/// Where in a chunk the next bytes belong.
 #[derive(Clone, Copy)]
 enum Part {
     /// To the header of a frame.
     Header,
-    /// To a frame of which so many octets are to be passed over.
+    /// To a frame of which so many bytes are to be passed over.
     Skipped(usize),
     /// To a frame's blocks; the last may have a checksum behind it.
     Blocks { checked: bool },
 }
 
-/// Unpacks one block at a time, so that a few octets never become more than a block and the frame's window in memory.
+/// Unpacks one block at a time, so that a few bytes never become more than a block and the frame's window in memory.
 pub(super) struct Zstd {
     frame: FrameDecoder,
     part: Part,
@@ -37,7 +37,7 @@ impl Zstd {
         Self { frame: FrameDecoder::new(), part: Part::Header }
     }
 
-    /// Takes what there is of the next part, and says how many octets that were.
+    /// Takes what there is of the next part, and says how many bytes that were.
     fn take(&mut self, packed: &[u8]) -> McapResult<usize> {
         match self.part {
             _ if packed.is_empty() => Ok(0),
@@ -106,7 +106,7 @@ impl Decompressor for Zstd {
     }
 }
 
-/// Octets of the block that these begin with, if its header is there.
+/// Bytes of the block that these begin with, if its header is there.
 fn block_length(packed: &[u8], checked: bool) -> Option<usize> {
     let header = packed.first_chunk::<BLOCK_HEADER>()?;
     let bits = usize::from(header[0]) | usize::from(header[1]) << 8 | usize::from(header[2]) << 16;

@@ -47,10 +47,10 @@ fn run(peer: Peer, request: &Request, mut replies: impl FnMut(Vec<u8>) -> Vec<Ve
     let mut exchange = Exchange::new(&[peer]);
     exchange.begin(vec![(0, request.clone())], Patience::default());
     for ms in 0..5_000 {
-        while let Some(octets) = exchange.due(0, at(ms)) {
-            let reply = reply_to(octets);
-            for octets in replies(reply) {
-                exchange.on_datagram(0, &octets, at(ms));
+        while let Some(bytes) = exchange.due(0, at(ms)) {
+            let reply = reply_to(bytes);
+            for bytes in replies(reply) {
+                exchange.on_datagram(0, &bytes, at(ms));
             }
         }
         if exchange.finished() {
@@ -74,9 +74,9 @@ proptest! {
         let dialect = if mbox { Dialect::Mbox } else { Dialect::Smc };
         let peer = Peer { dialect, ..PEER };
         let (outcome, ms) = run(peer, &request, |mut reply| {
-            for (place, octet) in &mangled {
+            for (place, byte) in &mangled {
                 if let Some(there) = reply.get_mut(*place) {
-                    *there ^= octet;
+                    *there ^= byte;
                 }
             }
             reply.truncate(cut);

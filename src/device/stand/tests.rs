@@ -26,10 +26,10 @@ fn stood_on(rig: &Rig, to: &str) -> Stood {
 /// The words of what one says who stands at `pulses` with its first axis, from its `from`th such answer on.
 fn standing_at(rig: &Rig, at: impl Fn(usize) -> [u16; 2] + 'static) {
     let mut readings = 0;
-    rig.filter(move |_, octets| {
-        let Ok(reply) = RegisterReply::parse(&octets) else { return vec![octets] };
+    rig.filter(move |_, bytes| {
+        let Ok(reply) = RegisterReply::parse(&bytes) else { return vec![bytes] };
         if reply.channel != 0 || reply.start != DP_POSITIONS[0] {
-            return vec![octets];
+            return vec![bytes];
         }
         let mut words: Vec<u16> = reply.data.iter().collect();
         words[..2].copy_from_slice(&at(readings));

@@ -118,7 +118,7 @@ fn two_controllers_of_one_address_are_seen_by_their_answers() {
         if reply[12..16] == [0, 0x10, 0, 12] {
             asked += 1;
             let mut other = reply.clone();
-            other[39] = asked; // the last octet of the hardware address
+            other[39] = asked; // the last byte of the hardware address
             return vec![other, reply];
         }
         vec![reply]
@@ -174,22 +174,22 @@ fn mbox_controllers_are_not_asked_what_they_lack() {
     assert_eq!((found.rounds, found.round_trips.len()), (ROUNDS, ROUNDS));
 }
 
-/// A reply as a hostile network would have it: cut, lengthened, with octets changed, twice, late or not at all.
+/// A reply as a hostile network would have it: cut, lengthened, with bytes changed, twice, late or not at all.
 fn mutated(reply: &[u8], dice: &mut impl FnMut(usize) -> usize) -> Vec<Vec<u8>> {
-    let mut octets = reply.to_vec();
+    let mut bytes = reply.to_vec();
     match dice(6) {
-        0 => octets.truncate(dice(reply.len())),
-        1 => octets.extend([0xa5; 7]),
+        0 => bytes.truncate(dice(reply.len())),
+        1 => bytes.extend([0xa5; 7]),
         2 => return vec![],
-        3 => return vec![octets.clone(), octets],
+        3 => return vec![bytes.clone(), bytes],
         _ => {
             for _ in 0..=dice(4) {
-                let at = dice(octets.len());
-                octets[at] = dice(256).try_into().unwrap();
+                let at = dice(bytes.len());
+                bytes[at] = dice(256).try_into().unwrap();
             }
         }
     }
-    vec![octets]
+    vec![bytes]
 }
 
 #[test]

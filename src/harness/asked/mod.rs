@@ -1,4 +1,4 @@
-//! The gate, asked for anything: sequences by chance, and a judge that knows the definition of the measure alone.
+//! The limiter, asked for anything: sequences by chance, and a judge that knows the definition of the measure alone.
 
 mod chance;
 mod judge;

@@ -1,4 +1,4 @@
-//! What a gate must let pass: motion of every sort that keeps the limits by the measure, up to the last thousandth.
+//! What a limiter must let pass: motion of every sort that keeps the limits by the measure, up to the last thousandth.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;

@@ -1,14 +1,14 @@
-//! Sends sequences through a gate of one axis, and judges what comes out.
+//! Sends sequences through a limiter of one axis, and judges what comes out.
 
 use super::judge::Judge;
 use super::sound::Sound;
 use super::wild::Wild;
 use crate::belief::{KnownPose, Reading};
-use crate::gate::{Asked, Counts, Gate};
+use crate::limiter::{Counts, Limiter, Provenance};
 use crate::motion::{Limits, MAX_AXES, Pose, SeatType, Slot, Window};
 use crate::time::{MonoTime, Rate};
 
-/// What a sequence made of a gate.
+/// What a sequence made of a limiter.
 pub struct Trial {
     /// Greatest share of a limit in what was sent; infinite outside the stroke.
     pub share: f64,
@@ -20,7 +20,7 @@ pub struct Trial {
 impl Trial {
     /// A sequence of anything.
     pub fn of_wild(wild: &mut Wild) -> Self {
-        let mut gate = standing(&window(wild.limits), wild.rate, first(wild.start));
+        let mut limiter = standing(&window(wild.limits), wild.rate, first(wild.start));
         let mut judge = Judge::new(wild.limits, wild.rate.hz(), wild.start);
         let (mut share, mut unchanged, mut ms) = (0.0_f64, true, 0);
         for (index, frame) in (0..).zip(0..wild.frames) {
@@ -28,26 +28,26 @@ impl Trial {
             ms += time_ms;
             let asked = wild.next(frame, f64::from(ms) * 1e-3, time_ms, &mut judge);
             let mut pose = first(asked);
-            gate.admit(&mut pose, index, Asked::Anyhow);
+            limiter.admit(&mut pose, index, Provenance::Anyhow);
             unchanged &= pose[0].to_bits() == asked.to_bits();
             share = share.max(judge.push(pose[0], time_ms).share());
         }
-        Self { share, unchanged, counts: *gate.counts() }
+        Self { share, unchanged, counts: *limiter.counts() }
     }
 
     /// A motion that keeps the limits.
     pub fn of_sound(sound: &Sound) -> Self {
-        let mut gate = standing(&window(sound.limits), sound.rate, first(sound.start));
+        let mut limiter = standing(&window(sound.limits), sound.rate, first(sound.start));
         let mut sent = sound.frames.clone();
         for (index, (position, _)) in (0..).zip(&mut sent) {
             let mut pose = first(*position);
-            gate.admit(&mut pose, index, Asked::Anyhow);
+            limiter.admit(&mut pose, index, Provenance::Anyhow);
             *position = pose[0];
         }
         let unchanged =
             sent.iter().zip(&sound.frames).all(|(sent, asked)| sent.0.to_bits() == asked.0.to_bits());
         let share = Judge::worst(sound.limits, sound.rate.hz(), sound.start, &sent).share();
-        Self { share, unchanged, counts: *gate.counts() }
+        Self { share, unchanged, counts: *limiter.counts() }
     }
 
     /// Whether a limit was broken: by more than the thousandth that the measure allows, and what rounding takes.
@@ -74,9 +74,9 @@ pub fn read(window: &Window, pose: Pose) -> KnownPose {
     KnownPose::of(&Reading::at_rest(pose, MonoTime::default()), window).expect("it tells of every axis")
 }
 
-/// The gate of a lane that was read at rest in that pose.
-pub fn standing(window: &Window, rate: Rate, pose: Pose) -> Gate {
-    let mut gate = Gate::new(window, rate);
-    gate.restart(&read(window, pose));
-    gate
+/// The limiter of a lane that was read at rest in that pose.
+pub fn standing(window: &Window, rate: Rate, pose: Pose) -> Limiter {
+    let mut limiter = Limiter::new(window, rate);
+    limiter.restart(&read(window, pose));
+    limiter
 }

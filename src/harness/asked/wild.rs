@@ -1,4 +1,4 @@
-//! What a gate may be asked for: anything.
+//! What a limiter may be asked for: anything.
 
 use std::f64::consts::TAU;
 

@@ -16,14 +16,14 @@ fn a_lost_controller_that_comes_back_as_it_was_rejoins() {
     let mut hall = Hall::with_lost();
     hall.back();
     hall.run(21);
-    assert_eq!(hall.changes(), [(Standing::Rejoining, Why::SeenAgain)]);
+    assert_eq!(hall.changes(), [(HealthState::Rejoining, Why::SeenAgain)]);
     hall.run(200);
-    assert_eq!(hall.health.standing(1), Standing::Rejoining, "until it has joined");
+    assert_eq!(hall.health.standing(1), HealthState::Rejoining, "until it has joined");
     hall.health.on_joined(1);
-    assert_eq!(hall.health.standing(1), Standing::Ok);
+    assert_eq!(hall.health.standing(1), HealthState::Ok);
     hall.silence(&[2]);
     hall.run(30);
-    assert_eq!(hall.health.standing(1), Standing::Lost);
+    assert_eq!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn a_controller_that_is_lost_again_while_it_rejoins_is_lost() {
     hall.run(21);
     hall.silence(&[2]);
     hall.run(40);
-    assert_eq!(hall.health.standing(1), Standing::Lost);
+    assert_eq!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -42,16 +42,16 @@ fn a_controller_that_rebooted_is_out_until_it_was_homed_and_seen() {
     hall.packets[2] = 40;
     hall.back();
     hall.run(21);
-    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Rebooted(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Excluded, Why::Rebooted(2))]);
     assert_eq!(hall.told_hall(), [Event::Rebooted(2)]);
     hall.run(300);
-    assert_eq!(hall.health.standing(1), Standing::Excluded);
+    assert_eq!(hall.health.standing(1), HealthState::Excluded);
     hall.health.look_anew(1);
     hall.run(30);
-    assert_eq!(hall.health.standing(1), Standing::Excluded, "clearing does not home");
+    assert_eq!(hall.health.standing(1), HealthState::Excluded, "clearing does not home");
     hall.health.on_homed(2);
     hall.run(2);
-    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+    assert_eq!(hall.health.standing(1), HealthState::Rejoining);
 }
 
 #[test]
@@ -67,21 +67,23 @@ fn a_controller_that_is_not_home_or_is_another_is_out() {
         hall.health.on_read_sent(2, 1);
         hall.health.on_sighting(2, &sighting, hall.now);
         hall.look();
-        assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, why));
+        assert_eq!((hall.health.standing(1), hall.health.why(1)), (HealthState::Excluded, why));
     }
 }
 
 #[test]
 fn a_controller_that_was_never_read_before_it_was_lost_cannot_prove_that_it_did_not_reboot() {
-    let mut health =
-        Hall { health: Health::new(Groups::named(["A"; 4]), LossPolicy::Park, 1, TICK), ..Hall::with_lost() };
+    let mut health = Hall {
+        health: HealthTable::new(Groups::named(["A"; 4]), LossPolicy::Park, 1, TICK),
+        ..Hall::with_lost()
+    };
     health.answers_reads = false;
     health.run(100);
-    assert_eq!(health.health.standing(0), Standing::Lost);
+    assert_eq!(health.health.standing(0), HealthState::Lost);
     health.answers_reads = true;
     health.ack_after = vec![Some(TICK); 4];
     health.run(30);
-    assert_eq!(health.health.standing(0), Standing::Excluded);
+    assert_eq!(health.health.standing(0), HealthState::Excluded);
     assert!(matches!(health.health.why(0), Why::Unproved(_)));
 }
 
@@ -91,7 +93,7 @@ fn acks_and_reports_do_not_bring_a_lost_controller_back_nor_does_a_sighting_that
     hall.answers_reads = false;
     hall.silence(&[2]);
     hall.run(40);
-    assert_eq!(hall.changes().pop(), Some((Standing::Lost, Why::Silent(2))));
+    assert_eq!(hall.changes().pop(), Some((HealthState::Lost, Why::Silent(2))));
     hall.notices.clear();
     for frame in 1..=hall.frame + 50 {
         hall.health.on_ack(2, FrameNo(frame), hall.now);
@@ -116,7 +118,7 @@ fn a_counter_is_read_again_before_too_many_frames_that_did_not_ask_make_it_prove
     (0..400).for_each(|_| hall.tick_after(period));
     hall.back();
     (0..300).for_each(|_| hall.tick_after(period));
-    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+    assert_eq!(hall.health.standing(1), HealthState::Rejoining);
 }
 
 #[test]
@@ -133,7 +135,7 @@ fn repeated_and_reordered_acks_do_not_shake_the_proof_by_the_counter() {
     hall.run(40);
     hall.back();
     hall.run(30);
-    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+    assert_eq!(hall.health.standing(1), HealthState::Rejoining);
 }
 
 #[test]
@@ -152,7 +154,7 @@ fn old_acks_that_come_late_keep_nobody_alive() {
         hall.tick();
         hall.health.on_ack(2, FrameNo(old), hall.now);
     }
-    assert_eq!(hall.health.standing(1), Standing::Lost);
+    assert_eq!(hall.health.standing(1), HealthState::Lost);
 }
 
 #[test]
@@ -163,10 +165,10 @@ fn a_seat_is_back_only_when_all_its_controllers_are() {
     hall.run(40);
     hall.ack_after[1] = Some(TICK);
     hall.run(100);
-    assert_eq!(hall.health.standing(0), Standing::Lost);
+    assert_eq!(hall.health.standing(0), HealthState::Lost);
     hall.ack_after[0] = Some(TICK);
     hall.run(30);
-    assert_eq!(hall.health.standing(0), Standing::Rejoining);
+    assert_eq!(hall.health.standing(0), HealthState::Rejoining);
 }
 
 #[test]
@@ -174,16 +176,16 @@ fn a_seat_that_was_moved_at_rest_is_out_until_it_was_seen_and_says_so_until_it_h
     let mut hall = Hall::new(LossPolicy::Park);
     hall.health.on_moved(2);
     hall.run(1);
-    assert_eq!(hall.changes(), [(Standing::Lost, Why::Moved(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Lost, Why::Moved(2))]);
     hall.notices.clear();
     hall.run(21);
-    assert_eq!(hall.changes(), [(Standing::Rejoining, Why::Moved(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Rejoining, Why::Moved(2))]);
     hall.run(100);
     hall.health.on_joined(1);
     hall.run(100);
     assert_eq!(
         (hall.health.standing(1), hall.health.why(1)),
-        (Standing::Ok, Why::Acked),
+        (HealthState::Ok, Why::Acked),
         "it was moved once"
     );
 }
@@ -194,12 +196,12 @@ fn another_master_is_a_fault_of_the_hall_and_its_seat_has_to_be_homed() {
     hall.packets[2] += 5_000;
     hall.back();
     hall.run(21);
-    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Crowded(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Excluded, Why::OtherMaster(2))]);
     assert_eq!(hall.told_hall(), [Event::Trouble(Trouble::OtherMaster(2)), Event::Rebooted(2)]);
     hall.notices.clear();
     hall.health.look_anew(1);
     hall.run(100);
-    assert_eq!(hall.changes(), [(Standing::Excluded, Why::Crowded(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Excluded, Why::OtherMaster(2))]);
     assert_eq!(hall.told_hall(), [Event::Rebooted(2)], "once cleared it is no fault any more");
 }
 
@@ -207,22 +209,22 @@ fn another_master_is_a_fault_of_the_hall_and_its_seat_has_to_be_homed() {
 fn a_hall_moves_no_controller_that_does_not_know_its_zero_whenever_it_is_first_seen() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.health =
-        Health::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
+        HealthTable::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
     hall.homed = false;
     hall.health.look_anew(1);
     hall.run(2);
-    assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, Why::NotHome(2)));
+    assert_eq!((hall.health.standing(1), hall.health.why(1)), (HealthState::Excluded, Why::NotHome(2)));
     hall.homed = true;
     hall.health.on_homed(2);
     hall.run(30);
-    assert_eq!(hall.health.standing(1), Standing::Rejoining);
+    assert_eq!(hall.health.standing(1), HealthState::Rejoining);
 }
 
 #[test]
 fn a_controller_that_is_reset_while_nothing_moves_is_out_within_two_seconds() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.health =
-        Health::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
+        HealthTable::new(Groups::named(["A1", "A1", "A2", "A3"]), LossPolicy::Continue, 1, TICK).of_a_hall();
     let beat = |hall: &mut Hall| {
         hall.now = hall.now + Duration::from_millis(250);
         for controller in 0..4 {
@@ -235,9 +237,9 @@ fn a_controller_that_is_reset_while_nothing_moves_is_out_within_two_seconds() {
     (0..8).for_each(|_| beat(&mut hall));
     let reads = hall.reads().len();
     assert!((8..=16).contains(&reads), "{reads} reads of four controllers in two seconds");
-    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.standings(), [HealthState::Ok; 3]);
     hall.homed = false;
     (0..8).for_each(|_| beat(&mut hall));
-    assert_eq!(hall.standings(), [Standing::Excluded; 3]);
+    assert_eq!(hall.standings(), [HealthState::Excluded; 3]);
     assert_eq!(hall.health.why(1), Why::NotHome(2));
 }

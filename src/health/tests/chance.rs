@@ -23,7 +23,7 @@ fn one_lost_ack_in_a_hundred_never_loses_a_controller() {
         }
         hall.tick();
     }
-    assert!(hall.changes().iter().all(|(to, _)| matches!(to, Standing::Ok | Standing::Degraded)));
+    assert!(hall.changes().iter().all(|(to, _)| matches!(to, HealthState::Ok | HealthState::Degraded)));
     assert_eq!(hall.told_hall(), []);
 }
 
@@ -78,7 +78,7 @@ proptest! {
             }
             hall.tick();
             since += 1;
-            prop_assert_eq!(hall.health.standing(group) == Standing::Lost, since > 25, "{} ticks", since);
+            prop_assert_eq!(hall.health.standing(group) == HealthState::Lost, since > 25, "{} ticks", since);
         }
     }
 
@@ -95,10 +95,10 @@ proptest! {
             let group = hall.health.groups().group_of(controller);
             prop_assert!(ticks < 26 || !hall.health.standing(group).may_move());
             hall.ack_after[controller] = Some(Duration::from_millis(1));
-            if rebooted && hall.health.standing(group) == Standing::Lost {
+            if rebooted && hall.health.standing(group) == HealthState::Lost {
                 hall.packets[controller] = hall.packets[controller].wrapping_add(20_000);
                 hall.run(42);
-                prop_assert_eq!(hall.health.standing(group), Standing::Excluded);
+                prop_assert_eq!(hall.health.standing(group), HealthState::Excluded);
                 hall.health.on_homed(controller);
             }
             hall.run(42);

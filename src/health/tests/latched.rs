@@ -9,7 +9,7 @@ fn an_emergency_stop_stops_its_group_at_once_and_the_hall_is_told_once() {
     hall.observed(1, ESTOP);
     hall.observed(2, ESTOP);
     hall.look();
-    assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok]);
+    assert_eq!(hall.standings(), [HealthState::Stopped, HealthState::Stopped, HealthState::Ok]);
     assert_eq!(hall.told_hall(), [Event::EmergencyStop(1), Event::Latched(Latch::Held)]);
     hall.observed(1, What::EmergencyStopOver);
     hall.look();
@@ -17,7 +17,7 @@ fn an_emergency_stop_stops_its_group_at_once_and_the_hall_is_told_once() {
     hall.observed(2, What::EmergencyStopOver);
     hall.look();
     assert_eq!(hall.told_hall()[2..], [Event::AllReleased, Event::Latched(Latch::Over)]);
-    assert_eq!(hall.standings(), [Standing::Stopped, Standing::Stopped, Standing::Ok], "latched");
+    assert_eq!(hall.standings(), [HealthState::Stopped, HealthState::Stopped, HealthState::Ok], "latched");
 }
 
 #[test]
@@ -26,7 +26,7 @@ fn an_emergency_stop_that_came_and_went_between_two_looks_is_told() {
     hall.observed(3, ESTOP);
     hall.observed(3, What::EmergencyStopOver);
     hall.look();
-    assert_eq!(hall.health.standing(2), Standing::Stopped);
+    assert_eq!(hall.health.standing(2), HealthState::Stopped);
     let told = hall.told_hall();
     assert_eq!(told, [Event::EmergencyStop(3), Event::AllReleased, Event::Latched(Latch::Over)]);
 }
@@ -39,13 +39,13 @@ fn a_cleared_group_takes_part_only_after_it_was_seen_and_not_while_it_is_pressed
     hall.look();
     hall.health.look_anew(2);
     hall.run(1);
-    assert_eq!(hall.health.standing(2), Standing::Stopped, "pressed");
+    assert_eq!(hall.health.standing(2), HealthState::Stopped, "pressed");
     hall.observed(3, What::EmergencyStopOver);
     hall.look();
     hall.health.look_anew(2);
-    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Lost, Why::NotSeenYet));
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (HealthState::Lost, Why::NotSeenYet));
     hall.run(2);
-    assert_eq!(hall.health.standing(2), Standing::Rejoining);
+    assert_eq!(hall.health.standing(2), HealthState::Rejoining);
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn a_power_cut_under_an_emergency_stop_is_a_reboot() {
     hall.run(30);
     hall.health.look_anew(1);
     hall.run(30);
-    assert_eq!(hall.health.standing(1), Standing::Excluded);
+    assert_eq!(hall.health.standing(1), HealthState::Excluded);
 }
 
 #[test]
@@ -68,15 +68,15 @@ fn an_error_stops_its_group_and_the_others_go_by_the_configuration() {
     hall.run(100);
     hall.observed(0, What::Error(21));
     hall.look();
-    assert_eq!(hall.health.standing(0), Standing::Error);
+    assert_eq!(hall.health.standing(0), HealthState::Error);
     assert_eq!(hall.health.why(0), Why::Error { controller: 0, error: 21 });
     assert_eq!(hall.told_hall(), [Event::Policy(Demand::Pause, 0), Event::Latched(Latch::Held)]);
     hall.observed(0, What::Error(0));
     hall.look();
-    assert_eq!((hall.health.standing(0), hall.told_hall()[2]), (Standing::Error, Event::ErrorsGone));
+    assert_eq!((hall.health.standing(0), hall.told_hall()[2]), (HealthState::Error, Event::ErrorsGone));
     hall.health.look_anew(0);
     hall.run(2);
-    assert_eq!(hall.health.standing(0), Standing::Rejoining);
+    assert_eq!(hall.health.standing(0), HealthState::Rejoining);
 }
 
 #[test]
@@ -95,11 +95,11 @@ fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
     hall.answers_reads = false;
     hall.health.on_refused(2);
     hall.look();
-    assert_eq!(hall.changes(), [(Standing::Error, Why::Refuses(2))]);
+    assert_eq!(hall.changes(), [(HealthState::Error, Why::Refuses(2))]);
     assert_eq!(hall.told_hall(), [Event::Latched(Latch::Held)]);
     hall.answers_reads = true;
     hall.run(30);
-    assert_eq!(hall.health.standing(1), Standing::Error);
+    assert_eq!(hall.health.standing(1), HealthState::Error);
     assert_eq!(hall.told_hall()[1..], [Event::ErrorsGone, Event::Latched(Latch::Over)]);
 }
 
@@ -148,12 +148,15 @@ fn a_released_stop_that_holds_until_a_reset_holds_up_no_clear_and_its_seat_is_ou
     hall.observed(3, What::EmergencyStopHeld);
     hall.look();
     assert!(hall.told_hall().contains(&Event::AllReleased));
-    assert_eq!(hall.health.standing(2), Standing::Stopped, "latched");
+    assert_eq!(hall.health.standing(2), HealthState::Stopped, "latched");
     hall.health.look_anew(2);
     hall.run(30);
-    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Excluded, Why::HeldUntilReset(3)));
+    assert_eq!(
+        (hall.health.standing(2), hall.health.why(2)),
+        (HealthState::Excluded, Why::HeldUntilReset(3))
+    );
     hall.health.on_homed(3);
     hall.observed(3, What::EmergencyStopOver);
     hall.run(30);
-    assert_eq!(hall.health.standing(2), Standing::Rejoining);
+    assert_eq!(hall.health.standing(2), HealthState::Rejoining);
 }

@@ -7,11 +7,11 @@ fn at_rest() -> Hall {
     let mut hall = Hall::new(LossPolicy::Continue);
     let groups = Groups::named(["A1", "A1", "A2", "A3"]);
     hall.counts = false;
-    hall.health = Health::new(groups, LossPolicy::Continue, 1, TICK).of_a_hall();
+    hall.health = HealthTable::new(groups, LossPolicy::Continue, 1, TICK).of_a_hall();
     (0..3).for_each(|group| hall.health.look_anew(group));
     hall.run(2);
     (0..3).for_each(|group| hall.health.on_joined(group));
-    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.standings(), [HealthState::Ok; 3]);
     hall.notices.clear();
     hall
 }
@@ -46,7 +46,7 @@ fn a_hall_that_counts_nothing_stays_well_at_rest_in_a_show_and_after_it() {
     hall.run(6_000);
     (0..40).for_each(|_| beat(&mut hall));
     assert_eq!(hall.changes(), []);
-    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.standings(), [HealthState::Ok; 3]);
 }
 
 #[test]
@@ -57,22 +57,22 @@ fn one_that_counts_nothing_is_well_after_homing_too_and_stays_so() {
     }
     (0..3).for_each(|group| hall.health.look_anew(group));
     hall.run(30);
-    assert_eq!(hall.standings(), [Standing::Rejoining; 3]);
+    assert_eq!(hall.standings(), [HealthState::Rejoining; 3]);
     (0..3).for_each(|group| hall.health.on_joined(group));
     (0..40).for_each(|_| beat(&mut hall));
-    assert_eq!(hall.standings(), [Standing::Ok; 3]);
+    assert_eq!(hall.standings(), [HealthState::Ok; 3]);
 }
 
 #[test]
 fn one_that_counts_nothing_comes_back_after_a_silence_too_short_for_a_reboot_and_after_no_longer_one() {
-    for (silent_ms, standing) in [(400, Standing::Rejoining), (1_000, Standing::Excluded)] {
+    for (silent_ms, standing) in [(400, HealthState::Rejoining), (1_000, HealthState::Excluded)] {
         let mut hall = at_rest();
         hall.run(100);
         unplug(&mut hall, Duration::from_millis(silent_ms));
-        assert_eq!(hall.health.standing(1), Standing::Lost);
+        assert_eq!(hall.health.standing(1), HealthState::Lost);
         hall.run(30);
         assert_eq!(hall.health.standing(1), standing, "{silent_ms} ms");
-        if standing == Standing::Excluded {
+        if standing == HealthState::Excluded {
             assert_eq!(hall.health.why(1), Why::Gap(2));
             hall.health.look_anew(1);
             hall.run(30);
@@ -80,7 +80,7 @@ fn one_that_counts_nothing_comes_back_after_a_silence_too_short_for_a_reboot_and
             hall.health.on_homed(2);
             hall.run(30);
         }
-        assert_eq!(hall.health.standing(1), Standing::Rejoining);
+        assert_eq!(hall.health.standing(1), HealthState::Rejoining);
     }
 }
 
@@ -99,7 +99,7 @@ fn one_that_counts_nothing_and_is_reset_in_mid_show_is_out_within_two_seconds() 
     hall.run(500);
     hall.homed = false;
     hall.run(200);
-    assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Excluded, Why::NotHome(2)));
+    assert_eq!((hall.health.standing(1), hall.health.why(1)), (HealthState::Excluded, Why::NotHome(2)));
 }
 
 #[test]
@@ -113,16 +113,16 @@ fn an_alarm_of_the_drives_that_is_reported_or_read_parks_the_hall_until_it_is_ov
         }
         hall.run(110);
         let alarm = Why::Alarm { controller: 2, register: DPFE, value: 12 };
-        assert_eq!((hall.health.standing(1), hall.health.why(1)), (Standing::Error, alarm));
+        assert_eq!((hall.health.standing(1), hall.health.why(1)), (HealthState::Error, alarm));
         assert_eq!(alarm.to_string(), "alarm of the servo drives, kind 12 (DPFE)");
         assert!(hall.told_hall().contains(&Event::Policy(Demand::Park, 1)), "{:?}", hall.told_hall());
         hall.alarm = 0;
         hall.run(30);
         assert!(hall.told_hall().ends_with(&[Event::ErrorsGone, Event::Latched(Latch::Over)]));
-        assert_eq!(hall.health.standing(1), Standing::Error, "latched");
+        assert_eq!(hall.health.standing(1), HealthState::Error, "latched");
         hall.health.look_anew(1);
         hall.run(30);
-        assert_eq!(hall.health.standing(1), Standing::Rejoining);
+        assert_eq!(hall.health.standing(1), HealthState::Rejoining);
     }
 }
 
@@ -139,7 +139,7 @@ fn a_refusal_is_explained_by_the_alarm_that_is_read_and_then_the_hall_parks() {
     assert_eq!(hall.health.why(1), Why::Alarm { controller: 2, register: DPFE, value: 12 });
     assert_eq!(hall.told_hall()[1..], [Event::Policy(Demand::Park, 1)], "once");
     let told = hall.changes();
-    assert_eq!(told.iter().filter(|(standing, _)| *standing == Standing::Error).count(), 2, "{told:?}");
+    assert_eq!(told.iter().filter(|(standing, _)| *standing == HealthState::Error).count(), 2, "{told:?}");
 }
 
 #[test]
@@ -160,6 +160,6 @@ fn registers_of_32_bits_are_an_error_in_words_and_no_position() {
     let mut hall = at_rest();
     hall.health.on_wide_registers(3);
     hall.look();
-    assert_eq!((hall.health.standing(2), hall.health.why(2)), (Standing::Error, Why::Wide(3)));
+    assert_eq!((hall.health.standing(2), hall.health.why(2)), (HealthState::Error, Why::Wide(3)));
     assert!(Why::Wide(3).next().unwrap().contains("take it out"));
 }

@@ -1,4 +1,4 @@
-//! Where axes say that they stand.
+//! Reported positions of the axes.
 
 use super::*;
 

@@ -57,7 +57,7 @@ impl Controller {
         self.emit(reply, buf)
     }
 
-    /// Whether all registers of a read are there; whether unused ones are, the manuals leave open.
+    /// True if all registers of a read are there; whether unused ones are, the manuals leave open.
     fn readable(&self, read: &ReadRequest) -> bool {
         let of = if read.channel == 0 { Address::Dp } else { Address::Pa };
         let mut numbers = read.start..read.start.saturating_add(read.num);

@@ -27,12 +27,12 @@ const LONGEST_JOG: Duration = Duration::from_secs(60);
 pub(super) struct EmergencyStop {
     /// From when on it is forced by order of the setup.
     forced_at: MonoTime,
-    /// Whether it is in effect although no input asks for it.
+    /// True if it is in effect although no input asks for it.
     forced: bool,
-    /// Whether anything asks for it.
+    /// True if anything asks for it.
     asked: bool,
     in_effect: bool,
-    /// Whether only a reset ends it (PA91 = 2).
+    /// True if only a reset ends it (PA91 = 2).
     latched: bool,
 }
 
@@ -104,7 +104,7 @@ impl Controller {
         by_register || self.inputs_ask(function::EMERGENCY_STOP, pa::ESTOP_INPUTS)
     }
 
-    /// Whether a function is enabled and all its inputs are active.
+    /// True if a function is enabled and all its inputs are active.
     fn inputs_ask(&self, function: u16, mask: u8) -> bool {
         self.registers.get(pa::INPUT_FUNCTIONS) & function != 0 && self.inputs.all(self.registers.get(mask))
     }

@@ -138,7 +138,7 @@ impl Controller {
         (turns * MS_PER_MINUTE).round() as i16
     }
 
-    /// Torque of an axis; none where its drive cannot be spoken to or has an alarm.
+    /// Torque of an axis; `None` if its drive cannot be spoken to or has an alarm.
     #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]
     pub(super) fn torque(&self, axis: usize) -> i16 {
         if self.errors.unreachable(axis) || self.errors.alarm(axis) {

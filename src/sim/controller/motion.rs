@@ -70,7 +70,7 @@ impl Controller {
         self.counts.motion += 1;
     }
 
-    /// Whether the play would begin with too long a time, which only a controller without automatic reset minds
+    /// True if the play would begin with too long a time, which only a controller without automatic reset minds
     /// (chapter 6: Err17).
     fn begins_too_long(&self, motion: &MotionRequest) -> bool {
         let first = motion.timing == Timing::Absolute && self.last_absolute.is_none();

@@ -37,7 +37,7 @@ impl Controller {
         self.emit_servo(verdict, Access::Write, (write.servo, write.start, num), write.data, buf)
     }
 
-    /// Whether a drive is there, can be spoken to and has these registers; else x and the error of the refusal.
+    /// True if a drive is there, can be spoken to and has these registers; else x and the error of the refusal.
     fn servo_verdict(&self, servo: u16, start: u16, num: u16) -> Result<(), (ReplyCode, u16)> {
         let axis = usize::from(servo).wrapping_sub(1);
         let registers = u32::from(start) + u32::from(num) <= u32::from(self.invented.servo_registers);

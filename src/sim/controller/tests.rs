@@ -46,18 +46,18 @@ impl Bench {
         Self::new(&Setup { parameters: parameters.to_vec(), ..Setup::default() })
     }
 
-    /// Sends octets and returns the answer.
-    fn send(&mut self, octets: &[u8]) -> Option<Vec<u8>> {
+    /// Sends bytes and returns the answer.
+    fn send(&mut self, bytes: &[u8]) -> Option<Vec<u8>> {
         let from = SocketAddrV4::new([192, 168, 15, 101].into(), self.from_port);
         let mut buf = [0xa5; MAX_LEN];
-        let handled = self.controller.on_datagram(from, octets, at(self.at_ms), &mut buf);
+        let handled = self.controller.on_datagram(from, bytes, at(self.at_ms), &mut buf);
         handled.reply.map(<[u8]>::to_vec)
     }
 
     fn play(&mut self, motion: &Motion<'_>) -> Option<MotionReply> {
         let mut buf = [0; MAX_LEN];
-        let octets = motion.emit(&mut buf).to_vec();
-        self.send(&octets).map(|answer| MotionReply::parse(&answer).unwrap())
+        let bytes = motion.emit(&mut buf).to_vec();
+        self.send(&bytes).map(|answer| MotionReply::parse(&answer).unwrap())
     }
 
     /// Plays a frame and returns the x of its answer and the error.

@@ -18,7 +18,7 @@ fn trouble() -> impl Strategy<Value = Trouble> {
     select(vec![
         DRIVE,
         Trouble::Controller { controller: 1, error: 21 },
-        Trouble::Gate,
+        Trouble::Limiter,
         Trouble::Planner,
         Trouble::Homing(2),
         Trouble::OtherMaster(0),
@@ -49,10 +49,10 @@ fn event() -> impl Strategy<Value = Event> {
 }
 
 fn turn() -> impl Strategy<Value = Turn> {
-    use Request::{Clear, Go, HomeAndArm, Park, Resume};
+    use Transition::{Clear, Go, HomeAndArm, Park, Resume};
     prop_oneof![
-        4 => select(Request::ALL.to_vec()).prop_map(|request| Turn::Step(Step::Ask(request))),
-        4 => select(vec![HomeAndArm, Go, Resume, Park, Clear]).prop_map(|request| Turn::Step(Step::Ask(request))),
+        4 => select(Transition::ALL.to_vec()).prop_map(|request| Turn::Step(Step::Command(request))),
+        4 => select(vec![HomeAndArm, Go, Resume, Park, Clear]).prop_map(|request| Turn::Step(Step::Command(request))),
         8 => event().prop_map(|event| Turn::Step(Step::Tell(event))),
         4 => (0..1_000_i64).prop_map(Turn::Clock),
         1 => (-4_000_000..4_000_000_i64).prop_map(Turn::Clock),
@@ -90,7 +90,7 @@ impl Model {
     fn check(&mut self, before: &Machine, turn: Turn, taken: bool, after: &Machine) {
         let (from, to) = (before.state(), after.state());
         match turn {
-            Turn::Step(Step::Ask(request)) => self.on_request(before, request, taken, after),
+            Turn::Step(Step::Command(request)) => self.on_request(before, request, taken, after),
             Turn::Step(Step::Tell(event)) => self.on_event(from, event, to),
             Turn::Clock(_) => assert!(height(to) <= height(from), "time alone led from {from} to {to}"),
         }
@@ -104,36 +104,41 @@ impl Model {
         );
     }
 
-    fn on_request(&mut self, before: &Machine, request: Request, taken: bool, after: &Machine) {
+    fn on_request(&mut self, before: &Machine, request: Transition, taken: bool, after: &Machine) {
         let (from, to) = (before.state(), after.state());
         if !taken {
             assert_eq!((from, before.cause(), before.since()), (to, after.cause(), after.since()));
         }
         match request {
-            Request::Stop => {
+            Transition::Stop => {
                 assert!(taken, "a stop was refused while {from}");
                 let rest = if from.may_send_motion() { State::Stopping } else { State::Stopped };
                 assert_eq!(to, rest, "stopped while {from}");
             }
-            Request::Clear if taken => {
+            Transition::Clear if taken => {
                 let held = matches!(from, State::Parked | State::Recovering) && self.latch == Latch::Over;
                 assert!((from.is_latched() || held) && to == State::Recovering, "cleared while {from}");
             }
-            Request::Arm | Request::HomeAndArm if taken => self.homes_to_arm = to == State::Homing,
-            Request::Home | Request::Disarm if taken => self.homes_to_arm &= request == Request::Home,
+            Transition::Arm | Transition::HomeAndArm if taken => self.homes_to_arm = to == State::Homing,
+            Transition::Home | Transition::Disarm if taken => {
+                self.homes_to_arm &= request == Transition::Home
+            }
             _ => {}
         }
         let homes = (from, to) != (State::Homing, State::Homing) && to == State::Homing;
         assert!(
-            !homes || matches!(request, Request::Home | Request::HomeAndArm),
+            !homes || matches!(request, Transition::Home | Transition::HomeAndArm),
             "{request} homed the seats"
         );
-        let stays = from.is_latched() && request != Request::Clear;
+        let stays = from.is_latched() && request != Transition::Clear;
         assert!(!stays || to.is_latched(), "{request} led from {from} to {to}");
         if !from.may_send_motion() && to.may_send_motion() {
             let way = (from, request);
             let parks = from == State::Recovering || (from == State::Parked && self.astray);
-            assert!(way == (State::Armed, Request::Go) || (parks && request == Request::Park), "{way:?}");
+            assert!(
+                way == (State::Armed, Transition::Go) || (parks && request == Transition::Park),
+                "{way:?}"
+            );
         }
     }
 
@@ -176,12 +181,12 @@ fn to_the_show(hall: &mut Machine, mut now: MonoTime) {
             State::Parking => hall.event(Event::Parked, now),
             State::Recovering => {
                 hall.event(Event::PositionsRead, now);
-                hall.request(Request::Park, now).or_else(|_| hall.request(Request::Home, now)).unwrap();
+                hall.request(Transition::Park, now).or_else(|_| hall.request(Transition::Home, now)).unwrap();
             }
-            State::Parked => hall.request(Request::HomeAndArm, now).unwrap(),
-            State::Armed => hall.request(Request::Go, now).unwrap(),
-            State::Paused => hall.request(Request::Resume, now).unwrap(),
-            State::Stopped | State::Fault => hall.request(Request::Clear, now).unwrap(),
+            State::Parked => hall.request(Transition::HomeAndArm, now).unwrap(),
+            State::Armed => hall.request(Transition::Go, now).unwrap(),
+            State::Paused => hall.request(Transition::Resume, now).unwrap(),
+            State::Stopped | State::Fault => hall.request(Transition::Clear, now).unwrap(),
         }
     }
     panic!("no way out of {}", hall.state());
@@ -227,7 +232,7 @@ proptest! {
                 let _ = take(&mut hall, step, s(1));
             }
         }
-        hall.request(Request::Stop, s(2)).unwrap();
+        hall.request(Transition::Stop, s(2)).unwrap();
         for event in more {
             hall.event(event, s(3));
             prop_assert!(matches!(hall.state(), State::Stopping | State::Stopped));

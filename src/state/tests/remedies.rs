@@ -9,19 +9,19 @@ fn follow(hall: &mut Machine, now: MonoTime) {
     let next = hall.next();
     let mut ask = |request| hall.request(request, now).unwrap_or_else(|refusal| panic!("{next}: {refusal}"));
     match next {
-        Next::ParkOrHome | Next::ParkOrStart => ask(Request::Park),
-        Next::Home => ask(Request::Home),
-        Next::Arm => ask(Request::Arm),
-        Next::ArmAndHome => ask(Request::HomeAndArm),
-        Next::Go => ask(Request::Go),
-        Next::Resume => ask(Request::Resume),
+        Next::ParkOrHome | Next::ParkOrStart => ask(Transition::Park),
+        Next::Home => ask(Transition::Home),
+        Next::Arm => ask(Transition::Arm),
+        Next::ArmAndHome => ask(Transition::HomeAndArm),
+        Next::Go => ask(Transition::Go),
+        Next::Resume => ask(Transition::Resume),
         Next::AwaitStandstill
         | Next::CheckCue
         | Next::LookAtSeat
         | Next::StopOtherMaster
         | Next::Clear
         | Next::Restart => {
-            ask(Request::Clear);
+            ask(Transition::Clear);
             hall.event(Event::Latched(Latch::Free), now);
         }
         Next::Release => hall.event(Event::AllReleased, now),
@@ -61,7 +61,7 @@ fn whatever_goes_wrong_wherever_what_is_named_next_can_be_done_and_leads_to_a_sh
     let troubles = [
         DRIVE,
         Trouble::Controller { controller: 1, error: 21 },
-        Trouble::Gate,
+        Trouble::Limiter,
         Trouble::Planner,
         Trouble::Deaf,
         Trouble::Homing(2),
@@ -87,7 +87,7 @@ fn whatever_goes_wrong_wherever_what_is_named_next_can_be_done_and_leads_to_a_sh
         for state in State::ALL {
             follow_to_the_show(&mut told(state, event), s(2));
             let mut stopped = told(state, event);
-            stopped.request(Request::Stop, s(1)).unwrap();
+            stopped.request(Transition::Stop, s(1)).unwrap();
             follow_to_the_show(&mut stopped, s(2));
         }
     }

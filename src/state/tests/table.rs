@@ -20,7 +20,7 @@ const EVENTS: [(&str, Event); 17] = [
     ("policy: park", Event::Policy(Demand::Park, 0)),
     ("asleep for 3 s", Event::Slept(Duration::from_secs(3))),
     ("asleep for 6 min", Event::Slept(Duration::from_mins(6))),
-    ("trouble", Event::Trouble(Trouble::Gate)),
+    ("trouble", Event::Trouble(Trouble::Limiter)),
     ("emergency stop", Event::EmergencyStop(0)),
 ];
 
@@ -46,8 +46,8 @@ fn table() -> String {
     let mut row = |head: String, cell: &dyn Fn(State) -> String| {
         rows.push((head, State::ALL.into_iter().map(cell).collect()));
     };
-    for request in Request::ALL {
-        row(format!("**{request}**"), &|state| cell(state, Step::Ask(request)));
+    for request in Transition::ALL {
+        row(format!("**{request}**"), &|state| cell(state, Step::Command(request)));
     }
     for (name, event) in EVENTS {
         row(name.to_owned(), &|state| cell(state, Step::Tell(event)));

@@ -35,10 +35,10 @@ export function headers(more = {}) {
   return bearer ? { ...more, Authorization: `Bearer ${bearer}` } : more;
 }
 
-/** A key that no other request has. Made of random octets, since `randomUUID` is there on secure origins alone. */
+/** A key that no other request has. Made of random bytes, since `randomUUID` is there on secure origins alone. */
 function key() {
-  const octets = crypto.getRandomValues(new Uint8Array(16));
-  return Array.from(octets, (octet) => octet.toString(16).padStart(2, '0')).join('');
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, '0')).join('');
 }
 
 /** Reads, one after the other. */
@@ -53,7 +53,7 @@ export const change = (method, path, body = {}) => inTurn(() => send(method, pat
 
 /** Sends a cue file to the library; the reply is what the library knows of it then. */
 export function upload(id, file) {
-  const type = { 'Content-Type': 'application/octet-stream' };
+  const type = { 'Content-Type': 'application/byte-stream' };
   return inTurn(() => request('PUT', `cues/${id}`, file, type, UPLOAD_MS));
 }
 

@@ -4,7 +4,7 @@ import { byId, make, setProperty, setText } from './dom.js';
 import { change } from './api.js';
 import { ask, onPress, onTwoPresses } from './press.js';
 import { hall } from './state.js';
-import { mark, standingOf } from './marks.js';
+import { mark, healthOf } from './marks.js';
 import { ackRate, bits, micros, sentence, whole } from './words.js';
 
 const FIGURES = {
@@ -60,14 +60,14 @@ export function showController(status) {
     parts = build(controller);
     place.replaceChildren(...parts.all);
   }
-  const standing = standingOf(controller);
-  setProperty(parts.standing, 'className', `standing look-${standing.look}`);
-  if (parts.shape !== standing.mark) {
-    parts.shape = standing.mark;
-    parts.picture.replaceChildren(mark(standing.mark));
+  const health = healthOf(controller);
+  setProperty(parts.health, 'className', `health look-${health.look}`);
+  if (parts.shape !== health.mark) {
+    parts.shape = health.mark;
+    parts.picture.replaceChildren(mark(health.mark));
   }
-  const forGood = controller.standing === 'out';
-  setText(parts.word, forGood ? 'out for good' : controller.enabled ? controller.standing : `taken out, ${controller.standing}`);
+  const forGood = controller.health === 'out';
+  setText(parts.word, forGood ? 'out for good' : controller.enabled ? controller.health : `taken out, ${controller.health}`);
   setText(parts.why, sentence(controller.why));
   for (const [label, figure] of Object.entries(FIGURES)) setText(parts.figures[label], figure(controller));
   setProperty(parts.out, 'hidden', !controller.enabled);
@@ -78,7 +78,7 @@ export function showController(status) {
 function build({ name: which, row, seat, address, group }) {
   const picture = make('span');
   const word = make('strong');
-  const standing = make('p', { className: 'standing' }, picture, word);
+  const health = make('p', { className: 'health' }, picture, word);
   const why = make('p', { className: 'why' });
   const figures = {};
   const list = make('dl', { className: 'controller-figures' });
@@ -107,7 +107,7 @@ function build({ name: which, row, seat, address, group }) {
   const title = make('h3', {}, `${which}${row ? `, row ${row}` : ''}`);
   const where = make('p', { className: 'quiet' }, `seat ${seat}, at ${address}${together ? `, one seat${together}` : ''}`);
   const buttons = make('div', { className: 'row' }, out, reason, back, close);
-  return { all: [title, where, standing, why, buttons, list], standing, picture, word, why, figures, out, reason, in: back, shape: '' };
+  return { all: [title, where, health, why, buttons, list], health, picture, word, why, figures, out, reason, in: back, shape: '' };
 }
 
 function drives(errors) {

@@ -7,7 +7,7 @@ import { ask, onPress, say } from './press.js';
 import { hall } from './state.js';
 import { clock } from './words.js';
 
-const MAY_SEEK = ['armed', 'joining', 'playing', 'freewheeling', 'paused'];
+const MAY_SEEK = ['armed', 'joining', 'playing', 'holding', 'paused'];
 /** A place that was chosen and left alone is forgotten, so that the bar follows the film again. */
 const FORGET_MS = 15_000;
 let chosen = null;

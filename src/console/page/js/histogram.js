@@ -39,8 +39,8 @@ function showFigures(place, { p50_us: p50, p99_us: p99, p999_us: p999, max_us: m
 function drawInto(place, { bounds_us: bounds, counts }) {
   const first = counts.findIndex((count) => count > 0);
   if (first < 0) {
-    place.replaceChildren(make('p', { className: 'quiet' }, 'Nothing was counted yet.'));
-    setAttribute(place, 'aria-label', 'Nothing was counted yet');
+    place.replaceChildren(make('p', { className: 'quiet' }, 'Nothing counted yet.'));
+    setAttribute(place, 'aria-label', 'Nothing counted yet');
     return;
   }
   const from = Math.max(first - 1, 0);

@@ -1,7 +1,7 @@
 // The hall as a map: a line for each row, a field for each controller, coloured and marked by how it stands.
 
 import { byId, choice, make, setAttribute, setProperty, setStyle, setText } from './dom.js';
-import { BANDS, STANDINGS, ackBand, latencyBand, mark, standingOf } from './marks.js';
+import { BANDS, HEALTH, ackBand, latencyBand, mark, healthOf } from './marks.js';
 import { ackRate, micros } from './words.js';
 import { hall } from './state.js';
 import { selected, select } from './controller.js';
@@ -10,7 +10,7 @@ const NO_ROW = 'no row';
 /** Names of rows up to so long stand beside their seats, longer ones above them; longer names of seats need wider fields. */
 const SHORT_ROW = 2;
 const SHORT_SEAT = 6;
-let by = 'standing';
+let by = 'health';
 let drawn = '';
 let fields = new Map();
 
@@ -83,15 +83,15 @@ function showField(field, controller) {
 }
 
 function lookOf(controller) {
-  const standing = standingOf(controller);
+  const health = healthOf(controller);
   // A controller that takes no part has no figures worth a colour.
-  if (by === 'standing' || ['away', 'bad', 'held'].includes(standing.look)) return standing;
+  if (by === 'health' || ['away', 'bad', 'held'].includes(health.look)) return health;
   return by === 'acks' ? ackBand(controller.ack_rate) : latencyBand(controller.ack_p99_us);
 }
 
-function spoken({ name, row, enabled, standing, ack_rate: acks, ack_p99_us: p99 }) {
+function spoken({ name, row, enabled, health, ack_rate: acks, ack_p99_us: p99 }) {
   const place = row ? `, row ${row}` : '';
-  return `${name}${place}: ${enabled ? standing : standing === 'out' ? 'out for good' : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
+  return `${name}${place}: ${enabled ? health : health === 'out' ? 'out for good' : 'taken out'}, acks ${ackRate(acks)}, latency ${micros(p99)}`;
 }
 
 function showLegend() {
@@ -102,6 +102,6 @@ function showLegend() {
   }[by];
   const entries = bands
     ? Object.values(BANDS).map((look, index) => entry(look, bands[index]))
-    : Object.entries(STANDINGS).map(([name, look]) => entry(look, `${name}: ${look.means}`));
+    : Object.entries(HEALTH).map(([name, look]) => entry(look, `${name}: ${look.means}`));
   byId('legend').replaceChildren(...entries);
 }

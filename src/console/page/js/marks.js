@@ -1,9 +1,9 @@
-// What is shown by colour is shown by a mark and a letter too: the standings of controllers, and how good a figure is.
+// What is shown by colour is shown by a mark and a letter too: the health of controllers, and how good a figure is.
 
 import { draw } from './dom.js';
 
-/** Every standing: its class of colour, its mark, its letters and what it means. */
-export const STANDINGS = {
+/** Every health: its class of colour, its mark, its letters and what it means. */
+export const HEALTH = {
   ok: { look: 'good', mark: 'disc', letters: 'OK', means: 'answers' },
   unwatched: { look: 'calm', mark: 'ring', letters: 'UW', means: 'not watched: acks are off' },
   degraded: { look: 'weak', mark: 'half', letters: 'DG', means: 'answers late or not always' },
@@ -17,7 +17,7 @@ export const STANDINGS = {
 };
 
 /** How a controller stands; one that a person took out is shown as that, however well it answers. */
-export const standingOf = ({ enabled, standing }) => STANDINGS[enabled || standing === 'out' ? standing : 'excluded'] ?? STANDINGS.unknown;
+export const healthOf = ({ enabled, health }) => HEALTH[enabled || health === 'out' ? health : 'excluded'] ?? HEALTH.unknown;
 
 /** The bands of a figure. */
 export const BANDS = {

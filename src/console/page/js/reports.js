@@ -29,7 +29,7 @@ function showPreflight({ preflight, controllers }) {
   }
   setProperty(verdict, 'className', `verdict ${preflight.passed ? 'look-good' : 'look-bad'}`);
   const outcome = preflight.passed ? 'PASSED' : 'NOT PASSED';
-  const all = controllers.filter(({ standing }) => standing !== 'out').length;
+  const all = controllers.filter(({ health }) => health !== 'out').length;
   const answered = `${preflight.answered} of ${all} controllers answered`;
   setText(verdict, `${outcome}: ${answered}, ${lasting(preflight.age_s)} ago`);
   showFindings({ findings: preflight.findings, all });

@@ -17,11 +17,11 @@ export const onToken = (listener) => given.push(listener);
 /** The server does not know who asks. Whoever left the dialog is asked again only when they press something. */
 export function askForToken({ pressed }) {
   if (left && !pressed) return;
-  open(token() ? 'The server does not know that token, or has forgotten it.' : 'This server wants a token.');
+  open(token() ? 'The server does not know that token, or it was removed.' : 'This server requires a token.');
 }
 
 /** The server knows who asks, and they may not. */
-export const askForAnother = () => open('That needs a token of somebody who may do more.');
+export const askForAnother = () => open('That needs a token with more permissions.');
 
 /** Takes the token of the link that led here; says whether there was one. */
 function takeFromLink() {

@@ -14,9 +14,9 @@ const MAY = {
   arm: ['parked'],
   disarm: ['armed', 'homing'],
   go: ['armed'],
-  pause: ['joining', 'playing', 'freewheeling'],
+  pause: ['joining', 'playing', 'holding'],
   resume: ['paused'],
-  park: ['recovering', 'parked', 'armed', 'joining', 'playing', 'freewheeling', 'paused'],
+  park: ['recovering', 'parked', 'armed', 'joining', 'playing', 'holding', 'paused'],
   home: ['recovering', 'parked'],
 };
 

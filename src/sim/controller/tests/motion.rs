@@ -133,22 +133,22 @@ fn inverted_outputs_are_on_where_a_frame_says_off() {
 }
 
 #[test]
-fn a_controller_whose_port_out_takes_four_octets_reads_outputs_and_vibration_there_and_refuses_two() {
+fn a_controller_whose_port_out_takes_four_bytes_reads_outputs_and_vibration_there_and_refuses_two() {
     let invented = Invented { vibration_port: VibrationPort::Four, ..Invented::default() };
     let mut bench = Bench::new(&Setup { invented, ..Setup::default() });
     bench.controller.set_switches(1, at(0));
     bench.wait(1_000);
     let shake = [Vibration { period: 400, amplitude: 10 }; 3];
     let motion = Motion { vibration: Some(&shake), outputs: 0x0801, ..FRAME };
-    let octets = motion.emit_as(VibrationPort::Four, &mut [0; MAX_LEN]).to_vec();
-    let answer = MotionReply::parse_as(VibrationPort::Four, &bench.send(&octets).unwrap()).unwrap();
+    let bytes = motion.emit_as(VibrationPort::Four, &mut [0; MAX_LEN]).to_vec();
+    let answer = MotionReply::parse_as(VibrationPort::Four, &bench.send(&bytes).unwrap()).unwrap();
     assert_eq!((answer.code, answer.vibration.as_deref()), (ReplyCode::Running, Some(&shake[..])));
     assert_eq!((bench.controller.outputs(), answer.inputs), (0x0801, 1));
     assert_eq!(bench.wait(100).positions(), [1_000, 2_000, -3_000]);
 
-    let octets = motion.emit(&mut [0; MAX_LEN]).to_vec();
-    let answer = MotionReply::parse_as(VibrationPort::Four, &bench.send(&octets).unwrap()).unwrap();
-    assert_eq!((answer.code, octets.len()), (ReplyCode::Command, 46), "it ends two octets too soon");
+    let bytes = motion.emit(&mut [0; MAX_LEN]).to_vec();
+    let answer = MotionReply::parse_as(VibrationPort::Four, &bench.send(&bytes).unwrap()).unwrap();
+    assert_eq!((answer.code, bytes.len()), (ReplyCode::Command, 46), "it ends two bytes too soon");
 }
 
 #[test]

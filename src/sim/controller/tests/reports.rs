@@ -4,12 +4,12 @@ use crate::wire::{Report, Status};
 /// The next report, if one is due.
 fn report(bench: &mut Bench) -> Option<(String, Vec<u8>)> {
     let mut buf = [0xa5; MAX_LEN];
-    let (to, octets) = bench.controller.report(at(bench.at_ms), &mut buf)?;
-    Some((to.to_string(), octets.to_vec()))
+    let (to, bytes) = bench.controller.report(at(bench.at_ms), &mut buf)?;
+    Some((to.to_string(), bytes.to_vec()))
 }
 
 fn status(bench: &mut Bench) -> Option<Status> {
-    report(bench).map(|(_, octets)| Status::parse(&octets).unwrap())
+    report(bench).map(|(_, bytes)| Status::parse(&bytes).unwrap())
 }
 
 #[test]
@@ -22,9 +22,9 @@ fn reports_come_every_pa1e_to_the_host_that_pa1f_names() {
         bench.play(&Motion { outputs: 5, ..FRAME });
         bench.controller.set_switches(2, at(50));
         assert_eq!(report(bench.wait(99)), None);
-        let (to, octets) = report(bench.wait(1)).unwrap();
-        let status = Status::parse(&octets).unwrap();
-        assert_eq!((to.as_str(), octets.len(), status.station), (host, 40, Code(0x0fc9)));
+        let (to, bytes) = report(bench.wait(1)).unwrap();
+        let status = Status::parse(&bytes).unwrap();
+        assert_eq!((to.as_str(), bytes.len(), status.station), (host, 40, Code(0x0fc9)));
         assert_eq!((&status.positions[..], status.outputs, status.inputs), (FRAME.positions, 5, 2));
         assert_eq!((status.error, bench.controller.report_due()), (0, Some(at(200))));
         assert_eq!(bench.controller.counts().reported, 1);
@@ -79,8 +79,8 @@ fn a_controller_that_starts_again_or_is_mute_reports_nothing() {
 fn an_mbox_reports_its_alarm_register_once() {
     let mut bench = Bench::new(&Setup { dialect: Dialect::Mbox, ..Setup::default() });
     bench.controller.act(&Action::Error(11), at(0));
-    let (to, octets) = report(&mut bench).unwrap();
-    let told = Report::parse(&octets).unwrap();
+    let (to, bytes) = report(&mut bench).unwrap();
+    let told = Report::parse(&bytes).unwrap();
     assert_eq!((to.as_str(), told.start, told.data), ("192.168.15.101:8410", 0xfe, Words::from(&[11][..])));
     assert_eq!((bench.word(0, 0xfe), report(&mut bench)), (11, None));
 }

@@ -169,7 +169,7 @@ fn a_refusal_of_smc_has_the_error_in_slot_6_and_one_of_mbox_where_the_data_stood
         let bad = WriteRequest { channel: 1, accept: codes.0, reply: codes.1, start: 0x06, data };
         let read = ReadRequest { channel: 1, accept: codes.0, reply: codes.1, start: 0x02, num: 1 };
         let [bad, read] = [bad.emit(&mut buf).to_vec(), read.emit(&mut buf).to_vec()]
-            .map(|octets| bench.send(&octets).unwrap());
+            .map(|bytes| bench.send(&bytes).unwrap());
         (bad[4..8].to_vec(), bad[12..].to_vec(), read[4..8].to_vec())
     };
     let (bad, data, read) = refusal(Dialect::Smc);
@@ -210,8 +210,8 @@ fn the_version_stands_in_dpff_and_dpfe() {
 }
 
 /// Asks a drive: x, slot 6 and the words.
-fn servo(bench: &mut Bench, octets: &[u8]) -> Option<(u8, u16, Vec<u16>)> {
-    bench.send(octets).map(|answer| {
+fn servo(bench: &mut Bench, bytes: &[u8]) -> Option<(u8, u16, Vec<u16>)> {
+    bench.send(bytes).map(|answer| {
         let reply = ServoReply::parse(&answer).unwrap();
         (reply.code as u8, reply.servo.max(reply.error), reply.data.iter().collect())
     })

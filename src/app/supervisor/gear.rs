@@ -1,0 +1,193 @@
+//! What show-control gear may do in a hall that people lead: go on where it paused itself, take in what it took out itself,
+//! and set levels up to what a person has set. The address that its messages come from proves nothing.
+
+use super::Supervisor;
+use super::hall_settings::HallSettings;
+use crate::control::{Code, Command, Desired, Levels, LevelsChange, Problem};
+use crate::state::State;
+
+/// What has to be known of the hall before an ask, to tell afterwards whose doing something is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Before {
+    state: State,
+}
+
+impl Supervisor {
+    /// True if it may be done for whom it is asked for.
+    ///
+    /// # Errors
+    /// Where gear would undo what a person did.
+    pub(super) fn may_ask(&self, desired: &Desired) -> Result<(), Problem> {
+        let Desired { ask, who } = desired;
+        if !who.surface.is_gear() || matches!(ask, Command::Stop | Command::Pause) {
+            return Ok(());
+        }
+        let refused = |why: &str, remedy: &str| {
+            let detail = format!("{} may not {}: {why}", who.surface, ask.word());
+            Err(Problem::new(Code::Role, detail, remedy))
+        };
+        if self.mirror.state == State::Paused && self.gear_paused != Some(self.mirror.since) {
+            return refused("it did not pause the hall", "a person goes on where a person paused");
+        }
+        match ask {
+            Command::Resume if !matches!(self.mirror.state, State::Paused | State::Playing(_)) => {
+                refused("nothing is paused", "a person looks at the hall first")
+            }
+            Command::Enable(name)
+                if self.settings.out.get(self.group(name)).is_some_and(|out| !out.surface.is_gear()) =>
+            {
+                refused(&format!("it did not take {name} out"), "a person takes in whom a person took out")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// How things stand before an ask is done.
+    pub(super) const fn before(&self) -> Before {
+        Before { state: self.mirror.state }
+    }
+
+    /// Notes whose doing it is what was done.
+    pub(super) fn note_doer(&mut self, desired: &Desired, before: Before) {
+        let by_gear = desired.who.surface.is_gear();
+        match &desired.ask {
+            Command::Pause if !by_gear => self.gear_paused = None,
+            Command::Pause if before.state != State::Paused => self.gear_paused = Some(self.mirror.since),
+            _ => {}
+        }
+    }
+
+    /// Sets levels for gear: no higher than a person has set, which it is told where it asked for more.
+    pub(super) fn levels_of_gear(&mut self, change: &LevelsChange) -> Result<(), Problem> {
+        let (change, over) = self.settings.within(change);
+        self.set(|settings| settings.change_below(&change))?;
+        if over.is_empty() {
+            return Ok(());
+        }
+        let detail = format!("a person has set less than was asked for: {}", over.join(", "));
+        Err(Problem::new(Code::Role, detail, "a person raises it, on the console or with `kinocue level`"))
+    }
+
+    fn group<'n>(&'n self, name: &'n str) -> &'n str {
+        let controllers = &self.runtime.config.controllers;
+        controllers.iter().find(|one| one.name == name).map_or(name, |one| &one.group)
+    }
+}
+
+impl HallSettings {
+    /// What of a change a person has allowed for, and in words what was taken back to that.
+    fn within(&self, change: &LevelsChange) -> (LevelsChange, Vec<String>) {
+        let Levels { motion, vibration, effects, rows } = &self.ceiling;
+        let mut change = change.clone();
+        let mut over = Vec::new();
+        let mut level = |name: &str, asked: &mut f64, most: f64| {
+            if *asked > most {
+                over.push(format!("{name} is {:.0} %", most * 100.0));
+                *asked = most;
+            }
+        };
+        if let Some(asked) = &mut change.motion {
+            level("motion", asked, *motion);
+        }
+        if let Some(asked) = &mut change.vibration {
+            level("vibration", asked, *vibration);
+        }
+        for (row, asked) in &mut change.rows {
+            level(&format!("row {row}"), asked, rows.get(row).copied().unwrap_or(1.0));
+        }
+        for (name, on) in
+            change.effects.iter_mut().filter(|(name, on)| **on && effects.get(*name) == Some(&false))
+        {
+            over.push(format!("{name} is off"));
+            *on = false;
+        }
+        (change, over)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::Rig;
+    use crate::control::Surface;
+
+    fn role(result: Result<std::sync::Arc<crate::control::Status>, Problem>) -> String {
+        let problem = result.unwrap_err();
+        assert_eq!(problem.code, Code::Role, "{problem}");
+        problem.detail
+    }
+
+    #[test]
+    fn gear_goes_on_where_it_paused_itself_and_nowhere_else() {
+        let mut rig = Rig::playing();
+        for surface in [Surface::Osc, Surface::Text] {
+            rig.ask_as(surface, Command::Pause).unwrap();
+            rig.ask_as(surface, Command::Resume).unwrap();
+            rig.ask(Command::Pause).unwrap();
+            assert!(role(rig.ask_as(surface, Command::Resume)).ends_with("it did not pause the hall"));
+            rig.ask_as(surface, Command::Pause).unwrap();
+            role(rig.ask_as(surface, Command::Resume));
+            for ask in [
+                Command::Park,
+                Command::Seek(crate::time::ShowTime::ZERO),
+                Command::Disable { name: "A1".to_owned(), why: None },
+            ] {
+                role(rig.ask_as(surface, ask));
+            }
+            assert_eq!(rig.state(), State::Paused);
+            rig.ask(Command::Resume).unwrap();
+        }
+        rig.ask_as(Surface::Osc, Command::Pause).unwrap();
+        rig.ask(Command::Pause).unwrap();
+        role(rig.ask_as(Surface::Osc, Command::Resume));
+        rig.ask(Command::Stop).unwrap();
+        role(rig.ask_as(Surface::Osc, Command::Resume));
+    }
+
+    #[test]
+    fn gear_takes_in_only_what_it_took_out() {
+        let mut rig = Rig::parked();
+        let (enable, disable) =
+            (|| Command::Enable("A1".to_owned()), || Command::Disable { name: "A1".to_owned(), why: None });
+        rig.ask_as(Surface::Osc, disable()).unwrap();
+        rig.ask_as(Surface::Osc, enable()).unwrap();
+        rig.ask(disable()).unwrap();
+        assert!(role(rig.ask_as(Surface::Osc, enable())).ends_with("it did not take A1 out"));
+        rig.ask_as(Surface::Osc, disable()).unwrap();
+        role(rig.ask_as(Surface::Osc, enable()));
+        rig.ask(enable()).unwrap();
+        rig.ask_as(Surface::Osc, disable()).unwrap();
+        rig.ask(disable()).unwrap();
+        role(rig.ask_as(Surface::Osc, enable()));
+        assert!(rig.supervisor.settings.out.contains_key("A1"));
+    }
+
+    #[test]
+    fn gear_sets_levels_up_to_what_a_person_set() {
+        let mut rig = Rig::parked();
+        let motion =
+            |motion| Command::Levels(LevelsChange { motion: Some(motion), ..LevelsChange::default() });
+        rig.ask(motion(0.6)).unwrap();
+        for (asked, is) in [(1.0, 0.6), (0.2, 0.2), (0.5, 0.5), (0.7, 0.6)] {
+            let answer = rig.ask_as(Surface::Osc, motion(asked));
+            if asked > is {
+                assert!(role(answer).ends_with("motion is 60 %"));
+            }
+            assert_eq!(rig.supervisor.settings.levels.motion, is, "{asked} was asked");
+        }
+        let rows = |a: f64, b: f64| LevelsChange {
+            rows: [("A".to_owned(), a), ("B".to_owned(), b)].into(),
+            ..LevelsChange::default()
+        };
+        rig.ask(Command::Levels(rows(0.5, 1.0))).unwrap();
+        role(rig.ask_as(Surface::Text, Command::Levels(rows(1.0, 0.1))));
+        let levels = &rig.supervisor.settings.levels.rows;
+        assert_eq!(
+            (levels["A"], levels["B"]),
+            (0.5, 0.1),
+            "one that was too high keeps none from being lowered"
+        );
+        rig.ask(motion(1.0)).unwrap();
+        rig.ask_as(Surface::Osc, motion(0.9)).unwrap();
+    }
+}

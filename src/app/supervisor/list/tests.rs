@@ -1,0 +1,190 @@
+//! Entries start by themselves where a person has let the one before go, or armed the hall for their time, and never otherwise.
+
+use std::path::Path;
+
+use super::*;
+use crate::app::supervisor::testing::Rig;
+use crate::control::LevelsChange;
+use crate::state::{Event, PlayMode};
+
+const JOINING: State = State::Playing(PlayMode::Joining);
+const DAY: &str = "title = \"Day\"\n[[entry]]\ncue = \"one\"\nthen = \"go\"\n[[entry]]\ncue = \"two\"\nthen = \"go\"\n\
+    [[entry]]\ncue = \"three\"\nlevel = 0.5\n";
+
+fn list() -> List {
+    let playlist = Playlist::parse(Path::new("day.toml"), DAY).unwrap();
+    let cues = vec![(None, 4.0); playlist.entries.len()];
+    List { id: "day".to_owned(), playlist, cues, current: 0, schedule: Schedule::default() }
+}
+
+/// A hall whose first entry plays.
+fn playing() -> Rig {
+    let mut rig = Rig::playing();
+    rig.supervisor.list = Some(list());
+    rig
+}
+
+/// A hall that is armed, and loads the second entry, whose time has come.
+fn due() -> Rig {
+    let mut rig = Rig::armed();
+    rig.supervisor.list = Some(list());
+    rig.supervisor.fetch_entry(1, Some(Start::Time), None);
+    rig
+}
+
+fn cue(rig: &Rig) -> Option<&str> {
+    rig.supervisor.cued.as_ref().map(|cued| cued.id.as_str())
+}
+
+/// The seats have parked, and the next cue is on its way.
+fn end_show(rig: &mut Rig) {
+    rig.happens(|machine, now| machine.event(Event::Parked, now));
+    rig.hear_of(State::Parked);
+    rig.supervisor.end_show();
+    assert!(rig.supervisor.job.is_some());
+}
+
+/// Has something asked, with nothing looked after in between.
+fn ask_in_between(rig: &mut Rig, ask: Command) {
+    drop(rig.post(ask));
+    rig.hear();
+}
+
+#[test]
+fn an_entry_goes_on_to_the_next_once_its_cue_came_to_its_end() {
+    let mut rig = playing();
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("two")));
+}
+
+#[test]
+fn a_cue_that_a_person_loads_beside_the_playlist_goes_on_to_nothing() {
+    let mut rig = Rig::parked();
+    rig.supervisor.list = Some(list());
+    rig.ask(Command::Load { cue: "three".to_owned() }).unwrap();
+    rig.ask(Command::Arm { seats_empty: false }).unwrap();
+    rig.ask(Command::Go).unwrap();
+    assert_eq!(rig.supervisor.place(), None);
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("three")));
+}
+
+#[test]
+fn nothing_goes_on_that_a_person_wanted_to_rest_before_the_seats_were_parked() {
+    for ask in [Command::Park, Command::Disarm, Command::Pause] {
+        let mut rig = playing();
+        rig.tell(Event::CueEnded);
+        ask_in_between(&mut rig, ask.clone());
+        rig.tell(Event::Parked);
+        rig.settle();
+        assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")), "{ask}");
+    }
+}
+
+#[test]
+fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() {
+    for ask in [Command::Stop, Command::Park, Command::Disarm, Command::Pause] {
+        let mut rig = playing();
+        rig.tell(Event::CueEnded);
+        end_show(&mut rig);
+        ask_in_between(&mut rig, ask.clone());
+        rig.settle();
+        let rests = if ask == Command::Stop { State::Stopped } else { State::Parked };
+        assert_eq!((rig.state(), cue(&rig)), (rests, Some("two")), "{ask}");
+    }
+}
+
+#[test]
+fn nothing_goes_on_after_a_stop_that_was_cleared_before_the_next_cue_was_loaded() {
+    let mut rig = playing();
+    rig.tell(Event::CueEnded);
+    end_show(&mut rig);
+    // By the stop socket, of which no word may come.
+    rig.supervisor.runtime.desk.stop();
+    rig.hear_of(State::Stopped);
+    rig.happens(|machine, now| {
+        machine.request(Transition::Clear, now).unwrap();
+        machine.event(Event::PositionsRead, now);
+        machine.request(Transition::Park, now).unwrap();
+    });
+    rig.hear_of(State::Parking);
+    rig.happens(|machine, now| machine.event(Event::Parked, now));
+    rig.hear_of(State::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
+}
+
+#[test]
+fn nothing_goes_on_while_the_program_ends() {
+    let mut rig = playing();
+    rig.tell(Event::CueEnded);
+    rig.supervisor.ports.signals.leave.store(true, std::sync::atomic::Ordering::Release);
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("one")));
+}
+
+#[test]
+fn an_entry_that_goes_on_homes_no_seat() {
+    let mut rig = playing();
+    rig.tell(Event::Rebooted(1));
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
+    assert!(
+        rig.supervisor.notes.iter().any(|note| note.contains("home first")),
+        "{:?}",
+        rig.supervisor.notes
+    );
+}
+
+#[test]
+fn an_entry_whose_time_has_come_starts_while_the_hall_is_armed() {
+    let mut rig = due();
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("two")));
+}
+
+#[test]
+fn an_entry_whose_time_has_come_arms_nothing_that_a_person_has_disarmed_meanwhile() {
+    for ask in [Command::Disarm, Command::Park, Command::Stop] {
+        let mut rig = due();
+        ask_in_between(&mut rig, ask.clone());
+        rig.settle();
+        assert!(matches!(rig.state(), State::Parked | State::Stopped), "{ask}: {}", rig.state());
+    }
+}
+
+#[test]
+fn an_entry_whose_time_has_come_does_not_start_where_arming_has_lapsed_meanwhile() {
+    let mut rig = due();
+    rig.happens(|machine, now| machine.tick(now + crate::state::ARMED_FOR));
+    rig.hear_of(State::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
+}
+
+#[test]
+fn a_show_that_a_person_lets_go_stays_the_one_that_is_loaded() {
+    let mut rig = due();
+    ask_in_between(&mut rig, Command::Go);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("one")));
+    assert_eq!(rig.supervisor.list.as_ref().unwrap().current, 0);
+    let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
+    rig.ask(Command::Levels(half)).unwrap();
+}
+
+#[test]
+fn a_playlist_that_was_loaded_before_is_at_the_entry_where_it_was_or_at_that_of_its_cue() {
+    let list = list();
+    assert_eq!(list.nearest(1, "two"), 1);
+    assert_eq!(list.nearest(0, "three"), 2, "somebody has changed it meanwhile");
+    assert_eq!(list.nearest(0, "beside"), 0, "a cue that was loaded beside it");
+    assert_eq!(list.nearest(7, "beside"), 2);
+}

@@ -1,0 +1,257 @@
+//! Records for the journal: commands with their operators, and shows.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jiff::Zoned;
+
+use super::Supervisor;
+use crate::control::{Desired, JournalLine, Problem, Surface};
+use crate::journal::{Action, Ending, Folds, Journal, Outcome, Percentiles, ShowRecord, stamp};
+use crate::rt::{Row, Times};
+use crate::state::Cause;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+use crate::tracker::{Counts, Histogram};
+
+/// How long the last frames of a show have to meet their fate, and the ack thread to tell it.
+const SETTLED_WITHIN: Duration = Duration::from_millis(1_500);
+/// Lines that every status carries.
+const NEWEST: usize = 20;
+
+/// What is written down, and what was lately.
+#[derive(Debug)]
+pub(super) struct Records {
+    journal: Journal,
+    folds: Folds,
+    newest: VecDeque<JournalLine>,
+    /// The show that is under way.
+    open: Option<Box<Open>>,
+}
+
+/// What was counted before a show.
+#[derive(Debug)]
+pub(super) struct Before {
+    ticks: u64,
+    missed: u64,
+    table: Vec<Row>,
+    times: Times,
+}
+
+/// A show that has begun.
+#[derive(Debug)]
+struct Open {
+    record: ShowRecord,
+    before: Before,
+    events: Vec<String>,
+    /// How it ended; none while it goes on.
+    over: Option<Over>,
+}
+
+/// The end of a show whose last frames may be on their way.
+#[derive(Debug)]
+struct Over {
+    cause: Cause,
+    end: String,
+    at: MonoTime,
+    ticks: u64,
+    missed: u64,
+}
+
+impl Records {
+    /// Records that go to a journal.
+    pub(super) fn new(journal: Journal) -> Self {
+        Self { journal, folds: Folds::default(), newest: VecDeque::new(), open: None }
+    }
+
+    /// The newest lines, newest first.
+    pub(super) fn newest(&self) -> Vec<JournalLine> {
+        self.newest.iter().cloned().collect()
+    }
+
+    /// Why lines cannot be written at present, and what to do.
+    pub(super) fn trouble(&self) -> Option<String> {
+        self.journal.trouble()
+    }
+
+    /// What has become worse or better in writing it.
+    pub(super) fn news(&mut self) -> Vec<String> {
+        self.journal.news()
+    }
+
+    /// The journal, for the next supervisor.
+    pub(super) fn into_journal(mut self) -> Journal {
+        self.folds.rest().iter().for_each(|action| self.journal.note(action));
+        self.journal
+    }
+
+    /// True if a show has begun, and is not over.
+    pub(super) fn is_under_way(&self) -> bool {
+        self.open.as_ref().is_some_and(|open| open.over.is_none())
+    }
+
+    /// Puts it before the newest lines; with the line before, where that was the same.
+    fn show(&mut self, action: &Action) {
+        let Action { at, who, what, result, .. } = action.clone();
+        let line = JournalLine { at, who, what, result, times: 1 };
+        let same = |before: &&mut JournalLine| {
+            (&before.who, &before.what, &before.result) == (&line.who, &line.what, &line.result)
+        };
+        match self.newest.front_mut().filter(same) {
+            Some(before) => *before = JournalLine { times: before.times.saturating_add(1), ..line },
+            None => self.newest.push_front(line),
+        }
+        self.newest.truncate(NEWEST);
+    }
+
+    /// Notes something that happens while a show is under way.
+    pub(super) fn event(&mut self, event: String) {
+        if let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) {
+            open.events.push(event);
+        }
+    }
+}
+
+impl Supervisor {
+    /// Writes down what somebody asked, and what came of it.
+    pub(super) fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
+        let at = stamp(&Zoned::now());
+        let (who, what) = (desired.who.to_string(), desired.ask.to_string());
+        let result = match result {
+            Ok(()) => "done".to_owned(),
+            Err(problem) => format!("{}; {}", problem.detail, problem.remedy),
+        };
+        let state = self.mirror.state.to_string();
+        let action = Action { at, who, what, result, state, times: 1 }.shortened();
+        self.record.show(&action);
+        let written = self.record.folds.take(action, desired.ask.word(), Monotonic.now());
+        written.iter().for_each(|action| self.note_action(action));
+    }
+
+    /// Writes down the repeats of what was asked, once their time is over.
+    pub(super) fn settle_folds(&mut self) {
+        let due = self.record.folds.due(Monotonic.now());
+        due.iter().for_each(|action| self.note_action(action));
+    }
+
+    fn note_action(&mut self, action: &Action) {
+        self.say_ask(action);
+        self.record.journal.note(action);
+    }
+
+    /// What is counted so far; to be taken before a show is let go.
+    pub(super) fn count_before(&self) -> Before {
+        let live = &self.runtime.live;
+        Before { ticks: live.ticks(), missed: live.missed(), table: live.table(), times: live.times() }
+    }
+
+    /// A show has just begun, and who let it go.
+    pub(super) fn begin_record(&mut self, who: &str, surface: Surface, before: Before) {
+        self.close_record();
+        let Some(cued) = &self.cued else { return };
+        let (now, config) = (Zoned::now(), &self.runtime.config);
+        let available = before
+            .table
+            .iter()
+            .enumerate()
+            .filter(|(lane, row)| self.settings.is_on(*lane) && row.standing.may_move());
+        let levels = &self.settings.levels;
+        let off = levels.effects.iter().filter(|(_, on)| !**on);
+        let record = ShowRecord {
+            start: stamp(&now),
+            hall: config.show.name.clone(),
+            cue: cued.id.clone(),
+            sha256: cued.sha256.clone(),
+            title: cued.title.clone(),
+            playlist: self.place(),
+            level: levels.motion,
+            vibration: levels.vibration,
+            trim_ms: self.settings.trim_ms,
+            effects_off: off.map(|(name, _)| name.clone()).collect(),
+            seats_total: config.named().count(),
+            seats_available: available.count(),
+            operator: who.to_owned(),
+            scheduled: surface == Surface::Schedule,
+            out_of_hours: config.log.hours.is_some_and(|hours| !hours.contains(now.time())),
+            outcome: None,
+        };
+        self.record.journal.begin(&record);
+        self.record.open = Some(Box::new(Open { record, before, events: Vec::new(), over: None }));
+    }
+
+    /// A show is over. It is written down once its last frames have met their fate.
+    pub(super) fn end_record(&mut self, ended: Cause) {
+        let Some(open) = self.record.open.as_mut().filter(|open| open.over.is_none()) else { return };
+        let live = &self.runtime.live;
+        open.over = Some(Over {
+            cause: ended,
+            end: stamp(&Zoned::now()),
+            at: Monotonic.now(),
+            ticks: live.ticks().saturating_sub(open.before.ticks),
+            missed: live.missed().saturating_sub(open.before.missed),
+        });
+    }
+
+    /// Writes down a show that is over, once the ack thread has told the fate of every frame of it.
+    pub(super) fn settle_record(&mut self) {
+        let Some(over) = self.record.open.as_ref().and_then(|open| open.over.as_ref()) else { return };
+        let told = |row: &Row| row.at > over.at && row.counts.in_flight() == 0;
+        let late = Monotonic.now().since(over.at) > SETTLED_WITHIN;
+        if late || self.runtime.live.table().iter().all(told) {
+            self.close_record();
+        }
+    }
+
+    /// Writes down a show that is over, with what was counted so far.
+    pub(super) fn close_record(&mut self) {
+        let Some(open) = self.record.open.take() else { return };
+        let Open { mut record, before, events, over } = *open;
+        let Some(Over { cause, end, ticks, missed, .. }) = over else { return };
+        let live = &self.runtime.live;
+        let now = live.table();
+        let sum = |of: fn(&Counts) -> u64| -> u64 {
+            let after: u64 = now.iter().map(|row| of(&row.counts)).sum();
+            let earlier: u64 = before.table.iter().map(|row| of(&row.counts)).sum();
+            after.saturating_sub(earlier)
+        };
+        let after = live.times();
+        record.outcome = Some(Outcome {
+            end,
+            result: ending(cause),
+            events,
+            ticks,
+            missed_ticks: missed,
+            sent: sum(|counts| counts.sent),
+            asked: sum(|counts| counts.asked),
+            acked: sum(|counts| counts.acked),
+            refused: sum(Counts::refused),
+            lost: sum(|counts| counts.lost),
+            send_failed: sum(|counts| counts.send_failed),
+            lateness: percentiles(after.lateness, &before.times.lateness),
+            ack: percentiles(after.acks, &before.times.acks),
+        });
+        self.record.journal.show(&record);
+    }
+}
+
+/// How a show ended for that cause.
+pub(super) const fn ending(cause: Cause) -> Ending {
+    match cause {
+        Cause::CueEnded => Ending::Completed,
+        Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
+        _ => Ending::Stopped,
+    }
+}
+
+/// Percentiles of what came since.
+fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
+    // What cannot be taken away was never in it.
+    let _ = now.subtract(before);
+    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+    let us = |ns: u64| (!now.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
+    Percentiles {
+        p50_us: us(now.value_at_quantile(0.5)),
+        p99_us: us(now.value_at_quantile(0.99)),
+        max_us: us(now.max()),
+    }
+}

@@ -1,0 +1,245 @@
+//! The test of empty seats: each axis in turn moves slowly there and back, then each effect is on for a second. It is a cue
+//! like any other, made here, proved and joined like any other.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::Supervisor;
+use super::job::JobResult;
+use super::show::ProvedShow;
+use crate::config::Config;
+use crate::control::{Asked, Code, Problem, Surface, TestRow, TestStatus};
+use crate::cue::{self, Source};
+use crate::motion::MAX_AXES;
+use crate::rt::{Command as TickCommand, Row};
+use crate::state::{State, Transition};
+use crate::time::ShowTime;
+use crate::timeline::Timeline;
+
+/// How far an axis moves from park, of its stroke.
+const REACH: f64 = 0.2;
+/// How long one axis takes, there, a rest, and back, ms.
+const AXIS_MS: u32 = 6_000;
+/// How long an effect is given, half of it on, ms.
+const EFFECT_MS: u32 = 2_000;
+/// What comes before the first, ms.
+const LEAD_MS: u32 = 1_000;
+
+/// A test that is under way, or was.
+#[derive(Debug)]
+pub(super) struct SeatTest {
+    parts: Vec<Part>,
+    /// The part that is under way, with what was counted when it began.
+    now: Option<(usize, Vec<Row>)>,
+    /// The rows under test; none for all.
+    only: Option<BTreeSet<String>>,
+    pub(super) status: TestStatus,
+    /// The cue that was loaded before.
+    before: Option<Box<ProvedShow>>,
+}
+
+impl SeatTest {
+    /// The cue that was loaded before.
+    pub(super) fn before(&self) -> Option<&ProvedShow> {
+        self.before.as_deref()
+    }
+}
+
+/// One thing that is tested.
+#[derive(Debug, Clone, PartialEq)]
+struct Part {
+    name: String,
+    from: ShowTime,
+    to: ShowTime,
+    /// The axis, from 0; none for an effect.
+    axis: Option<usize>,
+}
+
+/// The parts of a test of a hall, and its cue as CSV.
+fn script(config: &Config) -> (Vec<Part>, String) {
+    let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
+    let effects: Vec<&str> = config.effects.iter().map(|effect| effect.name.as_str()).collect();
+    let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
+    let columns =
+        (1..=axes).map(|axis| format!("a{axis}")).chain(effects.iter().map(|name| format!("fx_{name}")));
+    let mut text = format!(
+        "# title: test of empty seats\n# interpolation: monotone\ntime_ms,{}\n",
+        columns.collect::<Vec<_>>().join(",")
+    );
+    let mut row = |at_ms: u32, moved: Option<usize>, on: Option<usize>| {
+        let _ = write!(text, "{at_ms}");
+        for (axis, park) in park.iter().enumerate() {
+            let away = if *park + REACH <= 1.0 { *park + REACH } else { *park - REACH };
+            let _ = write!(text, ",{}", if moved == Some(axis) { away } else { *park });
+        }
+        for effect in 0..effects.len() {
+            let _ = write!(text, ",{}", u8::from(on == Some(effect)));
+        }
+        text.push('\n');
+    };
+    let (mut parts, mut at) = (Vec::new(), LEAD_MS);
+    row(0, None, None);
+    let time = |ms: u32| ShowTime::from_millis(i64::from(ms));
+    for axis in 0..axes {
+        row(at, None, None);
+        row(at + AXIS_MS * 5 / 12, Some(axis), None);
+        row(at + AXIS_MS * 7 / 12, Some(axis), None);
+        parts.push(Part {
+            name: format!("a{}", axis + 1),
+            from: time(at),
+            to: time(at + AXIS_MS),
+            axis: Some(axis),
+        });
+        at += AXIS_MS;
+    }
+    for (effect, name) in effects.iter().enumerate() {
+        row(at, None, Some(effect));
+        row(at + EFFECT_MS / 2, None, None);
+        parts.push(Part { name: (*name).to_owned(), from: time(at), to: time(at + EFFECT_MS), axis: None });
+        at += EFFECT_MS;
+    }
+    // It ends at rest: the last axis comes back before that.
+    if effects.is_empty() {
+        row(at, None, None);
+    }
+    row(at + LEAD_MS, None, None);
+    (parts, text)
+}
+
+/// Where an axis of the cue rests: that of the first seat that takes it.
+fn park_of(config: &Config, axis: usize) -> f64 {
+    let taker = config.controllers.iter().find(|one| one.takes(axis));
+    taker.and_then(|one| one.seat.park.get(axis - one.axis_offset).copied()).unwrap_or(0.0)
+}
+
+impl Supervisor {
+    /// Tests the seats of some rows, or all. The hall has to be armed: whoever armed it has seen that nobody sits there.
+    pub(super) fn test(&mut self, rows: &[String], asked: Asked) {
+        let known = |row: &String| self.settings.levels.rows.contains_key(row);
+        let unknown: Vec<&String> = rows.iter().filter(|row| !known(row)).collect();
+        let named = unknown.first().map_or(Ok(()), |row| {
+            Err(Problem::new(Code::Unknown, format!("there is no row {row}"), "the status names the rows"))
+        });
+        if let Err(problem) = self.may_test().and(named).and_then(|()| self.is_free()) {
+            return self.answer(asked, Err(problem));
+        }
+        let only = (!rows.is_empty()).then(|| rows.iter().cloned().collect());
+        let config = self.runtime.config.clone();
+        self.send("test", Some(asked), move || {
+            let (parts, text) = script(&config);
+            let cue = cue::read(Path::new("test"), text.as_bytes(), &Source::Native);
+            let cued = cue.map_err(|faults| {
+                Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
+                    .with(faults.to_string().lines().map(str::to_owned).collect())
+            });
+            let cued = cued.and_then(|cue| {
+                ProvedShow::prove("test".to_owned(), &config, Timeline::new(cue), String::new())
+            });
+            let status = TestStatus {
+                running: true,
+                step: "begins".to_owned(),
+                done: 0,
+                total: parts.len(),
+                rows: Vec::new(),
+            };
+            let seat_test = SeatTest { parts, now: None, only, status, before: None };
+            JobResult::Swept(cued.map(|cued| (Box::new(seat_test), Box::new(cued))))
+        });
+    }
+
+    fn may_test(&self) -> Result<(), Problem> {
+        if self.mirror.state == State::Armed {
+            return Ok(());
+        }
+        let detail = format!("cannot test while {}", self.mirror.state);
+        Err(Problem::new(Code::State, detail, "load any cue and arm, with nobody on the seats, then test"))
+    }
+
+    /// Takes up a test that was made, and lets it go, where the hall is still armed.
+    pub(super) fn take_up_seat_test(
+        &mut self,
+        mut seat_test: SeatTest,
+        cued: ProvedShow,
+    ) -> Result<(), Problem> {
+        self.may_test()?;
+        self.settings.only = seat_test.only.take();
+        seat_test.before = self.cued.replace(cued).map(Box::new);
+        self.seat_test = Some(seat_test);
+        let before = self.count_before();
+        let begun = self.stage().and_then(|()| self.command(TickCommand::Request(Transition::Go)));
+        match &begun {
+            Ok(()) => self.begin_show("a test of the seats", Surface::Socket, before),
+            Err(_) => {
+                self.end_seat_test("did not begin");
+                self.stage_again();
+            }
+        }
+        begun
+    }
+
+    /// Follows a test that is under way.
+    pub(super) fn follow_sweep(&mut self) {
+        let (live, config) = (&self.runtime.live, &self.runtime.config);
+        let Some(seat_test) = self.seat_test.as_mut().filter(|seat_test| seat_test.status.running) else {
+            return;
+        };
+        let film = live.show();
+        let table = live.table();
+        let part = seat_test.parts.iter().position(|part| (part.from..part.to).contains(&film));
+        if seat_test.now.as_ref().map(|(part, _)| *part) == part {
+            return;
+        }
+        if let Some((done, before)) = seat_test.now.take() {
+            let part = &seat_test.parts[done];
+            let settings = &self.settings;
+            let tested =
+                config.controllers.iter().enumerate().filter(|(lane, one)| {
+                    settings.is_on(*lane) && part.axis.is_none_or(|axis| one.takes(axis))
+                });
+            for (lane, controller) in tested {
+                let (Some(now), Some(then)) = (table.get(lane), before.get(lane)) else { continue };
+                let row = row_of(&controller.name, &part.name, then, now);
+                let TestRow { asked, acked, .. } = row;
+                let p99 = row.p99_us.map_or_else(|| "-".to_owned(), |us| format!("{us} µs"));
+                let line = format!("{} {}: {acked} of {asked} acked, p99 {p99}", controller.name, part.name);
+                self.record.event(line);
+                seat_test.status.rows.push(row);
+            }
+            seat_test.status.done = done + 1;
+        }
+        if let Some(part) = part {
+            seat_test.status.step.clone_from(&seat_test.parts[part].name);
+            seat_test.now = Some((part, table));
+        }
+    }
+
+    /// The test is over; says whether there was one. The cue that was loaded before is back.
+    pub(super) fn end_seat_test(&mut self, how: &str) -> bool {
+        let Some(seat_test) = self.seat_test.as_mut().filter(|seat_test| seat_test.status.running) else {
+            return false;
+        };
+        seat_test.status.running = false;
+        seat_test.status.step = how.to_owned();
+        self.settings.only = None;
+        self.cued = seat_test.before.take().map(|cued| *cued);
+        true
+    }
+}
+
+fn row_of(controller: &str, part: &str, then: &Row, now: &Row) -> TestRow {
+    let asked = now.counts.asked - then.counts.asked;
+    let acked = now.counts.acked - then.counts.acked;
+    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+    let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
+    TestRow {
+        controller: controller.to_owned(),
+        part: part.to_owned(),
+        asked,
+        acked,
+        p50_us: now.ack_ns.map(|ack| us(ack.p50)),
+        p99_us: now.ack_ns.map(|ack| us(ack.p99)),
+        // What was asked in the last moment may still be on its way.
+        passed: asked > 0 && acked + now.counts.in_flight() >= asked && now.standing.may_move(),
+    }
+}

@@ -1,0 +1,249 @@
+//! The status: how all of it stands, in the words of the hall.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use jiff::Zoned;
+
+use super::{Supervisor, belts};
+use crate::config::Controller;
+use crate::control::{ControllerStatus, FORMAT, Histogram, Percentiles, RealTimeStatus, Status};
+use crate::engine::Unplanned;
+use crate::rt::Row;
+use crate::state::{Next, Whose};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+use crate::tracker;
+
+/// Over how long the rate of acks is counted.
+const RATED: Duration = Duration::from_secs(1);
+/// The least and the greatest bound of the buckets, µs.
+const BOUNDS_US: [f64; 16] = [
+    5.0,
+    10.0,
+    20.0,
+    50.0,
+    100.0,
+    200.0,
+    350.0,
+    500.0,
+    750.0,
+    1_000.0,
+    2_000.0,
+    5_000.0,
+    10_000.0,
+    50_000.0,
+    200_000.0,
+    1_000_000.0,
+];
+
+/// What was counted of the last second.
+#[derive(Debug, Default)]
+pub(super) struct Rates {
+    /// Asked and acked by controller, oldest first.
+    counted: VecDeque<(MonoTime, Vec<(u64, u64)>)>,
+}
+
+impl Rates {
+    /// Notes what is counted now.
+    pub(super) fn note(&mut self, table: &[Row], now: MonoTime) {
+        let counted = |row: &Row| (row.counts.asked - row.counts.in_flight(), row.counts.acked);
+        self.counted.push_back((now, table.iter().map(counted).collect()));
+        while self.counted.len() > 1 && self.counted.front().is_some_and(|(at, _)| now.since(*at) > RATED) {
+            self.counted.pop_front();
+        }
+    }
+
+    /// Acks over frames whose fate is known, of the last second; `None` if there were none.
+    fn of(&self, controller: usize) -> Option<f64> {
+        let (_, first) = self.counted.front()?;
+        let (_, last) = self.counted.back()?;
+        let (before, now) = (first.get(controller)?, last.get(controller)?);
+        let asked = now.0.saturating_sub(before.0);
+        #[expect(clippy::cast_precision_loss, reason = "at most some thousand")]
+        (asked > 0).then(|| now.1.saturating_sub(before.1) as f64 / asked as f64)
+    }
+}
+
+impl Supervisor {
+    /// How all of it stands.
+    pub(super) fn status(&self) -> Status {
+        let now = Monotonic.now();
+        let live = &self.runtime.live;
+        let table = live.table();
+        let times = live.times();
+        let moving = live.is_moving();
+        let position = |cued: &super::ProvedShow| if moving { live.show() } else { cued.start };
+        Status {
+            hall: self.runtime.config.show.name.clone(),
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION"),
+            uptime_s: now.since(self.ports.began).as_secs_f64(),
+            state: self.mirror.state.word(),
+            cause: self.cause(),
+            next: self.next_action(&table, now),
+            arm_homes: self.mirror.next == Next::ArmAndHome,
+            may_clear: self.mirror.state.is_latched() || self.mirror.next == Next::Clear,
+            since_s: now.since(self.mirror.since).as_secs_f64(),
+            lapses_s: self.mirror.lapses(now),
+            moving,
+            show: self.cued.as_ref().map(|cued| cued.status(position(cued))),
+            playlist: self.list.as_ref().map(|list| list.status(&Zoned::now())),
+            trim_ms: self.settings.trim_ms,
+            levels: self.settings.levels.clone(),
+            presets: self.runtime.config.presets.iter().map(|preset| preset.name.clone()).collect(),
+            ticks: live.beats(),
+            missed_ticks: live.missed(),
+            rate_hz: self.runtime.config.show.rate_hz,
+            lateness: percentiles(&times.lateness),
+            ack_latency: percentiles(&times.acks),
+            realtime: RealTimeStatus {
+                policy: self.runtime.granted.policy.to_string(),
+                priority: self.runtime.granted.priority,
+                memory_locked: self.runtime.granted.memory_locked,
+                refusals: self.runtime.granted.refusals.clone(),
+            },
+            controllers: self.controllers(&table, now),
+            preflight: self.preflighted.as_ref().map(|it| it.status(now, |lane| self.settings.is_on(lane))),
+            warnings: self.warnings(&table),
+            test: self.seat_test.as_ref().map(|seat_test| seat_test.status.clone()),
+            journal: self.record.newest(),
+        }
+    }
+
+    /// What a person does next; where a show was left in its midst, also how it goes on from there.
+    pub(super) fn next(&self) -> String {
+        let next = self.mirror.next;
+        match self.cued.as_ref().and_then(|cued| cued.left_at) {
+            Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
+            Some(film) if next == Next::Arm => format!("{next}; it can go on from {film}, where it was left"),
+            _ => next.to_string(),
+        }
+    }
+
+    /// Why the hall is in its state, with the name of whom that is about.
+    pub(super) fn cause(&self) -> String {
+        let cause = self.mirror.cause;
+        let config = &self.runtime.config;
+        match cause.whose() {
+            Some(Whose::Controller(index)) => match config.controllers.get(index) {
+                Some(controller) => format!("{}: {cause}", controller.name),
+                None => cause.to_string(),
+            },
+            Some(Whose::Group(index)) => {
+                format!("{}: {cause}", crate::health::Groups::of(&config.controllers).name(index))
+            }
+            None => cause.to_string(),
+        }
+    }
+
+    /// What could not be planned, with the name of whose move that is.
+    pub(super) fn name_unplanned(&self, what: Unplanned) -> String {
+        match what {
+            Unplanned::Seek => what.to_string(),
+            Unplanned::Lane(lane) => format!("{}: {what}", self.runtime.config.controllers[lane].name),
+        }
+    }
+
+    fn controllers(&self, table: &[Row], now: MonoTime) -> Vec<ControllerStatus> {
+        let config = &self.runtime.config;
+        let present = config.controllers.iter().enumerate();
+        let mut all: Vec<_> =
+            present.map(|(index, one)| self.controller(index, one, table.get(index), now)).collect();
+        for (index, one) in config.absent.iter().enumerate() {
+            all.insert(one.after + index, absent(&one.controller));
+        }
+        all
+    }
+
+    fn controller(
+        &self,
+        index: usize,
+        controller: &Controller,
+        row: Option<&Row>,
+        now: MonoTime,
+    ) -> ControllerStatus {
+        let counts = row.map(|row| row.counts).unwrap_or_default();
+        let state = row.map(|row| row.state).unwrap_or_default();
+        #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+        let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
+        let ack = row.and_then(|row| row.ack_ns);
+        let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
+        ControllerStatus {
+            name: controller.name.clone(),
+            row: controller.row.clone(),
+            seat: controller.seat.name.clone(),
+            address: controller.address.to_string(),
+            group: controller.group.clone(),
+            enabled: self.settings.is_on(index),
+            health: row.map_or("unknown", |row| super::warnings::word(row.standing)),
+            why: match self.settings.out.get(self.settings.group(index)) {
+                Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
+                None => why,
+            },
+            heard_s: state.heard_at.map(|at| now.since(at).as_secs_f64()),
+            ack_rate: self.rates.of(index),
+            ack_p50_us: ack.map(|ack| us(ack.p50)),
+            ack_p99_us: ack.map(|ack| us(ack.p99)),
+            sent: counts.sent,
+            asked: counts.asked,
+            acked: counts.acked,
+            refused: counts.refused(),
+            lost: counts.lost,
+            send_failed: counts.send_failed,
+            clamps: self.runtime.live.clamps(index),
+            homed: row.and_then(|row| row.homed),
+            emergency_stop: state.emergency_stop(),
+            error: state.error.map(|heard| heard.value),
+            servo_errors: state.servo_errors.map(|heard| heard.value.to_vec()),
+            inputs: state.inputs.map(|heard| heard.value),
+            belts_open: belts::open(controller, &state, now).map(belts::numbers),
+            outputs: state.outputs.map(|heard| heard.value),
+            positions_mm: state.measured.or(state.echoed).map(|heard| {
+                let mm = |pulses: &crate::motion::Pulses| {
+                    controller.seat.fraction(*pulses) * controller.seat.stroke_mm
+                };
+                heard.value.iter().take(controller.seat.axes).map(mm).collect()
+            }),
+        }
+    }
+}
+
+/// A controller that is out for good: nothing is known of it.
+fn absent(controller: &Controller) -> ControllerStatus {
+    ControllerStatus {
+        name: controller.name.clone(),
+        row: controller.row.clone(),
+        seat: controller.seat.name.clone(),
+        address: controller.address.to_string(),
+        group: controller.group.clone(),
+        health: "out",
+        why: "out for good: enabled = false in the configuration".to_owned(),
+        ..ControllerStatus::default()
+    }
+}
+
+/// A histogram of nanoseconds as surfaces show it.
+fn percentiles(times: &tracker::Histogram) -> Percentiles {
+    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
+    let us = |ns: u64| (!times.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
+    let mut counts = Vec::with_capacity(BOUNDS_US.len() + 1);
+    let mut from = 0;
+    for bound in BOUNDS_US {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a second")]
+        let to = (bound * 1e3) as u64;
+        counts.push(times.count_between(from, to));
+        from = to + 1;
+    }
+    let counted: u64 = counts.iter().sum();
+    counts.push(times.len().saturating_sub(counted));
+    #[expect(clippy::cast_precision_loss, reason = "for a mean")]
+    let sum_s = times.mean() * times.len() as f64 / 1e9;
+    Percentiles {
+        p50_us: us(times.value_at_quantile(0.5)),
+        p99_us: us(times.value_at_quantile(0.99)),
+        p999_us: us(times.value_at_quantile(0.999)),
+        max_us: us(times.max()),
+        histogram: Histogram { bounds_us: BOUNDS_US.to_vec(), counts, sum_s },
+    }
+}

@@ -1,0 +1,373 @@
+//! What must not happen when things come at the same time.
+
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::channel;
+
+use super::job::JobResult;
+use super::testing::Rig;
+use super::*;
+use crate::control::{Code, Command, LevelsChange, Role, Surface, Who};
+use crate::engine::Unplanned;
+use crate::rt::{News, TickReport};
+use crate::settings::Out;
+use crate::state::{Event, Next, PlayMode, Trouble};
+use crate::time::ShowTime;
+
+const ARM: Command = Command::Arm { seats_empty: false };
+
+fn anna() -> Who {
+    Who { role: Role::Engineer, surface: Surface::Socket, name: "anna".to_owned() }
+}
+
+fn out(name: &str) -> Command {
+    Command::Disable { name: name.to_owned(), why: None }
+}
+
+#[test]
+fn an_answer_that_came_too_late_is_not_taken_for_that_of_the_next_command() {
+    let mut known = StateMirror::new(MonoTime::default());
+    known.expect();
+    known.expect();
+    known.hear(News::NotLoaded(State::Paused));
+    assert!(known.take_answer().is_none());
+    known.hear(News::Taken);
+    assert_eq!(known.take_answer(), Some(Ok(())));
+}
+
+#[test]
+fn a_hall_that_was_latched_is_so_with_another_configuration_too() {
+    let mut before = Rig::parked();
+    before.ask(Command::Stop).unwrap();
+    let carryover = before.supervisor.remember();
+    let mut rig = Rig::starting(carryover);
+    rig.wait_until(|supervisor| supervisor.mirror.state == State::Stopped);
+    assert!(
+        rig.supervisor.notes.iter().any(|note| note.contains("stopped by the operator")),
+        "{:?}",
+        rig.supervisor.notes
+    );
+    let parked = Rig::starting(Rig::parked().supervisor.remember());
+    assert_eq!(parked.state(), State::Boot);
+}
+
+#[test]
+fn a_seat_that_is_out_is_out_from_the_first_tick_of_the_next_hall_on() {
+    let mut before = Rig::parked();
+    before.ask(out("B1")).unwrap();
+    let rig = Rig::starting(before.supervisor.remember());
+    assert_eq!([0, 1].map(|lane| rig.supervisor.runtime.desk.mix(lane).on), [true, false]);
+}
+
+/// What a supervisor that ends here leaves for one that starts after it, as its file does.
+fn after_a_restart(mut rig: Rig) -> Carryover {
+    let folder = rig.folder.path().to_owned();
+    rig.supervisor.keep_settings();
+    let Rig { supervisor, folder: kept, .. } = rig;
+    drop(supervisor);
+    let (_store, found) = SettingsFile::open(&folder);
+    drop(kept);
+    Carryover::of(found)
+}
+
+#[test]
+fn a_seat_that_was_taken_out_is_out_after_a_restart_and_whoever_arms_first_is_told() {
+    let mut before = Rig::parked();
+    let why = Some("broken leg".to_owned());
+    before.ask(Command::Disable { name: "B1".to_owned(), why }).unwrap();
+    before.ask(Command::Levels(LevelsChange { motion: Some(0.6), ..LevelsChange::default() })).unwrap();
+    before.ask(Command::Trim(-40)).unwrap();
+    let mut rig = Rig::starting(after_a_restart(before));
+    let desk = &rig.supervisor.runtime.desk;
+    assert_eq!(([0, 1].map(|lane| desk.mix(lane).on), desk.trim_ms()), ([true, false], -40));
+    assert!((desk.mix(0).motion - 0.6).abs() < 1e-6);
+    let status = rig.supervisor.status();
+    let said = |id: &str| status.warnings.iter().find(|one| one.id == id).map(|one| one.text.clone());
+    let out = said("seat-out").unwrap();
+    assert!(out.starts_with("out since ") && out.ends_with(", by anna: broken leg"), "{out}");
+    assert_eq!(said("kept").unwrap(), "as it was before the start: motion 60 %, trim -40 ms, cue one");
+    assert!(status.controllers[1].why.contains("broken leg"), "{}", status.controllers[1].why);
+    rig.ask(Command::Enable("B1".to_owned())).unwrap();
+    assert!(rig.supervisor.settings().out.is_empty());
+}
+
+#[test]
+fn a_seat_that_is_taken_out_again_stays_out_since_then_and_a_reason_can_be_added() {
+    let mut rig = Rig::parked();
+    rig.ask(out("B1")).unwrap();
+    let first = rig.supervisor.settings().out["B1"].clone();
+    rig.ask(Command::Disable { name: "B1".to_owned(), why: Some("broken leg".to_owned()) }).unwrap();
+    rig.ask(out("B1")).unwrap();
+    let now = rig.supervisor.settings().out["B1"].clone();
+    assert_eq!((&now.at, now.why.as_deref()), (&first.at, Some("broken leg")));
+    let long = Command::Disable { name: "A1".to_owned(), why: Some("x".repeat(201)) };
+    assert_eq!(rig.ask(long).unwrap_err().code, Code::Value);
+    assert!(rig.supervisor.settings.is_on(0));
+}
+
+#[test]
+fn what_was_loaded_is_loaded_after_a_restart_and_nothing_starts() {
+    let mut before = Rig::parked();
+    before.ask(Command::Load { cue: "two".to_owned() }).unwrap();
+    let folder = before.folder.path().to_owned();
+    let mut rig = Rig::starting_in(|folder_of_next| {
+        std::fs::create_dir(folder_of_next.join("cues")).unwrap();
+        let cue = "cues/two.csv";
+        std::fs::copy(folder.join(cue), folder_of_next.join(cue)).unwrap();
+        after_a_restart(before)
+    });
+    // Also where the program ends before it is loaded.
+    assert_eq!(rig.supervisor.settings().show.unwrap().cue, "two");
+    rig.settle();
+    assert_eq!(rig.supervisor.cued.as_ref().unwrap().id, "two");
+    assert_eq!(rig.state(), State::Boot);
+}
+
+#[test]
+fn what_was_loaded_before_is_taken_up_once_the_seats_rest() {
+    let mut rig = Rig::playing();
+    let cued = rig.supervisor.cued.take().unwrap();
+    rig.supervisor.take_up_again((None, Ok(Box::new(cued)))).unwrap();
+    assert!(rig.supervisor.cued.is_none(), "the seats move");
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    assert_eq!(rig.supervisor.cued.as_ref().unwrap().id, "one");
+    let mut other = rig.supervisor.cued.take().unwrap();
+    rig.ask(Command::Load { cue: "two".to_owned() }).unwrap();
+    other.id = "three".to_owned();
+    rig.supervisor.take_up_again((None, Ok(Box::new(other)))).unwrap();
+    assert_eq!(rig.supervisor.cued.as_ref().unwrap().id, "two", "a person has loaded that since");
+}
+
+#[test]
+fn a_cue_that_is_gone_after_a_restart_is_named_and_the_hall_goes_on_without() {
+    let carryover = after_a_restart(Rig::parked());
+    let mut rig = Rig::starting(carryover);
+    rig.settle();
+    assert!(rig.supervisor.cued.is_none() && rig.supervisor.settings().show.is_none());
+    assert!(rig.supervisor.notes.iter().any(|note| note.contains("one")), "{:?}", rig.supervisor.notes);
+}
+
+/// A show that was stopped where the film was at 2.5 s, with the seats parked since.
+fn stopped_in_its_midst() -> Rig {
+    let mut rig = Rig::playing();
+    let show = ShowTime::from_millis(2_500);
+    rig.supervisor.runtime.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.ask(Command::Stop).unwrap();
+    rig.tell(Event::AtRest);
+    rig.ask(Command::Clear).unwrap();
+    rig.tell(Event::PositionsRead);
+    rig.ask(Command::Park).unwrap();
+    rig.tell(Event::Parked);
+    assert_eq!(rig.state(), State::Parked);
+    rig
+}
+
+#[test]
+fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before() {
+    let mut rig = stopped_in_its_midst();
+    let status = rig.supervisor.status();
+    assert_eq!(status.show.as_ref().unwrap().resume_s, Some(2.5));
+    assert!(status.next.contains("it can go on from 00:02.500"), "{}", status.next);
+    let place = Command::GoFrom(ShowTime::from_millis(2_500));
+    assert_eq!(rig.ask(place.clone()).unwrap_err().code, Code::State, "nobody has armed it");
+    rig.ask(ARM).unwrap();
+    assert!(rig.supervisor.status().next.contains("or go on from 00:02.500"));
+    assert_eq!(rig.ask(Command::GoFrom(ShowTime::from_millis(4_000))).unwrap_err().code, Code::Value);
+    rig.ask(place).unwrap();
+    assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+    let cued = rig.supervisor.cued.as_ref().unwrap();
+    assert_eq!((cued.start, cued.left_at), (ShowTime::from_millis(2_500), None));
+    rig.tell(Event::Joined);
+    rig.tell(Event::CueEnded);
+    rig.tell(Event::Parked);
+    let cued = rig.supervisor.cued.as_ref().unwrap();
+    assert_eq!((cued.start, cued.left_at), (ShowTime::ZERO, None), "the next one is whole");
+}
+
+#[test]
+fn a_show_that_is_stopped_on_its_way_to_park_after_its_end_is_over() {
+    let mut rig = Rig::playing();
+    let show = ShowTime::from_millis(3_900);
+    rig.supervisor.runtime.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.tell(Event::CueEnded);
+    rig.ask(Command::Stop).unwrap();
+    rig.tell(Event::AtRest);
+    rig.wait_until(|supervisor| supervisor.mirror.state == State::Stopped);
+    assert_eq!(rig.supervisor.cued.as_ref().unwrap().left_at, None);
+}
+
+#[test]
+fn a_plain_go_after_a_stop_begins_at_the_beginning() {
+    let mut rig = stopped_in_its_midst();
+    rig.ask(ARM).unwrap();
+    rig.ask(Command::Go).unwrap();
+    assert_eq!(rig.supervisor.cued.as_ref().unwrap().start, ShowTime::ZERO);
+    assert_eq!(rig.supervisor.status().show.unwrap().resume_s, None);
+}
+
+#[test]
+fn where_a_show_was_left_lasts_over_a_restart_unless_the_cue_is_another_by_then() {
+    for (change, left_at) in [("", Some(ShowTime::from_millis(2_500))), ("5000,0.6\n", None)] {
+        let before = stopped_in_its_midst();
+        let ride = std::fs::read_to_string(before.folder.path().join("cues/one.csv")).unwrap();
+        let mut rig = Rig::starting_in(|folder| {
+            std::fs::create_dir(folder.join("cues")).unwrap();
+            std::fs::write(folder.join("cues/one.csv"), ride + change).unwrap();
+            after_a_restart(before)
+        });
+        rig.settle();
+        assert_eq!(rig.supervisor.cued.as_ref().unwrap().left_at, left_at, "{change}");
+    }
+}
+
+#[test]
+fn where_a_crash_has_cut_a_show_is_known_to_five_seconds() {
+    let rig = Rig::playing();
+    for (film_ms, kept) in [(4_900, None), (12_340, Some(10_000))] {
+        let show = ShowTime::from_millis(film_ms);
+        rig.supervisor.runtime.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+        assert_eq!(rig.supervisor.settings().show.unwrap().film_ms, kept);
+    }
+}
+
+#[test]
+fn a_configuration_is_read_anew_once_nobody_speaks_with_the_controllers_any_more() {
+    let mut rig = Rig::parked();
+    let (go_on, held) = channel::<()>();
+    rig.supervisor.send("preflight", None, move || {
+        let _ = held.recv();
+        JobResult::Listed(Err(Problem::new(Code::Check, "no list", "none")))
+    });
+    assert_eq!(rig.ask(Command::Reload).unwrap_err().code, Code::Busy);
+    rig.supervisor.ports.signals.reload.store(true, Ordering::Release);
+    rig.supervisor.look_after();
+    assert!(!rig.supervisor.runtime.leave.load(Ordering::Acquire), "the port is in use");
+    drop(go_on);
+    rig.wait_until(|supervisor| supervisor.runtime.leave.load(Ordering::Acquire));
+    assert!(rig.supervisor.reload.is_some());
+}
+
+#[test]
+fn nothing_long_begins_in_a_hall_that_closes() {
+    let mut rig = Rig::parked();
+    rig.supervisor.runtime.leave.store(true, Ordering::Release);
+    for ask in [Command::Preflight, Command::Home, Command::Load { cue: "two".to_owned() }] {
+        assert_eq!(rig.ask(ask).unwrap_err().code, Code::Busy);
+    }
+}
+
+#[test]
+fn a_clear_that_was_asked_before_a_stop_clears_it_not() {
+    let mut rig = Rig::parked();
+    rig.tell(Event::Trouble(Trouble::Limiter));
+    let clear = rig.post(Command::Clear);
+    rig.supervisor.runtime.desk.stop();
+    rig.hear_of(State::Stopped);
+    rig.hear();
+    assert_eq!(clear.join().unwrap().unwrap_err().code, Code::Late);
+    assert_eq!(rig.state(), State::Stopped);
+    rig.ask(Command::Clear).unwrap();
+}
+
+#[test]
+fn arming_homes_no_seat_unless_somebody_says_that_they_are_empty() {
+    let mut rig = Rig::parked();
+    rig.tell(Event::Rebooted(1));
+    assert!(rig.supervisor.status().arm_homes);
+    assert!(rig.ask(ARM).unwrap_err().detail.contains("home first"));
+    assert_eq!(rig.state(), State::Parked);
+    rig.ask(Command::Arm { seats_empty: true }).unwrap();
+    assert_eq!(rig.state(), State::Homing);
+}
+
+#[test]
+fn what_cannot_be_set_is_not_set_on_the_desk_either() {
+    let mut rig = Rig::playing();
+    // As where the supervisor has not heard yet that the seats move.
+    rig.supervisor.mirror.state = State::Parked;
+    let problem = rig.supervisor.set(|settings| {
+        settings.enable("B1", Some(Out::now(&anna(), None)));
+        Ok(())
+    });
+    assert_eq!(problem.unwrap_err().code, Code::State);
+    assert!(rig.supervisor.settings.is_on(1) && rig.supervisor.runtime.desk.mix(1).on);
+}
+
+#[test]
+fn a_seat_whose_preflight_has_not_passed_does_not_join_a_show() {
+    let mut rig = Rig::parked();
+    rig.ask(out("B1")).unwrap();
+    rig.supervisor.preflighted = Some(ready::Preflighted::failing_at(1, 2));
+    rig.ask(ARM).unwrap();
+    rig.ask(Command::Go).unwrap();
+    assert_eq!(rig.ask(Command::Enable("B1".to_owned())).unwrap_err().code, Code::State);
+    assert!(!rig.supervisor.runtime.desk.mix(1).on);
+    rig.ask(out("A1")).unwrap();
+    rig.ask(Command::Enable("A1".to_owned())).unwrap();
+    assert!(rig.supervisor.runtime.desk.mix(0).on);
+}
+
+#[test]
+fn an_armed_hall_is_not_asked_for_registers() {
+    let mut rig = Rig::armed();
+    assert_eq!(rig.ask(Command::Preflight).unwrap_err().code, Code::State);
+    assert_eq!((rig.state(), rig.supervisor.mirror.next), (State::Armed, Next::Go));
+}
+
+#[test]
+fn a_park_between_shows_leaves_the_next_show_where_it_is_to_begin() {
+    let mut rig = Rig::parked();
+    let start = ShowTime::from_millis(2_000);
+    rig.ask(Command::Seek(start)).unwrap();
+    rig.tell(Event::Astray(true));
+    rig.ask(Command::Park).unwrap();
+    assert_eq!(rig.state(), State::Parking);
+    rig.tell(Event::Parked);
+    assert_eq!(
+        (rig.state(), rig.supervisor.cued.as_ref().map(|cued| cued.start)),
+        (State::Parked, Some(start))
+    );
+}
+
+#[test]
+fn a_move_that_was_not_found_is_a_warning_with_the_name_of_the_seat_and_what_to_do() {
+    let mut rig = Rig::playing();
+    rig.supervisor.hear(News::Unplanned(Unplanned::Lane(1)));
+    let warnings = rig.supervisor.status().warnings;
+    let told =
+        warnings.iter().find(|one| one.text.starts_with("B1: it stays where it is")).expect("it is told");
+    assert!(told.text.ends_with("seek elsewhere in the cue, or park"), "{}", told.text);
+}
+
+#[test]
+fn a_test_that_is_made_while_the_hall_is_disarmed_is_forgotten() {
+    for held_by in [Command::Disarm, Command::Stop, Command::Go] {
+        let mut rig = Rig::armed();
+        let test = rig.post(Command::Test { rows: vec!["A".to_owned()] });
+        rig.hear();
+        let other = rig.post(held_by.clone());
+        rig.hear();
+        rig.settle();
+        rig.wait_until(|_| test.is_finished() && other.is_finished());
+        let problem = test.join().unwrap().unwrap_err();
+        assert_eq!(problem.code, Code::State, "{problem:?}");
+        let cued = rig.supervisor.cued.as_ref().map(|cued| cued.id.clone());
+        assert_eq!((cued.as_deref(), rig.supervisor.seat_test.is_none()), (Some("one"), true), "{held_by:?}");
+        assert!(rig.supervisor.runtime.desk.mix(1).on, "the other row is as it was");
+    }
+}
+
+#[test]
+fn a_homing_that_is_stopped_tells_no_further_seat_to_home() {
+    let mut rig = Rig::parked();
+    rig.post(Command::Home);
+    rig.hear();
+    rig.supervisor.take_news();
+    let Some(homing::Homing::UnderWay(called_off)) = &rig.supervisor.homing else { panic!("it homes") };
+    let called_off = Arc::clone(called_off);
+    assert!(!called_off.load(Ordering::Acquire));
+    rig.ask(Command::Stop).unwrap();
+    assert!(called_off.load(Ordering::Acquire));
+    assert_eq!(rig.state(), State::Stopped);
+    assert!(rig.supervisor.homing.is_none());
+}

@@ -1,0 +1,205 @@
+//! Messages of a play: from its state, its cause and its current figures.
+
+use std::fmt::{Display, Write as _};
+use std::time::Duration;
+
+use super::{CtrlC, keyboard};
+use crate::app::Control;
+use crate::engine::Unplanned;
+use crate::rt::{News, Phase};
+use crate::state::{Cause, State, Transition, Whose};
+use crate::time::ShowTime;
+
+/// What there is to say of a play.
+pub(super) struct Messages {
+    pub(super) control: Control,
+    pub(super) ctrl_c: CtrlC,
+    /// Length of the cue.
+    pub(super) length: ShowTime,
+    /// How long the first move onto the cue takes.
+    pub(super) join: Duration,
+    /// The controllers' names.
+    pub(super) names: Vec<String>,
+}
+
+impl Messages {
+    /// What goes on before the hall plays.
+    pub(super) fn preparing(&self, phase: Phase) -> String {
+        if phase != Phase::Homing {
+            return "asking where the seats stand".to_owned();
+        }
+        let (seats, time) = self.control.live.homing();
+        let noun = if seats == 1 { "seat" } else { "seats" };
+        format!("bringing {seats} {noun} to park (up to {:.1} s)", time.as_secs_f64())
+    }
+
+    /// What has happened: the state with its cause and the next action, or why a request was not taken; `None` if there is
+    /// nothing to say.
+    pub(super) fn news(&self, news: &News) -> Option<String> {
+        let (state, cause, next) = match *news {
+            News::Entered { state, cause, next, .. } => (state, cause, next),
+            News::Refused(refusal) => return Some(refusal.by_keys()),
+            News::Unplanned(what) => return Some(self.unplanned(what)),
+            News::Taken | News::NotLoaded(_) => return None,
+        };
+        let mut text = match (state, cause) {
+            (State::Playing(_), Cause::Asked(Transition::Go)) => {
+                format!("{state} ({:.2} s): {cause}", self.join.as_secs_f64())
+            }
+            _ => format!("{state}: {cause}"),
+        };
+        if let Some(name) = self.name(cause) {
+            let _ = write!(text, " ({name})"); // a String takes it
+        }
+        // Parked, the play is over.
+        if state != State::Parked {
+            let next = next.by_keys().map_or_else(|| next.to_string(), str::to_owned);
+            let _ = write!(text, "; {}", self.next(next));
+        }
+        Some(text)
+    }
+
+    fn unplanned(&self, what: Unplanned) -> String {
+        match what {
+            Unplanned::Seek => what.to_string(),
+            Unplanned::Lane(lane) => format!("{}: {what}", self.names[lane]),
+        }
+    }
+
+    fn name(&self, cause: Cause) -> Option<&str> {
+        match cause.whose()? {
+            Whose::Controller(index) => self.names.get(index).map(String::as_str),
+            Whose::Group(_) => None,
+        }
+    }
+
+    /// What a person does next.
+    pub(super) fn next(&self, next: impl Display) -> String {
+        let more = if self.ctrl_c.is_armed() { "; Ctrl-C again ends at once" } else { "" };
+        format!("next: {next}{more}")
+    }
+
+    /// Where the show stands; behind the end of the cue that is its end.
+    pub(super) fn show(&self) -> ShowTime {
+        self.control.live.show().min(self.length)
+    }
+
+    /// The figures of this instant.
+    pub(super) fn figures(&self, state: State) -> String {
+        let Control { desk, live, .. } = &self.control;
+        let mixes: Vec<_> = (0..desk.lanes()).map(|lane| desk.mix(lane)).collect();
+        let (percent, trim, missed) = (keyboard::percent(&mixes), desk.trim_ms(), live.missed());
+        let sign = if trim > 0 { "+" } else { "" };
+        let mut text =
+            format!("{state}: {} / {}, level {percent} %, trim {sign}{trim} ms", self.show(), self.length);
+        if missed > 0 {
+            let _ = write!(text, ", {missed} missed"); // a String takes it
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::engine::Mix;
+    use crate::rt::{Desk, TickReport};
+    use crate::state::{Next, PlayMode, Refusal, Trouble, Why};
+    use crate::time::MonoTime;
+
+    fn said() -> Messages {
+        let desk = Arc::new(Desk::new([Mix::FULL, Mix { motion: 0.5, ..Mix::FULL }].into_iter()));
+        Messages {
+            control: Control { desk, live: Arc::default(), leave: Arc::default() },
+            ctrl_c: CtrlC::default(),
+            length: ShowTime::from_secs_f64(8.0),
+            join: Duration::from_millis(1_250),
+            names: vec!["A1".to_owned(), "A2".to_owned()],
+        }
+    }
+
+    fn entered(state: State, cause: Cause, next: Next) -> News {
+        News::Entered { state, cause, next, at: MonoTime::default() }
+    }
+
+    #[test]
+    fn before_the_play_it_says_what_the_seats_are_doing() {
+        let said = said();
+        assert_eq!(said.preparing(Phase::Asking), "asking where the seats stand");
+        [2_000, 3_000].into_iter().for_each(|ms| said.control.live.on_homing(ms));
+        assert_eq!(said.preparing(Phase::Homing), "bringing 2 seats to park (up to 3.0 s)");
+    }
+
+    #[test]
+    fn a_state_comes_with_its_cause_and_the_next_action() {
+        let said = said();
+        let go = entered(State::Playing(PlayMode::Joining), Cause::Asked(Transition::Go), Next::Watch);
+        assert_eq!(
+            said.news(&go).unwrap(),
+            "joining (1.25 s): started by the operator; next: nothing; pause, park or stop as needed"
+        );
+        let pressed = entered(State::Stopped, Cause::EmergencyStop(1), Next::Release);
+        assert_eq!(
+            said.news(&pressed).unwrap(),
+            "stopped: emergency stop (A2); next: release the emergency-stop button, then clear"
+        );
+        let broken = Trouble::Controller { controller: 0, error: 7 };
+        let fault = entered(State::Fault, Cause::Trouble(broken), Next::PutRight);
+        assert_eq!(
+            said.news(&fault).unwrap(),
+            "fault: a controller has an error (A1); next: clear the error at the controller, then clear the hall"
+        );
+        let parked = entered(State::Parked, Cause::ArrivedAtPark, Next::Arm);
+        assert_eq!(said.news(&parked).unwrap(), "parked: the seats have parked", "the play is over");
+    }
+
+    #[test]
+    fn a_refusal_says_what_stands_against_it_and_what_to_do_first() {
+        let refusal =
+            Refusal { state: State::Recovering, asked: Transition::Park, why: Why::PositionsNotRead };
+        assert_eq!(
+            said().news(&News::Refused(refusal)).unwrap(),
+            "cannot park while recovering: the seats' positions have not been read since they stopped; wait until the \
+             controllers have answered"
+        );
+    }
+
+    #[test]
+    fn it_names_nothing_that_its_keys_cannot_do() {
+        let text = |next| said().news(&entered(State::Recovering, Cause::Cleared, next)).unwrap();
+        assert!(text(Next::Home).ends_with("leave, then `kinocue home` with nobody on the seats"));
+        assert!(text(Next::ParkOrHome).ends_with("next: park"));
+        for next in Next::ALL {
+            assert!(!text(next).contains("disable"), "{next}");
+        }
+    }
+
+    #[test]
+    fn a_move_that_was_not_found_names_the_seat_and_what_to_do() {
+        let told = said().news(&News::Unplanned(Unplanned::Lane(1))).unwrap();
+        assert!(told.starts_with("A2: it stays where it is: ") && told.ends_with(", or park"), "{told}");
+    }
+
+    #[test]
+    fn only_after_a_first_ctrl_c_does_it_say_what_a_second_one_does() {
+        let said = said();
+        assert_eq!(said.next("wait"), "next: wait");
+        said.ctrl_c.arm();
+        assert_eq!(said.next("wait"), "next: wait; Ctrl-C again ends at once");
+    }
+
+    #[test]
+    fn the_figures_are_state_position_length_level_and_trim() {
+        let said = said();
+        let paused = |said: &Messages| said.figures(State::Paused);
+        assert_eq!(paused(&said), "paused: 00:00.000 / 00:08.000, level 100 %, trim 0 ms");
+        said.control.desk.set_trim_ms(10);
+        (0..2).for_each(|lane| said.control.desk.set(lane, Mix { motion: 0.45, ..Mix::FULL }));
+        let show = ShowTime::from_secs_f64(9.0);
+        said.control.live.on_tick(&TickReport { late_ns: 0, missed: 2, show });
+        let past_the_end = "paused: 00:08.000 / 00:08.000, level 45 %, trim +10 ms, 2 missed";
+        assert_eq!(paused(&said), past_the_end);
+    }
+}

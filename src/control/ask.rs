@@ -1,0 +1,235 @@
+//! What surfaces may ask of the hall.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::Role;
+use crate::config::{GearWord, Preset};
+use crate::time::ShowTime;
+
+/// One thing asked of the hall. Each is answered with the state that it led to, or with a problem.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command {
+    /// Home all controllers, with nobody on the seats.
+    Home,
+    /// Load a cue of the library.
+    Load {
+        /// Its id.
+        cue: String,
+    },
+    /// Load a playlist, or drop the one that is loaded.
+    Playlist {
+        /// Its id.
+        id: Option<String>,
+    },
+    /// Make an entry of the playlist the next to be played, counted from 0.
+    Select {
+        /// Which.
+        entry: usize,
+    },
+    /// Get ready to go.
+    Arm {
+        /// Whoever asks says that nobody sits on the seats: where a position is unknown they are homed first. Else arming is
+        /// refused then.
+        seats_empty: bool,
+    },
+    /// Stand down.
+    Disarm,
+    /// Start what is loaded.
+    Go,
+    /// Start what is loaded at that time of the film.
+    GoFrom(ShowTime),
+    /// Hold; the film waits.
+    Pause,
+    /// Go on.
+    Resume,
+    /// Go on elsewhere in the cue.
+    Seek(ShowTime),
+    /// Bring the seats to rest at once. Of all ways to ask, [`super::Handle::stop`] is the quick one.
+    Stop,
+    /// Bring the seats to their park poses.
+    Park,
+    /// Leave what is latched.
+    Clear,
+    /// How much later than the film the motion is, ms, -500 to 500.
+    Trim(i32),
+    /// Change levels and effects.
+    Levels(LevelsChange),
+    /// Set levels and effects as the preset of that name says.
+    Preset(String),
+    /// Take a controller's group in.
+    Enable(String),
+    /// Take a controller's group out: its seat parks.
+    Disable {
+        /// Which.
+        name: String,
+        /// Why, for whoever comes next.
+        why: Option<String>,
+    },
+    /// Ask all controllers for their registers and judge them.
+    Preflight,
+    /// Move each axis and effect of empty, armed seats slowly in turn, and store a table of acks and latency.
+    Test {
+        /// The rows whose seats move; none for all.
+        rows: Vec<String>,
+    },
+    /// Read the configuration anew.
+    Reload,
+}
+
+/// How much of a cue the seats make.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Levels {
+    /// Of the motion about the neutral pose, 0 to 1.
+    pub motion: f64,
+    /// Of the vibration, 0 to 1.
+    pub vibration: f64,
+    /// True if each effect may be on.
+    pub effects: BTreeMap<String, bool>,
+    /// Of motion and vibration in each row, 0 to 1, on top of the hall's.
+    pub rows: BTreeMap<String, f64>,
+}
+
+/// A change of levels; what is not named stays as it is.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LevelsChange {
+    /// Of the motion about the neutral pose, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<f64>,
+    /// Of the vibration, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vibration: Option<f64>,
+    /// True if an effect may be on, by its name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub effects: BTreeMap<String, bool>,
+    /// Of motion and vibration in a row, 0 to 1.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rows: BTreeMap<String, f64>,
+}
+
+impl Command {
+    /// The word for it on every surface.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Home => "home",
+            Self::Load { .. } => "load",
+            Self::Playlist { .. } => "playlist",
+            Self::Select { .. } => "select",
+            Self::Arm { .. } => "arm",
+            Self::Disarm => "disarm",
+            Self::Go | Self::GoFrom(_) => "go",
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Seek(_) => "seek",
+            Self::Stop => "stop",
+            Self::Park => "park",
+            Self::Clear => "clear",
+            Self::Trim(_) => "trim",
+            Self::Levels(_) => "levels",
+            Self::Preset(_) => "preset",
+            Self::Enable(_) => "enable",
+            Self::Disable { .. } => "disable",
+            Self::Preflight => "preflight",
+            Self::Test { .. } => "test",
+            Self::Reload => "reload",
+        }
+    }
+
+    /// True if it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
+    /// another by then.
+    #[must_use]
+    pub const fn goes_stale(&self) -> bool {
+        matches!(
+            self,
+            Self::Home
+                | Self::Arm { .. }
+                | Self::Go
+                | Self::GoFrom(_)
+                | Self::Resume
+                | Self::Seek(_)
+                | Self::Park
+                | Self::Clear
+                | Self::Enable(_)
+                | Self::Test { .. }
+        )
+    }
+
+    /// What gear has to be allowed for it; none for what needs no leave, a stop, and for what gear has no way to ask.
+    #[must_use]
+    pub const fn gear_word(&self) -> Option<GearWord> {
+        Some(match self {
+            Self::Go => GearWord::Go,
+            Self::Pause => GearWord::Pause,
+            Self::Resume => GearWord::Resume,
+            Self::Park => GearWord::Park,
+            Self::Seek(_) => GearWord::Seek,
+            Self::Trim(_) => GearWord::Trim,
+            Self::Levels(_) => GearWord::Levels,
+            Self::Enable(_) | Self::Disable { .. } => GearWord::Seats,
+            _ => return None,
+        })
+    }
+
+    /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.
+    #[must_use]
+    pub const fn least_role(&self) -> Role {
+        match self {
+            Self::Stop => Role::View,
+            Self::Home | Self::Arm { seats_empty: true } | Self::Clear | Self::Test { .. } | Self::Reload => {
+                Role::Engineer
+            }
+            _ => Role::Operate,
+        }
+    }
+}
+
+impl From<&Preset> for LevelsChange {
+    fn from(preset: &Preset) -> Self {
+        let Preset { motion, vibration, effects, .. } = preset;
+        Self { motion: *motion, vibration: *vibration, effects: effects.clone(), rows: BTreeMap::new() }
+    }
+}
+
+impl fmt::Display for Command {
+    /// What was asked, as the journal has it: its word, and what it names.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())?;
+        match self {
+            Self::Load { cue } => write!(f, " {cue}"),
+            Self::Playlist { id: Some(id) } => write!(f, " {id}"),
+            Self::Playlist { id: None } => f.write_str(" none"),
+            Self::Select { entry } => write!(f, " entry {}", entry.saturating_add(1)), // as people count
+            Self::Seek(film) => write!(f, " {film}"),
+            Self::Trim(ms) => write!(f, " {ms} ms"),
+            Self::Levels(change) => change.fmt(f),
+            Self::GoFrom(film) => write!(f, " from {film}"),
+            Self::Preset(name) | Self::Enable(name) | Self::Disable { name, why: None } => {
+                write!(f, " {name}")
+            }
+            Self::Disable { name, why: Some(why) } => write!(f, " {name}: {}", why.escape_debug()),
+            Self::Arm { seats_empty: true } => f.write_str(" with empty seats"),
+            Self::Test { rows } if rows.is_empty() => f.write_str(" all rows"),
+            Self::Test { rows } => write!(f, " rows {}", rows.join(", ")),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for LevelsChange {
+    /// Each change behind a blank.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let levels = [("motion", self.motion), ("vibration", self.vibration)];
+        for (name, level) in levels.into_iter().filter_map(|(name, level)| Some((name, level?))) {
+            write!(f, " {name} {:.0} %", level * 100.0)?;
+        }
+        for (row, level) in &self.rows {
+            write!(f, " row {row} {:.0} %", level * 100.0)?;
+        }
+        self.effects.iter().try_for_each(|(name, on)| write!(f, " {name} {}", if *on { "on" } else { "off" }))
+    }
+}

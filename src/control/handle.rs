@@ -1,0 +1,289 @@
+//! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
+//! stop, which waits for neither.
+
+use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::Duration;
+
+use tokio::sync::{oneshot, watch};
+
+use super::{Code, Command, Problem, Status, Who};
+use crate::rt::Desk;
+use crate::state::State;
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// Asks that wait at the most; of a flood the rest is refused.
+const ASKS: usize = 64;
+/// How long an answer may take: a cue of two hours is proved meanwhile.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// How old an ask that [goes stale](Command::goes_stale) may be when its turn comes.
+pub const FRESH: Duration = Duration::from_secs(2);
+
+/// What a surface wants, and on whose behalf.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Desired {
+    /// What.
+    pub ask: Command,
+    /// Who.
+    pub who: Who,
+}
+
+/// An ask on its way to the supervisor of the hall.
+#[derive(Debug)]
+pub struct Asked {
+    /// What, and who.
+    pub desired: Desired,
+    asked_at: MonoTime,
+    reply: oneshot::Sender<Result<Arc<Status>, Problem>>,
+}
+
+impl Asked {
+    fn is_stale(&self, now: MonoTime) -> bool {
+        self.desired.ask.goes_stale() && now.since(self.asked_at) > FRESH
+    }
+
+    /// True if it was asked before that instant.
+    #[must_use]
+    pub fn is_before(&self, at: MonoTime) -> bool {
+        self.asked_at < at
+    }
+
+    /// Answers it: the state that it led to, or why it was not done.
+    pub fn answer(self, answer: Result<Arc<Status>, Problem>) {
+        drop(self.reply.send(answer)); // whoever asked may have gone
+    }
+}
+
+/// The supervisor's end: asks come out, in the order in which they were asked.
+#[derive(Debug)]
+pub struct Inbox(mpsc::Receiver<Asked>);
+
+impl Inbox {
+    /// The next ask, waited for so long; `None` if nobody asked. None as well where all surfaces are gone. What has gone
+    /// stale while it waited is answered here and never comes out: nobody expects it any more.
+    #[must_use]
+    pub fn next(&self, wait: Duration) -> Option<Asked> {
+        let until = Monotonic.now() + wait;
+        loop {
+            match self.0.recv_timeout(until.since(Monotonic.now())) {
+                Ok(asked) if asked.is_stale(Monotonic.now()) => {
+                    let problem = late(asked.desired.ask.word());
+                    asked.answer(Err(problem));
+                }
+                Ok(asked) => return Some(asked),
+                Err(RecvTimeoutError::Timeout) => return None,
+                Err(RecvTimeoutError::Disconnected) => {
+                    Monotonic.sleep_until(until);
+                    return None;
+                }
+            }
+        }
+    }
+}
+
+/// Where the supervisor puts the newest status.
+#[derive(Debug)]
+pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Arc<Desk>>>);
+
+impl StatusSource {
+    /// From now on a stop goes to that desk: the hall was opened anew.
+    pub fn lead(&self, desk: Arc<Desk>) {
+        *self.1.write().unwrap_or_else(PoisonError::into_inner) = desk;
+    }
+
+    /// Makes a status known to all who watch.
+    pub fn put(&self, status: Arc<Status>) {
+        self.0.send_replace(status);
+    }
+}
+
+/// A surface's end; one each.
+#[derive(Debug, Clone)]
+pub struct Handle {
+    asks: SyncSender<Asked>,
+    status: watch::Receiver<Arc<Status>>,
+    desk: Arc<RwLock<Arc<Desk>>>,
+}
+
+/// The ends of a hall: for its surfaces, and for its supervisor. `desk` is the tick thread's.
+#[must_use]
+pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
+    let (asks, inbox) = mpsc::sync_channel(ASKS);
+    let (source, status) = watch::channel(Arc::new(first));
+    let desk = Arc::new(RwLock::new(desk));
+    (Handle { asks, status, desk: Arc::clone(&desk) }, Inbox(inbox), StatusSource(source, desk))
+}
+
+impl Handle {
+    /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
+    pub fn stop(&self) {
+        self.desk.read().unwrap_or_else(PoisonError::into_inner).stop();
+    }
+
+    /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
+    pub fn note_stop(&self, who: Who) {
+        let (reply, _) = oneshot::channel();
+        let note = Asked { desired: Desired { ask: Command::Stop, who }, asked_at: Monotonic.now(), reply };
+        drop(self.asks.try_send(note));
+    }
+
+    /// The newest status.
+    #[must_use]
+    pub fn status(&self) -> Arc<Status> {
+        Arc::clone(&self.status.borrow())
+    }
+
+    /// To be woken by each new status.
+    #[must_use]
+    pub fn watch(&self) -> watch::Receiver<Arc<Status>> {
+        self.status.clone()
+    }
+
+    /// Asks, and gives the state that it led to. A stop is set on its flag before it is queued for the journal.
+    ///
+    /// # Errors
+    /// [`Problem`] where it was not done.
+    pub async fn ask(&self, who: Who, ask: Command) -> Result<Arc<Status>, Problem> {
+        self.post(who, ask)?.answer().await
+    }
+
+    /// The same in two parts, for whoever goes on reading meanwhile: what is posted is queued in the order of the calls.
+    ///
+    /// # Errors
+    /// [`Problem`] where it is not even queued: the role is too low, or too many wait.
+    pub fn post(&self, who: Who, ask: Command) -> Result<Posted, Problem> {
+        self.post_asked(who, ask, Monotonic.now())
+    }
+
+    /// The same for what was asked a while ago.
+    ///
+    /// # Errors
+    /// [`Problem`] where it is not even queued: the role is too low, it is stale already, or too many wait.
+    pub fn post_asked(&self, who: Who, ask: Command, asked_at: MonoTime) -> Result<Posted, Problem> {
+        if who.role < ask.least_role() {
+            let (word, least) = (ask.word(), ask.least_role());
+            let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
+            return Err(Problem::new(Code::Role, detail, "ask somebody who may"));
+        }
+        if ask == Command::Stop {
+            self.stop();
+        }
+        let (reply, answer) = oneshot::channel();
+        let asked = Asked { desired: Desired { ask, who }, asked_at, reply };
+        if asked.is_stale(Monotonic.now()) {
+            return Err(late(asked.desired.ask.word()));
+        }
+        match self.asks.try_send(asked) {
+            Ok(()) => Ok(Posted(answer)),
+            // It is done with its flag; what would follow is its line in the journal.
+            Err(TrySendError::Full(asked)) if asked.desired.ask == Command::Stop => {
+                asked.answer(Ok(self.status()));
+                Ok(Posted(answer))
+            }
+            Err(TrySendError::Full(_)) => {
+                let detail = format!("{ASKS} requests wait already");
+                Err(Problem::new(Code::Busy, detail, "ask again in a second"))
+            }
+            Err(TrySendError::Disconnected(_)) => Err(gone()),
+        }
+    }
+}
+
+/// Something asked that waits for its answer. Dropped, it is done all the same.
+#[derive(Debug)]
+pub struct Posted(oneshot::Receiver<Result<Arc<Status>, Problem>>);
+
+impl Posted {
+    /// The state that it led to.
+    ///
+    /// # Errors
+    /// [`Problem`] where it was not done.
+    pub async fn answer(self) -> Result<Arc<Status>, Problem> {
+        match tokio::time::timeout(PATIENCE, self.0).await {
+            Ok(answer) => answer.unwrap_or_else(|_| Err(gone())),
+            Err(_) => Err(Problem::new(
+                Code::Timeout,
+                format!("no answer within {} s", PATIENCE.as_secs()),
+                "look at the status before asking again: it may still be done",
+            )),
+        }
+    }
+}
+
+/// What was asked of a hall that is another since.
+#[must_use]
+pub fn overtaken(word: &str, state: State) -> Problem {
+    let detail = format!("{word} was asked before the hall was {state}");
+    Problem::new(Code::Late, detail, "look at the seats, then ask again")
+}
+
+fn late(word: &str) -> Problem {
+    let detail = format!("{word} came more than {} s after it was asked", FRESH.as_secs());
+    Problem::new(Code::Late, detail, "look at the seats, then ask again")
+}
+
+fn gone() -> Problem {
+    Problem::new(Code::Timeout, "the hall is shutting down", "wait until the service is back")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{Role, Surface};
+
+    fn who(role: Role) -> Who {
+        Who { role, surface: Surface::Http, name: "anna".to_owned() }
+    }
+
+    fn hall() -> (Handle, Inbox, Arc<Desk>) {
+        let desk = Arc::new(Desk::new(std::iter::empty()));
+        let (handle, inbox, _source) = handle(Arc::clone(&desk), Status::starting("Hall 1"));
+        (handle, inbox, desk)
+    }
+
+    const NOW: Duration = Duration::ZERO;
+
+    #[test]
+    fn what_waited_too_long_never_comes_out_but_a_stop_does() {
+        let (handle, inbox, _) = hall();
+        let long_ago = Monotonic.now().before(2 * FRESH);
+        assert_eq!(
+            handle.post_asked(who(Role::Operate), Command::Go, long_ago).unwrap_err().code,
+            Code::Late
+        );
+        let stale = Monotonic.now().before(FRESH - Duration::from_millis(1));
+        let posted = handle.post_asked(who(Role::Operate), Command::Go, stale);
+        Monotonic.sleep_until(stale + FRESH + Duration::from_micros(1));
+        handle.post_asked(who(Role::View), Command::Stop, long_ago).unwrap();
+        assert_eq!(inbox.next(NOW).unwrap().desired.ask, Command::Stop);
+        drop(posted); // it may have gone stale on its way in
+    }
+
+    #[test]
+    fn a_stop_is_set_also_where_nothing_more_fits_and_noted_where_it_does() {
+        let (handle, inbox, desk) = hall();
+        for _ in 0..ASKS {
+            handle.post(who(Role::Operate), Command::Pause).unwrap();
+        }
+        assert_eq!(handle.post(who(Role::Operate), Command::Pause).unwrap_err().code, Code::Busy);
+        handle.stop();
+        handle.note_stop(who(Role::View));
+        assert!(desk.take_stop());
+        assert!(handle.post(who(Role::View), Command::Stop).is_ok(), "a stop that is done is not refused");
+        assert!(desk.take_stop());
+        assert_eq!(inbox.next(NOW).unwrap().desired.ask, Command::Pause);
+        handle.note_stop(who(Role::View));
+        let last = std::iter::from_fn(|| inbox.next(NOW)).last().unwrap();
+        assert_eq!(last.desired.ask, Command::Stop);
+    }
+
+    #[test]
+    fn a_role_that_may_not_ask_reaches_nobody() {
+        let (handle, inbox, _) = hall();
+        let problem = handle.post(who(Role::View), Command::Go).unwrap_err();
+        assert_eq!((problem.code, problem.status), (Code::Role, 403));
+        assert!(inbox.next(NOW).is_none());
+    }
+}

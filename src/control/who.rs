@@ -1,0 +1,67 @@
+//! Who asks, and what they may ask.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::Role;
+
+/// Which way somebody came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Surface {
+    /// The control socket of this machine.
+    Socket,
+    /// HTTP over TCP.
+    Http,
+    /// OSC over UDP.
+    Osc,
+    /// Lines of text over TCP.
+    Text,
+    /// The schedule of the playlist, armed by a person.
+    Schedule,
+    /// A signal to the process.
+    Signal,
+    /// The program by itself, as it does in `kinocue demo`.
+    Program,
+}
+
+/// Who asks: for the journal, and for what they may do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Who {
+    /// What they may do.
+    pub role: Role,
+    /// Which way they came.
+    pub surface: Surface,
+    /// Their name, as well as it is known: the user of the socket's peer, the name of a token, an address.
+    pub name: String,
+}
+
+impl Surface {
+    /// True if it is that of show-control gear, which is known by its address alone.
+    #[must_use]
+    pub const fn is_gear(self) -> bool {
+        matches!(self, Self::Osc | Self::Text)
+    }
+}
+
+impl fmt::Display for Surface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Socket => "socket",
+            Self::Http => "http",
+            Self::Osc => "osc",
+            Self::Text => "text",
+            Self::Schedule => "schedule",
+            Self::Signal => "signal",
+            Self::Program => "program",
+        })
+    }
+}
+
+impl fmt::Display for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, surface, role } = self;
+        write!(f, "{name} ({surface}, {role})")
+    }
+}

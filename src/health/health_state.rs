@@ -1,0 +1,188 @@
+//! Health of a group of controllers, its cause, and its consequences.
+
+use crate::motion::Pulses;
+use crate::state;
+use crate::time::MonoTime;
+
+/// Health of a motion group. One member's trouble is the whole group's: the seat is rigid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum HealthState {
+    /// All is well.
+    Ok,
+    /// Acks are missing; motion goes on.
+    Degraded,
+    /// Not heard for too long: three hold frames, then no motion.
+    Lost,
+    /// Found again as it was: it takes part from the next join on.
+    Rejoining,
+    /// An emergency stop; no frame at all. Latched.
+    Stopped,
+    /// A controller or a drive has an error; no motion. Latched.
+    Error,
+    /// Its position is unknown, or nobody can tell: no motion until it is homed.
+    Excluded,
+    /// Acks are off: nobody notices when it is lost.
+    Unwatched,
+}
+
+impl HealthState {
+    /// True if motion frames may go to it.
+    #[must_use]
+    pub const fn may_move(self) -> bool {
+        matches!(self, Self::Ok | Self::Degraded | Self::Rejoining | Self::Unwatched)
+    }
+
+    /// True if its registers are to be read, to see when it is back or put right.
+    #[must_use]
+    pub const fn is_looked_at(self) -> bool {
+        matches!(self, Self::Lost | Self::Stopped | Self::Error)
+    }
+}
+
+/// Why a group stands as it does. Controllers are counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Why {
+    /// Acks come as they should.
+    Acked,
+    /// No acks are asked for.
+    AcksOff,
+    /// Acks of this controller are missing or late.
+    AcksMissing(usize),
+    /// No ack and no report came from this controller for too long.
+    Silent(usize),
+    /// Nobody has looked at it since it was cleared or homed.
+    NotSeenYet,
+    /// It was seen as it was before.
+    SeenAgain,
+    /// This controller's seat is elsewhere than frames left it.
+    Moved(usize),
+    /// It is not known where the frames to this controller have led its seat.
+    Unsure(usize),
+    /// That was so three times within a minute.
+    Unsteady(usize),
+    /// Not all axes of this controller tell where they are.
+    Unread(usize),
+    /// The positions of this controller make two places each, and nothing says in which order their words come.
+    Ambiguous(usize),
+    /// An axis of this controller, from 0, says that it is outside of its stroke.
+    Outside {
+        /// Which controller.
+        controller: usize,
+        /// Which axis.
+        axis: usize,
+        /// Where.
+        pulses: Pulses,
+    },
+    /// An emergency stop at this controller.
+    EmergencyStop(usize),
+    /// An emergency stop at this controller was released, and it holds until it is reset.
+    HeldUntilReset(usize),
+    /// This controller has an error.
+    Error {
+        /// Which.
+        controller: usize,
+        /// The number.
+        error: u16,
+    },
+    /// A drive of this controller has an alarm.
+    Drive {
+        /// Which.
+        controller: usize,
+        /// Its axis, from 1.
+        axis: usize,
+        /// The number.
+        error: u16,
+    },
+    /// This controller reports an alarm (MBOX): of its drives where the register is DPFE.
+    Alarm {
+        /// Which.
+        controller: usize,
+        /// The monitor register that it reports.
+        register: u16,
+        /// What stands there.
+        value: u16,
+    },
+    /// This controller refuses frames (x = 3, 5, MBOX also 4) and gives no error number.
+    Refuses(usize),
+    /// This controller answers with registers of 32 bits.
+    Wide(usize),
+    /// This controller drives more axes than its seat type has (PA02): frames would lead those, too.
+    MoreAxes {
+        /// Which.
+        controller: usize,
+        /// How many it drives.
+        drives: u16,
+    },
+    /// This controller has rebooted: its packet counter began anew.
+    Rebooted(usize),
+    /// This controller got more datagrams than were sent from here, and more than it can have got since a reboot.
+    OtherMaster(usize),
+    /// This controller was reset: it is not home any more.
+    NotHome(usize),
+    /// Another controller, or another mode, is where this one was.
+    Other(usize),
+    /// This controller, which counts no packets, was silent for so long that it may have rebooted.
+    Gap(usize),
+    /// True if this controller has rebooted cannot be told.
+    Unproved(usize),
+}
+
+impl Why {
+    /// The controller it is about; `None` if that is the whole group.
+    #[must_use]
+    pub const fn controller(self) -> Option<usize> {
+        match self {
+            Self::AcksMissing(controller)
+            | Self::Silent(controller)
+            | Self::Moved(controller)
+            | Self::Unsure(controller)
+            | Self::Unsteady(controller)
+            | Self::Unread(controller)
+            | Self::Ambiguous(controller)
+            | Self::MoreAxes { controller, .. }
+            | Self::Outside { controller, .. }
+            | Self::EmergencyStop(controller)
+            | Self::HeldUntilReset(controller)
+            | Self::Error { controller, .. }
+            | Self::Drive { controller, .. }
+            | Self::Alarm { controller, .. }
+            | Self::Refuses(controller)
+            | Self::Wide(controller)
+            | Self::Rebooted(controller)
+            | Self::OtherMaster(controller)
+            | Self::NotHome(controller)
+            | Self::Other(controller)
+            | Self::Gap(controller)
+            | Self::Unproved(controller) => Some(controller),
+            Self::Acked | Self::AcksOff | Self::NotSeenYet | Self::SeenAgain => None,
+        }
+    }
+}
+
+/// A group that stands otherwise than before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// Which, counted from 0.
+    pub group: usize,
+    /// When that was noticed.
+    pub at: MonoTime,
+    /// How it stood.
+    pub from: HealthState,
+    /// How it stands.
+    pub to: HealthState,
+    /// Why.
+    pub why: Why,
+}
+
+/// What comes of a look at all groups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Notice {
+    /// For the lanes, the report and the console: a group stands otherwise.
+    Group(Change),
+    /// For the state machine of the hall.
+    Hall(state::Event),
+    /// Identity, mode, error, packet counter and DPF0 of this controller are to be read.
+    Read(usize),
+    /// The packet counter of this controller, to which frames go, is to be read.
+    Count(usize),
+}

@@ -1,0 +1,169 @@
+//! One axis that is not simply let pass: it brakes, waits at rest, and is led back.
+
+use super::limits::{AxisLimits, SLACK};
+use crate::motion::{Halt, Measure, Spacing};
+use crate::time::ShowTime;
+
+/// What the way back takes at the least, as a join does.
+const SHORTEST_RETURN: f64 = 1.5;
+/// Share of the limits that fading over a whole stroke takes by itself.
+const FADE_SHARE: f64 = 0.5;
+/// How many times as long a way back may become after several that did not lead there.
+const LONGEST: f64 = 8.0;
+
+/// What an axis is about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Mode {
+    /// Sends what is asked.
+    Following,
+    /// Comes to rest, and stays there.
+    Braking {
+        brake: Halt,
+        /// Seconds on it.
+        after: f64,
+    },
+    /// Fades from rest onto what is asked.
+    Returning { from: f64, after: f64, seconds: f64 },
+}
+
+/// The state of one axis.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    pub(super) limits: AxisLimits,
+    pub(super) mode: Mode,
+    /// The last way to rest that was looked for in good time, and the frame from whose pose it begins.
+    pub(super) way_out: Option<(u64, Halt)>,
+    /// Which of the ways to rest did last.
+    pub(super) habit: usize,
+    fade: f64,
+    stretch: f64,
+    asked: Asked,
+}
+
+impl Axis {
+    pub(super) fn new(limits: AxisLimits, spacing: Spacing) -> Self {
+        // The greatest derivatives of u^3 (10 - 15 u + 6 u^2) are 15/8, 10/sqrt 3 and 60 (docs/limiter.md, section 7).
+        let share = |limit: f64| FADE_SHARE * limit;
+        let fade = (1.875 / share(limits.velocity))
+            .max((5.7735 / share(limits.acceleration)).sqrt())
+            .max((60.0 / share(limits.jerk)).cbrt())
+            .max(SHORTEST_RETURN);
+        Self {
+            limits,
+            mode: Mode::Following,
+            way_out: None,
+            habit: 0,
+            fade,
+            stretch: 1.0,
+            asked: Asked::new(spacing),
+        }
+    }
+
+    /// Forgets all but the limits: the axis stands, and has for long.
+    pub(super) fn rest(&mut self) {
+        self.mode = Mode::Following;
+        self.way_out = None;
+        self.stretch = 1.0;
+        self.asked.forget();
+    }
+
+    /// Goes onto a way to rest, `seconds` of which the next frame takes.
+    pub(super) fn brake(&mut self, brake: Halt, seconds: f64) -> f64 {
+        match self.mode {
+            // What the fade adds to what it fades onto shrinks with its length, so a longer one may be let pass.
+            Mode::Returning { .. } => self.stretch = (2.0 * self.stretch).min(LONGEST),
+            Mode::Following => self.asked.forget(),
+            Mode::Braking { .. } => {}
+        }
+        self.mode = Mode::Braking { brake, after: seconds };
+        self.way_out = None;
+        brake.position(seconds)
+    }
+
+    /// Looks at what is asked; whether it broke the limits, taken by itself.
+    pub(super) fn look(&mut self, asked: f64, time_ms: u32) -> bool {
+        self.asked.look(asked, time_ms, &self.limits)
+    }
+
+    /// Where the present mode leads in a frame of so many seconds, `asked` being what is asked. On a way to rest that is
+    /// over, the way back, once what is asked can be followed.
+    pub(super) fn wish(&self, asked: f64, seconds: f64) -> (Mode, f64) {
+        match self.mode {
+            Mode::Following => (Mode::Following, asked),
+            Mode::Braking { brake, after } if after > brake.seconds() && self.asked.is_sound() => {
+                let back = Mode::Returning {
+                    from: brake.position(after),
+                    after: 0.0,
+                    seconds: self.fade * self.stretch,
+                };
+                fade_on(back, asked, seconds)
+            }
+            Mode::Braking { brake, after } => {
+                let after = after + seconds;
+                (Mode::Braking { brake, after }, brake.position(after))
+            }
+            Mode::Returning { .. } => fade_on(self.mode, asked, seconds),
+        }
+    }
+
+    /// Takes up the mode that a wish came with.
+    pub(super) fn take_up(&mut self, mode: Mode) {
+        if mode == Mode::Following {
+            self.stretch = 1.0;
+        }
+        self.mode = mode;
+    }
+}
+
+/// The next frame of a way back: what is asked counts for more and more.
+fn fade_on(mode: Mode, asked: f64, passed: f64) -> (Mode, f64) {
+    let Mode::Returning { from, after, seconds } = mode else { return (mode, asked) };
+    let after = after + passed;
+    if after >= seconds {
+        return (Mode::Following, asked);
+    }
+    let u = after / seconds;
+    let weight = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+    (Mode::Returning { from, after, seconds }, from + weight * (asked - from))
+}
+
+/// What is asked, taken by itself: whether it can be followed.
+#[derive(Debug, Clone)]
+struct Asked {
+    spacing: Spacing,
+    measure: Measure,
+    at: ShowTime,
+    /// Poses in a row that kept the limits.
+    sound: usize,
+}
+
+impl Asked {
+    const fn new(spacing: Spacing) -> Self {
+        Self { spacing, measure: Measure::new(spacing), at: ShowTime::ZERO, sound: 0 }
+    }
+
+    fn forget(&mut self) {
+        *self = Self::new(self.spacing);
+    }
+
+    fn look(&mut self, asked: f64, time_ms: u32, limits: &AxisLimits) -> bool {
+        if !asked.is_finite() {
+            self.forget();
+            return true;
+        }
+        self.at = ShowTime::from_nanos(self.at.as_nanos() + i64::from(time_ms) * 1_000_000);
+        let seen = self.measure.push(self.at, asked);
+        let kept = (0.0..=1.0).contains(&asked)
+            && seen.velocity.value.abs() <= SLACK * limits.velocity
+            && seen.step.value.abs() <= SLACK * limits.step
+            && seen.acceleration.value.abs() <= SLACK * limits.acceleration
+            && seen.jerk.value.abs() <= SLACK * limits.jerk;
+        self.sound = if kept { self.sound + 1 } else { 0 };
+        !kept
+    }
+
+    /// True if all that the measure looks back on has kept the limits.
+    const fn is_sound(&self) -> bool {
+        self.sound > 3 * self.spacing.m + 1
+    }
+}

@@ -1,0 +1,318 @@
+//! The quick test that nearly every pose passes, from frame to frame alone.
+//!
+//! A divided difference over a distance is a mean of the differences from frame to frame inside it, each with a weight of
+//! at most two over the distance in periods. So where acceleration and jerk from frame to frame stay below a level, or are above it
+//! by little in sum over what the measure looks back on, the measure sees less than the limits; and will still do so if
+//! next frame the axis begins to brake with no more than the level. Nothing of this is a guess: what is not sure by these
+//! sums goes to the long test.
+
+use super::limits::AxisLimits;
+use crate::motion::{MAX_AXES, Pose, Spacing};
+
+// Any shares below 1 are right; why these: docs/limiter.md, section 3.
+/// Shares of the acceleration and of the jerk up to which frames are calm, and with which an axis is thought to brake.
+pub(super) const LEVEL: (f64, f64) = (0.9, 0.8);
+
+/// Limits of all axes, each in a row of its own; none for axes that a lane does not have.
+#[derive(Debug, Clone)]
+struct Rows {
+    velocity: Pose,
+    step: Pose,
+    acceleration: Pose,
+    jerk: Pose,
+    /// What sums of acceleration and of jerk beyond the level may come to.
+    rest: [Pose; 2],
+    /// For the way to rest: half of 1 / jerk, half of 1 / acceleration, half of acceleration / jerk, at the level.
+    half_per_jerk: Pose,
+    half_per_acceleration: Pose,
+    half_rise: Pose,
+}
+
+/// What one more frame makes of an axis, frame to frame.
+#[derive(Debug, Clone, Copy)]
+struct Glance {
+    velocity: f64,
+    acceleration: f64,
+    /// Acceleration and jerk beyond the level.
+    beyond: [f64; 2],
+    calm: bool,
+}
+
+/// Seconds and their reciprocals: of the newest frame, and together with one and two before it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Spans {
+    /// The Times they are of, newest first.
+    times: [f64; 3],
+    frame: f64,
+    two: f64,
+    per_frame: f64,
+    double_per_two: f64,
+    triple_per_three: f64,
+}
+
+/// What is known from frame to frame of all axes of a lane.
+#[derive(Debug, Clone)]
+pub(super) struct FastPath {
+    rows: Rows,
+    position: Pose,
+    velocity: Pose,
+    acceleration: Pose,
+    /// Sums beyond the level in the present stretch of frames and in the one before: acceleration, jerk.
+    sums: [[Pose; 2]; 2],
+    /// Frames of a stretch, no less than the measure looks back on; and those left of the present one.
+    stretch: usize,
+    left: usize,
+    /// Times of the newest frames, s, newest first.
+    times: [f64; 2],
+    spans: Spans,
+}
+
+impl FastPath {
+    #[expect(clippy::cast_precision_loss, reason = "1 to 20")]
+    pub(super) fn new<'a>(
+        limits: impl Iterator<Item = &'a AxisLimits>,
+        spacing: Spacing,
+        pose: Pose,
+        usual: f64,
+    ) -> Self {
+        let (none, any) = ([0.0; MAX_AXES], [f64::INFINITY; MAX_AXES]);
+        let mut rows = Rows {
+            velocity: any,
+            step: any,
+            acceleration: any,
+            jerk: any,
+            rest: [any; 2],
+            half_per_jerk: none,
+            half_per_acceleration: none,
+            half_rise: none,
+        };
+        for (axis, limits) in limits.enumerate() {
+            let (acceleration, jerk) = (LEVEL.0 * limits.acceleration, LEVEL.1 * limits.jerk);
+            rows.velocity[axis] = limits.velocity;
+            rows.step[axis] = limits.step;
+            rows.acceleration[axis] = acceleration;
+            rows.jerk[axis] = jerk;
+            // No frame weighs more than 2/n in a difference, Times of 1 and 2 ms in turns included (docs/limiter.md, section 2).
+            rows.rest[0][axis] = (limits.acceleration - acceleration) * spacing.n as f64 / 2.0;
+            rows.rest[1][axis] = (limits.jerk - jerk) * spacing.n as f64 / 2.0;
+            rows.half_per_jerk[axis] = 0.5 / jerk;
+            rows.half_per_acceleration[axis] = 0.5 / acceleration;
+            rows.half_rise[axis] = 0.5 * acceleration / jerk;
+        }
+        // The present stretch and the one before are summed, so at least one whole one: more than a difference spans.
+        let stretch = 3 * spacing.m + 1;
+        let mut calm = Self {
+            rows,
+            position: pose,
+            velocity: none,
+            acceleration: none,
+            sums: [[none; 2]; 2],
+            stretch,
+            left: stretch,
+            times: [usual; 2],
+            spans: Spans::default(),
+        };
+        calm.rest(pose, usual);
+        calm
+    }
+
+    /// All stand in `pose`, and have for long.
+    pub(super) fn rest(&mut self, pose: Pose, usual: f64) {
+        self.position = pose;
+        self.velocity = [0.0; MAX_AXES];
+        self.acceleration = [0.0; MAX_AXES];
+        self.sums = [[[0.0; MAX_AXES]; 2]; 2];
+        self.left = self.stretch;
+        self.times = [usual; 2];
+        self.look_at_times(usual);
+    }
+
+    fn look_at_times(&mut self, frame: f64) {
+        let two = frame + self.times[0];
+        self.spans = Spans {
+            times: [frame, self.times[0], self.times[1]],
+            frame,
+            two,
+            per_frame: 1.0 / frame,
+            double_per_two: 2.0 / two,
+            triple_per_three: 3.0 / (two + self.times[1]),
+        };
+    }
+
+    /// Tells of the frame that comes next.
+    #[inline]
+    pub(super) fn begin(&mut self, frame: f64) {
+        let times = [frame, self.times[0], self.times[1]];
+        if times != self.spans.times {
+            self.look_at_times(frame);
+        }
+    }
+
+    /// Takes `pose` if it is calm on all axes; says whether it was taken.
+    #[inline]
+    pub(super) fn take_calm(&mut self, pose: &Pose) -> bool {
+        let mut seen = Seen::default();
+        let mut calm = true;
+        // All rows are as long: the loop is one that a compiler turns into vectors.
+        for (axis, &position) in pose.iter().enumerate() {
+            let glance = self.glance(axis, position);
+            seen.keep(axis, &glance);
+            calm &= glance.calm;
+        }
+        if calm {
+            self.keep(pose, &seen);
+        }
+        calm
+    }
+
+    /// True if an axis is calm at that position.
+    pub(super) fn is_calm(&self, axis: usize, position: f64) -> bool {
+        self.glance(axis, position).calm
+    }
+
+    /// Takes what is sent, calm or not.
+    pub(super) fn take(&mut self, pose: &Pose) {
+        let mut seen = Seen::default();
+        for (axis, &position) in pose.iter().enumerate() {
+            seen.keep(axis, &self.glance(axis, position));
+        }
+        self.keep(pose, &seen);
+    }
+
+    #[inline]
+    fn keep(&mut self, pose: &Pose, seen: &Seen) {
+        self.position = *pose;
+        self.velocity = seen.velocity;
+        self.acceleration = seen.acceleration;
+        for (sum, beyond) in self.sums[0].iter_mut().zip(&seen.beyond) {
+            for (sum, beyond) in sum.iter_mut().zip(beyond) {
+                *sum += beyond;
+            }
+        }
+        self.left -= 1;
+        if self.left == 0 {
+            self.left = self.stretch;
+            self.sums = [[[0.0; MAX_AXES]; 2], self.sums[0]];
+        }
+        self.times = [self.spans.frame, self.times[0]];
+    }
+
+    #[inline(always)]
+    #[expect(clippy::manual_range_contains, reason = "without a branch the loops around it become vectors")]
+    fn glance(&self, axis: usize, position: f64) -> Glance {
+        let (rows, spans) = (&self.rows, &self.spans);
+        let velocity = (position - self.position[axis]) * spans.per_frame;
+        let change = velocity - self.velocity[axis];
+        let acceleration = change * spans.double_per_two;
+        let jerk = (acceleration - self.acceleration[axis]) * spans.triple_per_three;
+        let beyond = [
+            (acceleration.abs() - rows.acceleration[axis]).max(0.0),
+            (jerk.abs() - rows.jerk[axis]).max(0.0),
+        ];
+        // At the pose itself, of the cubic through the newest four: a brake from there has no jump of acceleration in it.
+        let speed = velocity + spans.frame * (0.5 * acceleration + spans.two * jerk * (1.0 / 6.0));
+        let pull = acceleration + (spans.frame + spans.two) * jerk * (1.0 / 3.0);
+        let (rising, falling) = (pull.max(0.0), (-pull).max(0.0));
+        let up = speed.max(0.0) + rising * rising * rows.half_per_jerk[axis];
+        let down = (-speed).max(0.0) + falling * falling * rows.half_per_jerk[axis];
+        // A brake from here is seen together with old poses by one more acceleration, and by fewer than three more jerks
+        // (docs/limiter.md, section 3).
+        let calm = (self.sums[0][0][axis] + self.sums[1][0][axis] + 2.0 * beyond[0] <= rows.rest[0][axis])
+            & (self.sums[0][1][axis] + self.sums[1][1][axis] + 4.0 * beyond[1] <= rows.rest[1][axis])
+            & (pull.abs() <= rows.acceleration[axis])
+            & (change.abs() <= rows.step[axis])
+            & (velocity.abs() <= rows.velocity[axis])
+            & (up.max(down) <= rows.velocity[axis])
+            & (position >= 0.0)
+            & (position <= 1.0)
+            & (position + self.way(axis, up, rising) <= 1.0 + 1e-9)
+            & (position - self.way(axis, down, falling) >= -1e-9);
+        Glance { velocity, acceleration, beyond, calm }
+    }
+
+    /// At least the way to rest from the speed that is left when an acceleration is gone.
+    #[inline(always)]
+    fn way(&self, axis: usize, speed: f64, acceleration: f64) -> f64 {
+        let rows = &self.rows;
+        // Let go at full speed, then stop: exact with a hold, more than the way without one (docs/limiter.md, section 3).
+        speed
+            * (2.0 * acceleration * rows.half_per_jerk[axis]
+                + speed * rows.half_per_acceleration[axis]
+                + rows.half_rise[axis])
+    }
+}
+
+/// What was seen of all axes.
+#[derive(Default)]
+struct Seen {
+    velocity: Pose,
+    acceleration: Pose,
+    beyond: [Pose; 2],
+}
+
+impl Seen {
+    #[inline(always)]
+    fn keep(&mut self, axis: usize, glance: &Glance) {
+        self.velocity[axis] = glance.velocity;
+        self.acceleration[axis] = glance.acceleration;
+        self.beyond[0][axis] = glance.beyond[0];
+        self.beyond[1][axis] = glance.beyond[1];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::history::Difference;
+    use super::super::times::Times;
+    use super::*;
+    use crate::time::Rate;
+
+    /// What the newest of the differences of that order is, where poses are as `x` says.
+    fn over(apart: usize, order: usize, at: &[f64], x: impl Fn(usize) -> f64) -> f64 {
+        let newest = at.len() - 1;
+        // Of an acceleration, nothing is asked of the fourth pose.
+        let places = [0, 1, 2, 3].map(|count| newest.saturating_sub(count * apart));
+        let mut seconds = places.map(|place| at[place]);
+        if order == 2 {
+            seconds[3] = seconds[2] - 1.0;
+        }
+        let shown = Difference::new(apart, seconds).show(places.map(x));
+        if order == 2 { shown.acceleration } else { shown.jerk }
+    }
+
+    proptest! {
+        #[test]
+        fn a_difference_over_a_distance_is_a_mean_of_those_from_frame_to_frame_none_of_which_weighs_more_than_is_allowed_for(
+            millihertz in prop_oneof![1_000..1_000_000_u32, 400_000..1_000_000_u32], start in 0..100_000_u64,
+        ) {
+            let rate = Rate::from_hz(f64::from(millihertz) * 1e-3);
+            let spacing = Spacing::at_rate(rate.hz());
+            let most = 2.0 / f64::from(u32::try_from(spacing.n).expect("1 to 20"));
+            for (apart, order) in [(spacing.n, 2), (spacing.m, 2), (spacing.n, 3), (spacing.m, 3)] {
+                let mut times = Times::new(rate);
+                let mut at = vec![0.0];
+                for frame in 0..order * apart {
+                    at.push(at[frame] + f64::from(times.of(start + frame as u64)) * 1e-3);
+                }
+                let mut sum = 0.0;
+                for first in 0..=at.len() - 1 - order {
+                    // Of such a curve one difference from frame to frame alone is not 0: that of the poses from `first` on.
+                    let (b, c) = (at[first + 1], at[first + order - 1]);
+                    let bent = |k: usize| match order {
+                        _ if k < first + order => 0.0,
+                        2 => at[k] - b,
+                        _ => (at[k] - b) * (at[k] - c),
+                    };
+                    let few: Vec<f64> = at[first..=first + order].to_vec();
+                    let one = over(1, order, &few, |k| bent(first + k));
+                    let weight = over(apart, order, &at, bent) / one;
+                    prop_assert!((-1e-6..=most).contains(&weight), "{weight} at {first}");
+                    sum += weight;
+                }
+                prop_assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+            }
+        }
+    }
+}

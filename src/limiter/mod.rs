@@ -1,0 +1,321 @@
+//! The last check before the encoder: whatever came before, what is sent keeps the limits of every axis by the measure of
+//! [`crate::motion::Measure`], on the poses before they are rounded to pulses. Tick thread; told the time; allocates
+//! nothing.
+//!
+//! What keeps the limits passes unchanged, bit for bit. A pose that does not, or after which no way to rest within the
+//! limits is left, is not sent: the axis goes on along a way to rest instead, and once what is asked has kept the limits
+//! for as long as the measure looks back, it fades from rest onto it.
+
+mod axis;
+mod counts;
+mod fast_path;
+mod history;
+mod limits;
+mod stop_path;
+mod times;
+
+pub use counts::{Clamp, Counts, Limit};
+
+use axis::{Axis, Mode};
+use counts::Counter;
+use fast_path::FastPath;
+use history::{Difference, History};
+use limits::{AxisLimits, Next, SLACK};
+use stop_path::StopPath;
+use times::Times;
+
+use crate::belief::KnownPose;
+use crate::motion::{AxisState, Halt, Limits, MAX_AXES, Pose, Spacing, Window};
+use crate::time::Rate;
+
+/// What the turn of a pose that was proved may lie outside the stroke, in strokes: what poses show of a motion is off by
+/// some thousandths of a millimetre.
+const ROOM_SLACK: f64 = 1e-4;
+
+/// What became of a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Admitted {
+    /// It is sent as it was asked for.
+    Passed,
+    /// At least one axis is sent something else.
+    Held,
+    /// The same, and clamps have come so often that the show must end.
+    Fault,
+}
+
+/// What is known of a pose that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Provenance {
+    /// It lies on a cue whose limits were proved up to rest after its last pose, or on a move that was planned within them
+    /// and ends at rest or on the cue.
+    Proved,
+    /// Nothing.
+    Anyhow,
+}
+
+/// The limiter of one lane.
+#[derive(Debug, Clone)]
+pub struct Limiter {
+    axes: Vec<Axis>,
+    fast_path: FastPath,
+    history: History,
+    times: Times,
+    /// True if every axis is sent what is asked.
+    following: bool,
+    /// True if it was told where the lane stands.
+    is_seeded: bool,
+    counter: Counter,
+}
+
+/// What the differences of one tick need.
+#[derive(Clone, Copy)]
+struct Frame {
+    index: u64,
+    time_ms: u32,
+    seconds: f64,
+    per_second: f64,
+    per_second_before: f64,
+    differences: [Difference; 2],
+}
+
+impl Limiter {
+    /// The limiter of a lane. It lets nothing pass before it is told where the lane stands ([`Self::restart`]).
+    #[must_use]
+    pub fn new(window: &Window, rate: Rate) -> Self {
+        let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
+        let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, times.period()));
+        let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
+        let pose = [0.0; MAX_AXES];
+        Self {
+            fast_path: FastPath::new(
+                axes.iter().map(|axis| &axis.limits),
+                spacing,
+                pose,
+                f64::from(times.usual_ms()) * 1e-3,
+            ),
+            axes,
+            history: History::new(spacing, pose, times.usual_ms()),
+            times,
+            following: false,
+            is_seeded: false,
+            counter: Counter::default(),
+        }
+    }
+
+    /// Tells that frames stopped for long: what comes next goes on from the last pose.
+    pub fn rest(&mut self) {
+        self.rest_in(*self.history.last());
+    }
+
+    /// Tells that the lane is known to have stood in that pose for long, wherever it was before.
+    pub fn restart(&mut self, known: &KnownPose) {
+        self.is_seeded = true;
+        self.rest_in(*known.pose());
+    }
+
+    /// The same for a lane that is known to stand in its park pose, but for what is noise.
+    pub fn restart_at_park(&mut self, known: &KnownPose, window: &Window) {
+        self.restart(known);
+        self.rest_in(window.park());
+    }
+
+    fn rest_in(&mut self, pose: Pose) {
+        let pose = held_inside(pose);
+        self.history.rest(pose, self.times.usual_ms());
+        self.fast_path.rest(pose, f64::from(self.times.usual_ms()) * 1e-3);
+        self.axes.iter_mut().for_each(Axis::rest);
+        self.following = true;
+    }
+
+    /// Counts since the limiter was made.
+    #[must_use]
+    pub const fn counts(&self) -> &Counts {
+        &self.counter.counts
+    }
+
+    /// Goes on counting where another limiter of the same lane left off; its latched fault is its own.
+    pub const fn count_on(&mut self, before: &Counts) {
+        let fault = self.counter.counts.fault;
+        self.counter.counts = *before;
+        self.counter.counts.fault = fault;
+    }
+
+    /// The pose sent last.
+    #[must_use]
+    pub fn sent(&self) -> &Pose {
+        self.history.last()
+    }
+
+    /// Puts into `pose`, which frame `index` (counted from 0, of [`Rate::time_ms`]) is to carry, what may be sent, and takes
+    /// it as sent. Frames that were left out, few or many, are not missed: see [`Self::rest`].
+    #[inline]
+    pub fn admit(&mut self, pose: &mut Pose, index: u64, asked: Provenance) -> Admitted {
+        let time_ms = self.times.of(index);
+        self.fast_path.begin(f64::from(time_ms) * 1e-3);
+        if self.following && self.fast_path.take_calm(pose) {
+            self.history.push(*pose, time_ms);
+            self.counter.tick(time_ms, false, false);
+            return Admitted::Passed;
+        }
+        self.judge(pose, index, time_ms, asked)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "some seconds")]
+    fn frame(&mut self, index: u64, time_ms: u32) -> Frame {
+        let seconds = f64::from(time_ms) * 1e-3;
+        Frame {
+            index,
+            time_ms,
+            seconds,
+            per_second: 1.0 / seconds,
+            per_second_before: 1e3 / self.history.last_time() as f64,
+            differences: self.history.differences(time_ms),
+        }
+    }
+
+    #[inline]
+    fn next(&self, axis: usize, position: f64, frame: &Frame) -> Next {
+        let before = |back: usize| self.history.before(back)[axis];
+        let velocity = (position - before(1)) * frame.per_second;
+        let shown = frame.differences.map(|difference| {
+            let apart = difference.apart;
+            difference.show([position, before(apart), before(2 * apart), before(3 * apart)])
+        });
+        Next { position, velocity, step: velocity - (before(1) - before(2)) * frame.per_second_before, shown }
+    }
+
+    /// The same axis by axis, where not all is plain.
+    #[cold]
+    #[inline(never)]
+    fn judge(&mut self, pose: &mut Pose, index: u64, time_ms: u32, asked: Provenance) -> Admitted {
+        if !self.is_seeded {
+            *pose = *self.history.last();
+            return Admitted::Fault;
+        }
+        let frame = &self.frame(index, time_ms);
+        let (mut refused, mut held) = (false, false);
+        for (axis, position) in pose.iter_mut().enumerate().take(self.axes.len()) {
+            let (sent, was_refused) = self.judge_axis(axis, *position, frame, asked);
+            *position = sent;
+            refused |= was_refused;
+            held |= self.axes[axis].mode != Mode::Following;
+        }
+        self.following = !held;
+        self.fast_path.take(pose);
+        self.history.push(*pose, time_ms);
+        self.counter.tick(time_ms, refused, held);
+        match (held, self.counter.counts.fault) {
+            (false, _) => Admitted::Passed,
+            (true, false) => Admitted::Held,
+            (true, true) => Admitted::Fault,
+        }
+    }
+
+    /// What one axis is sent, and whether what was asked broke a limit.
+    fn judge_axis(&mut self, axis: usize, asked: f64, frame: &Frame, by: Provenance) -> (f64, bool) {
+        let state = &mut self.axes[axis];
+        let broken = state.mode != Mode::Following && state.look(asked, frame.time_ms);
+        let (mode, wish) = state.wish(asked, frame.seconds);
+        let next = self.next(axis, wish, frame);
+        let held = self.axes[axis].limits.hold(&next);
+        if let Mode::Braking { .. } = mode {
+            if held {
+                self.axes[axis].take_up(mode);
+                return (wish, broken);
+            }
+            return (self.brake(axis, frame), broken);
+        }
+        if held && self.leads_on(axis, &next, frame, by) {
+            self.axes[axis].take_up(mode);
+            return (wish, broken);
+        }
+        let allowed = self.brake(axis, frame);
+        let (limit, times) = exceeded(&self.axes[axis].limits, &next);
+        self.counter.refused(Clamp { axis, asked, allowed, limit, times });
+        (allowed, true)
+    }
+
+    /// True if a way to rest goes on from this pose.
+    ///
+    /// Of what was proved, one does: it can be followed to its end within the limits, and from its last pose a way to rest
+    /// within them is part of the proof (`proof::end`); a planned move ends at rest or on the cue. The stroke has room for a
+    /// stop at once as well, since what turns inside it leaves room to turn sooner. That much is asked here all the same, in
+    /// closed form: what was said to be proved and runs out of its stroke is refused while there is room left.
+    fn leads_on(&mut self, axis: usize, next: &Next, frame: &Frame, by: Provenance) -> bool {
+        (by == Provenance::Proved && self.has_room(axis, next, frame))
+            || self.leaves_a_way_out(axis, next, frame)
+    }
+
+    /// True if the axis can turn inside the stroke, by what its last poses show of its motion.
+    fn has_room(&self, axis: usize, next: &Next, frame: &Frame) -> bool {
+        let AxisLimits { velocity, acceleration, jerk, .. } = self.axes[axis].limits;
+        let limits = Limits { velocity, acceleration, jerk };
+        frame.differences.iter().zip(next.shown).any(|(difference, shown)| {
+            let (velocity, acceleration) = difference.newest(shown);
+            let acceleration = acceleration.clamp(-limits.acceleration, limits.acceleration);
+            let state = AxisState { position: next.position, velocity, acceleration };
+            // No way peaks lower than braking with everything (docs/limiter.md, section 4).
+            Halt::least_past(state, limits, 1.0) <= ROOM_SLACK
+        })
+    }
+
+    /// True if the axis can come to rest after this pose; the way is kept for the next tick.
+    fn leaves_a_way_out(&mut self, axis: usize, next: &Next, frame: &Frame) -> bool {
+        let state = &mut self.axes[axis];
+        if self.fast_path.is_calm(axis, next.position) {
+            return true;
+        }
+        self.counter.counts.looked += 1;
+        let sent = Some(next.position);
+        let mut outlook = StopPath::new(&self.history, axis, &state.limits, self.times, frame.time_ms, sent);
+        let way = outlook.way(state.habit);
+        if let Some((brake, habit)) = way {
+            state.way_out = Some((frame.index, brake));
+            state.habit = habit;
+        }
+        way.is_some()
+    }
+
+    /// Goes onto a way to rest: the one kept from the tick before, or one that is looked for now.
+    fn brake(&mut self, axis: usize, frame: &Frame) -> f64 {
+        // All of this way was laid against the measure with the Times of these very frames (docs/limiter.md, section 4).
+        let begins_here = |&(index, _): &(u64, Halt)| index + 1 == frame.index;
+        if let Some((_, brake)) = self.axes[axis].way_out.take_if(|way| begins_here(way)) {
+            let position = brake.position(frame.seconds);
+            let next = self.next(axis, position, frame);
+            if self.axes[axis].limits.hold(&next) {
+                return self.axes[axis].brake(brake, frame.seconds);
+            }
+        }
+        let state = &self.axes[axis];
+        let mut outlook = StopPath::new(&self.history, axis, &state.limits, self.times, frame.time_ms, None);
+        let brake = outlook.way(state.habit).map_or_else(|| outlook.least(), |way| way.0);
+        let next = self.next(axis, brake.position(frame.seconds), frame);
+        if !self.axes[axis].limits.hold(&next) {
+            self.counter.counts.beyond += 1;
+        }
+        self.axes[axis].brake(brake, frame.seconds)
+    }
+}
+
+/// The limit that a pose exceeds most, and how many times.
+fn exceeded(limits: &AxisLimits, next: &Next) -> (Limit, f64) {
+    if !(0.0..=1.0).contains(&next.position) {
+        return (Limit::Position, f64::INFINITY);
+    }
+    let [n, m] = next.shown;
+    let shares = [
+        (Limit::Velocity, next.velocity.abs() / limits.velocity),
+        (Limit::Step, next.step.abs() / limits.step),
+        (Limit::Acceleration, n.acceleration.abs().max(m.acceleration.abs()) / limits.acceleration),
+        (Limit::Jerk, n.jerk.abs().max(m.jerk.abs()) / limits.jerk),
+    ];
+    let worst =
+        shares.into_iter().fold((Limit::WayOut, SLACK), |most, of| if of.1 > most.1 { of } else { most });
+    if worst.0 == Limit::WayOut { (Limit::WayOut, 1.0) } else { worst }
+}
+
+/// Positions held inside the stroke; what is no number rests at its lower end.
+fn held_inside(pose: Pose) -> Pose {
+    pose.map(|position| if position.is_nan() { 0.0 } else { position.clamp(0.0, 1.0) })
+}
