@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::belief::Taken;
+use crate::belief::{KnownPose, Reading, Taken};
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
@@ -14,7 +14,7 @@ use crate::rt::{AckLoop, Live, Phase, Places, Sent};
 use crate::time::{Clock, MonoTime};
 use crate::wire::MAX_LEN;
 
-/// Rounds of position reads, and how long each waits for the answers. A seat is at rest where two rounds find it.
+/// Rounds of position reads, and how long each waits for the answers. A seat is at rest where three rounds find it.
 const READ_TRIES: usize = 5;
 const READ_WAIT: Duration = Duration::from_millis(150);
 /// How often the slow frame is sent, where its ack does not come.
@@ -75,15 +75,14 @@ impl<C: Clock> Preparation<'_, C> {
             self.read_positions();
         }
         let mut prepared = Prepared::nothing(self.lanes.len());
-        let moving = self.names(|this, lane| this.reading(lane).is_some_and(|(_, rests)| !rests));
+        let moving = self.names(|this, lane| this.reading(lane).is_some_and(|reading| reading.moves));
         if self.stopped() {
             return Ok(prepared);
         }
         if !moving.is_empty() {
             return Err(Unready { moving, ..Unready::default() });
         }
-        let untold: Vec<usize> =
-            (0..self.lanes.len()).filter(|&lane| self.reading(lane).is_none_or(|(all, _)| !all)).collect();
+        let untold: Vec<usize> = (0..self.lanes.len()).filter(|&lane| !self.is_known(lane)).collect();
         let unsure = self.park_slowly(&untold, &mut prepared);
         if unsure.is_empty() { Ok(prepared) } else { Err(Unready { unsure, ..Unready::default() }) }
     }
@@ -103,18 +102,19 @@ impl<C: Clock> Preparation<'_, C> {
         lanes.map(|lane| self.controllers[lane].name.clone()).collect()
     }
 
-    /// Whether a seat told of all its axes, and whether it was at rest; `None` if it told nothing.
-    fn reading(&self, lane: usize) -> Option<(bool, bool)> {
-        let (_, reading) = self.live.evidence(lane)?.reading()?;
-        let own = self.lanes[lane].window.own();
-        Some((reading.slots & own == own, reading.rests))
+    fn reading(&self, lane: usize) -> Option<Reading> {
+        self.live.evidence(lane)?.reading().map(|(_, reading)| reading)
+    }
+
+    /// True if a seat told of all its axes, and was at rest.
+    fn is_known(&self, lane: usize) -> bool {
+        self.reading(lane).is_some_and(|reading| KnownPose::of(&reading, &self.lanes[lane].window).is_some())
     }
 
     /// True if a seat tells that it stands at park, to a pulse.
     fn is_at_park(&self, lane: usize) -> bool {
-        let reading = self.live.evidence(lane).and_then(|evidence| evidence.reading());
         let window = &self.lanes[lane].window;
-        reading.is_some_and(|(_, reading)| {
+        self.reading(lane).is_some_and(|reading| {
             let own = window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own);
             own.into_iter().all(|(index, slot)| {
                 let apart = slot.pulses(reading.pose[index]).0.abs_diff(slot.pulses(slot.park).0);
@@ -128,7 +128,7 @@ impl<C: Clock> Preparation<'_, C> {
     fn read_positions(&mut self) {
         for _ in 0..READ_TRIES {
             let open: Vec<usize> = (0..self.lanes.len())
-                .filter(|&lane| !self.reading(lane).is_some_and(|(_, rests)| rests))
+                .filter(|&lane| !self.reading(lane).is_some_and(|reading| reading.rests))
                 .collect();
             if open.is_empty() || self.stopped() {
                 break;

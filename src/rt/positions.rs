@@ -20,6 +20,8 @@ const TIMES: u32 = 3;
 const REST_REPEATED: Duration = Duration::from_millis(500);
 /// An answer that comes later than this is none; so long after an answer was repeated others may be.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+/// An answer is lost rather than late after this.
+const LATE: Duration = Duration::from_millis(300);
 /// Requests that may be open at a time; of more the older ones count.
 const OPEN: usize = 8;
 /// Answers further apart say nothing of what was between them.
@@ -103,6 +105,14 @@ impl Positions {
         for first in (0..self.led.min(REGISTERS)).step_by(AXES_PER_BLOCK) {
             self.on_asked(DP_POSITIONS[first], at);
         }
+    }
+
+    /// True if a request has been open for so long that its answer is lost rather than late. Another would be taken for the answer to
+    /// it, and so would each after that: it is asked again once nothing is open any more.
+    pub(super) fn is_behind(&mut self, now: MonoTime) -> bool {
+        (0..REGISTERS)
+            .step_by(AXES_PER_BLOCK)
+            .any(|first| self.open(first, now).front().is_some_and(|asked| now.since(*asked) > LATE))
     }
 
     /// The requests for a block of axes to which an answer may still come.
@@ -350,6 +360,22 @@ mod tests {
         positions.on_asked(DP_POSITIONS[0], ms(1_650));
         positions.answer(0, &[Pulses(7)], ms(1_651));
         assert_eq!(positions.reading(ms(1_651)).unwrap().at, ms(1_650));
+    }
+
+    #[test]
+    fn after_an_outage_a_seat_is_asked_again_once_no_request_from_before_is_open() {
+        let mut positions = seat(1);
+        let asked: Vec<u64> = (0..20)
+            .map(|round| 200 * round)
+            .filter(|at| {
+                let asks = !positions.is_behind(ms(*at));
+                if asks {
+                    positions.on_asked(DP_POSITIONS[0], ms(*at));
+                }
+                asks
+            })
+            .collect();
+        assert_eq!(asked, [0, 200, 1_400, 1_600, 2_800, 3_000]);
     }
 
     #[test]

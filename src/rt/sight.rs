@@ -107,8 +107,8 @@ impl Looker {
         self.dialect
     }
 
-    /// Asks for all of it, and says in how many datagrams.
-    pub(super) fn ask(&mut self, lane: usize, sender: &Sender) -> u32 {
+    /// Asks for all of it, where its seat is only if that is wanted, and says in how many datagrams.
+    pub(super) fn ask(&mut self, lane: usize, sender: &Sender, where_it_is: bool) -> u32 {
         self.seen = Seen { asked: true, ..Seen::default() };
         let read =
             |channel, start, num| ReadRequest { channel, accept: self.code, reply: self.code, start, num };
@@ -120,7 +120,7 @@ impl Looker {
             read(MONITORS, RESET, 1),
             read(MONITORS, VERSIONS.0, VERSIONS.1),
         ];
-        let positions = position_reads(self.axes, self.code, self.code);
+        let positions = position_reads(if where_it_is { self.axes } else { 0 }, self.code, self.code);
         let reads = others.into_iter().chain(packets).chain(mask).chain(inputs).chain(positions);
         let mut sent = 0;
         for request in reads {
@@ -354,7 +354,8 @@ mod tests {
     /// Answers to all that is asked, as a controller gives them in that state.
     fn answer(looker: &mut Looker, code: ReplyCode, error: u16) -> Vec<bool> {
         let is_well = code == ReplyCode::Running;
-        let stands = position_words(Pulses(75_000), Dialect::Smc);
+        let place = position_words(Pulses(75_000), Dialect::Smc);
+        let stands = [place, [0, 0], [0, 0]].concat();
         let answers: [(u16, u16, &[u16]); 5] = [
             (PARAMETERS, MODE.0, &[2, 0, 1]),
             (MONITORS, RESET, &[RESET_DONE]),
@@ -519,12 +520,12 @@ mod tests {
     }
 
     #[test]
-    fn axes_that_a_controller_drives_beside_those_of_its_seat_are_led_where_its_frames_have_places_for_them()
-    {
+    fn axes_that_a_controller_drives_and_nobody_reads_are_led_where_its_frames_have_places_for_them() {
         let looker = looker(); // one axis, in frames of three
-        assert_eq!([1, 2, 3, 12].map(|drives| looker.leads_more_axes(drives)), [false, true, true, true]);
-        let looker = Looker { places: 1, ..looker };
-        assert!(!looker.leads_more_axes(12));
+        assert_eq!((looker.places, looker.axes), (3, 3));
+        assert!([1, 3, 12].into_iter().all(|drives| !looker.leads_more_axes(drives)));
+        let looker = Looker { places: 10, axes: 6, ..looker };
+        assert_eq!([6, 7, 12].map(|drives| looker.leads_more_axes(drives)), [false, true, true]);
     }
 
     #[test]

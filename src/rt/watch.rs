@@ -376,8 +376,12 @@ impl Watch {
             Notice::Count(controller) => self.lookers[controller].ask_count(controller, &self.sender),
             Notice::Read(controller) => {
                 self.darken(controller);
-                let datagrams = self.lookers[controller].ask(controller, &self.sender);
-                self.positions[controller].on_all_asked(self.looked);
+                let now = self.looked;
+                let where_it_is = !self.positions[controller].is_behind(now);
+                if where_it_is {
+                    self.positions[controller].on_all_asked(now);
+                }
+                let datagrams = self.lookers[controller].ask(controller, &self.sender, where_it_is);
                 self.health.on_read_sent(controller, datagrams);
             }
             Notice::Group(change) => {
