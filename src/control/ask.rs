@@ -81,7 +81,8 @@ pub enum Command {
 }
 
 /// How much of a cue the seats make.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct Levels {
     /// Of the motion about the neutral pose, 0 to 1.
     pub motion: f64,
