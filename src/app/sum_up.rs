@@ -5,8 +5,9 @@ use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
 use crate::config::Controller;
-use crate::control::{FORMAT, Percentiles, model};
-use crate::engine::Ending;
+use crate::control::model::Ending;
+use crate::control::{FORMAT, Percentiles};
+use crate::engine;
 use crate::health::Groups;
 use crate::limiter::Clamp;
 use crate::time::Rate;
@@ -32,6 +33,16 @@ fn events(controllers: &[Controller], run: &Run) -> Vec<EventReport> {
     events
 }
 
+impl From<engine::Ending> for Ending {
+    fn from(ending: engine::Ending) -> Self {
+        match ending {
+            engine::Ending::Completed => Self::Completed,
+            engine::Ending::Stopped => Self::Stopped,
+            engine::Ending::Fault => Self::Fault,
+        }
+    }
+}
+
 /// What is summed up.
 pub(super) struct About {
     /// What was played, as people know it.
@@ -49,11 +60,7 @@ pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepar
     let report = Report {
         format: FORMAT,
         cue,
-        result: match ending {
-            Ending::Completed => model::Ending::Completed,
-            Ending::Stopped => model::Ending::Stopped,
-            Ending::Fault => model::Ending::Fault,
-        },
+        result: ending,
         ticks: run.ended.ticks,
         missed_ticks: run.ended.missed,
         rate_hz: rate.hz(),
