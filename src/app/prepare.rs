@@ -12,10 +12,10 @@ use crate::net::{Delivery, Sender};
 use crate::plan::slow_park_time;
 use crate::rt::{AckLoop, Live, Phase, Places, Sent};
 use crate::time::{Clock, MonoTime};
-use crate::wire::{MAX_LEN, position_reads};
+use crate::wire::MAX_LEN;
 
 /// Rounds of position reads, and how long each waits for the answers. A seat is at rest where two rounds find it.
-const READ_TRIES: usize = 4;
+const READ_TRIES: usize = 5;
 const READ_WAIT: Duration = Duration::from_millis(150);
 /// How often the slow frame is sent, where its ack does not come.
 const PARK_TRIES: usize = 3;
@@ -124,7 +124,7 @@ impl<C: Clock> Preparation<'_, C> {
         })
     }
 
-    /// Reads where the seats stand, twice at the least.
+    /// Reads where the seats stand, until each was seen at rest.
     fn read_positions(&mut self) {
         for _ in 0..READ_TRIES {
             let open: Vec<usize> = (0..self.lanes.len())
@@ -134,11 +134,7 @@ impl<C: Clock> Preparation<'_, C> {
                 break;
             }
             for lane in open {
-                let code = self.lanes[lane].code;
-                for read in position_reads(self.controllers[lane].seat.axes, code, code) {
-                    // A read that the kernel does not take is like one that is lost: there are further tries.
-                    let _ = self.sender.send(lane, read.emit(&mut [0; MAX_LEN]));
-                }
+                self.acks.ask_positions(lane, self.clock.now());
             }
             let until = self.clock.now() + READ_WAIT;
             self.wait_until(until, |_| false);

@@ -228,6 +228,10 @@ impl<'a> Stage<'a> {
         {
             return;
         }
+        self.read_all();
+    }
+
+    fn read_all(&self) {
         self.beat_at.set(self.now.get());
         for (lane, pose) in self.hands.stands.borrow().iter().enumerate() {
             read_at_rest(self.hands.live, lane, *pose, self.now.get());
@@ -272,7 +276,10 @@ impl Clock for Stage<'_> {
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
-                Event::Late(span) => self.now.set(self.now.get() + *span),
+                Event::Late(span) => {
+                    self.now.set(self.now.get() + *span);
+                    self.read_all(); // whoever was asleep wants to know
+                }
                 Event::Leave => self.hands.leave.store(true, Ordering::Relaxed),
                 Event::Stop => self.hands.desk.stop(),
                 Event::Ask(request) => self.hands.command(Command::Request(*request)),

@@ -90,7 +90,8 @@ impl fmt::Display for Why {
             Self::Outside { axis, pulses, .. } => {
                 return write!(
                     f,
-                    "its axis {} says that it is at {} pulses, outside of its stroke: wrong word order (dialect), or not home",
+                    "its axis {} says that it is at {} pulses, outside of its stroke (one that its seat type does not have is led to 0): \
+                     wrong word order (dialect), other axes (PA02), or not home",
                     axis + 1,
                     pulses.0
                 );
@@ -107,7 +108,7 @@ impl fmt::Display for Why {
             }
             Self::Refuses(_) => "it refuses frames",
             Self::MoreAxes { drives, .. } => {
-                return write!(f, "PA02 = {drives}: it drives more axes than its seat type has, and frames would lead them");
+                return write!(f, "PA02 = {drives}: it drives axes that its seat type does not have, nobody can read them, and frames would lead them to 0");
             }
             Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",

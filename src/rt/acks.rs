@@ -111,6 +111,13 @@ impl AckLoop {
         acks
     }
 
+    /// Asks a controller where its axes are, at `now`. What the kernel does not take is like what is lost: ask again.
+    pub fn ask_positions(&mut self, controller: usize, now: MonoTime) {
+        if let Some(watch) = &mut self.watch {
+            watch.ask_positions(controller, now);
+        }
+    }
+
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
     pub fn tell(&mut self, live: Arc<Live>) {
         self.live = Some(live);

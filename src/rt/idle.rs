@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use super::sight::axes_to_read;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::motion::Pulses;
@@ -42,7 +43,7 @@ impl Beats {
         let heart = |(one, lane): (&Controller, &Lane)| Heart {
             code: lane.code,
             dialect: one.dialect,
-            axes: one.seat.axes.min(DP_POSITIONS.len()),
+            axes: axes_to_read(one, lane).min(DP_POSITIONS.len()),
             inputs: one.belt_inputs != 0,
         };
         Self {

@@ -47,6 +47,8 @@ pub(super) struct Positions {
     seat: Arc<SeatType>,
     /// The place of the first of them in a frame.
     first_slot: usize,
+    /// The axes that frames lead, of its seat type or not.
+    led: usize,
     told: [Option<Told>; MAX_AXES],
     /// The axis, from 0, that told a position outside of its stroke, and which.
     outside: Option<(usize, Pulses)>,
@@ -68,11 +70,12 @@ pub(super) struct Positions {
 }
 
 impl Positions {
-    pub(super) fn new(seat: Arc<SeatType>, first_slot: usize) -> Self {
+    pub(super) fn new(seat: Arc<SeatType>, first_slot: usize, led: usize) -> Self {
         let told = [None; MAX_AXES];
         Self {
             seat,
             first_slot,
+            led,
             told,
             asked: std::array::from_fn(|_| VecDeque::with_capacity(OPEN)),
             answered: MonoTime::default(),
@@ -97,7 +100,7 @@ impl Positions {
 
     /// Notes that it is asked for all of them.
     pub(super) fn on_all_asked(&mut self, at: MonoTime) {
-        for first in (0..self.seat.axes.min(REGISTERS)).step_by(AXES_PER_BLOCK) {
+        for first in (0..self.led.min(REGISTERS)).step_by(AXES_PER_BLOCK) {
             self.on_asked(DP_POSITIONS[first], at);
         }
     }
@@ -137,9 +140,13 @@ impl Positions {
 
     /// Hears where axes were between `made` and `at`.
     fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
-        for (axis, pulses) in (first..self.seat.axes).zip(positions) {
-            self.by = by;
+        for (axis, pulses) in (first..self.led).zip(positions) {
             let fraction = self.seat.fraction(*pulses);
+            if axis >= self.seat.axes {
+                self.hear_beyond(axis, *pulses, fraction);
+                continue;
+            }
+            self.by = by;
             let is_outside = !(-OUTSIDE..=1.0 + OUTSIDE).contains(&fraction);
             if is_outside {
                 self.outside = Some((axis, *pulses));
@@ -159,6 +166,15 @@ impl Positions {
                 _ => ((fraction, at), before.is_some(), 1),
             };
             self.told[axis] = Some(Told { fraction, at: made, since, moved, times });
+        }
+    }
+
+    /// Hears of an axis that its seat type does not have: frames would lead it to 0 at once.
+    fn hear_beyond(&mut self, axis: usize, pulses: Pulses, fraction: f64) {
+        if fraction.abs() > OUTSIDE {
+            self.outside = Some((axis, pulses));
+        } else {
+            self.outside = self.outside.filter(|(other, _)| *other != axis);
         }
     }
 
@@ -214,7 +230,8 @@ impl Positions {
     pub(super) fn reading(&self, now: MonoTime) -> Option<Reading> {
         let (pose, by) = ([0.0; MAX_AXES], self.by);
         let mut reading = Reading { pose, slots: 0, at: now, rests: true, moves: false, by };
-        if self.is_ambiguous() {
+        let is_beyond = self.outside.is_some_and(|(axis, _)| axis >= self.seat.axes);
+        if self.is_ambiguous() || is_beyond {
             return None;
         }
         let rest = if now < self.repeats_until { REST_REPEATED } else { REST };
@@ -251,6 +268,7 @@ const BLOCKS: usize = REGISTERS.div_ceil(AXES_PER_BLOCK);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::motion_channel_and_slots;
 
     fn ms(ms: u64) -> MonoTime {
         MonoTime::from_nanos(ms * 1_000_000)
@@ -265,7 +283,7 @@ mod tests {
     }
 
     fn seat(axes: usize) -> Positions {
-        Positions::new(Arc::new(SeatType::bench3(axes)), 0)
+        Positions::new(Arc::new(SeatType::bench3(axes)), 0, motion_channel_and_slots(axes).1)
     }
 
     #[test]
@@ -364,6 +382,32 @@ mod tests {
         assert_eq!((positions.reading(ms(1)), positions.outside()), (None, Some((0, Pulses(-20_000)))));
         look(&mut positions, 0, &[Pulses(0)], 2);
         assert_eq!(positions.outside(), None);
+    }
+
+    #[test]
+    fn a_seat_with_an_axis_beyond_those_of_its_type_that_is_not_at_0_is_nowhere() {
+        let mut positions = seat(2);
+        look(&mut positions, 0, &[Pulses(7), Pulses(7), Pulses(90_000)], 0);
+        assert_eq!((positions.reading(ms(0)), positions.outside()), (None, Some((2, Pulses(90_000)))));
+        look(&mut positions, 0, &[Pulses(7), Pulses(7), Pulses(0)], 1);
+        assert!(positions.reading(ms(1)).is_some());
+        let mut many = seat(8);
+        look(&mut many, 0, &[Pulses(0); 6], 0);
+        many.report(
+            &[
+                Pulses(0),
+                Pulses(0),
+                Pulses(0),
+                Pulses(0),
+                Pulses(0),
+                Pulses(0),
+                Pulses(0),
+                Pulses(0),
+                Pulses(900),
+            ],
+            ms(1),
+        );
+        assert_eq!(many.outside(), Some((8, Pulses(900))));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::net::{Delivery, Sender};
 use crate::observe::{Look, StopSign};
 use crate::wire::{
     Access, Code, DP_POSITIONS, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode, Words, WriteRequest,
-    motion_channel_and_slots, position_reads,
+    position_reads,
 };
 
 /// Object channels of reads: monitors, parameters (SMC manual 2.2.2.1).
@@ -47,8 +47,9 @@ pub(super) struct Looker {
     /// The place of its first own axis in a frame.
     first_slot: usize,
     park: Pose,
-    /// Axes for which its frames have places.
+    /// Axes for which its frames have places, and those of them whose registers are read.
     places: usize,
+    axes: usize,
     /// Inputs of which any one means an emergency stop.
     estop_inputs: u16,
     /// Looks in a row without a sign of an emergency stop.
@@ -91,7 +92,8 @@ impl Looker {
             seat: Arc::clone(&controller.seat),
             first_slot: controller.first_slot(),
             park: lane.window.park(),
-            places: motion_channel_and_slots(lane.window.slots().len()).1,
+            places: places(controller, lane),
+            axes: axes_to_read(controller, lane).min(DP_POSITIONS.len()),
             estop_inputs: controller.estop_inputs,
             calm: 0,
             held: None,
@@ -118,7 +120,7 @@ impl Looker {
             read(MONITORS, RESET, 1),
             read(MONITORS, VERSIONS.0, VERSIONS.1),
         ];
-        let positions = position_reads(self.seat.axes, self.code, self.code);
+        let positions = position_reads(self.axes, self.code, self.code);
         let reads = others.into_iter().chain(packets).chain(mask).chain(inputs).chain(positions);
         let mut sent = 0;
         for request in reads {
@@ -221,7 +223,7 @@ impl Looker {
     pub(super) fn take(&mut self) -> Option<Sighting> {
         let Seen { asked, mode, versions, packets, homed, error, axes, .. } = self.seen;
         let ((work_mode, of_frame), (minor_version, version), homed) = (mode?, versions?, homed?);
-        let all = (1 << self.seat.axes.min(DP_POSITIONS.len())) - 1;
+        let all = (1 << self.axes) - 1;
         let told = packets.is_some() || self.dialect != Dialect::Smc;
         // Positions may have been asked for beside it: what comes before them is still to be heard then.
         if !asked || !told || axes & all != all || !self.is_whole() {
@@ -236,9 +238,9 @@ impl Looker {
         Some(Sighting { identity, error, alarm, packets, homed })
     }
 
-    /// Whether frames would lead axes of a controller that its seat type does not have: it takes as many as it drives (PA02).
+    /// True if frames would lead axes of a controller that nobody here reads: it takes as many as it drives (PA02).
     pub(super) fn leads_more_axes(&self, drives: u16) -> bool {
-        usize::from(drives).min(self.places - self.first_slot) > self.seat.axes
+        usize::from(drives).min(self.places) > self.axes.max(self.seat.axes)
     }
 
     /// What it reads that tells of an emergency stop, each by its first register: by the reply code, or by the inputs.
@@ -313,6 +315,19 @@ impl Looker {
         let own = self.first_slot..MAX_AXES.min(self.first_slot + self.seat.axes.min(DP_POSITIONS.len()));
         own.into_iter().all(|slot| (self.park[slot] - pose[slot]).abs() <= NEAR)
     }
+}
+
+/// Axes of a controller for which its lane's frames have places.
+fn places(controller: &Controller, lane: &Lane) -> usize {
+    lane.window.slots().len() - controller.first_slot()
+}
+
+/// Axes of a controller that are read: those of its seat type, and those beyond for which frames have no more than places that are
+/// always 0. Whoever stands there elsewhere than at 0 would be led there at once.
+pub(super) fn axes_to_read(controller: &Controller, lane: &Lane) -> usize {
+    let own = controller.seat.axes;
+    let beyond = lane.window.slots().iter().skip(controller.first_slot() + own);
+    if beyond.into_iter().all(|slot| slot.axis.is_none()) { places(controller, lane) } else { own }
 }
 
 #[cfg(test)]

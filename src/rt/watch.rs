@@ -11,7 +11,7 @@ use super::idle::Beats;
 use super::live::{Live, Phase};
 use super::mail::{Alarm, Sent};
 use super::positions::Positions;
-use super::sight::Looker;
+use super::sight::{Looker, axes_to_read};
 use super::standby::{Seen, Standby};
 use super::table::{Row, Turns};
 use crate::config::Controller;
@@ -92,7 +92,7 @@ impl Watch {
         }
         Self {
             lookers: controllers.iter().zip(lanes).map(|(one, lane)| Looker::new(one, lane)).collect(),
-            positions: controllers.iter().map(positions).collect(),
+            positions: controllers.iter().zip(lanes).map(positions).collect(),
             beats: Beats::new(controllers, lanes),
             notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
             changes: Vec::with_capacity(CHANGES_KEPT),
@@ -491,11 +491,16 @@ impl Watch {
         }
         for controller in 0..self.lookers.len() {
             if self.stands(controller).may_move() {
-                let sent = self.beats.send_all(controller, &self.sender);
-                self.positions[controller].on_all_asked(self.looked);
+                let sent = self.ask_positions(controller, self.looked);
                 self.health.on_other_sent(controller, sent);
             }
         }
+    }
+
+    /// Asks where all axes of a seat are; says in how many datagrams.
+    pub(super) fn ask_positions(&mut self, controller: usize, now: MonoTime) -> u64 {
+        self.positions[controller].on_all_asked(now);
+        self.beats.send_all(controller, &self.sender)
     }
 
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
@@ -560,8 +565,8 @@ impl Watch {
 }
 
 /// What the seat of a controller tells of where it is.
-fn positions(controller: &Controller) -> Positions {
-    Positions::new(Arc::clone(&controller.seat), controller.first_slot())
+fn positions((controller, lane): (&Controller, &Lane)) -> Positions {
+    Positions::new(Arc::clone(&controller.seat), controller.first_slot(), axes_to_read(controller, lane))
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ fn cleared_and_parked(hall: &Hall) {
 #[test]
 fn an_emergency_stop_pressed_at_rest_is_shown_and_nothing_is_armed_until_it_was_released_and_cleared() {
     let hall = pressed_at_rest();
-    assert!(hall.status()["next"].as_str().expect("text").starts_with("release the emergency stop"));
+    assert!(hall.status()["next"].as_str().expect("text").starts_with("release the emergency-stop button"));
     for refused in ["arm", "clear", "park"] {
         assert_eq!(hall.run(&[refused]).code, Some(75), "{refused}");
     }
