@@ -5,7 +5,8 @@ use std::path::Path;
 use assert_cmd::Command;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
-use kinocue::journal::{Action, Ending, Journal, Limits, Outcome, Percentiles, ShowRecord};
+use kinocue::control::model::{Ending, FrameCounts, Percentiles};
+use kinocue::journal::{Action, Journal, Limits, Outcome, ShowRecord};
 use serde_json::Value;
 
 const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
@@ -24,7 +25,8 @@ fn report(args: &[&str]) -> Run {
 }
 
 fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> ShowRecord {
-    let percentiles = Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), max_us: Some(60.0) };
+    let percentiles =
+        Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), max_us: Some(60.0), ..Percentiles::default() };
     ShowRecord {
         start: start.to_owned(),
         hall: "one".to_owned(),
@@ -47,11 +49,7 @@ fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> Sho
             events: vec!["A2 was lost at 00:12.000".to_owned()],
             ticks: 1000,
             missed_ticks: 1,
-            sent: 4000,
-            asked: 4000,
-            acked: 3999,
-            refused: 0,
-            lost: 1,
+            frames: FrameCounts { sent: 4000, asked: 4000, acked: 3999, refused: 0, lost: 1 },
             send_failed: 0,
             lateness: percentiles,
             ack: percentiles,

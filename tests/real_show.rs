@@ -268,7 +268,7 @@ fn a_led_show_of_two_six_axis_seats_at_250_hz_executes_no_step_and_its_stop_is_l
         leader.lead(250);
         assert_eq!(leader.stop(), Why::Latched);
     });
-    assert_eq!(played.report.result, "stopped");
+    assert_eq!(played.report.result.word(), "stopped");
     let executed = real.executed();
     executed.iter().for_each(|moves| assert_gentle(250, moves));
     assert!(longest_park(&executed[0]).is_zero(), "the first seat was never off");
@@ -279,7 +279,7 @@ fn a_led_show_of_two_six_axis_seats_at_250_hz_executes_no_step_and_its_stop_is_l
 fn a_led_show_in_absolute_time_executes_no_step_and_ends_in_park() {
     let real = Real::new(3, 100, Timing::Absolute);
     let played = real.play(|leader| leader.lead(100));
-    assert_eq!(played.report.result, "stopped");
+    assert_eq!(played.report.result.word(), "stopped");
     let executed = real.executed();
     executed.iter().for_each(|moves| assert_gentle(100, moves));
     assert!(longest_park(&executed[0]).is_zero(), "the first seat was never off");

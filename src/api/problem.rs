@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::control::{Code, Problem, Status};
+use crate::control::{Code, HallFacts, Problem, Status};
 
 /// The type of a problem's body.
 pub(super) const PROBLEM_JSON: &str = "application/problem+json";
@@ -33,27 +33,7 @@ pub(super) struct Body<'p> {
     faults: &'p [String],
     /// The state of the hall, its cause and the next action, as in its status.
     #[serde(flatten)]
-    hall: Option<Hall<'p>>,
-}
-
-/// How the hall is, in short.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Hall<'p> {
-    /// The state, one word.
-    state: &'static str,
-    /// Why it is in that state.
-    cause: &'p str,
-    /// What a person does next.
-    next: &'p str,
-    /// Where in the cue the film is, s; null if none is loaded.
-    position_s: Option<f64>,
-}
-
-impl<'p> From<&'p Status> for Hall<'p> {
-    fn from(status: &'p Status) -> Self {
-        let position_s = status.show.as_ref().map(|show| show.position_s);
-        Self { state: status.state, cause: &status.cause, next: &status.next, position_s }
-    }
+    hall: Option<HallFacts>,
 }
 
 impl IntoResponse for Problem {
@@ -77,7 +57,7 @@ pub(super) fn render(mut response: Response, hall: Option<&Status>) -> Response 
         detail,
         remedy,
         faults,
-        hall: hall.map(Hall::from),
+        hall: hall.map(HallFacts::from),
     };
     let text = serde_json::to_string(&body).expect("text and numbers are written without fail");
     let mut rendered = (

@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 
 use super::problem::nothing_there;
 use super::shared::Shared;
+use crate::control::model::Word;
 use crate::control::{Code, Problem};
 use crate::metrics;
 use crate::state::State as HallState;
@@ -25,7 +26,8 @@ pub(super) const DOCUMENT: &str = "/api/v1/openapi.json";
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct Well {
     /// The state of the hall.
-    state: &'static str,
+    #[schema(value_type = String)]
+    state: Word<HallState>,
 }
 
 /// True if the process lives and its tick thread ticks; 503 if not.
@@ -42,7 +44,7 @@ pub(super) async fn health(State(shared): State<Arc<Shared>>) -> Result<JsonRepl
 #[utoipa::path(get, path = "/readyz", tag = "service", responses((status = 200, body = Well)))]
 pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Result<JsonReply<Well>, Problem> {
     let status = shared.handle.status();
-    if status.state == HallState::Boot.word() {
+    if status.state == HallState::Boot {
         let problem = Problem::new(Code::State, "the hall has just started", status.next.clone());
         return Err(Problem { status: 503, ..problem });
     }
@@ -50,7 +52,7 @@ pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Result<JsonReply
 }
 
 fn well(shared: &Shared) -> JsonReply<Well> {
-    JsonReply(Well { state: shared.handle.status().state })
+    JsonReply(Well { state: shared.handle.status().state.clone() })
 }
 
 /// Figures for Prometheus, `OpenMetrics` text.

@@ -15,8 +15,6 @@ pub mod supervisor;
 pub mod surfaces;
 
 pub use play::{Control, Play, PlayError, PlayHandle, Played};
-pub use report::{
-    ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, SpinReport, StateReport,
-};
+pub use report::{ControllerReport, EventReport, RealTimeReport, Report, SpinReport, StateReport};
 pub use run::Run;
 pub use staged::StagedShow;

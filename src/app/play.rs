@@ -261,7 +261,8 @@ impl Play {
         let attended = lead(PlayHandle { commands, news });
         let parks: Vec<Window> = stage.lanes.iter().map(|lane| lane.window.clone()).collect();
         let run = stage.run(acks, plans, attended, &self.control).map_err(PlayError::Thread)?;
-        let about = About { cue, rate: show.rate, ending: run.ended.ending, silent: self.manner.silent };
+        let about =
+            About { cue, rate: show.rate, ending: run.ended.ending.into(), silent: self.manner.silent };
         let mut played = sum_up(about, &self.config.controllers, &prepared, &run);
         if run.ended.ending == Ending::Completed {
             played.off_park = off_park(&self.config, &parks, &self.control.live, run.closed_at);

@@ -4,23 +4,23 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use comfy_table::{CellAlignment, Table, presets};
-use hdrhistogram::Histogram;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use crate::control::model::{Ending, FrameCounts, InMicros, Percentiles};
 use crate::observe::ControllerState;
 use crate::rt::Spun;
 use crate::sys::realtime::RealTime;
 use crate::time::MonoTime;
 
 /// What became of a play. Within one `format` fields are added, never changed.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Report {
     /// The layout of this document ([`crate::control::FORMAT`]).
     pub format: u32,
     /// The cue file, as it was named.
     pub cue: String,
     /// `completed`, `stopped` or `fault`.
-    pub result: &'static str,
+    pub result: Ending,
     /// Ticks that sent.
     pub ticks: u64,
     /// Ticks slept through.
@@ -28,7 +28,8 @@ pub struct Report {
     /// Ticks per second.
     pub rate_hz: f64,
     /// Lateness of the ticks that sent, µs.
-    pub lateness_us: LatencyReport,
+    #[serde(with = "InMicros")]
+    pub lateness_us: Percentiles,
     /// What the system granted.
     pub realtime: RealTimeReport,
     /// Datagrams on the frame port from nobody we sent to.
@@ -40,7 +41,7 @@ pub struct Report {
 }
 
 /// Something that happened to a controller.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EventReport {
     /// The controller's name.
     pub controller: String,
@@ -51,7 +52,7 @@ pub struct EventReport {
 }
 
 /// The last known state of a controller; null if it never told.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StateReport {
     /// Seconds since it was last heard.
     pub heard_s_ago: Option<f64>,
@@ -95,36 +96,8 @@ impl StateReport {
     }
 }
 
-/// Percentiles in µs; null if nothing was counted.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct LatencyReport {
-    /// Half of them are no longer.
-    pub p50: Option<f64>,
-    /// 99 of 100.
-    pub p99: Option<f64>,
-    /// 999 of 1,000.
-    pub p999: Option<f64>,
-    /// The longest.
-    pub max: Option<f64>,
-}
-
-impl LatencyReport {
-    /// The percentiles of a histogram of nanoseconds.
-    #[must_use]
-    pub fn of(histogram: &Histogram<u64>) -> Self {
-        #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-        let us = |ns: u64| (!histogram.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
-        Self {
-            p50: us(histogram.value_at_quantile(0.5)),
-            p99: us(histogram.value_at_quantile(0.99)),
-            p999: us(histogram.value_at_quantile(0.999)),
-            max: us(histogram.max()),
-        }
-    }
-}
-
 /// What the system granted, as read back from it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RealTimeReport {
     /// Scheduling policy of the tick thread: `fifo`, `other` …
     pub policy: String,
@@ -137,7 +110,7 @@ pub struct RealTimeReport {
 }
 
 /// How long a play spun before each deadline, µs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpinReport {
     /// What was asked for.
     pub asked: f64,
@@ -172,22 +145,15 @@ impl RealTimeReport {
 }
 
 /// What became of one controller's frames.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ControllerReport {
     /// Its name.
     pub name: String,
     /// Where it is reached.
     pub address: String,
-    /// Frames that the kernel took.
-    pub sent: u64,
-    /// Of these, frames that asked for a reply; always acked + refused + lost.
-    pub asked: u64,
-    /// Answered with x = 2.
-    pub acked: u64,
-    /// Answered with x = 3, 4 or 5.
-    pub refused: u64,
-    /// Not answered within 1 s.
-    pub lost: u64,
+    /// Its frames; in the end asked is always acked + refused + lost.
+    #[serde(flatten)]
+    pub frames: FrameCounts,
     /// Slow frames before tick 0, which brought it to its park pose.
     pub park_frames: u64,
     /// Further replies to an answered frame.
@@ -211,7 +177,8 @@ pub struct ControllerReport {
     /// Of these, frames that found it with more than two to do, and were hurried for that (PA06).
     pub hurried: u64,
     /// Ack latency, µs.
-    pub ack_us: LatencyReport,
+    #[serde(with = "InMicros")]
+    pub ack_us: Percentiles,
     /// What it last said of itself.
     pub state: StateReport,
 }
@@ -229,10 +196,10 @@ impl Report {
                 "lateness",
                 format!(
                     "p50 {} µs, p99 {} µs, p99.9 {} µs, max {} µs",
-                    shown(late.p50),
-                    shown(late.p99),
-                    shown(late.p999),
-                    shown(late.max)
+                    shown(late.p50_us),
+                    shown(late.p99_us),
+                    shown(late.p999_us),
+                    shown(late.max_us)
                 ),
             ),
             ("real time", self.realtime.text()),
@@ -290,11 +257,11 @@ impl ControllerReport {
     /// Its row, cell by cell in the order of [`COLUMNS`].
     fn row(&self) -> Vec<String> {
         let counts = [
-            self.sent,
-            self.asked,
-            self.acked,
-            self.refused,
-            self.lost,
+            self.frames.sent,
+            self.frames.asked,
+            self.frames.acked,
+            self.frames.refused,
+            self.frames.lost,
             self.park_frames,
             self.duplicate,
             self.stale,
@@ -302,7 +269,7 @@ impl ControllerReport {
             self.send_failed,
             self.port_closed,
         ];
-        let latencies = [self.ack_us.p50, self.ack_us.p99, self.ack_us.p999, self.ack_us.max];
+        let latencies = [self.ack_us.p50_us, self.ack_us.p99_us, self.ack_us.p999_us, self.ack_us.max_us];
         let mut row = vec![self.name.clone(), self.address.clone()];
         row.extend(counts.iter().map(u64::to_string));
         row.extend(latencies.iter().map(|us| shown(*us)));
@@ -312,4 +279,16 @@ impl ControllerReport {
 
 fn shown(us: Option<f64>) -> String {
     us.map_or_else(|| "-".to_owned(), |us| format!("{us:.1}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_field_of_a_report_is_read_as_it_was_written_and_written_as_it_ever_was() {
+        let json = include_str!("../../tests/data/play-report.json");
+        let report: Report = serde_json::from_str(json).unwrap();
+        assert_eq!(serde_json::to_string_pretty(&report).unwrap() + "\n", json);
+    }
 }

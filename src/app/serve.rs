@@ -24,10 +24,10 @@ use super::supervisor::{Carryover, ServiceLog, Signals, Supervisor, SupervisorEn
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
 use crate::config::Config;
+use crate::control::model::Ending;
 use crate::control::{Handle, Status, handle};
-use crate::engine::Ending;
 use crate::health::Why;
-use crate::journal::{self, Journal, Limits};
+use crate::journal::{Journal, Limits};
 use crate::library::{self, Library, LibraryError};
 use crate::log::Log;
 use crate::sd::{self, WatchdogThread};
@@ -138,7 +138,7 @@ pub struct Parts {
 pub struct Served {
     config: Arc<Config>,
     closed: Box<RuntimeEnd>,
-    ended: journal::Ending,
+    ended: Ending,
 }
 
 impl Served {
@@ -149,12 +149,7 @@ impl Served {
         // That a group is there when the hall opens is no change worth telling.
         let mut seen = BTreeSet::new();
         closed.run.accounts.changes.retain(|one| !seen.insert(one.group) || one.why != Why::SeenAgain);
-        let ending = match ended {
-            journal::Ending::Completed => Ending::Completed,
-            journal::Ending::Stopped => Ending::Stopped,
-            journal::Ending::Fault => Ending::Fault,
-        };
-        let about = About { cue, rate: Rate::from_hz(config.show.rate_hz), ending, silent: false };
+        let about = About { cue, rate: Rate::from_hz(config.show.rate_hz), ending: ended, silent: false };
         // A hall brings its seats to park by frames like any other.
         let prepared = Prepared::nothing(config.controllers.len());
         sum_up(about, &config.controllers, &prepared, &closed.run)

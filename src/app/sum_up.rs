@@ -2,11 +2,12 @@
 
 use super::play::Played;
 use super::prepare::Prepared;
-use super::report::{ControllerReport, EventReport, LatencyReport, RealTimeReport, Report, StateReport};
+use super::report::{ControllerReport, EventReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
 use crate::config::Controller;
-use crate::control::FORMAT;
-use crate::engine::Ending;
+use crate::control::model::Ending;
+use crate::control::{FORMAT, Percentiles};
+use crate::engine;
 use crate::health::Groups;
 use crate::limiter::Clamp;
 use crate::time::Rate;
@@ -32,6 +33,16 @@ fn events(controllers: &[Controller], run: &Run) -> Vec<EventReport> {
     events
 }
 
+impl From<engine::Ending> for Ending {
+    fn from(ending: engine::Ending) -> Self {
+        match ending {
+            engine::Ending::Completed => Self::Completed,
+            engine::Ending::Stopped => Self::Stopped,
+            engine::Ending::Fault => Self::Fault,
+        }
+    }
+}
+
 /// What is summed up.
 pub(super) struct About {
     /// What was played, as people know it.
@@ -49,15 +60,11 @@ pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepar
     let report = Report {
         format: FORMAT,
         cue,
-        result: match ending {
-            Ending::Completed => "completed",
-            Ending::Stopped => "stopped",
-            Ending::Fault => "fault",
-        },
+        result: ending,
         ticks: run.ended.ticks,
         missed_ticks: run.ended.missed,
         rate_hz: rate.hz(),
-        lateness_us: LatencyReport::of(&run.accounts.lateness),
+        lateness_us: Percentiles::of(&run.accounts.lateness),
         realtime: RealTimeReport::of(&run.granted, run.spun),
         strangers: run.accounts.strangers,
         controllers: (0..controllers.len())
@@ -83,11 +90,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
     ControllerReport {
         name: controller.name.clone(),
         address: controller.address.to_string(),
-        sent: counts.sent,
-        asked: counts.asked,
-        acked: counts.acked,
-        refused: counts.refused(),
-        lost: counts.lost,
+        frames: (&counts).into(),
         park_frames: prepared.park_frames[index],
         duplicate: counts.duplicate,
         stale: counts.stale,
@@ -99,7 +102,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
         gaps: run.tallies[index].gaps,
         late: run.tallies[index].late,
         hurried: run.tallies[index].hurried,
-        ack_us: LatencyReport::of(tracker.latency(index)),
+        ack_us: Percentiles::of(tracker.latency(index)),
         state: StateReport::of(&run.accounts.observer.states()[index], run.closed_at),
     }
 }

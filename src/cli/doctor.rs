@@ -12,8 +12,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::{Exit, Failure, load, print};
-use crate::app::LatencyReport;
 use crate::config::Config;
+use crate::control::model::{InMicros, Percentiles};
 use crate::doctor::chart::{buckets, draw};
 use crate::doctor::lateness::{Load, RATE_HZ, Run};
 use crate::doctor::measure::measure;
@@ -151,7 +151,8 @@ struct RunReport {
     /// Wake-ups.
     ticks: u64,
     missed_ticks: u64,
-    lateness_us: LatencyReport,
+    #[serde(with = "InMicros")]
+    lateness_us: Percentiles,
     histogram: Vec<BucketReport>,
 }
 
@@ -176,7 +177,7 @@ impl RunReport {
             policy: run.policy.to_string(),
             ticks: run.ticks,
             missed_ticks: run.missed,
-            lateness_us: LatencyReport::of(&run.lateness),
+            lateness_us: Percentiles::of(&run.lateness),
             histogram: histogram.collect(),
         }
     }

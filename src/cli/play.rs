@@ -13,6 +13,7 @@ use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
+use crate::control::model::Ending;
 use crate::engine::Show;
 use crate::fanout::Manner;
 use crate::health::ACKS_OFF;
@@ -240,10 +241,10 @@ pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
         .report
         .controllers
         .iter()
-        .filter(|one| one.refused > 0 || one.state.emergency_stop)
+        .filter(|one| one.frames.refused > 0 || one.state.emergency_stop)
         .map(|one| one.name.as_str())
         .collect();
-    if played.report.result == "fault" {
+    if played.report.result == Ending::Fault {
         return Err(anyhow!("the play ended in a fault; the seats were stopped")).or_exit(Exit::Internal);
     }
     if !refused.is_empty() {

@@ -81,7 +81,8 @@ pub enum Command {
 }
 
 /// How much of a cue the seats make.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct Levels {
     /// Of the motion about the neutral pose, 0 to 1.
     pub motion: f64,
@@ -112,79 +113,65 @@ pub struct LevelsChange {
 }
 
 impl Command {
+    /// What people alone may ask: no gear and no line of text, whose senders are known by address alone.
+    pub const OF_PEOPLE: [&str; 5] = ["arm", "disarm", "home", "clear", "load"];
+
+    /// Its row of the table of commands: its word, the least role, whether it goes stale, and what gear has to be allowed.
+    const fn row(&self) -> (&'static str, Role, bool, Option<GearWord>) {
+        use Role::{Engineer, Operate, View};
+        const STALE: bool = true;
+        const LASTS: bool = false;
+        match self {
+            Self::Home => ("home", Engineer, STALE, None),
+            Self::Load { .. } => ("load", Operate, LASTS, None),
+            Self::Playlist { .. } => ("playlist", Operate, LASTS, None),
+            Self::Select { .. } => ("select", Operate, LASTS, None),
+            Self::Arm { seats_empty: false } => ("arm", Operate, STALE, None),
+            Self::Arm { seats_empty: true } => ("arm", Engineer, STALE, None),
+            Self::Disarm => ("disarm", Operate, LASTS, None),
+            Self::Go => ("go", Operate, STALE, Some(GearWord::Go)),
+            Self::GoFrom(_) => ("go", Operate, STALE, None),
+            Self::Pause => ("pause", Operate, LASTS, Some(GearWord::Pause)),
+            Self::Resume => ("resume", Operate, STALE, Some(GearWord::Resume)),
+            Self::Seek(_) => ("seek", Operate, STALE, Some(GearWord::Seek)),
+            // Whoever may look may also stop: an attacker may at worst stop the show.
+            Self::Stop => ("stop", View, LASTS, None),
+            Self::Park => ("park", Operate, STALE, Some(GearWord::Park)),
+            Self::Clear => ("clear", Engineer, STALE, None),
+            Self::Trim(_) => ("trim", Operate, LASTS, Some(GearWord::Trim)),
+            Self::Levels(_) => ("levels", Operate, LASTS, Some(GearWord::Levels)),
+            Self::Preset(_) => ("preset", Operate, LASTS, None),
+            Self::Enable(_) => ("enable", Operate, STALE, Some(GearWord::Seats)),
+            Self::Disable { .. } => ("disable", Operate, LASTS, Some(GearWord::Seats)),
+            Self::Preflight => ("preflight", Operate, LASTS, None),
+            Self::Test { .. } => ("test", Engineer, STALE, None),
+            Self::Reload => ("reload", Engineer, LASTS, None),
+        }
+    }
+
     /// The word for it on every surface.
     #[must_use]
     pub const fn word(&self) -> &'static str {
-        match self {
-            Self::Home => "home",
-            Self::Load { .. } => "load",
-            Self::Playlist { .. } => "playlist",
-            Self::Select { .. } => "select",
-            Self::Arm { .. } => "arm",
-            Self::Disarm => "disarm",
-            Self::Go | Self::GoFrom(_) => "go",
-            Self::Pause => "pause",
-            Self::Resume => "resume",
-            Self::Seek(_) => "seek",
-            Self::Stop => "stop",
-            Self::Park => "park",
-            Self::Clear => "clear",
-            Self::Trim(_) => "trim",
-            Self::Levels(_) => "levels",
-            Self::Preset(_) => "preset",
-            Self::Enable(_) => "enable",
-            Self::Disable { .. } => "disable",
-            Self::Preflight => "preflight",
-            Self::Test { .. } => "test",
-            Self::Reload => "reload",
-        }
+        self.row().0
+    }
+
+    /// The least role that may ask it.
+    #[must_use]
+    pub const fn least_role(&self) -> Role {
+        self.row().1
     }
 
     /// True if it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
     /// another by then.
     #[must_use]
     pub const fn goes_stale(&self) -> bool {
-        matches!(
-            self,
-            Self::Home
-                | Self::Arm { .. }
-                | Self::Go
-                | Self::GoFrom(_)
-                | Self::Resume
-                | Self::Seek(_)
-                | Self::Park
-                | Self::Clear
-                | Self::Enable(_)
-                | Self::Test { .. }
-        )
+        self.row().2
     }
 
     /// What gear has to be allowed for it; none for what needs no leave, a stop, and for what gear has no way to ask.
     #[must_use]
     pub const fn gear_word(&self) -> Option<GearWord> {
-        Some(match self {
-            Self::Go => GearWord::Go,
-            Self::Pause => GearWord::Pause,
-            Self::Resume => GearWord::Resume,
-            Self::Park => GearWord::Park,
-            Self::Seek(_) => GearWord::Seek,
-            Self::Trim(_) => GearWord::Trim,
-            Self::Levels(_) => GearWord::Levels,
-            Self::Enable(_) | Self::Disable { .. } => GearWord::Seats,
-            _ => return None,
-        })
-    }
-
-    /// The least role that may ask it. Whoever may look may also stop: an attacker may at worst stop the show.
-    #[must_use]
-    pub const fn least_role(&self) -> Role {
-        match self {
-            Self::Stop => Role::View,
-            Self::Home | Self::Arm { seats_empty: true } | Self::Clear | Self::Test { .. } | Self::Reload => {
-                Role::Engineer
-            }
-            _ => Role::Operate,
-        }
+        self.row().3
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod ask;
 mod handle;
+pub mod model;
 mod places;
 mod problem;
 mod status;
@@ -12,10 +13,11 @@ mod who;
 pub use crate::config::Role;
 pub use ask::{Command, Levels, LevelsChange};
 pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle, overtaken};
+pub use model::{FrameCounts, Health, Histogram, Percentiles, Severity, Then, Times};
 pub use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub use status::{
-    ControllerStatus, EntryStatus, FORMAT, Histogram, JournalLine, Percentiles, PlaylistStatus,
-    PreflightStatus, RealTimeStatus, Severity, ShowStatus, Status, TestRow, TestStatus, Warning,
+    ControllerStatus, EntryStatus, FORMAT, HallFacts, JournalLine, PlaylistStatus, PreflightStatus,
+    RealTimeStatus, ShowStatus, Status, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

@@ -5,45 +5,46 @@ use std::fmt;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::model::words;
 use crate::state::Refusal;
 
-/// The kind of a problem. Its word is stable: programs may rely on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, ToSchema)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Code {
-    /// The state of the hall does not allow it.
-    State,
-    /// Who asked may not.
-    Role,
-    /// Nobody knows who asked, or their token is wrong.
-    Token,
-    /// A value is not what it may be.
-    Value,
-    /// There is nothing of that name.
-    Unknown,
-    /// What is there cannot be asked that way.
-    Method,
-    /// It is longer than may be.
-    Size,
-    /// It is written in a form that is not read here.
-    Media,
-    /// The cue, playlist or configuration does not pass.
-    Check,
-    /// It came more than two seconds after it was asked.
-    Late,
-    /// The page or program that asked is not one of this server's.
-    Origin,
-    /// Too much at once.
-    Busy,
-    /// The hall did not answer in time.
-    Timeout,
-    /// A file could not be read or written.
-    File,
-    /// It is not built, or turned off in the configuration.
-    Off,
-    /// A fault of our own.
-    Internal,
+words! {
+    /// The kind of a problem. Its word is stable: programs may rely on it.
+    #[non_exhaustive]
+    Code {
+        /// The state of the hall does not allow it.
+        State = "state",
+        /// Who asked may not.
+        Role = "role",
+        /// Nobody knows who asked, or their token is wrong.
+        Token = "token",
+        /// A value is not what it may be.
+        Value = "value",
+        /// There is nothing of that name.
+        Unknown = "unknown",
+        /// What is there cannot be asked that way.
+        Method = "method",
+        /// It is longer than may be.
+        Size = "size",
+        /// It is written in a form that is not read here.
+        Media = "media",
+        /// The cue, playlist or configuration does not pass.
+        Check = "check",
+        /// It came more than two seconds after it was asked.
+        Late = "late",
+        /// The page or program that asked is not one of this server's.
+        Origin = "origin",
+        /// Too much at once.
+        Busy = "busy",
+        /// The hall did not answer in time.
+        Timeout = "timeout",
+        /// A file could not be read or written.
+        File = "file",
+        /// It is not built, or turned off in the configuration.
+        Off = "off",
+        /// A fault of our own.
+        Internal = "internal",
+    }
 }
 
 /// Why something was not done (RFC 9457).
@@ -63,29 +64,6 @@ pub struct Problem {
 }
 
 impl Code {
-    /// The word that programs rely on.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::State => "state",
-            Self::Role => "role",
-            Self::Token => "token",
-            Self::Value => "value",
-            Self::Unknown => "unknown",
-            Self::Method => "method",
-            Self::Size => "size",
-            Self::Media => "media",
-            Self::Check => "check",
-            Self::Late => "late",
-            Self::Origin => "origin",
-            Self::Busy => "busy",
-            Self::Timeout => "timeout",
-            Self::File => "file",
-            Self::Off => "off",
-            Self::Internal => "internal",
-        }
-    }
-
     /// The status of the HTTP reply.
     #[must_use]
     pub const fn status(self) -> u16 {

@@ -1,12 +1,11 @@
 //! The status of the hall. The supervisor publishes one ten times a second and after every change; every surface shows
 //! this and nothing else.
 
-use std::collections::BTreeMap;
-
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Levels;
+use super::model::{FrameCounts, Health, Severity, Then, Times, Word};
 use crate::state::{Cause, Next, State};
 
 /// The layout of [`Status`] and of the report of a play: the number goes up when a field changes its name or its meaning. 1 was that
@@ -14,19 +13,21 @@ use crate::state::{Cause, Next, State};
 pub const FORMAT: u32 = 2;
 
 /// The whole status of the hall.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct Status {
     /// The layout of this document, 2 since kinocue 0.2: the number goes up when a field changes its name or its meaning.
     pub format: u32,
     /// The name of the hall.
     pub hall: String,
     /// The version of the program.
-    pub version: &'static str,
+    pub version: String,
     /// Seconds since the program started.
     pub uptime_s: f64,
     /// One word: `boot`, `recovering`, `parked`, `homing`, `armed`, `joining`, `playing`, `holding`, `paused`, `parking`,
     /// `stopping`, `stopped` or `fault`.
-    pub state: &'static str,
+    #[schema(value_type = String)]
+    pub state: Word<State>,
     /// Why it is in that state.
     pub cause: String,
     /// What a person does next.
@@ -58,9 +59,9 @@ pub struct Status {
     /// Ticks per second.
     pub rate_hz: f64,
     /// Lateness of the ticks that sent, since the program started.
-    pub lateness: Percentiles,
+    pub lateness: Times,
     /// Latency of all acks, since the program started.
-    pub ack_latency: Percentiles,
+    pub ack_latency: Times,
     /// What the system granted the tick thread.
     pub realtime: RealTimeStatus,
     /// Every controller, in the order of the configuration.
@@ -82,38 +83,45 @@ impl Status {
         Self {
             hall: hall.to_owned(),
             format: FORMAT,
-            version: env!("CARGO_PKG_VERSION"),
-            uptime_s: 0.0,
-            state: State::Boot.word(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            state: State::Boot.into(),
             cause: Cause::Started.to_string(),
             next: Next::AwaitAnswers.to_string(),
-            arm_homes: false,
-            may_clear: false,
-            since_s: 0.0,
-            lapses_s: None,
-            moving: false,
-            show: None,
-            playlist: None,
-            trim_ms: 0,
-            levels: Levels { motion: 1.0, vibration: 1.0, effects: BTreeMap::new(), rows: BTreeMap::new() },
-            presets: Vec::new(),
-            ticks: 0,
-            missed_ticks: 0,
-            rate_hz: 0.0,
-            lateness: Percentiles::default(),
-            ack_latency: Percentiles::default(),
-            realtime: RealTimeStatus::default(),
-            controllers: Vec::new(),
-            preflight: None,
-            warnings: Vec::new(),
-            test: None,
-            journal: Vec::new(),
+            levels: Levels { motion: 1.0, vibration: 1.0, ..Levels::default() },
+            ..Self::default()
+        }
+    }
+}
+
+/// How the hall is, in short.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct HallFacts {
+    /// The state, one word.
+    #[schema(value_type = String)]
+    pub state: Word<State>,
+    /// Why it is in that state.
+    pub cause: String,
+    /// What a person does next.
+    pub next: String,
+    /// Where in the cue the film is, s; null if none is loaded.
+    pub position_s: Option<f64>,
+}
+
+impl From<&Status> for HallFacts {
+    fn from(status: &Status) -> Self {
+        Self {
+            state: status.state.clone(),
+            cause: status.cause.clone(),
+            next: status.next.clone(),
+            position_s: status.show.as_ref().map(|show| show.position_s),
         }
     }
 }
 
 /// What is loaded, and where in it the hall is.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct ShowStatus {
     /// The id of the cue.
     pub cue: String,
@@ -137,7 +145,8 @@ pub struct ShowStatus {
 }
 
 /// A playlist, and where in it the hall is.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct PlaylistStatus {
     /// Its id.
     pub id: String,
@@ -152,7 +161,8 @@ pub struct PlaylistStatus {
 }
 
 /// One entry of a playlist.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct EntryStatus {
     /// The id of the cue.
     pub cue: String,
@@ -167,39 +177,14 @@ pub struct EntryStatus {
     /// Its trim, ms; null if the hall's stays.
     pub trim_ms: Option<i32>,
     /// What follows its end: `hold` (a person goes on) or `go`.
-    pub then: &'static str,
+    pub then: Then,
     /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
     pub at: Option<String>,
 }
 
-/// Percentiles in µs; null if nothing was counted.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
-pub struct Percentiles {
-    /// Half of them are no longer.
-    pub p50_us: Option<f64>,
-    /// 99 of 100.
-    pub p99_us: Option<f64>,
-    /// 999 of 1,000.
-    pub p999_us: Option<f64>,
-    /// The longest.
-    pub max_us: Option<f64>,
-    /// How many there are.
-    pub histogram: Histogram,
-}
-
-/// Counts by size.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
-pub struct Histogram {
-    /// The upper bounds, µs, each twice the one before or less; the last bucket has none.
-    pub bounds_us: Vec<f64>,
-    /// How many are in each bucket, one more than bounds.
-    pub counts: Vec<u64>,
-    /// The sum of all, s.
-    pub sum_s: f64,
-}
-
 /// What the system granted the tick thread.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct RealTimeStatus {
     /// Scheduling policy: `fifo`, `other` …
     pub policy: String,
@@ -212,7 +197,8 @@ pub struct RealTimeStatus {
 }
 
 /// One controller.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct ControllerStatus {
     /// Its name.
     pub name: String,
@@ -228,7 +214,7 @@ pub struct ControllerStatus {
     pub enabled: bool,
     /// `ok`, `degraded`, `lost`, `rejoining`, `stopped`, `error`, `excluded`, `unwatched`, `unknown`, or
     /// `out` where the configuration has it out for good.
-    pub health: &'static str,
+    pub health: Health,
     /// Why it stands so, and what to do.
     pub why: String,
     /// Seconds since it was last heard; null if it never was.
@@ -239,16 +225,9 @@ pub struct ControllerStatus {
     pub ack_p50_us: Option<f64>,
     /// 99 of 100 of them are no longer.
     pub ack_p99_us: Option<f64>,
-    /// Frames since the program started: handed to the kernel.
-    pub sent: u64,
-    /// Of these: asked for a reply.
-    pub asked: u64,
-    /// Of these: acked.
-    pub acked: u64,
-    /// Refused, x = 3, 4, 5.
-    pub refused: u64,
-    /// Not answered within a second.
-    pub lost: u64,
+    /// Its frames since the program started.
+    #[serde(flatten)]
+    pub frames: FrameCounts,
     /// Not taken by the kernel.
     pub send_failed: u64,
     /// How often the limiter held its motion back.
@@ -272,7 +251,8 @@ pub struct ControllerStatus {
 }
 
 /// What the last preflight found.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct PreflightStatus {
     /// True if nothing fails.
     pub passed: bool,
@@ -285,7 +265,8 @@ pub struct PreflightStatus {
 }
 
 /// A test that moves each axis and switches each effect in turn.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct TestStatus {
     /// True if it runs; if not, the rows are its result.
     pub running: bool,
@@ -300,7 +281,8 @@ pub struct TestStatus {
 }
 
 /// What a test found of one axis or effect of one controller.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct TestRow {
     /// The controller.
     pub controller: String,
@@ -318,20 +300,9 @@ pub struct TestRow {
     pub passed: bool,
 }
 
-/// How grave something is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// Good to know.
-    Info,
-    /// Worth a look.
-    Warning,
-    /// The show suffers.
-    Error,
-}
-
 /// Something that a person should know.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct Warning {
     /// Stable, for programs: `not-real-time`, `controller-lost` …
     pub id: String,
@@ -346,7 +317,8 @@ pub struct Warning {
 }
 
 /// One thing that somebody asked.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
 pub struct JournalLine {
     /// When, RFC 3339.
     pub at: String,

@@ -24,7 +24,7 @@ mod tests;
 mod writer;
 
 pub use fold::Folds;
-pub use record::{Action, Ending, Outcome, Percentiles, PlaylistPlace, ShowRecord, stamp};
+pub use record::{Action, Outcome, PlaylistPlace, ShowRecord, stamp};
 pub use report::{JournalError, Most, Report, ShowResult, Shown, Totals, report};
 
 use std::path::Path;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::files::Kind;
+use crate::control::model::{Ending, FrameCounts, Percentiles};
 
 /// Events of a show that are kept, and characters of each.
 const MOST_EVENTS: usize = 100;
@@ -124,46 +125,15 @@ pub struct Outcome {
     pub ticks: u64,
     /// Ticks slept through.
     pub missed_ticks: u64,
-    /// Frames that the kernel took.
-    pub sent: u64,
-    /// Of these: asked for a reply. asked = acked + refused + lost.
-    pub asked: u64,
-    /// Of these: acked.
-    pub acked: u64,
-    /// Refused (x = 3, 4, 5).
-    pub refused: u64,
-    /// Not answered within a second.
-    pub lost: u64,
+    /// Its frames.
+    #[serde(flatten)]
+    pub frames: FrameCounts,
     /// Frames that the kernel did not take.
     pub send_failed: u64,
     /// How late ticks were.
     pub lateness: Percentiles,
     /// How long acks took.
     pub ack: Percentiles,
-}
-
-/// How a show ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Ending {
-    /// It was played to its end.
-    Completed,
-    /// A person ended it.
-    Stopped,
-    /// A fault ended it.
-    Fault,
-}
-
-/// Percentiles in µs; null if nothing was counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = RecordPercentiles)]
-pub struct Percentiles {
-    /// Half of them are no longer.
-    pub p50_us: Option<f64>,
-    /// 99 of 100.
-    pub p99_us: Option<f64>,
-    /// The longest.
-    pub max_us: Option<f64>,
 }
 
 /// One line of a file.

@@ -9,8 +9,9 @@ use jiff::civil::Date;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::record::{Action, Ending, Line, ShowRecord, day_of};
+use super::record::{Action, Line, ShowRecord, day_of};
 use super::{files, read};
+use crate::control::model::{Ending, FrameCounts, words};
 use crate::sys::folder::Folder;
 
 /// How long after its day the end of a show is looked for, days.
@@ -71,20 +72,20 @@ pub struct Shown {
     pub record: ShowRecord,
 }
 
-/// What came of a show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum ShowResult {
-    /// It was played to its end.
-    Completed,
-    /// A person ended it.
-    Stopped,
-    /// A fault ended it.
-    Fault,
-    /// The program or the machine ended before it did.
-    Interrupted,
-    /// It goes on.
-    Running,
+words! {
+    /// What came of a show.
+    ShowResult {
+        /// It was played to its end.
+        Completed = "completed",
+        /// A person ended it.
+        Stopped = "stopped",
+        /// A fault ended it.
+        Fault = "fault",
+        /// The program or the machine ended before it did.
+        Interrupted = "interrupted",
+        /// It goes on.
+        Running = "running",
+    }
 }
 
 /// All shows together.
@@ -104,28 +105,9 @@ pub struct Totals {
     pub running: usize,
     /// From begin to end, of those that ended, s.
     pub took_s: f64,
-    /// Frames sent, of those that ended.
-    pub sent: u64,
-    /// Frames acked.
-    pub acked: u64,
-    /// Frames refused.
-    pub refused: u64,
-    /// Frames lost.
-    pub lost: u64,
-}
-
-impl ShowResult {
-    /// Its word.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Completed => "completed",
-            Self::Stopped => "stopped",
-            Self::Fault => "fault",
-            Self::Interrupted => "interrupted",
-            Self::Running => "running",
-        }
-    }
+    /// Frames of those that ended.
+    #[serde(flatten)]
+    pub frames: FrameCounts,
 }
 
 /// Reads the journal in `dir` for the days `from` to `to`, both included, and keeps no more of them than `most`. A show belongs to the day on which it began, by
@@ -254,7 +236,9 @@ impl Open {
 
 impl Totals {
     fn of(shows: &[Shown]) -> Self {
-        let mut totals = Self { shows: shows.len(), ..Self::default() };
+        let outcomes = shows.iter().filter_map(|show| show.record.outcome.as_ref());
+        let frames = outcomes.map(|outcome| outcome.frames).sum();
+        let mut totals = Self { shows: shows.len(), frames, ..Self::default() };
         for show in shows {
             let count = match show.result {
                 ShowResult::Completed => &mut totals.completed,
@@ -265,12 +249,6 @@ impl Totals {
             };
             *count += 1;
             totals.took_s += show.took_s.unwrap_or(0.0);
-            if let Some(outcome) = &show.record.outcome {
-                totals.sent += outcome.sent;
-                totals.acked += outcome.acked;
-                totals.refused += outcome.refused;
-                totals.lost += outcome.lost;
-            }
         }
         totals
     }

@@ -9,6 +9,7 @@ use jiff::{SignedDuration, Timestamp};
 use proptest::prelude::*;
 
 use super::*;
+use crate::control::model::{Ending, FrameCounts, Percentiles};
 
 const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
 
@@ -60,13 +61,9 @@ fn outcome(end: &str, result: Ending) -> Outcome {
         events: vec!["A2 lost".to_owned()],
         ticks: 1000,
         missed_ticks: 1,
-        sent: 4000,
-        asked: 4000,
-        acked: 3990,
-        refused: 1,
-        lost: 9,
+        frames: FrameCounts { sent: 4000, asked: 4000, acked: 3990, refused: 1, lost: 9 },
         send_failed: 0,
-        lateness: Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), max_us: Some(60.0) },
+        lateness: Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), p999_us: None, max_us: Some(60.0) },
         ack: Percentiles::default(),
     }
 }
@@ -109,7 +106,7 @@ fn a_show_is_reported_as_it_was_recorded() {
     assert_eq!((shown.result, shown.took_s), (ShowResult::Completed, Some(300.0)));
     assert_eq!(shown.record, show);
     assert_eq!(report.actions, [action("2026-11-21T18:59:00.000+01:00", "arm")]);
-    assert_eq!((report.totals.shows, report.totals.completed, report.totals.lost), (1, 1, 9));
+    assert_eq!((report.totals.shows, report.totals.completed, report.totals.frames.lost), (1, 1, 9));
     assert!(report.notes.is_empty(), "{:?}", report.notes);
     assert!(of_day(dir.path(), "2026-11-20").shows.is_empty());
 }
@@ -404,7 +401,7 @@ fn a_journal_of_0_1_is_still_read() {
     assert_eq!(report.notes, [""; 0]);
     let [shown] = &report.shows[..] else { panic!("one show: {report:?}") };
     assert_eq!((shown.result, shown.took_s), (ShowResult::Completed, Some(300.0)));
-    assert_eq!(shown.record.outcome.as_ref().unwrap().acked, 3990);
+    assert_eq!(shown.record.outcome.as_ref().unwrap().frames.acked, 3990);
     let [paused] = &report.actions[..] else { panic!("one action: {report:?}") };
     assert_eq!((paused.what.as_str(), paused.state.as_str()), ("pause", "freewheeling"));
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::control::model;
 use crate::tracker::Histogram;
 
 /// Percentiles of times, µs; all null where there were none.
@@ -25,17 +26,9 @@ impl Percentiles {
     /// Those of a histogram of nanoseconds.
     #[must_use]
     pub fn of(times: &Histogram) -> Self {
-        #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-        let us = |ns: u64| (!times.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
-        let at = |quantile| us(times.value_at_quantile(quantile));
-        Self {
-            count: times.len(),
-            p50: at(0.5),
-            p90: at(0.9),
-            p99: at(0.99),
-            p999: at(0.999),
-            max: us(times.max()),
-        }
+        let model::Percentiles { p50_us, p99_us, p999_us, max_us } = model::Percentiles::of(times);
+        let p90 = p50_us.map(|_| model::us(times.value_at_quantile(0.9)));
+        Self { count: times.len(), p50: p50_us, p90, p99: p99_us, p999: p999_us, max: max_us }
     }
 
     /// The figures with their names, in rising order.

@@ -1,7 +1,7 @@
 //! Figures of each controller.
 
 use super::{Family, Labels, Values, flag};
-use crate::control::ControllerStatus;
+use crate::control::{ControllerStatus, Health};
 
 pub(super) fn families(controllers: &[ControllerStatus]) -> Vec<Family> {
     let mut all = health(controllers);
@@ -16,7 +16,9 @@ fn health(all: &[ControllerStatus]) -> Vec<Family> {
         Family {
             name: "controller_health",
             help: "1, with how it stands",
-            values: Values::Gauges(all.iter().map(|one| (and(one, "health", one.health), 1.0)).collect()),
+            values: Values::Gauges(
+                all.iter().map(|one| (and(one, "health", one.health.word()), 1.0)).collect(),
+            ),
         },
         gauges(all, "controller_emergency_stop", "1 while an emergency stop is in effect", |one| {
             Some(flag(one.emergency_stop))
@@ -32,13 +34,13 @@ fn health(all: &[ControllerStatus]) -> Vec<Family> {
 
 fn frames(all: &[ControllerStatus]) -> Vec<Family> {
     let acks = all.iter().flat_map(|one| {
-        [("acked", one.acked), ("refused", one.refused), ("lost", one.lost)]
+        [("acked", one.frames.acked), ("refused", one.frames.refused), ("lost", one.frames.lost)]
             .map(|(result, count)| (and(one, "result", result), count))
     });
     vec![
-        counters(all, "frames_sent", "Frames handed to the kernel", |one| one.sent),
+        counters(all, "frames_sent", "Frames handed to the kernel", |one| one.frames.sent),
         counters(all, "frames_failed", "Frames that the kernel did not take", |one| one.send_failed),
-        counters(all, "frames_asked", "Frames that asked for a reply", |one| one.asked),
+        counters(all, "frames_asked", "Frames that asked for a reply", |one| one.frames.asked),
         Family {
             name: "acks",
             help: "What became of the frames that asked; lost: no reply within a second",
@@ -49,10 +51,10 @@ fn frames(all: &[ControllerStatus]) -> Vec<Family> {
 }
 
 /// True if it answers; `None` if nobody listens for its answers, or asks.
-fn answers(health: &str) -> Option<f64> {
+const fn answers(health: Health) -> Option<f64> {
     match health {
-        "lost" | "unknown" => Some(0.0),
-        "unwatched" | "out" => None,
+        Health::Lost | Health::Unknown => Some(0.0),
+        Health::Unwatched | Health::Out => None,
         _ => Some(1.0),
     }
 }

@@ -3,24 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{Family, Labels, Values, flag};
-use crate::control::{Severity, Status};
-
-/// Every state there is, so that a panel shows which ones it is not in; as `control::Status` has them.
-const STATES: [&str; 13] = [
-    "boot",
-    "recovering",
-    "parked",
-    "homing",
-    "armed",
-    "joining",
-    "playing",
-    "holding",
-    "paused",
-    "parking",
-    "stopping",
-    "stopped",
-    "fault",
-];
+use crate::control::Status;
+use crate::state::State;
 
 pub(super) fn families(status: &Status) -> Vec<Family> {
     let mut all = state(status);
@@ -34,19 +18,15 @@ pub(super) fn families(status: &Status) -> Vec<Family> {
 fn state(status: &Status) -> Vec<Family> {
     let show = status.show.as_ref();
     let preflight = status.preflight.as_ref();
-    let states = STATES.iter().map(|state| (label("state", *state), flag(*state == status.state)));
+    let states = State::ALL.map(|state| (label("state", state.word()), flag(status.state == state)));
     vec![
         Family {
             name: "build",
             help: "What program this is",
-            values: Values::Info(label("version", status.version)),
+            values: Values::Info(label("version", &*status.version)),
         },
         Family::gauge("uptime_seconds", "Since the program started", status.uptime_s),
-        Family {
-            name: "state",
-            help: "1 for the state of the hall",
-            values: Values::Gauges(states.collect()),
-        },
+        Family { name: "state", help: "1 for the state of the hall", values: Values::Gauges(states.into()) },
         Family::gauge("state_age_seconds", "Since the hall is in its state", status.since_s),
         Family::gauge("moving", "1 while motion frames leave", flag(status.moving)),
         Family::gauge(
@@ -143,7 +123,7 @@ fn machine(status: &Status) -> Vec<Family> {
 fn warnings(status: &Status) -> Family {
     let mut counts: BTreeMap<(&str, &str), u32> = BTreeMap::new();
     for warning in &status.warnings {
-        *counts.entry((&warning.id, word(warning.severity))).or_default() += 1;
+        *counts.entry((&warning.id, warning.severity.word())).or_default() += 1;
     }
     let labels = |id: &str, severity: &str| vec![("id", id.to_owned()), ("severity", severity.to_owned())];
     let counts = counts.iter().map(|((id, severity), count)| (labels(id, severity), f64::from(*count)));
@@ -151,14 +131,6 @@ fn warnings(status: &Status) -> Family {
         name: "warnings",
         help: "What a person should know, how many of each kind",
         values: Values::Gauges(counts.collect()),
-    }
-}
-
-const fn word(severity: Severity) -> &'static str {
-    match severity {
-        Severity::Info => "info",
-        Severity::Warning => "warning",
-        Severity::Error => "error",
     }
 }
 

@@ -2,18 +2,21 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::control::{
-    ControllerStatus, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus, Severity, ShowStatus,
-    Warning,
+    ControllerStatus, FrameCounts, Health, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus,
+    Severity, ShowStatus, Times, Warning,
 };
+use crate::state::{PlayMode, State};
 
 mod strict;
 
 use strict::{Page, check};
 
-fn times() -> Percentiles {
+fn times() -> Times {
     let histogram =
         Histogram { bounds_us: vec![10.0, 20.0, 40.0], counts: vec![5, 3, 0, 2], sum_s: 0.001_25 };
-    Percentiles { p50_us: Some(10.0), p99_us: Some(40.0), p999_us: Some(90.0), max_us: Some(90.0), histogram }
+    let percentiles =
+        Percentiles { p50_us: Some(10.0), p99_us: Some(40.0), p999_us: Some(90.0), max_us: Some(90.0) };
+    Times { percentiles, histogram }
 }
 
 fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
@@ -24,17 +27,13 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         address: "127.0.0.1:7408".to_owned(),
         group: name.to_owned(),
         enabled: true,
-        health: "ok",
+        health: Health::Ok,
         why: "it answers".to_owned(),
         heard_s: Some(0.25),
         ack_rate: Some(1.0),
         ack_p50_us: Some(40.0),
         ack_p99_us: None,
-        sent: 1_000,
-        asked: 900,
-        acked: 890,
-        refused: 2,
-        lost: 8,
+        frames: FrameCounts { sent: 1_000, asked: 900, acked: 890, refused: 2, lost: 8 },
         send_failed: 1,
         clamps: 3,
         homed: Some(true),
@@ -61,9 +60,9 @@ fn playing() -> Status {
         test: None,
         hall: "1".to_owned(),
         format: 2,
-        version: "9.9.9",
+        version: "9.9.9".to_owned(),
         uptime_s: 60.5,
-        state: "playing",
+        state: State::Playing(PlayMode::Following).into(),
         cause: "somebody asked".to_owned(),
         next: "nothing".to_owned(),
         arm_homes: false,
@@ -112,11 +111,11 @@ fn playing() -> Status {
 /// Before anything was read, loaded or played.
 fn booting() -> Status {
     Status {
-        state: "boot",
+        state: State::Boot.into(),
         moving: false,
         show: None,
-        lateness: Percentiles::default(),
-        ack_latency: Percentiles::default(),
+        lateness: Times::default(),
+        ack_latency: Times::default(),
         realtime: RealTimeStatus::default(),
         controllers: vec![],
         preflight: None,
@@ -212,9 +211,9 @@ fn bucket(page: &Page, le: &str) -> f64 {
 #[test]
 fn what_nobody_knows_is_left_out_rather_than_told_as_0() {
     let mut status = playing();
-    status.controllers[0].health = "unwatched";
+    status.controllers[0].health = Health::Unwatched;
     status.controllers[0].heard_s = None;
-    status.controllers[1].health = "lost";
+    status.controllers[1].health = Health::Lost;
     status.show = None;
     let page = page(&status);
     assert_eq!(page.samples.get("kinocue_controller_up{controller=\"A1\",row=\"A\"}"), None);

@@ -2,12 +2,14 @@
 
 use rosc::{OscMessage, OscType};
 
+use crate::control::model::Word;
 use crate::control::{Severity, Status, Warning};
+use crate::state::State;
 
 /// What one receiver has been told so far.
 #[derive(Debug, Default)]
 pub(super) struct Said {
-    state: Option<&'static str>,
+    state: Option<Word<State>>,
     position: Option<f64>,
     /// Whole seconds of the hall.
     beat: Option<i32>,
@@ -18,8 +20,9 @@ impl Said {
     /// What is new to it. A heartbeat is the hall's own clock in whole seconds: a hall that hangs does not beat.
     pub(super) fn news(&mut self, status: &Status) -> Vec<OscMessage> {
         let mut news = Vec::new();
-        if self.state.replace(status.state) != Some(status.state) {
-            news.push(message("state", vec![OscType::from(status.state)]));
+        if self.state.as_ref() != Some(&status.state) {
+            self.state = Some(status.state.clone());
+            news.push(message("state", vec![OscType::from(status.state.to_string())]));
         }
         let position = status.show.as_ref().map(|show| show.position_s);
         if let Some(s) = position.filter(|_| position != self.position) {

@@ -49,10 +49,10 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
     let taken = Taken { message, allow };
     match parts[..] {
         ["stop"] => Ok(taken.stop()),
-        ["go"] => taken.allowed(GearWord::Go)?.button(Command::Go),
-        ["pause"] => taken.allowed(GearWord::Pause)?.button(Command::Pause),
-        ["resume"] => taken.allowed(GearWord::Resume)?.button(Command::Resume),
-        ["park"] => taken.allowed(GearWord::Park)?.button(Command::Park),
+        ["go"] => taken.button(Command::Go),
+        ["pause"] => taken.button(Command::Pause),
+        ["resume"] => taken.button(Command::Resume),
+        ["park"] => taken.button(Command::Park),
         ["seek"] => taken.allowed(GearWord::Seek)?.seek(),
         ["trim"] => taken.allowed(GearWord::Trim)?.trim(),
         ["subscribe"] => taken.subscribe(),
@@ -73,12 +73,10 @@ pub(super) fn order(message: &OscMessage, allow: &[GearWord]) -> Result<Order, F
             let name = name.to_owned();
             Ok(Order::Command(if on { Command::Enable(name) } else { Command::Disable { name, why: None } }))
         }
-        ["arm", ..] => Err(Fault::Forbidden("arm")),
-        ["disarm", ..] => Err(Fault::Forbidden("disarm")),
-        ["home", ..] => Err(Fault::Forbidden("home")),
-        ["clear", ..] => Err(Fault::Forbidden("clear")),
-        ["load", ..] => Err(Fault::Forbidden("load")),
-        _ => Err(unknown()),
+        _ => Err(match Command::OF_PEOPLE.into_iter().find(|word| *word == parts[0]) {
+            Some(word) => Fault::Forbidden(word),
+            None => unknown(),
+        }),
     }
 }
 
@@ -96,6 +94,7 @@ impl Taken<'_> {
 
     /// Without an argument, or with one that says whether a button went down or up.
     fn button(self, ask: Command) -> Result<Order, Fault> {
+        ask.gear_word().map_or(Ok(self), |word| self.allowed(word))?;
         let pressed = match self.message.args.as_slice() {
             [] => true,
             [value] => {

@@ -14,6 +14,7 @@ use crate::control::{
     Warning, handle,
 };
 use crate::rt::Desk;
+use crate::state::{PlayMode, State};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 
@@ -114,7 +115,11 @@ fn playing_at(position_s: f64) -> Status {
         axes: 3,
         effects: Vec::new(),
     };
-    Status { state: "playing", show: Some(show), ..Status::starting("Hall 1") }
+    Status {
+        state: State::Playing(PlayMode::Following).into(),
+        show: Some(show),
+        ..Status::starting("Hall 1")
+    }
 }
 
 #[test]

@@ -22,6 +22,7 @@ use jiff::tz::TimeZone;
 
 use crate::config::{Config, Preset};
 use crate::control::LevelsChange;
+pub use crate::control::Then;
 use crate::library::{CueId, Id};
 
 /// The name of a playlist.
@@ -63,16 +64,6 @@ pub struct Entry {
     pub(crate) places: Places,
 }
 
-/// What follows the end of an entry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Then {
-    /// The next entry waits for a person, or for its time.
-    #[default]
-    Hold,
-    /// The next entry starts.
-    Go,
-}
-
 /// A time of day, on some days of the week.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct At {
@@ -88,17 +79,6 @@ pub(crate) struct Places {
     cue: (usize, usize),
     preset: (usize, usize),
     effects: (usize, usize),
-}
-
-impl Then {
-    /// Its word: `hold` or `go`.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Hold => "hold",
-            Self::Go => "go",
-        }
-    }
 }
 
 impl At {

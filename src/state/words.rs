@@ -1,6 +1,10 @@
 //! Every word about states, causes, next actions and refusals, once: report, console and API take theirs from here.
 
+use std::borrow::Cow;
 use std::fmt;
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Cause, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why};
 
@@ -23,6 +27,20 @@ impl State {
             Self::Parking => "parking",
             Self::Fault => "fault",
         }
+    }
+}
+
+impl Serialize for State {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.word())
+    }
+}
+
+impl<'de> Deserialize<'de> for State {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let word = Cow::<str>::deserialize(from)?;
+        let known = Self::ALL.into_iter().find(|state| state.word() == word);
+        known.ok_or_else(|| D::Error::custom(format_args!("{word:?} is no state")))
     }
 }
 

@@ -53,7 +53,7 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
         ["effect", name, "off"] => effect(name, false),
         ["enable", name] => Command::Enable(name.to_owned()),
         ["disable", name] => Command::Disable { name: name.to_owned(), why: None },
-        [word @ ("arm" | "disarm" | "home" | "clear" | "load"), ..] => {
+        [word, ..] if Command::OF_PEOPLE.contains(&word) => {
             let detail = format!("lines of text may never {word}");
             return Err(Problem::new(Code::Role, detail, "a person does that on the console").into());
         }

@@ -85,7 +85,11 @@ fn playing() -> Status {
         axes: 3,
         effects: Vec::new(),
     };
-    Status { state: "playing", show: Some(show), ..Status::starting("Hall 1") }
+    Status {
+        state: crate::state::State::Playing(crate::state::PlayMode::Following).into(),
+        show: Some(show),
+        ..Status::starting("Hall 1")
+    }
 }
 
 #[test]

@@ -11,13 +11,14 @@ use std::time::Duration;
 use kinocue::api::{self, Running, Setup, StopSocket};
 use kinocue::config::{self, ApiToken};
 use kinocue::control::{
-    Code, Command, ControllerStatus, Desired, Handle, Inbox, JournalLine, Problem, Role, Status,
+    Code, Command, ControllerStatus, Desired, Handle, Health, Inbox, JournalLine, Problem, Role, Status,
     StatusSource, handle,
 };
 use kinocue::library::{self, Bounds, Library};
 use kinocue::log::Log;
 use kinocue::playlist::Shelf;
 use kinocue::rt::Desk;
+use kinocue::state::{PlayMode, State};
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
@@ -178,13 +179,16 @@ impl Supervisor {
             Command::Resume => {
                 return Err(Problem::new(Code::State, "cannot resume while armed", "arm and go"));
             }
-            Command::Arm { .. } => "armed",
-            Command::Go => "joining",
-            Command::Stop => "stopping",
-            _ => "parked",
+            Command::Arm { .. } => State::Armed,
+            Command::Go => State::Playing(PlayMode::Joining),
+            Command::Stop => State::Stopping,
+            _ => State::Parked,
         };
-        let status =
-            Status { state, cause: format!("asked: {}", ask.word()), ..Status::clone(&self.handle.status()) };
+        let status = Status {
+            state: state.into(),
+            cause: format!("asked: {}", ask.word()),
+            ..Status::clone(&self.handle.status())
+        };
         let status = Arc::new(status);
         self.source.put(Arc::clone(&status));
         Ok(status)
@@ -212,29 +216,10 @@ pub fn with_controller() -> Status {
         address: "127.0.0.1:7408".to_owned(),
         group: "A1".to_owned(),
         enabled: true,
-        health: "ok",
-        why: String::new(),
-        heard_s: None,
-        ack_rate: None,
-        ack_p50_us: None,
-        ack_p99_us: None,
-        sent: 0,
-        asked: 0,
-        acked: 0,
-        refused: 0,
-        lost: 0,
-        send_failed: 0,
-        clamps: 0,
-        homed: None,
-        emergency_stop: false,
-        error: None,
-        servo_errors: None,
-        belts_open: None,
-        inputs: None,
-        outputs: None,
-        positions_mm: None,
+        health: Health::Ok,
+        ..ControllerStatus::default()
     };
-    Status { state: "parked", controllers: vec![controller], ..Status::starting("Hall 1") }
+    Status { state: State::Parked.into(), controllers: vec![controller], ..Status::starting("Hall 1") }
 }
 
 fn hash(token: &str) -> [u8; 32] {

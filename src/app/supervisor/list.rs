@@ -107,7 +107,7 @@ impl List {
             preset: entry.preset.clone(),
             level: entry.level,
             trim_ms: entry.trim_ms,
-            then: entry.then.word(),
+            then: entry.then,
             at: entry.at.as_ref().map(|at| at.time.to_string()),
         };
         PlaylistStatus {

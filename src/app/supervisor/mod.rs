@@ -38,8 +38,9 @@ use std::time::Duration;
 
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
+use crate::control::model::Ending;
 use crate::control::{Asked, Inbox, Problem, Status, StatusSource};
-use crate::journal::{Ending, Journal};
+use crate::journal::Journal;
 use crate::library::Library;
 use crate::rt::{Command as TickCommand, News};
 use crate::settings::SettingsFile;

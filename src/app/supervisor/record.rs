@@ -6,13 +6,14 @@ use std::time::Duration;
 use jiff::Zoned;
 
 use super::Supervisor;
+use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
-use crate::journal::{Action, Ending, Folds, Journal, Outcome, Percentiles, ShowRecord, stamp};
+use crate::journal::{Action, Folds, Journal, Outcome, ShowRecord, stamp};
 use crate::rt::{Row, Times};
 use crate::state::Cause;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
-use crate::tracker::{Counts, Histogram};
+use crate::tracker::Histogram;
 
 /// How long the last frames of a show have to meet their fate, and the ack thread to tell it.
 const SETTLED_WITHIN: Duration = Duration::from_millis(1_500);
@@ -209,11 +210,9 @@ impl Supervisor {
         let Some(Over { cause, end, ticks, missed, .. }) = over else { return };
         let live = &self.runtime.live;
         let now = live.table();
-        let sum = |of: fn(&Counts) -> u64| -> u64 {
-            let after: u64 = now.iter().map(|row| of(&row.counts)).sum();
-            let earlier: u64 = before.table.iter().map(|row| of(&row.counts)).sum();
-            after.saturating_sub(earlier)
-        };
+        let frames =
+            |table: &[Row]| table.iter().map(|row| FrameCounts::from(&row.counts)).sum::<FrameCounts>();
+        let failed = |table: &[Row]| table.iter().map(|row| row.counts.send_failed).sum::<u64>();
         let after = live.times();
         record.outcome = Some(Outcome {
             end,
@@ -221,12 +220,8 @@ impl Supervisor {
             events,
             ticks,
             missed_ticks: missed,
-            sent: sum(|counts| counts.sent),
-            asked: sum(|counts| counts.asked),
-            acked: sum(|counts| counts.acked),
-            refused: sum(Counts::refused),
-            lost: sum(|counts| counts.lost),
-            send_failed: sum(|counts| counts.send_failed),
+            frames: frames(&now).since(frames(&before.table)),
+            send_failed: failed(&now).saturating_sub(failed(&before.table)),
             lateness: percentiles(after.lateness, &before.times.lateness),
             ack: percentiles(after.acks, &before.times.acks),
         });
@@ -247,11 +242,5 @@ pub(super) const fn ending(cause: Cause) -> Ending {
 fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
     // What cannot be taken away was never in it.
     let _ = now.subtract(before);
-    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-    let us = |ns: u64| (!now.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
-    Percentiles {
-        p50_us: us(now.value_at_quantile(0.5)),
-        p99_us: us(now.value_at_quantile(0.99)),
-        max_us: us(now.max()),
-    }
+    Percentiles::of(&now)
 }

@@ -9,6 +9,7 @@ use super::Supervisor;
 use super::job::JobResult;
 use super::show::ProvedShow;
 use crate::config::Config;
+use crate::control::model::us;
 use crate::control::{Asked, Code, Problem, Surface, TestRow, TestStatus};
 use crate::cue::{self, Source};
 use crate::motion::MAX_AXES;
@@ -230,8 +231,6 @@ impl Supervisor {
 fn row_of(controller: &str, part: &str, then: &Row, now: &Row) -> TestRow {
     let asked = now.counts.asked - then.counts.asked;
     let acked = now.counts.acked - then.counts.acked;
-    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-    let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
     TestRow {
         controller: controller.to_owned(),
         part: part.to_owned(),

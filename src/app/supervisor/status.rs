@@ -7,7 +7,10 @@ use jiff::Zoned;
 
 use super::{Supervisor, belts};
 use crate::config::Controller;
-use crate::control::{ControllerStatus, FORMAT, Histogram, Percentiles, RealTimeStatus, Status};
+use crate::control::model::us;
+use crate::control::{
+    ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times,
+};
 use crate::engine::Unplanned;
 use crate::rt::Row;
 use crate::state::{Next, Whose};
@@ -77,9 +80,9 @@ impl Supervisor {
         Status {
             hall: self.runtime.config.show.name.clone(),
             format: FORMAT,
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: now.since(self.ports.began).as_secs_f64(),
-            state: self.mirror.state.word(),
+            state: self.mirror.state.into(),
             cause: self.cause(),
             next: self.next_action(&table, now),
             arm_homes: self.mirror.next == Next::ArmAndHome,
@@ -95,8 +98,8 @@ impl Supervisor {
             ticks: live.beats(),
             missed_ticks: live.missed(),
             rate_hz: self.runtime.config.show.rate_hz,
-            lateness: percentiles(&times.lateness),
-            ack_latency: percentiles(&times.acks),
+            lateness: counted(&times.lateness),
+            ack_latency: counted(&times.acks),
             realtime: RealTimeStatus {
                 policy: self.runtime.granted.policy.to_string(),
                 priority: self.runtime.granted.priority,
@@ -165,8 +168,6 @@ impl Supervisor {
     ) -> ControllerStatus {
         let counts = row.map(|row| row.counts).unwrap_or_default();
         let state = row.map(|row| row.state).unwrap_or_default();
-        #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-        let us = |ns: u64| (ns as f64 / 100.0).round() / 10.0;
         let ack = row.and_then(|row| row.ack_ns);
         let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
         ControllerStatus {
@@ -176,7 +177,7 @@ impl Supervisor {
             address: controller.address.to_string(),
             group: controller.group.clone(),
             enabled: self.settings.is_on(index),
-            health: row.map_or("unknown", |row| super::warnings::word(row.standing)),
+            health: row.map_or(Health::Unknown, |row| row.standing.into()),
             why: match self.settings.out.get(self.settings.group(index)) {
                 Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
                 None => why,
@@ -185,11 +186,7 @@ impl Supervisor {
             ack_rate: self.rates.of(index),
             ack_p50_us: ack.map(|ack| us(ack.p50)),
             ack_p99_us: ack.map(|ack| us(ack.p99)),
-            sent: counts.sent,
-            asked: counts.asked,
-            acked: counts.acked,
-            refused: counts.refused(),
-            lost: counts.lost,
+            frames: (&counts).into(),
             send_failed: counts.send_failed,
             clamps: self.runtime.live.clamps(index),
             homed: row.and_then(|row| row.homed),
@@ -217,16 +214,14 @@ fn absent(controller: &Controller) -> ControllerStatus {
         seat: controller.seat.name.clone(),
         address: controller.address.to_string(),
         group: controller.group.clone(),
-        health: "out",
+        health: Health::Out,
         why: "out for good: enabled = false in the configuration".to_owned(),
         ..ControllerStatus::default()
     }
 }
 
 /// A histogram of nanoseconds as surfaces show it.
-fn percentiles(times: &tracker::Histogram) -> Percentiles {
-    #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-    let us = |ns: u64| (!times.is_empty()).then_some((ns as f64 / 100.0).round() / 10.0);
+fn counted(times: &tracker::Histogram) -> Times {
     let mut counts = Vec::with_capacity(BOUNDS_US.len() + 1);
     let mut from = 0;
     for bound in BOUNDS_US {
@@ -239,11 +234,6 @@ fn percentiles(times: &tracker::Histogram) -> Percentiles {
     counts.push(times.len().saturating_sub(counted));
     #[expect(clippy::cast_precision_loss, reason = "for a mean")]
     let sum_s = times.mean() * times.len() as f64 / 1e9;
-    Percentiles {
-        p50_us: us(times.value_at_quantile(0.5)),
-        p99_us: us(times.value_at_quantile(0.99)),
-        p999_us: us(times.value_at_quantile(0.999)),
-        max_us: us(times.max()),
-        histogram: Histogram { bounds_us: BOUNDS_US.to_vec(), counts, sum_s },
-    }
+    let histogram = Histogram { bounds_us: BOUNDS_US.to_vec(), counts, sum_s };
+    Times { percentiles: Percentiles::of(times), histogram }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::Supervisor;
-use crate::control::{Severity, Warning};
+use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
 use crate::state::Next;
@@ -15,17 +15,18 @@ const FIRST_LOOK: Duration = Duration::from_secs(1);
 /// What the warnings are called that say what no state says.
 pub(super) const NOTE: &str = "note";
 
-/// How a group stands, in one word.
-pub(super) const fn word(standing: HealthState) -> &'static str {
-    match standing {
-        HealthState::Ok => "ok",
-        HealthState::Degraded => "degraded",
-        HealthState::Lost => "lost",
-        HealthState::Rejoining => "rejoining",
-        HealthState::Stopped => "stopped",
-        HealthState::Error => "error",
-        HealthState::Excluded => "excluded",
-        HealthState::Unwatched => "unwatched",
+impl From<HealthState> for Health {
+    fn from(standing: HealthState) -> Self {
+        match standing {
+            HealthState::Ok => Self::Ok,
+            HealthState::Degraded => Self::Degraded,
+            HealthState::Lost => Self::Lost,
+            HealthState::Rejoining => Self::Rejoining,
+            HealthState::Stopped => Self::Stopped,
+            HealthState::Error => Self::Error,
+            HealthState::Excluded => Self::Excluded,
+            HealthState::Unwatched => Self::Unwatched,
+        }
     }
 }
 
@@ -72,7 +73,7 @@ impl Supervisor {
                 _ => Severity::Error,
             };
             Some(Warning {
-                id: format!("controller-{}", word(row.standing)),
+                id: format!("controller-{}", Health::from(row.standing)),
                 severity,
                 controller: Some(controller.name.clone()),
                 text: format!("{}: {}", row.standing, row.why),

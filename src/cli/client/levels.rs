@@ -7,10 +7,9 @@ use serde_json::json;
 
 use super::rows::parse_rows;
 use super::server::{ServerArgs, in_path};
-use super::view::Status;
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
-use crate::control::LevelsChange;
+use crate::control::{LevelsChange, Status};
 use crate::time::parse_trim;
 
 /// The commands that set what lasts.

@@ -2,7 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::view::{Controller, Show, Status, Warning, percent, time, us};
+use super::view::{percent, time, us};
+use crate::control::{ControllerStatus, Health, ShowStatus, Status, Warning};
 use crate::plain;
 
 /// Controllers and warnings that are shown one by one at the most.
@@ -41,10 +42,9 @@ impl Panel {
 
 /// What the panel says.
 fn text(status: &Status) -> String {
-    let hall = &status.hall;
     let mut lines = vec![
-        format!("{}  {}", hall.state.to_uppercase(), hall.cause),
-        format!("next: {}", hall.next),
+        format!("{}  {}", status.state.to_string().to_uppercase(), status.cause),
+        format!("next: {}", status.next),
         status.show.as_ref().map_or_else(|| "nothing is loaded".to_owned(), film),
         status.mix(),
     ];
@@ -55,15 +55,15 @@ fn text(status: &Status) -> String {
         "{} ticks, {} missed; lateness p99 {} µs; acks p99 {} µs",
         status.ticks,
         status.missed_ticks,
-        us(status.lateness.p99_us),
-        us(status.ack_latency.p99_us)
+        us(status.lateness.percentiles.p99_us),
+        us(status.ack_latency.percentiles.p99_us)
     ));
     lines.extend(controllers(&status.controllers));
     lines.extend(few(status.warnings.iter().map(Warning::line).collect()));
     lines.join("\n")
 }
 
-fn film(show: &Show) -> String {
+fn film(show: &ShowStatus) -> String {
     let part = if show.length_s > 0.0 { (show.position_s / show.length_s).clamp(0.0, 1.0) } else { 0.0 };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it is 0 to the width")]
     #[expect(clippy::cast_precision_loss, reason = "the width is small")]
@@ -73,8 +73,8 @@ fn film(show: &Show) -> String {
 }
 
 /// How many are well, and those that are not.
-fn controllers(all: &[Controller]) -> Vec<String> {
-    let is_well = |one: &&Controller| one.health == "ok" && one.enabled;
+fn controllers(all: &[ControllerStatus]) -> Vec<String> {
+    let is_well = |one: &&ControllerStatus| one.health == Health::Ok && one.enabled;
     let part = all.iter().filter(|one| !one.is_out_for_good()).count();
     let mut lines = vec![format!("{} of {part} controllers ok", all.iter().filter(is_well).count())];
     let ill = all.iter().filter(|one| !is_well(one)).map(|one| {
@@ -101,20 +101,20 @@ mod tests {
 
     #[test]
     fn the_panel_names_who_is_not_well_and_no_more_than_a_few() {
-        let lost = |n: u32| Controller {
+        let lost = |n: u32| ControllerStatus {
             name: format!("A{n}"),
-            health: "lost".into(),
+            health: Health::Lost,
             enabled: true,
             ..<_>::default()
         };
-        let mut controllers: Vec<Controller> = (0..9).map(lost).collect();
-        controllers.push(Controller {
+        let mut controllers: Vec<ControllerStatus> = (0..9).map(lost).collect();
+        controllers.push(ControllerStatus {
             name: "B1".into(),
-            health: "ok".into(),
+            health: Health::Ok,
             enabled: true,
             ..<_>::default()
         });
-        let show = Show { cue: "c".into(), length_s: 100.0, position_s: 50.0, ..Show::default() };
+        let show = ShowStatus { cue: "c".into(), length_s: 100.0, position_s: 50.0, ..ShowStatus::default() };
         let text = text(&Status { controllers, show: Some(show), ..Status::default() });
         assert!(text.contains("1 of 10 controllers ok\n  A0 lost"), "{text}");
         assert!(text.ends_with("  and 3 more: kinocue status"), "{text}");
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn a_film_without_length_or_past_its_end_can_be_drawn() {
         for (length_s, position_s) in [(0.0, 5.0), (10.0, 50.0), (10.0, -5.0), (f64::NAN, 1.0)] {
-            assert!(!film(&Show { length_s, position_s, ..Show::default() }).is_empty());
+            assert!(!film(&ShowStatus { length_s, position_s, ..ShowStatus::default() }).is_empty());
         }
     }
 }

@@ -4,8 +4,9 @@ use serde_json::json;
 
 use super::server::ServerArgs;
 use super::table::table;
-use super::view::{Entry, Playlist, percent, time};
+use super::view::{percent, time};
 use crate::cli::{Exit, Failure, print};
+use crate::control::{EntryStatus, PlaylistStatus};
 
 /// The commands that choose what is played.
 #[derive(Debug, clap::Subcommand)]
@@ -99,8 +100,8 @@ fn show(server: &ServerArgs) -> Result<Exit, Failure> {
 }
 
 /// The entries, the one that is loaded marked.
-fn entries(playlist: &Playlist) -> String {
-    let row = |(place, entry): (usize, &Entry)| {
+fn entries(playlist: &PlaylistStatus) -> String {
+    let row = |(place, entry): (usize, &EntryStatus)| {
         let mark = if place == playlist.current { ">" } else { "" };
         let or = |text: Option<String>, otherwise: &str| text.unwrap_or_else(|| otherwise.to_owned());
         [
@@ -110,12 +111,12 @@ fn entries(playlist: &Playlist) -> String {
             time(entry.length_s),
             or(entry.level.map(percent), "-"),
             or(entry.trim_ms.map(|ms| format!("{ms:+} ms")), "-"),
-            entry.then.clone(),
+            entry.then.to_string(),
             or(entry.at.clone(), "-"),
         ]
     };
     let header = ["", "cue", "title", "length", "level", "trim", "then", "starts at"];
-    let Playlist { id, title, entries, next_start, .. } = playlist;
+    let PlaylistStatus { id, title, entries, next_start, .. } = playlist;
     let next =
         next_start.as_ref().map_or_else(String::new, |at| format!("; the next starts by itself at {at}"));
     format!("{id}: {title}{next}\n\n{}", table(header, entries.iter().enumerate().map(row)))

@@ -4,8 +4,8 @@ use anyhow::anyhow;
 use serde::Deserialize;
 
 use super::http::Reply;
-use super::view::{Hall, Status};
 use crate::cli::{Exit, Failure, OrExit as _};
+use crate::control::{HallFacts, Status};
 
 /// Why something was not done (RFC 9457), as the daemon writes it.
 #[derive(Debug, Default, Deserialize)]
@@ -16,7 +16,7 @@ struct Problem {
     remedy: String,
     faults: Vec<String>,
     #[serde(flatten)]
-    hall: Hall,
+    hall: HallFacts,
 }
 
 /// The status in a reply, or why there is none.
@@ -45,7 +45,7 @@ impl Problem {
         let Self { detail, remedy, faults, hall, .. } = self;
         let mut text = format!("{detail}; {remedy}");
         faults.iter().for_each(|fault| text.extend(["\n  ", fault]));
-        if !hall.state.is_empty() {
+        if *hall != HallFacts::default() {
             text.extend(["\n", &hall.line(None)]);
         }
         text

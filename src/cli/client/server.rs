@@ -10,8 +10,8 @@ use serde_json::Value;
 
 use super::http::{self, Reply};
 use super::reply;
-use super::view::Status;
 use crate::cli::{Exit, Failure, print};
+use crate::control::Status;
 
 /// The environment variable that names the socket. Not clap's to read, for which it would count as an argument.
 const SOCKET_VARIABLE: &str = "KINOCUE_SOCKET";

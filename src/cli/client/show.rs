@@ -4,14 +4,12 @@ use serde_json::json;
 
 use super::server::ServerArgs;
 use super::table::table;
-use super::view::{Controller, Preflight, Status, Warning};
 use crate::cli::{Exit, Failure, ask, print};
+use crate::control::{ControllerStatus, PreflightStatus, Severity, Status, Warning};
 use crate::time::{ShowTime, parse_time};
 
 /// Of so many controllers with the same finding only the number is told.
 const FEW: usize = 9;
-/// The severity of a finding that fails.
-const FAILS: &str = "error";
 
 /// The commands that lead a show.
 #[derive(Debug, clap::Subcommand)]
@@ -153,12 +151,12 @@ pub(in crate::cli) fn preflight(server: &ServerArgs) -> Result<Exit, Failure> {
     if !server.json && !found.findings.is_empty() {
         print::out(&findings(&status, &found.findings))?;
     }
-    let Preflight { passed, answered, .. } = found;
+    let PreflightStatus { passed, answered, .. } = found;
     let verdict = if *passed { "passed" } else { "failed" };
     print::tell(&format!(
         "kinocue: preflight {verdict}: {answered} of {} controllers answered; next: {}",
         status.controllers.iter().filter(|one| !one.is_out_for_good()).count(),
-        status.hall.next
+        status.next
     ));
     Ok(if *passed { Exit::Done } else { Exit::CheckFailed })
 }
@@ -179,10 +177,10 @@ fn findings(status: &Status, all: &[Warning]) -> String {
     let row = |(one, of): &(&Warning, Vec<String>)| {
         let Warning { severity, id, text, remedy, .. } = one;
         let of = match of.len() {
-            FEW.. if severity != FAILS => format!("{} controllers", of.len()),
+            FEW.. if *severity != Severity::Error => format!("{} controllers", of.len()),
             _ => of.join(", "),
         };
-        [severity.as_str(), &of, id, text, remedy].map(str::to_owned)
+        [severity.word(), &of, id, text, remedy].map(str::to_owned)
     };
     table(["severity", "controllers", "check", "found", "what to do"], rows.iter().map(row))
 }
@@ -190,9 +188,9 @@ fn findings(status: &Status, all: &[Warning]) -> String {
 /// The controller that something was found of; where it fails with its row and address, for whoever goes there.
 fn who(status: &Status, found: &Warning) -> String {
     let Some(name) = &found.controller else { return "-".to_owned() };
-    match status.controllers.iter().find(|one| one.name == *name && found.severity == FAILS) {
-        Some(Controller { row: Some(row), address, .. }) => format!("{name} (row {row}, {address})"),
-        Some(Controller { address, .. }) => format!("{name} ({address})"),
+    match status.controllers.iter().find(|one| one.name == *name && found.severity == Severity::Error) {
+        Some(ControllerStatus { row: Some(row), address, .. }) => format!("{name} (row {row}, {address})"),
+        Some(ControllerStatus { address, .. }) => format!("{name} ({address})"),
         None => name.clone(),
     }
 }

@@ -3,8 +3,9 @@
 use super::reply;
 use super::server::ServerArgs;
 use super::table::table;
-use super::view::{Controller, Playlist, Show, Status, percent, time, us};
+use super::view::{percent, time, us};
 use crate::cli::{Exit, Failure, print};
+use crate::control::{ControllerStatus, PlaylistStatus, ShowStatus, Status};
 
 /// Shows the hall's status.
 ///
@@ -46,11 +47,10 @@ fn text(status: &Status) -> String {
 
 /// A word and a line for each thing there is to say of the hall.
 fn block(status: &Status) -> Vec<(&'static str, String)> {
-    let hall = &status.hall;
-    let mut lines = vec![("hall", format!("{}, kinocue {}", status.name, status.version))];
+    let mut lines = vec![("hall", format!("{}, kinocue {}", status.hall, status.version))];
     let lapses = status.lapses_s.map_or_else(String::new, |s| format!(", for {s:.0} s more"));
-    lines.push(("state", format!("{} for {:.0} s{lapses}: {}", hall.state, status.since_s, hall.cause)));
-    lines.push(("next", hall.next.clone()));
+    lines.push(("state", format!("{} for {:.0} s{lapses}: {}", status.state, status.since_s, status.cause)));
+    lines.push(("next", status.next.clone()));
     lines.push(("show", status.show.as_ref().map_or_else(|| "nothing is loaded".to_owned(), show)));
     lines.extend(status.playlist.as_ref().map(|list| ("playlist", playlist(list))));
     lines.push(("levels", status.mix()));
@@ -68,21 +68,22 @@ fn block(status: &Status) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn show(show: &Show) -> String {
-    let Show { cue, title, length_s, position_s, resume_s } = show;
+fn show(show: &ShowStatus) -> String {
+    let ShowStatus { cue, title, length_s, position_s, resume_s, .. } = show;
     let title = title.as_ref().map_or_else(String::new, |title| format!(" \"{title}\""));
     let left =
         resume_s.map(time).map(|at| format!("; left at {at}: kinocue go --from {at} goes on from there"));
     format!("{cue}{title}, at {} of {}{}", time(*position_s), time(*length_s), left.unwrap_or_default())
 }
 
-fn playlist(list: &Playlist) -> String {
+fn playlist(list: &PlaylistStatus) -> String {
     let next = list.next_start.as_ref().map_or_else(String::new, |at| format!(", the next starts at {at}"));
     format!("{}, entry {} of {}{next}", list.id, list.current + 1, list.entries.len())
 }
 
 fn ticks(status: &Status) -> String {
-    let Status { ticks, missed_ticks, rate_hz, lateness, ack_latency, .. } = status;
+    let Status { ticks, missed_ticks, rate_hz, .. } = status;
+    let [lateness, ack_latency] = [&status.lateness, &status.ack_latency].map(|times| times.percentiles);
     format!(
         "{ticks} at {rate_hz} Hz, {missed_ticks} missed; lateness p50 {} p99 {} max {} µs; acks p50 {} p99 {} max {} µs",
         us(lateness.p50_us),
@@ -94,9 +95,9 @@ fn ticks(status: &Status) -> String {
     )
 }
 
-fn controllers(all: &[Controller]) -> String {
-    let row = |one: &Controller| {
-        let Controller { name, row, why, ack_rate, ack_p50_us, ack_p99_us, lost, .. } = one;
+fn controllers(all: &[ControllerStatus]) -> String {
+    let row = |one: &ControllerStatus| {
+        let ControllerStatus { name, row, why, ack_rate, ack_p50_us, ack_p99_us, frames, .. } = one;
         [
             name.clone(),
             row.clone().unwrap_or_else(|| "-".to_owned()),
@@ -104,7 +105,7 @@ fn controllers(all: &[Controller]) -> String {
             ack_rate.map_or_else(|| "-".to_owned(), percent),
             us(*ack_p50_us),
             us(*ack_p99_us),
-            lost.to_string(),
+            frames.lost.to_string(),
             why.clone(),
         ]
     };

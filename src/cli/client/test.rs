@@ -11,9 +11,10 @@ use super::http::block_on;
 use super::rows::parse_rows;
 use super::server::ServerArgs;
 use super::table::table;
-use super::view::{Status, Test, TestRow, us};
+use super::view::us;
 use crate::cli::ask::agreed;
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::control::{Status, TestRow, TestStatus};
 
 /// Tests empty seats and their effects.
 #[derive(Debug, clap::Args)]
@@ -75,14 +76,14 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         print::out(&text(&result.test))?;
     }
     let failed = result.test.rows.iter().filter(|row| !row.passed).count();
-    let Test { done, total, step, .. } = &result.test;
+    let TestStatus { done, total, step, .. } = &result.test;
     print::tell(&format!("kinocue: test {step}: {done} of {total} axes and effects, {failed} failed"));
     Ok(if failed == 0 && done == total { Exit::Done } else { Exit::CheckFailed })
 }
 
 /// A test that is over.
 struct Outcome {
-    test: Test,
+    test: TestStatus,
     /// The same as the daemon wrote it.
     json: String,
 }
@@ -92,7 +93,8 @@ fn follow(server: &ServerArgs, begun: Status) -> Result<Outcome, Failure> {
     let bar = std::io::stderr().is_terminal().then(|| {
         let style =
             ProgressStyle::with_template("{msg} [{wide_bar}] {pos} of {len}").expect("the template is fixed");
-        ProgressBar::new(begun.test.map_or(0, |test| test.total)).with_style(style.progress_chars("=> "))
+        ProgressBar::new(begun.test.map_or(0, |test| test.total as u64))
+            .with_style(style.progress_chars("=> "))
     });
     let outcome = block_on(async {
         let ended = listen(server, bar.as_ref());
@@ -122,7 +124,7 @@ async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<Outcom
         // While it says nothing there is nothing to show; the test may well go on.
         let Some(data) = events.next().await.map_err(gone).or_exit(Exit::Unavailable)? else { continue };
         let Ok(status) = serde_json::from_str::<Status>(&data) else { continue };
-        if status.hall.state.is_empty() {
+        if status == Status::default() {
             continue;
         }
         let test = status.test.context("the daemon has no result of the test").or_exit(Exit::Internal)?;
@@ -131,14 +133,14 @@ async fn listen(server: &ServerArgs, bar: Option<&ProgressBar>) -> Result<Outcom
             return Ok(Outcome { test, json: whole["test"].to_string() });
         }
         if let Some(bar) = bar {
-            bar.set_length(test.total);
-            bar.set_position(test.done);
+            bar.set_length(test.total as u64);
+            bar.set_position(test.done as u64);
             bar.set_message(test.step);
         }
     }
 }
 
-fn text(test: &Test) -> String {
+fn text(test: &TestStatus) -> String {
     let row = |row: &TestRow| {
         let TestRow { controller, part, asked, acked, p50_us, p99_us, passed } = row;
         let passed = if *passed { "ok" } else { "FAIL" };

@@ -10,8 +10,8 @@ use super::events::{Events, QUIET};
 use super::http::block_on;
 use super::panel::Panel;
 use super::server::ServerArgs;
-use super::view::{Controller, Status};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::control::{ControllerStatus, Status, Warning};
 use crate::plain;
 
 /// How often a daemon that is gone is looked for.
@@ -104,7 +104,7 @@ impl Shown {
         }
         // What is no status is for others.
         let Ok(status) = serde_json::from_str::<Status>(data) else { return Ok(true) };
-        if status.hall.state.is_empty() {
+        if status == Status::default() {
             return Ok(true);
         }
         match self {
@@ -151,7 +151,7 @@ fn line(text: &str) -> Result<bool, Failure> {
 fn changes(before: Option<&Status>, now: &Status) -> Vec<String> {
     let mut lines = Vec::new();
     let was = before.cloned().unwrap_or_default();
-    if was.hall != now.hall {
+    if (&was.state, &was.cause, &was.next) != (&now.state, &now.cause, &now.next) {
         lines.push(now.line());
     }
     let cue = |status: &Status| status.show.as_ref().map(|show| show.cue.clone());
@@ -163,14 +163,13 @@ fn changes(before: Option<&Status>, now: &Status) -> Vec<String> {
     }
     for controller in &now.controllers {
         let known = was.controllers.iter().find(|one| one.name == controller.name);
-        let Controller { name, enabled, health, why, .. } = controller;
+        let ControllerStatus { name, enabled, health, why, .. } = controller;
         if known.map(|one| (one.enabled, &one.health)) != Some((*enabled, health)) {
             let why = if why.is_empty() { String::new() } else { format!(": {why}") };
             lines.push(format!("{name} {}{why}", controller.stands()));
         }
     }
-    let same =
-        |a: &super::view::Warning, b: &super::view::Warning| (&a.id, &a.controller) == (&b.id, &b.controller);
+    let same = |a: &Warning, b: &Warning| (&a.id, &a.controller) == (&b.id, &b.controller);
     for warning in &now.warnings {
         if !was.warnings.iter().any(|one| same(one, warning)) {
             lines.push(warning.line());

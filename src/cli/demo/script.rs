@@ -89,7 +89,7 @@ async fn lead(
 /// Has the cue played, and waits until the seats rest again.
 async fn ride(handle: &Handle) -> Result<(), Problem> {
     let who = Who { role: Role::Operate, surface: Surface::Program, name: "demo".to_owned() };
-    let parked = reach(handle, |status| status.state == State::Parked.word());
+    let parked = reach(handle, |status| status.state == State::Parked);
     match tokio::time::timeout(PATIENCE, parked).await {
         Ok(Ok(())) => {}
         Ok(Err(Gone)) => return Ok(()),
@@ -98,8 +98,8 @@ async fn ride(handle: &Handle) -> Result<(), Problem> {
     for ask in [Command::Load { cue: CUE_ID.to_owned() }, Command::Preflight, ARM, Command::Go] {
         handle.ask(who.clone(), ask).await?;
     }
-    let resting = [State::Parked, State::Stopped, State::Fault, State::Recovering].map(State::word);
-    let _ = reach(handle, |status| resting.contains(&status.state)).await; // gone, it is at rest as well
+    let resting = [State::Parked, State::Stopped, State::Fault, State::Recovering];
+    let _ = reach(handle, |status| resting.iter().any(|state| status.state == *state)).await; // gone, it is at rest as well
     Ok(())
 }
 

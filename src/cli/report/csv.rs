@@ -1,6 +1,7 @@
 //! A report as CSV (RFC 4180).
 
-use crate::journal::{Percentiles, Report, Shown};
+use crate::control::model::{FrameCounts, Percentiles};
+use crate::journal::{Report, Shown};
 use crate::plain::escaped;
 
 const SHOWS: &str = "start,end,took_s,result,hall,cue,sha256,title,playlist,entry,level,vibration,trim_ms,effects_off,\
@@ -49,10 +50,11 @@ fn show(show: &Shown) -> Vec<String> {
         record.out_of_hours.to_string(),
     ];
     let counts = outcome.map(|one| {
-        [one.ticks, one.missed_ticks, one.sent, one.asked, one.acked, one.refused, one.lost, one.send_failed]
+        let FrameCounts { sent, asked, acked, refused, lost } = one.frames;
+        [one.ticks, one.missed_ticks, sent, asked, acked, refused, lost, one.send_failed]
     });
     cells.extend((0..8).map(|index| counts.map_or_else(String::new, |counts| counts[index].to_string())));
-    for Percentiles { p50_us, p99_us, max_us } in
+    for Percentiles { p50_us, p99_us, max_us, .. } in
         [outcome.map(|one| one.lateness), outcome.map(|one| one.ack)].map(Option::unwrap_or_default)
     {
         cells.extend([p50_us, p99_us, max_us].map(number));

@@ -2,7 +2,8 @@
 
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
-use crate::journal::{Outcome, Report, Shown, Totals};
+use crate::control::model::FrameCounts;
+use crate::journal::{Report, Shown, Totals};
 
 /// A line under the header, and no other lines.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
@@ -69,8 +70,10 @@ fn show(show: &Shown) -> Vec<String> {
     match &record.outcome {
         None => row.resize(13, String::new()),
         Some(one) => {
-            row.extend([one.sent.to_string(), acked(one)]);
-            row.extend([one.refused, one.lost, one.missed_ticks].map(|count| count.to_string()));
+            row.extend([one.frames.sent.to_string(), acked(one.frames)]);
+            row.extend(
+                [one.frames.refused, one.frames.lost, one.missed_ticks].map(|count| count.to_string()),
+            );
             row.extend([one.lateness.p99_us, one.ack.p99_us].map(micros));
         }
     }
@@ -97,10 +100,7 @@ fn totals(totals: &Totals, days: &str) -> String {
         interrupted,
         running,
         took_s,
-        sent,
-        acked,
-        refused,
-        lost,
+        frames: FrameCounts { sent, acked, refused, lost, .. },
     } = totals;
     let noun = if *shows == 1 { "show" } else { "shows" };
     let parts = [
@@ -120,11 +120,11 @@ fn totals(totals: &Totals, days: &str) -> String {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "for people")]
-fn acked(outcome: &Outcome) -> String {
-    match outcome.asked {
+fn acked(frames: FrameCounts) -> String {
+    match frames.asked {
         0 => "–".to_owned(),
         // Rounded down, so that only all of them are 100 %.
-        asked => format!("{:.2} %", (10_000.0 * outcome.acked as f64 / asked as f64).floor() / 100.0),
+        asked => format!("{:.2} %", (10_000.0 * frames.acked as f64 / asked as f64).floor() / 100.0),
     }
 }
 
