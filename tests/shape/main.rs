@@ -21,7 +21,7 @@ type Row = (&'static str, fn(&[File]) -> (f64, String), Better, f64, f64);
 
 /// What is counted, how, which way is better, what it was when it was noted last, and the target.
 const ROWS: &[Row] = &[
-    ("methods on one type", counts::methods_of_one_type, Less, 114.0, 25.0),
+    ("methods on one type", counts::methods_of_one_type, Less, 115.0, 25.0),
     ("bool fields in one struct", counts::bools_of_one_struct, Less, 14.0, 3.0),
     ("enums with the words of the hall's state", counts::encodings_of_state, Less, 2.0, 1.0),
     ("compositions", counts::compositions, Less, 2.0, 1.0),
@@ -33,10 +33,10 @@ const ROWS: &[Row] = &[
     ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
     ("pairs of runs, but for names", repeats::but_for_names, Less, 251.0, 170.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 18.0, 2.0),
-    ("lines of code", counts::lines_of_code, Less, 48_059.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 48_082.0, 39_800.0),
     ("public items and fields", counts::public_items, Less, 2_852.0, 400.0),
-    ("lines of the longest function", counts::longest_function, Less, 57.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 596.0, 390.0),
+    ("lines of the longest function", counts::longest_function, Less, 55.0, 48.0),
+    ("lines of the longest file", counts::longest_file, Less, 538.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.4, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];

@@ -30,16 +30,8 @@ impl Supervisor {
                 self.request(request).inspect(|()| self.say_what_lasts())
             }
             Command::Disarm => self.request(Transition::Disarm),
-            Command::Go => {
-                let counted = self.count_before();
-                let go = self.are_buckled().and_then(|()| self.request(Transition::Go));
-                go.inspect(|()| self.begin_show(&who.to_string(), who.surface, counted))
-            }
-            Command::GoFrom(film) => {
-                let before = self.count_before();
-                let go = self.are_buckled().and_then(|()| self.go_from(film));
-                go.inspect(|()| self.begin_show(&who.to_string(), who.surface, before))
-            }
+            Command::Go => self.go(&who, |this| this.request(Transition::Go)),
+            Command::GoFrom(film) => self.go(&who, |this| this.go_from(film)),
             Command::Pause => self.request(Transition::Pause),
             Command::Resume => self.request(Transition::Resume),
             Command::Park => self.request(Transition::Park),
@@ -68,6 +60,15 @@ impl Supervisor {
         }
         self.tell_readiness();
         self.answer(asked, result);
+    }
+
+    /// Begins the show for `who`, once everybody is buckled who has to be.
+    fn go(&mut self, who: &Who, begin: impl FnOnce(&mut Self) -> Result<(), Problem>) -> Result<(), Problem> {
+        let counted = self.count_before();
+        self.are_buckled()?;
+        begin(self)?;
+        self.begin_show(&who.to_string(), who.surface, counted);
+        Ok(())
     }
 
     fn request(&mut self, request: Transition) -> Result<(), Problem> {

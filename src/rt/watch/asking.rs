@@ -1,0 +1,109 @@
+//! What controllers are asked beside the looks: where seats are before a motion and while nothing moves, and all of it anew once the
+//! hall was cleared.
+
+use super::super::live::Phase;
+use super::super::mail::Alarm;
+use super::{SILENT_AFTER, Watch};
+use crate::health::HealthState;
+use crate::state::Event;
+use crate::time::MonoTime;
+
+impl Watch {
+    /// Whoever cleared the hall wants to know where its seats stand: nothing is taken on trust.
+    pub(super) fn look_anew(&mut self, now: MonoTime) {
+        let phase = self.live.phase();
+        let has_entered = std::mem::replace(&mut self.phase, phase) != phase && phase == Phase::Recovering;
+        let clears = self.live.clears();
+        let is_cleared = std::mem::replace(&mut self.clears, clears) != clears;
+        if !has_entered && !is_cleared {
+            return;
+        }
+        if self.silent {
+            // Nobody answers: where the frames left the seats is all there is to know.
+            self.alarm(Alarm::Event(Event::PositionsRead));
+            return;
+        }
+        self.anew = Some(now);
+        (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
+    }
+
+    /// A motion that begins waits for readings of where the seats are by now.
+    pub(super) fn read_all(&mut self) {
+        let wanted = self.live.wanted();
+        if self.silent || std::mem::replace(&mut self.wanted, wanted) == wanted {
+            return;
+        }
+        for controller in 0..self.lookers.len() {
+            if self.stands(controller).may_move() {
+                let sent = self.ask_positions(controller, self.looked);
+                self.health.on_other_sent(controller, sent);
+            }
+        }
+    }
+
+    /// Asks where all axes of a seat are; says in how many datagrams.
+    pub(in super::super) fn ask_positions(&mut self, controller: usize, now: MonoTime) -> u64 {
+        self.positions[controller].on_all_asked(now);
+        self.beats.send_all(controller, &self.sender)
+    }
+
+    /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
+    pub(super) fn beat(&mut self, now: MonoTime) {
+        // Preflight counts every datagram that a controller received: none of ours may come between.
+        if self.silent
+            || self.live.is_moving()
+            || self.is_hushed()
+            || self.is_asked_otherwise()
+            || !self.beats.take(now)
+        {
+            return;
+        }
+        for controller in 0..self.lookers.len() {
+            if self.stands(controller).may_move()
+                && let Some(register) = self.beats.send(controller, &self.sender)
+            {
+                self.positions[controller].on_asked(register, now);
+                self.health.on_beat_sent(controller, now);
+            }
+        }
+    }
+
+    pub(super) fn stand_by(&mut self) {
+        let Self { standby, health, positions, live, untold, .. } = self;
+        let Some(standby) = standby else { return };
+        for controller in 0..health.groups().controllers() {
+            health.on_part(controller, standby.takes_part(controller));
+        }
+        standby.serve(health, |homed| positions[homed].on_homed());
+        if live.is_moving() {
+            return;
+        }
+        // A group that was found at park is where the others are.
+        for group in 0..health.groups().len() {
+            if health.standing(group) == HealthState::Rejoining
+                && standby.is_at_park(health.groups().members(group))
+            {
+                health.on_joined(group);
+                *untold = true;
+            }
+        }
+        if let Some(finding) = standby.take_finding(health) {
+            self.alarm(Alarm::Event(Event::Identified(finding)));
+        }
+    }
+
+    /// Those that take part are waited for, and not for ever: nothing goes to one that is silent, and the others may park.
+    pub(super) fn end_look_anew(&mut self, now: MonoTime) {
+        let Some(since) = self.anew else { return };
+        let is_open = |group| {
+            let mut members = self.health.groups().members(group);
+            self.health.standing(group) == HealthState::Lost
+                && members.any(|controller| self.takes_part(controller))
+        };
+        let is_read = !(0..self.health.groups().len()).any(is_open);
+        if is_read || now.since(since) >= SILENT_AFTER {
+            self.anew = None;
+            self.alarm(Alarm::Event(Event::PositionsRead));
+        }
+    }
+}
