@@ -8,15 +8,15 @@ use std::time::Duration;
 use crate::belief::{Reading, Source};
 use crate::motion::{MAX_AXES, Pulses, SeatType, in_stroke};
 use crate::time::MonoTime;
-use crate::wire::{AXES_PER_BLOCK, DP_POSITIONS, PerAxis};
+use crate::wire::{AXES_PER_BLOCK, DP_POSITIONS, PerAxis, in_other_order};
 
 /// How far apart two answers may see an axis at rest, in strokes.
 const STILL: f64 = 0.001;
 /// For how long an axis has to be seen in one place to be at rest there. What comes in one burst proves nothing.
 const REST: Duration = Duration::from_millis(100);
-/// So many answers have to. One may be an older one that the network repeats in place of another that it holds back.
+/// So many answers have to see it there. One may be an older one that the network repeats in place of another that it holds back.
 const TIMES: u32 = 3;
-/// The same while the network repeats answers: one of them may be from before a move, and so may the next.
+/// As [`REST`] while the network repeats answers: one of them may be from before a move, and so may the next.
 const REST_REPEATED: Duration = Duration::from_millis(500);
 /// An answer that comes later than this is none; so long after an answer was repeated others may be.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
@@ -152,18 +152,20 @@ impl Positions {
     fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
         for (axis, pulses) in (first..self.led).zip(positions) {
             let fraction = self.seat.fraction(*pulses);
-            if axis >= self.seat.axes {
-                self.hear_beyond(axis, *pulses, fraction);
+            let is_own = axis < self.seat.axes;
+            // Frames would lead an axis that its seat type does not have to 0 at once: all of its stroke is there.
+            let end = if is_own { 1.0 } else { 0.0 };
+            let is_outside = !(-OUTSIDE..=end + OUTSIDE).contains(&fraction);
+            let other = self.outside.filter(|(other, _)| *other != axis);
+            self.outside = if is_outside { Some((axis, *pulses)) } else { other };
+            if !is_own {
                 continue;
             }
             self.by = by;
-            let is_outside = !(-OUTSIDE..=1.0 + OUTSIDE).contains(&fraction);
             if is_outside {
-                self.outside = Some((axis, *pulses));
                 self.told[axis] = None;
                 continue;
             }
-            self.outside = self.outside.filter(|(other, _)| *other != axis);
             if by == Source::Registers {
                 self.mind_order(axis, *pulses);
             }
@@ -179,19 +181,10 @@ impl Positions {
         }
     }
 
-    /// Hears of an axis that its seat type does not have: frames would lead it to 0 at once.
-    fn hear_beyond(&mut self, axis: usize, pulses: Pulses, fraction: f64) {
-        if fraction.abs() > OUTSIDE {
-            self.outside = Some((axis, pulses));
-        } else {
-            self.outside = self.outside.filter(|(other, _)| *other != axis);
-        }
-    }
-
     /// A position that only its own order puts inside the stroke settles the order for the whole controller; so does a seat that is
     /// known to be at 0.
     fn mind_order(&mut self, axis: usize, pulses: Pulses) {
-        let other = other_order(pulses);
+        let other = in_other_order(pulses);
         let is_open = other != pulses && in_stroke(other, self.seat.stroke_pulses());
         let bit = 1 << axis;
         self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
@@ -205,7 +198,7 @@ impl Positions {
         let Some(told) = self.told[axis] else { return };
         let told = self.seat.pulses(told.fraction);
         let apart = |one: Pulses| (self.seat.fraction(one) - self.seat.fraction(reported)).abs();
-        self.ordered |= apart(told) <= STILL && apart(other_order(told)) > STILL;
+        self.ordered |= apart(told) <= STILL && apart(in_other_order(told)) > STILL;
     }
 
     /// Whether it tells two places for some axis, and nothing says which of them is true.
@@ -264,11 +257,6 @@ impl Positions {
         }
         Some(reading)
     }
-}
-
-/// The position that the same two words tell in the other order.
-const fn other_order(pulses: Pulses) -> Pulses {
-    Pulses(pulses.0.cast_unsigned().rotate_left(16).cast_signed())
 }
 
 /// Axes that have position registers, and how many blocks of them.

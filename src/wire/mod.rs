@@ -34,6 +34,7 @@ pub use report::{DPFE, Report};
 pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
 pub use vibration::{Vibration, VibrationPort};
+pub(crate) use word_order::in_other_order;
 pub use word_order::{WordOrder, word_order};
 pub use words::{MAX_WORDS, Words};
 

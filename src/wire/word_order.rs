@@ -40,7 +40,8 @@ pub fn word_order(
     };
     let (mut configured, mut swapped, mut same) = (true, true, true);
     for (axis, words) in words.iter().enumerate() {
-        let [one, two] = [position(*words, dialect), position(*words, other(dialect))];
+        let one = position(*words, dialect);
+        let two = in_other_order(one);
         let report = reported.and_then(|all| all.get(axis));
         configured &= fits(one, report);
         swapped &= fits(two, report);
@@ -55,11 +56,10 @@ pub fn word_order(
     }
 }
 
-const fn other(dialect: Dialect) -> Dialect {
-    match dialect {
-        Dialect::Smc => Dialect::Mbox,
-        Dialect::Mbox => Dialect::Smc,
-    }
+/// The position that the same two words tell in the other order.
+#[must_use]
+pub(crate) const fn in_other_order(position: Pulses) -> Pulses {
+    Pulses(position.0.cast_unsigned().rotate_left(16).cast_signed())
 }
 
 fn near(one: Pulses, other: Pulses, stroke: f64) -> bool {
