@@ -171,11 +171,6 @@ impl Supervisor {
         let ack = row.and_then(|row| row.ack_ns);
         let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
         ControllerStatus {
-            name: controller.name.clone(),
-            row: controller.row.clone(),
-            seat: controller.seat.name.clone(),
-            address: controller.address.to_string(),
-            group: controller.group.clone(),
             enabled: self.settings.is_on(index),
             health: row.map_or(Health::Unknown, |row| row.standing.into()),
             why: match self.settings.out.get(self.settings.group(index)) {
@@ -202,21 +197,29 @@ impl Supervisor {
                 };
                 heard.value.iter().take(controller.seat.axes).map(mm).collect()
             }),
+            ..nameplate(controller)
         }
     }
 }
 
-/// A controller that is out for good: nothing is known of it.
-fn absent(controller: &Controller) -> ControllerStatus {
+/// What a controller is, and nothing of how it is.
+fn nameplate(controller: &Controller) -> ControllerStatus {
     ControllerStatus {
         name: controller.name.clone(),
         row: controller.row.clone(),
         seat: controller.seat.name.clone(),
         address: controller.address.to_string(),
         group: controller.group.clone(),
+        ..ControllerStatus::default()
+    }
+}
+
+/// A controller that is out for good: nothing is known of it.
+fn absent(controller: &Controller) -> ControllerStatus {
+    ControllerStatus {
         health: Health::Out,
         why: "out for good: enabled = false in the configuration".to_owned(),
-        ..ControllerStatus::default()
+        ..nameplate(controller)
     }
 }
 
