@@ -79,7 +79,7 @@ pub(crate) fn setting(name: &str) -> Option<u64> {
 }
 
 /// Lives through so many histories on two threads: those in which a seat did what no seat may.
-pub(crate) fn histories(first: u64, count: u64, bent: Option<Bent>) -> Vec<Past> {
+fn histories(first: u64, count: u64, bent: Option<Bent>) -> Vec<Past> {
     let [next, frames] = [0; 2].map(AtomicU64::new);
     let work = || {
         let mut bad = Vec::new();
@@ -123,10 +123,11 @@ pub(crate) fn tell(seed: u64, bent: Option<Bent>) {
     assert!(past.breaches.is_empty(), "seed {seed}: {} moves that no seat may make", past.breaches.len());
 }
 
+/// No more than `most` of so many histories break the judge.
 #[track_caller]
-fn assert_none(first: u64, count: u64, admitted: f64) {
-    println!("{count} histories from seed {first}");
-    let bad = histories(first, count, None);
+pub(crate) fn assert_at_most(most: usize, first: u64, count: u64, bent: Option<Bent>) {
+    println!("{bent:?}: {count} histories from seed {first}");
+    let bad = histories(first, count, bent);
     for past in bad.iter().take(20) {
         let worst = past.breaches.iter().max_by(|a, b| a.mm_s().total_cmp(&b.mm_s()));
         println!("seed {}: {} times, worst {}", past.seed, past.breaches.len(), worst.expect("there is one"));
@@ -137,8 +138,8 @@ fn assert_none(first: u64, count: u64, admitted: f64) {
         println!("{} of {count}, in {unasked} of them unasked; the farthest {farthest}", bad.len());
     }
     assert!(
-        bad.len() as f64 <= admitted * count as f64,
-        "{} of {count} histories; KINOCUE_HISTORIES=1 KINOCUE_SEED={} tells the first",
+        bad.len() <= most,
+        "{bent:?}: {} of {count} histories, {most} are open; KINOCUE_HISTORIES=1 KINOCUE_SEED={} tells the first",
         bad.len(),
         bad[0].seed
     );
@@ -147,12 +148,16 @@ fn assert_none(first: u64, count: u64, admitted: f64) {
 /// The share of histories of any seed that is open yet: some of the many millions break the judge.
 const OPEN_SHARE: f64 = 0.000_2;
 
+fn open_of(count: u64) -> usize {
+    (OPEN_SHARE * count as f64) as usize
+}
+
 #[test]
 fn no_history_moves_a_seat_faster_than_its_type_allows_or_unasked() {
     match (setting("KINOCUE_SEED"), setting("KINOCUE_HISTORIES").unwrap_or(5_000)) {
         (Some(seed), 1) => tell(seed, None),
-        (Some(seed), count) => assert_none(seed, count, OPEN_SHARE),
-        (None, count) => assert_none(FIXED, count, if count > 5_000 { OPEN_SHARE } else { 0.0 }),
+        (Some(seed), count) => assert_at_most(open_of(count), seed, count, None),
+        (None, count) => assert_at_most(if count > 5_000 { open_of(count) } else { 0 }, FIXED, count, None),
     }
 }
 
@@ -162,5 +167,5 @@ fn nor_do_more_than_one_in_five_thousand_that_were_drawn_anew() {
     if setting("KINOCUE_SEED").is_some() {
         return; // the other one plays them
     }
-    assert_none(wall_now_ns() / 1_000, count, OPEN_SHARE);
+    assert_at_most(open_of(count), wall_now_ns() / 1_000, count, None);
 }

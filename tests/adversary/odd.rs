@@ -2,7 +2,7 @@
 //! seeds. `KINOCUE_SEED` and the others tell and shorten them as in `chance`; a test's name chooses the kind.
 
 use super::bent::Bent;
-use super::chance::{histories, setting, tell};
+use super::chance::{assert_at_most, setting, tell};
 
 /// Where the histories begin that are always the same, and how many of them are played.
 const FIXED_ODD: u64 = 13_000_000;
@@ -16,20 +16,9 @@ fn assert_no_more(bent: Bent, open: usize, share: f64) {
     if count == 1 {
         return tell(first, Some(bent));
     }
-    let bad = histories(first, count, Some(bent));
-    for past in bad.iter().take(20) {
-        let worst = past.breaches.iter().max_by(|a, b| a.mm_s().total_cmp(&b.mm_s()));
-        println!("seed {}: {} times, worst {}", past.seed, past.breaches.len(), worst.expect("there is one"));
-    }
-    println!("{bent:?}: {} of {count} histories from seed {first}", bad.len());
     let is_fixed = seed.is_none() && count == COUNT;
     let most = if is_fixed { open } else { (share * count as f64).ceil() as usize };
-    assert!(
-        bad.len() <= most,
-        "{bent:?}: {} of {count} histories, {most} are open; KINOCUE_HISTORIES=1 KINOCUE_SEED={} tells the first",
-        bad.len(),
-        bad[0].seed
-    );
+    assert_at_most(most, first, count, Some(bent));
 }
 
 // Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits.
