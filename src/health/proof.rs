@@ -74,6 +74,10 @@ pub(super) enum Verdict {
 }
 
 impl Baseline {
+    pub(super) const fn homed(&self) -> bool {
+        self.homed
+    }
+
     pub(super) const fn of(sighting: &Sighting, traffic: Traffic) -> Self {
         Self { identity: sighting.identity, packets: sighting.packets, homed: sighting.homed, traffic }
     }
