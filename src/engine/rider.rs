@@ -133,7 +133,8 @@ impl Rider {
             state.position = *position;
         }
         self.brake = Brake::new(&self.window, &states);
-        self.part = Part::Braking(Duration::ZERO);
+        // One that was on its way out is told so by whatever course leads on.
+        (self.part, self.leaving) = (Part::Braking(Duration::ZERO), None);
     }
 
     /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
