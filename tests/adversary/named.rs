@@ -386,6 +386,24 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
 }
 
 #[test]
+fn a_seat_that_is_cut_off_on_its_way_to_park_is_there_before_the_hall_says_that_it_is_parked() {
+    for (at, length) in [(0, 150), (300, 90), (300, 600), (900, 150)] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(600);
+            hall.ask(Transition::Park);
+            hall.pass(at);
+            hall.ether.turns(0, Weather::Cut, length);
+            assert!(hall.comes_to(|state| state == State::Parked, 30_000), "{:?}", hall.state);
+            hall.pass(50);
+            assert_at_park(&hall.ether, 3);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
 fn a_seat_whose_power_went_is_sent_nothing_when_it_comes_back_with_another_zero() {
     for park in [false, true] {
         let ether = ether(THREE, |_| {});
