@@ -114,11 +114,12 @@ impl Engine {
 
     /// Brings one lane to rest; after three hold frames nothing goes to it.
     pub fn leave(&mut self, lane: usize) {
-        if self.sends_nothing() {
-            return self.cut(lane);
+        if !self.sends_nothing() {
+            self.brake(lane);
+            self.riders[lane].leave();
+        } else if self.takes_part(lane) {
+            self.riders[lane].step_out();
         }
-        self.brake(lane);
-        self.riders[lane].leave();
     }
 
     /// Nobody knows which frames reach a lane: it is brought to rest by frames that are slow enough from wherever it may be

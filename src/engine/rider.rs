@@ -179,10 +179,16 @@ impl Rider {
         (self.part, self.leaving, self.ahead, self.awaited) = (Part::Away, None, 0, 0);
     }
 
+    /// The same, and it is looked at: it may be back soon.
+    pub(super) const fn step_out(&mut self) {
+        self.cut();
+        self.awaited = self.patience;
+    }
+
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
     pub(super) const fn fall_out(&mut self) {
-        self.cut();
-        (self.fallen, self.awaited) = (true, self.patience);
+        self.step_out();
+        self.fallen = true;
     }
 
     /// Whether it has just fallen out; said once.
@@ -217,9 +223,13 @@ impl Rider {
         }
     }
 
-    /// Goes on counting what the limiter has to do where another left off.
-    pub(super) const fn count_on(&mut self, before: &Self) {
+    /// Goes on where another left off: with what the limiter had to do, and away where that was.
+    pub(super) fn go_on_from(&mut self, before: &Self) {
         self.limiter.count_on(before.limiter.counts());
+        if before.part == Part::Away {
+            self.cut();
+            self.awaited = before.awaited;
+        }
     }
 
     /// What the limiter had to do.
@@ -342,7 +352,7 @@ impl Rider {
         apart && !self.refused
     }
 
-    /// Whether it may still come to park: it has just fallen out and is looked at, or is about to.
+    /// Whether it may still come to park: it has just stepped out and is looked at, or is about to.
     pub(super) const fn is_awaited(&self) -> bool {
         self.awaited > 0 || self.is_blind()
     }
@@ -350,6 +360,11 @@ impl Rider {
     /// Whether it is there again, and the others left for park without it.
     pub(super) fn is_left_behind(&self) -> bool {
         self.part == Part::Still && self.needs_a_course()
+    }
+
+    /// Whether a park is not over without it.
+    pub(super) fn is_missing(&self) -> bool {
+        self.is_awaited() || self.is_left_behind()
     }
 
     /// Hears that no such course could be planned.

@@ -259,7 +259,7 @@ impl Engine {
         }
         self.phase = match switch.goal {
             Goal::Home | Goal::Park
-                if course.settled() <= course.start && !self.riders.iter().any(Rider::is_awaited) =>
+                if course.settled() <= course.start && !self.riders.iter().any(Rider::is_missing) =>
             {
                 Phase::Closing(HOLD_FRAMES)
             }

@@ -1,7 +1,7 @@
 //! Between shows: an engine that is loaded waits until somebody lets it go, and the next takes over what the last one knows
 //! of the lanes. Nothing is sent meanwhile.
 
-use super::{Engine, Part, Phase, Rest, Rider, first_phase};
+use super::{Engine, Phase, Rest, Rider, first_phase};
 use crate::engine::Mix;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::time::TRIM_MS;
@@ -62,10 +62,7 @@ impl Engine {
     /// is not ready to play (`ready` false), it rests.
     pub fn take_over(&mut self, before: &Self, ready: bool) {
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
-            rider.count_on(old);
-            if old.part == Part::Away {
-                rider.cut();
-            }
+            rider.go_on_from(old);
         }
         if !ready {
             self.rest_untold();
