@@ -9,12 +9,13 @@ use crate::time::{ShowTime, TRIM_MS};
 impl Engine {
     /// Parks, three hold frames, and the end. Asking again changes nothing.
     ///
-    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end
-    /// at once: nothing has been set in motion, and the lanes may still be on a slow way to park, or where nobody knows.
+    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end, and no
+    /// frame goes out; between shows once that was read. One that was let go ends at once: nothing has been set in motion, and the
+    /// lanes may still be on a slow way to park, or where nobody knows.
     pub fn park(&mut self) {
         let is_over = self.phase == Phase::Done;
         let is_fresh = self.frames == 0 && self.rest().is_none();
-        if (is_over || is_fresh) && self.is_astray() {
+        if is_over || self.phase == Phase::Waiting || (is_fresh && self.is_astray()) {
             self.rest_untold();
         } else if is_over || self.is_homeward() {
             return;

@@ -109,6 +109,7 @@ impl Engine {
     fn look_ahead_at_rest(&mut self, rest: Rest, soonest: ShowTime) {
         let now = self.playhead;
         match rest {
+            Rest::Stopped if self.is_parked_untold() => self.phase = Phase::Done,
             _ if self.homeward => self.ask(Goal::Park, None, now),
             Rest::Late => self.ask(Goal::Cue, Some(soonest), soonest),
             Rest::Ended if self.plays_left == Some(0) => self.ask(Goal::Home, None, now),
