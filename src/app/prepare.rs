@@ -193,7 +193,7 @@ impl<C: Clock> Preparation<'_, C> {
             self.acks.on_sent(Sent::Failed { lane: of, frame: stamped.frame });
         } else {
             let (frame, asked) = (stamped.frame, stamped.asked);
-            self.places.taken(lane, &Taken { frame, asked, pose: &park, lasts_ms: time_ms, at });
+            self.places.taken(lane, &Taken { frame, asked, pose: &park, lasts_ms: time_ms, shakes: 0.0, at });
         }
         prepared.park_frames[lane] += 1;
         if hurried {

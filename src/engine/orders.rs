@@ -2,7 +2,7 @@
 
 use super::wait::is_at;
 use super::{Ending, Engine, Mix, Part, Phase, Rest};
-use crate::belief::KnownPose;
+use crate::belief::{Fall, KnownPose};
 use crate::motion::Pose;
 use crate::time::{ShowTime, TRIM_MS};
 
@@ -108,9 +108,15 @@ impl Engine {
 
     /// Sets what a lane makes of the cue.
     pub fn mix(&mut self, lane: usize, mix: Mix) {
+        let sends_nothing = self.sends_nothing();
         let rider = &mut self.riders[lane];
         rider.refused &= rider.wanted.on == mix.on;
+        let is_put_back = mix.on && !rider.wanted.on;
         rider.wanted = mix;
+        // While it was out nobody minded where it stands.
+        if is_put_back && rider.part == Part::Unseen && !sends_nothing {
+            rider.fall_out(Fall::PutBack);
+        }
     }
 
     /// Brings one lane to rest; after three hold frames nothing goes to it.
@@ -127,7 +133,7 @@ impl Engine {
     /// ([`Engine::slow_down`]), and then it is away, until it is found.
     pub fn go_blind(&mut self, lane: usize) {
         if self.sends_nothing() {
-            return self.fall_out(lane);
+            return self.fall_out(lane, Fall::Gap);
         }
         self.riders[lane].go_blind();
     }
@@ -143,8 +149,8 @@ impl Engine {
     }
 
     /// The same, and it is to be looked at.
-    pub fn fall_out(&mut self, lane: usize) {
-        self.riders[lane].fall_out();
+    pub fn fall_out(&mut self, lane: usize, why: Fall) {
+        self.riders[lane].fall_out(why);
     }
 
     /// A lane's seat is known to be at rest in that pose, `near` of which is noise. One that was away is there again, and joins the
@@ -155,6 +161,8 @@ impl Engine {
         let rider = &mut self.riders[lane];
         let at_park = is_at(&rider.window, known.pose(), &rider.window.park(), near);
         match rider.part {
+            // One that is out is left where it stands.
+            Part::Unseen | Part::Away if !rider.wanted.on => rider.part = Part::Unseen,
             // The course begins at park.
             Part::Unseen | Part::Still if is_fresh && at_park => rider.begin_at_park(known),
             Part::Unseen | Part::Away => {

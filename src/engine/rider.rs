@@ -6,7 +6,7 @@ use super::blind::{self, Axis, Grid, LONGEST_WAY_MS};
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
-use crate::belief::KnownPose;
+use crate::belief::{Fall, KnownPose};
 use crate::limiter::{Admitted, Counts, Limiter, Provenance};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
@@ -33,7 +33,7 @@ pub(super) enum Part {
     Blind(u32),
     /// Rests where it is, until a course leads on from there.
     Still,
-    /// Nothing goes to it: nobody has told yet where it stands.
+    /// Nothing goes to it: nobody has told yet where it stands, or it is out and at park.
     Unseen,
     /// Nothing goes to it, until it is said to be found.
     Away,
@@ -52,10 +52,10 @@ pub(super) struct Rider {
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
     /// Whether it has just come to be away, and is to be looked at before it can come back.
-    fallen: bool,
+    fallen: Option<Fall>,
     /// Ticks for which whoever parks still waits for it to come back.
     awaited: u32,
-    /// Ticks for which that is so once it has fallen out.
+    /// Ticks for which that is so once it has stepped out.
     patience: u32,
     /// Ticks for which its last frame leads it, this one included.
     ahead: u32,
@@ -87,7 +87,7 @@ impl Rider {
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             leaving: None,
-            fallen: false,
+            fallen: None,
             awaited: 0,
             patience: ticks(AWAITED_FOR, rate),
             ahead: 0,
@@ -158,7 +158,7 @@ impl Rider {
     pub(super) fn go_blind(&mut self) {
         match self.part {
             Part::With | Part::Braking(_) => self.part = Part::Blind(0),
-            Part::Still => self.fall_out(),
+            Part::Still => self.fall_out(Fall::Gap),
             Part::Blind(_) | Part::Unseen | Part::Away => {}
         }
     }
@@ -170,7 +170,7 @@ impl Rider {
                 (self.part, self.ahead) = (Part::Unseen, 0);
             }
             Part::Unseen | Part::Away => {}
-            Part::With | Part::Braking(_) | Part::Still | Part::Blind(_) => self.fall_out(),
+            Part::With | Part::Braking(_) | Part::Still | Part::Blind(_) => self.fall_out(Fall::Gap),
         }
     }
 
@@ -186,14 +186,14 @@ impl Rider {
     }
 
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
-    pub(super) const fn fall_out(&mut self) {
+    pub(super) const fn fall_out(&mut self, why: Fall) {
         self.step_out();
-        self.fallen = true;
+        self.fallen = Some(why);
     }
 
-    /// Whether it has just fallen out; said once.
-    pub(super) const fn take_fall(&mut self) -> bool {
-        std::mem::replace(&mut self.fallen, false)
+    /// Why it has just fallen out; said once.
+    pub(super) const fn take_fall(&mut self) -> Option<Fall> {
+        self.fallen.take()
     }
 
     /// It is there (again), at rest in that pose.
@@ -217,7 +217,7 @@ impl Rider {
         self.trail.rest(*self.pose());
         self.limiter.rest();
         if self.is_blind() {
-            self.fall_out();
+            self.fall_out(Fall::Gap);
         } else if self.is_there() {
             self.part = Part::Still;
         }
@@ -258,7 +258,10 @@ impl Rider {
     ) -> Pose {
         self.on_cue = self.part == Part::With && course.is_on_cue(lane, at);
         match self.part {
-            Part::With => course.pose(lane, at, &self.window, cue),
+            Part::With => {
+                self.count_stowed(course.is_settled(lane, at));
+                course.pose(lane, at, &self.window, cue)
+            }
             Part::Braking(since) => self.brake_on(since + time),
             Part::Still => {
                 self.count_holds();
@@ -279,8 +282,21 @@ impl Rider {
         if let Some(left) = &mut self.leaving {
             *left -= 1;
             if *left == 0 {
-                self.fall_out();
+                self.fall_out(Fall::Gap);
             }
+        }
+    }
+
+    /// One that is out, and at park, gets three more frames: whoever works on it is safe from those of the others.
+    fn count_stowed(&mut self, is_settled: bool) {
+        if !(self.out && self.wants_out() && is_settled) {
+            self.leaving = None;
+            return;
+        }
+        let left = self.leaving.get_or_insert(HOLD_FRAMES);
+        match left.checked_sub(1) {
+            Some(fewer) => *left = fewer,
+            None => (self.part, self.leaving) = (Part::Unseen, None),
         }
     }
 
@@ -302,7 +318,7 @@ impl Rider {
         }
         let grid = Grid { rate, index, longest_ms, left_ms: LONGEST_WAY_MS.saturating_sub(since_ms) };
         let Some(leg) = blind::next_leg(&axes, grid) else {
-            self.fall_out();
+            self.fall_out(Fall::Gap);
             return None;
         };
         self.trail.push(Duration::from_millis(u64::from(leg.lasts_ms)), leg.to);

@@ -101,7 +101,7 @@ impl Engine {
     pub(super) const fn sends_nothing(&self) -> bool {
         match self.phase {
             Phase::Waiting | Phase::Done => true,
-            Phase::Resting(Rest::Stopped) => self.holds.are_over(),
+            Phase::Resting(Rest::Paused | Rest::Stopped) => self.holds.are_over(),
             _ => false,
         }
     }

@@ -6,6 +6,7 @@ use super::Why;
 use super::counter::{Counter, Said};
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::window::Window;
+use crate::belief::Fall;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::time::MonoTime;
 use crate::wire::{DPFE, FrameNo};
@@ -78,8 +79,8 @@ pub(super) struct Member {
     pub(super) first_error: Option<Why>,
     /// Its seat was found elsewhere than frames left it.
     pub(super) moved: bool,
-    /// Nobody knows where its frames have led it.
-    pub(super) unsure: bool,
+    /// Nobody knows where its seat is, and why.
+    pub(super) unsure: Option<Why>,
     /// When it was sent to last before each of the last two times that nobody knew that any more.
     falls: [Option<MonoTime>; 2],
     /// The axis, from 0, that told a position outside of its stroke, and which.
@@ -125,7 +126,7 @@ impl Member {
             refusing: false,
             first_error: None,
             moved: false,
-            unsure: false,
+            unsure: None,
             falls: [None; 2],
             outside: None,
             ambiguous: false,
@@ -190,9 +191,12 @@ impl Member {
         self.traffic.sent += datagrams;
     }
 
-    /// A beat was sent at `at`: with no frames going out, an answer to it is the sign of life that is waited for.
+    /// A beat was sent at `at`: with no frames going there, an answer to it is the sign of life that is waited for.
     pub(super) fn on_beat_sent(&mut self, at: MonoTime) {
         self.traffic.sent += 1;
+        if self.flows(at) {
+            return;
+        }
         self.unheard = self.unheard.saturating_add(BEAT_WEIGHT);
         self.waiting.get_or_insert(at);
         self.unanswered.get_or_insert(at);
@@ -322,12 +326,28 @@ impl Member {
     }
 
     /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
-    pub(super) fn on_fell_out(&mut self) {
-        (self.unsure, self.seen, self.reading) = (true, None, false);
+    pub(super) fn on_fell_out(&mut self, why: Fall) {
+        let why = match why {
+            Fall::Gap => Why::Unsure(self.controller),
+            Fall::Astray => Why::Astray(self.controller),
+            Fall::PutBack => Why::NotSeenYet,
+        };
+        (self.unsure, self.seen, self.reading) = (Some(why), None, false);
+        if why == Why::NotSeenYet {
+            return;
+        }
         let [last, before] = self.falls;
         self.falls = [Some(self.asked), last];
         if before.is_some_and(|first| self.asked.since(first) < UNSTEADY) {
             self.first_error.get_or_insert(Why::Unsteady(self.controller));
+        }
+    }
+
+    /// DPF0 was read by itself. Some seats are played without ever having been homed by it: only the loss of it tells something.
+    pub(super) fn on_zero(&mut self, homed: bool) {
+        let was_home = self.must_be_home || self.baseline.is_some_and(|baseline| baseline.homed());
+        if was_home && !homed {
+            self.must_rehome.get_or_insert(Why::NotHome(self.controller));
         }
     }
 
@@ -379,10 +399,14 @@ impl Member {
 
     /// True if frames go there, and it is time to read its packet counter; if so, it counts as sent.
     pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
-        let flows = self.framed.is_some_and(|at| now.since(at) < FLOWS);
-        let due = flows && self.counter.take_turn(self.controller, now);
+        let due = self.flows(now) && self.counter.take_turn(self.controller, now);
         self.traffic.sent += u64::from(due);
         due
+    }
+
+    /// True if frames go there.
+    fn flows(&self, now: MonoTime) -> bool {
+        self.framed.is_some_and(|at| now.since(at) < FLOWS)
     }
 
     pub(super) const fn is_poor(&self) -> bool {
@@ -406,7 +430,7 @@ impl Member {
     /// Whatever was on its way, or was seen, does not count from here on.
     pub(super) fn forget(&mut self) {
         self.seen = None;
-        (self.moved, self.unsure) = (false, false);
+        (self.moved, self.unsure) = (false, None);
         self.reading = false;
         self.next_read = None;
         // Who it is when it is back, and whether it rebooted, is for a sighting to prove.

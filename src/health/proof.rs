@@ -80,6 +80,10 @@ pub(super) enum Verdict {
 }
 
 impl Baseline {
+    pub(super) const fn homed(&self) -> bool {
+        self.homed
+    }
+
     pub(super) fn of(sighting: &Sighting, traffic: Traffic) -> Self {
         let Sighting { identity, packets, homed, .. } = *sighting;
         Self { identity, packets, homed, traffic, late: Late::default() }

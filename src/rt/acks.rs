@@ -279,7 +279,8 @@ fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &
     if let Some(inputs) = inputs {
         observer.on_inputs(controller, inputs, at);
     }
-    let is_answer = watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some();
+    let zero = watch.hear_zero(controller, octets, at);
+    let is_answer = watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some() || zero;
     if let Some(reply) = RegisterReply::parse(octets).ok().filter(|_| is_answer) {
         observer.on_code(controller, reply.code, at);
         watch.mind_stop(controller, reply.code);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use kinocue::engine::Mix;
 use kinocue::state::{PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind};
@@ -12,6 +13,8 @@ use super::seat::{MS, Settings};
 const THREE: Kind = KINDS[0];
 const SIX: Kind = KINDS[1];
 const EIGHT: Kind = KINDS[3];
+/// Two seats, at 50 frames a second.
+const TWO: Kind = KINDS[6];
 const FAST: Kind = KINDS[7];
 
 /// How far apart each axis may stand from where it is meant to be, mm.
@@ -559,4 +562,90 @@ fn nor_at_a_thousand_frames_a_second() {
 fn nor_does_whoever_parks_out_of_a_pause() {
     assert_on_time(THREE, true);
     assert_on_time(FAST, true);
+}
+
+// Seats that ack frames and do not execute them, and seats that frames must not lead.
+
+#[test]
+fn a_seat_that_is_jogged_at_its_keys_in_a_show_is_sent_no_more_and_joins_again_from_where_it_was_left() {
+    for (kind, mm) in [(THREE, 80.0), (FAST, 60.0), (SIX, -25.0)] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ether.world().lines[0].seat.seize(Some((0, mm)), hall.ether.ns(), 600 * MS);
+            hall.pass(500);
+            let frames = hall.ether.world().lines[0].frames;
+            hall.pass(50);
+            assert_eq!(hall.ether.world().lines[0].frames, frames, "{kind:?}: nothing goes to it");
+            hall.pass(3_000);
+            assert!(hall.ether.world().lines[0].frames > frames, "{kind:?}: it joins again");
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_homes_by_itself_in_a_show_is_not_led_until_somebody_has_homed_it() {
+    for kind in [THREE, EIGHT] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ether.world().lines[0].seat.seize(None, hall.ether.ns(), 2_500 * MS);
+            hall.pass(500);
+            let frames = hall.ether.world().lines[0].frames;
+            hall.pass(4_000);
+            assert_eq!(hall.ether.world().lines[0].frames, frames, "{kind:?}: nothing goes to it");
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_is_jogged_in_a_pause_gets_no_frame_and_joins_from_there() {
+    for park in [false, true] {
+        let ether = ether(SIX, |_| {});
+        lead(SIX, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ask(Transition::Pause);
+            hall.pass(1_500);
+            let frames = hall.ether.world().lines[0].frames;
+            assert!(hall.ether.jog(0, 1, 45.0, hall.ether.ns()));
+            hall.pass(2_000);
+            assert_eq!(hall.ether.world().lines[0].frames, frames, "a pause sends nothing");
+            if park {
+                assert!(hall.parks(), "{:?}", hall.state);
+            } else {
+                hall.ask(Transition::Resume);
+                hall.follows(6_000);
+            }
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_was_taken_out_is_parked_gets_no_frame_and_comes_back_from_where_it_was_jogged_to() {
+    let two = TWO;
+    let ether = ether(two, |_| {});
+    lead(two, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(500);
+        let mix = hall.runtime.desk.mix(0);
+        hall.set(0, Mix { on: false, ..mix });
+        hall.pass(3_000);
+        assert!(mm(&hall.ether, 0).abs() < NEAR_MM, "parked, at {} mm", mm(&hall.ether, 0));
+        let frames = hall.ether.world().lines[0].frames;
+        assert!(hall.ether.jog(0, 0, 45.0, hall.ether.ns()));
+        hall.pass(600);
+        // While it still moves.
+        hall.set(0, mix);
+        hall.pass(300);
+        assert_eq!(hall.ether.world().lines[0].frames, frames, "nothing goes to one that moves");
+        hall.pass(3_000);
+        assert!(hall.ether.world().lines[0].frames > frames, "it is back");
+    });
+    assert_no_breach(&ether);
 }

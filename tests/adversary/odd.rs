@@ -58,3 +58,8 @@ fn none_does_whose_controllers_say_after_a_reboot_that_they_know_their_zero() {
 fn no_more_than_are_open_do_whose_controllers_answer_with_where_they_were_up_to_60_ms_before() {
     assert_no_more(Bent::Stale, 4, 0.02);
 }
+
+#[test]
+fn none_does_whose_seats_are_jogged_or_home_by_themselves_in_a_show_and_ack_what_they_do_not_execute() {
+    assert_no_more(Bent::Deaf, 0, 0.0);
+}

@@ -29,6 +29,8 @@ const ADMITTED: u64 = 50 * MS;
 const BOUT: u64 = 1_000 * MS;
 /// For how long a seat is looked at before it counts as at rest.
 const UNSEEN: u64 = 150 * MS;
+/// What was sent within so long after a seat came into other hands is not judged: so long nobody can know of it.
+const SEEN_DEAF: u64 = 400 * MS;
 /// Axes that have registers of their positions, and the first of the two of each.
 pub(crate) const REGISTERS: usize = 6;
 const POSITIONS: [u16; REGISTERS] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
@@ -83,7 +85,18 @@ struct Move {
     to: [f64; 12],
     begin: u64,
     end: u64,
-    homes: bool,
+    why: Why,
+}
+
+/// What a move is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Why {
+    /// A frame, or a person where none comes.
+    Led,
+    /// It homes; what it is told meanwhile it acks and does not do.
+    Homes,
+    /// It is jogged at its keys, and the same.
+    Keys,
 }
 
 /// How a datagram came.
@@ -130,7 +143,7 @@ pub(crate) struct Seat {
     stale: Option<(u64, [f64; 12])>,
     /// When the first and the last frame came of another master that sends for a while.
     foreign: Option<(u64, u64)>,
-    /// Until when a hall may not know of them, and whether they have left it more to do than it has time.
+    /// What was sent before then is not judged: a hall could not know of them, or that the seat was deaf; and whether they have left it more to do than it has time.
     excused_until: u64,
     crowded: bool,
     /// Moves that were hurried though the network brought them as they were sent; and the longest wait in the queue.
@@ -199,11 +212,11 @@ impl Seat {
     }
 
     /// Goes somewhere by itself.
-    fn go(&mut self, to: [f64; 12], mm_s: f64, now: u64, homes: bool) {
+    fn go(&mut self, to: [f64; 12], mm_s: f64, now: u64, why: Why) {
         self.hold(now);
         let far = (0..12).map(|axis| (to[axis] - self.rest[axis]).abs()).fold(0.0, f64::max);
         let takes = (far / PULSES_PER_MM / mm_s * 1e9) as u64;
-        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes.max(200 * MS), homes });
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes.max(200 * MS), why });
     }
 
     /// Somebody jogs an axis by so many millimetres, within its stroke; not while it is led or stopped. The next frame ends it.
@@ -214,9 +227,35 @@ impl Seat {
         }
         let mut to = self.rest;
         to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
-        self.go(to, JOG_MM_S, now, false);
+        self.go(to, JOG_MM_S, now, Why::Led);
         self.jogged = true;
         true
+    }
+
+    /// Somebody takes it out of the hands of whoever leads it, for that long at least: jogs an axis at its keys, or has it home where
+    /// none is given. It acks what it is told meanwhile, and does not do it.
+    pub(crate) fn seize(&mut self, jogged: Option<(usize, f64)>, now: u64, lasts: u64) {
+        self.advance(now);
+        if self.rebooting || self.stopped || self.moving.is_some_and(|current| current.why != Why::Led) {
+            return;
+        }
+        let mut to = self.place(now);
+        let why = match jogged {
+            Some((axis, mm)) => {
+                to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
+                Why::Keys
+            }
+            None => {
+                (to, self.homed) = (self.zero, false);
+                Why::Homes
+            }
+        };
+        self.go(to, JOG_MM_S, now, why);
+        if let Some(own) = &mut self.moving {
+            own.end = own.end.max(now + lasts);
+        }
+        self.executed = None;
+        self.excuse(now + SEEN_DEAF);
     }
 
     /// Its power goes, and is back after that long: it knows its place no longer.
@@ -250,7 +289,7 @@ impl Seat {
         match (pressed, self.settings.stop_mode) {
             (true, 1) => {
                 let zero = self.zero;
-                self.go(zero, OWN_MM_S, now, false);
+                self.go(zero, OWN_MM_S, now, Why::Led);
             }
             (true, _) => self.hold(now),
             // Only a reset ends it.
@@ -262,10 +301,10 @@ impl Seat {
     }
 
     fn advance_moves(&mut self, now: u64) {
-        while let Some(Move { to, end, homes, .. }) = self.moving.filter(|current| current.end <= now) {
+        while let Some(Move { to, end, why, .. }) = self.moving.filter(|current| current.end <= now) {
             self.rest = to;
             self.moving = None;
-            self.homed |= homes;
+            self.homed |= why == Why::Homes;
             self.begin_next(end);
         }
     }
@@ -283,8 +322,9 @@ impl Seat {
             *to = command.to[axis] + self.zero[axis];
         }
         let sent_before = self.foreign.is_some_and(|(first, _)| command.sent_ns < first);
-        self.crowded = now < self.excused_until || sent_before || (self.crowded && waiting > PATIENT);
-        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
+        let is_excused = command.sent_ns < self.excused_until;
+        self.crowded = is_excused || sent_before || (self.crowded && waiting > PATIENT);
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, why: Why::Led });
         if command.foreign {
             return;
         }
@@ -365,7 +405,7 @@ impl Seat {
                     self.homings += 1;
                     (self.zero, self.homed, self.stopped) = (zero, false, self.button.0);
                     (self.last_absolute, self.executed) = (None, None);
-                    self.go(zero, OWN_MM_S, arrival.at, true);
+                    self.go(zero, OWN_MM_S, arrival.at, Why::Homes);
                 }
                 words::register_reply(octets, x, 0, &[value])
             }
@@ -385,7 +425,7 @@ impl Seat {
         }
     }
 
-    /// Up to then nobody can know that another master sends to it.
+    /// Up to then nobody can know that another master sends to it, or that it does not hear.
     pub(crate) fn excuse(&mut self, until: u64) {
         self.excused_until = self.excused_until.max(until);
     }
@@ -417,8 +457,8 @@ impl Seat {
         if self.jogged {
             self.hold(at);
         }
-        let homes = self.moving.is_some_and(|current| current.homes);
-        if self.stopped || homes || self.queue.len() >= DEPTH {
+        let is_deaf = self.moving.is_some_and(|current| current.why != Why::Led);
+        if self.stopped || is_deaf || self.queue.len() >= DEPTH {
             return;
         }
         let time_ms = self.time_of(frame);
@@ -483,7 +523,7 @@ impl Seat {
             let upper = (at == POSITIONS[axis]) == self.settings.high_first;
             return if upper { (position >> 16) as u16 } else { position as u16 };
         }
-        let homes = self.moving.is_some_and(|current| current.homes);
+        let homes = self.moving.is_some_and(|current| current.why == Why::Homes);
         match at {
             0x34 if self.settings.mbox => 0,
             0x34 => self.packets,

@@ -75,7 +75,7 @@ impl Supervisor {
         let live = &self.runtime.live;
         let table = live.table();
         let times = live.times();
-        let moving = live.is_moving();
+        let moving = self.mirror.state.may_send_motion();
         let position = |cued: &super::ProvedShow| if moving { live.show() } else { cued.start };
         Status {
             hall: self.runtime.config.show.name.clone(),
