@@ -370,7 +370,7 @@ impl Rider {
 
     /// Whether it may still come to park: it has just stepped out and is looked at, or is about to.
     pub(super) const fn is_awaited(&self) -> bool {
-        self.awaited > 0 || self.is_blind()
+        self.wanted.on && (self.awaited > 0 || self.is_blind())
     }
 
     /// Whether it is there again, and the others left for park without it.
