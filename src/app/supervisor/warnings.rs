@@ -34,6 +34,7 @@ impl Supervisor {
     /// All of them, gravest first.
     pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
+        warnings.extend(self.of_nobody(table));
         warnings.extend(self.of_strangers());
         warnings.extend(self.of_belts(table));
         warnings.extend(self.of_the_machine());
@@ -81,6 +82,22 @@ impl Supervisor {
             })
         };
         controllers.filter_map(of).collect::<Vec<_>>().into_iter()
+    }
+
+    /// A hall may play and park with all its seats out; none of what its state says is true of any then.
+    fn of_nobody(&self, table: &[Row]) -> Option<Warning> {
+        let takes_part = |(lane, row): (usize, &Row)| self.settings.is_on(lane) && row.standing.may_move();
+        let is_looked_for = |row: &Row| row.why == Why::NotSeenYet;
+        if table.iter().all(is_looked_for) || table.iter().enumerate().any(takes_part) {
+            return None;
+        }
+        Some(Warning {
+            id: "no-seat".to_owned(),
+            severity: Severity::Error,
+            controller: None,
+            text: format!("no seat takes part: \"{}\" is said of none", self.mirror.state),
+            remedy: "take seats in (`kinocue enable`), or see at each what keeps it out".to_owned(),
+        })
     }
 
     fn of_strangers(&self) -> impl Iterator<Item = Warning> {
