@@ -36,8 +36,8 @@ const SETTLE: Duration = Duration::from_millis(50);
 /// So long after its frames a seat may be where they have led it: on their way, in the controller's queue, in its filters. Three
 /// periods come to it: more frames than that in its queue it goes through in haste, or lags behind the film for good.
 const FOLLOWS: Duration = Duration::from_millis(100);
-/// A reading that came later than this after it was asked for says nothing of a seat that frames lead.
-const STALE: Duration = Duration::from_millis(300);
+/// A reading from before this says nothing of a seat that frames lead: where they led it then is not kept.
+const STALE: Duration = Duration::from_millis(400);
 /// How far from wherever frames have led it a seat may be found that follows them, strokes: 1.5 mm of 150.
 const ASTRAY: f64 = 0.01;
 /// Rounding to pulses, and the step from one whole millisecond to the next, may take a frame past the greatest speed by this.

@@ -310,7 +310,7 @@ fn an_answer_that_came_late_is_held_against_all_since_it_was_asked_for_and_one_m
 {
     assert_eq!(passes(&mut ridden(), 0.28, 350, 500), Found::Nothing, "it was there 300 ms ago");
     assert_eq!(passes(&mut ridden(), 0.9, 350, 500), Found::Astray);
-    assert_eq!(passes(&mut ridden(), 0.9, 190, 500), Found::Nothing);
+    assert_eq!(passes(&mut ridden(), 0.9, 90, 500), Found::Nothing);
 }
 
 #[test]

@@ -20,6 +20,8 @@ const TIMES: u32 = 3;
 const REST_REPEATED: Duration = Duration::from_millis(500);
 /// An answer that comes later than this is none; so long after an answer was repeated others may be.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+/// A repeated answer is hardly older than this.
+const REPEATED: Duration = Duration::from_millis(300);
 /// An answer is lost rather than late after this.
 const LATE: Duration = Duration::from_millis(300);
 /// Requests that may be open at a time; of more the older ones count.
@@ -127,11 +129,20 @@ impl Positions {
         asked
     }
 
+    /// True if no further request finds a place, since answers are lost.
+    pub(super) fn is_full(&mut self, now: MonoTime) -> bool {
+        (0..REGISTERS).step_by(AXES_PER_BLOCK).any(|first| self.open(first, now).len() == OPEN)
+    }
+
     /// Hears an answer: where axes are, from `first` on. One that nobody waits for tells of no place. Gives what it tells by itself.
     pub(super) fn answer(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> Option<Reading> {
+        let newest = self.open(first, at).back().copied();
         let made = self.open(first, at).pop_front()?;
         self.answered = self.answered.max(made);
         self.hear(first, positions, made, at, Source::Registers);
+        // Whether a seat follows its frames is a question of now: it is looked at once more than needs be where this is an older answer.
+        let newest = newest.unwrap_or(made);
+        let made = if self.may_be_repeated(at) { newest.before(REPEATED) } else { newest };
         Some(self.in_passing(first, positions, made))
     }
 
@@ -152,7 +163,7 @@ impl Positions {
     }
 
     /// True while any answer may be an older one that the network repeats.
-    pub(super) fn may_be_repeated(&self, at: MonoTime) -> bool {
+    fn may_be_repeated(&self, at: MonoTime) -> bool {
         at < self.repeats_until
     }
 

@@ -225,7 +225,7 @@ impl Watch {
     /// well.
     fn on_passing(&self, controller: usize, passing: &Reading, at: MonoTime) {
         let positions = &self.positions[controller];
-        if !self.live.is_moving() || positions.may_be_repeated(at) || positions.reading(at).is_some() {
+        if !self.live.is_moving() || positions.reading(at).is_some() {
             return;
         }
         if let Some(evidence) = self.live.evidence(controller) {

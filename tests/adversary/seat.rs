@@ -29,8 +29,9 @@ const ADMITTED: u64 = 50 * MS;
 const BOUT: u64 = 1_000 * MS;
 /// For how long a seat is looked at before it counts as at rest.
 const UNSEEN: u64 = 150 * MS;
-/// What was sent within so long after a seat came into other hands is not judged: so long nobody can know of it.
-const SEEN_DEAF: u64 = 400 * MS;
+/// A seat that does not hear is seen to be elsewhere once it is so far from where it is led, mm, and within so long.
+const VISIBLE_MM: f64 = 1.5;
+const SEEN: u64 = 350 * MS;
 /// Axes that have registers of their positions, and the first of the two of each.
 pub(crate) const REGISTERS: usize = 6;
 const POSITIONS: [u16; REGISTERS] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
@@ -145,6 +146,8 @@ pub(crate) struct Seat {
     foreign: Option<(u64, u64)>,
     /// What was sent before then is not judged: a hall could not know of them, or that the seat was deaf; and whether they have left it more to do than it has time.
     excused_until: u64,
+    /// Whether it was led visibly elsewhere by the frames that come now, since it does not hear.
+    astray: bool,
     crowded: bool,
     /// Moves that were hurried though the network brought them as they were sent; and the longest wait in the queue.
     pub(crate) hurried: u32,
@@ -180,6 +183,7 @@ impl Seat {
             stale: None,
             foreign: None,
             excused_until: 0,
+            astray: false,
             crowded: false,
             hurried: 0,
             waited_ns: 0,
@@ -254,8 +258,7 @@ impl Seat {
         if let Some(own) = &mut self.moving {
             own.end = own.end.max(now + lasts);
         }
-        self.executed = None;
-        self.excuse(now + SEEN_DEAF);
+        (self.executed, self.astray) = (None, false);
     }
 
     /// Its power goes, and is back after that long: it knows its place no longer.
@@ -305,11 +308,13 @@ impl Seat {
             self.rest = to;
             self.moving = None;
             self.homed |= why == Why::Homes;
-            self.begin_next(end);
+            self.begin_next(end, true);
         }
     }
 
-    fn begin_next(&mut self, now: u64) {
+    /// Begins with the next command; what has waited behind another master's is not judged, whatever the hall could know: no reading
+    /// tells of a queue.
+    fn begin_next(&mut self, now: u64, has_waited: bool) {
         let waiting = self.queue.len();
         let Some(command) = self.queue.pop_front() else { return };
         let bunched = self.heaped || now < self.bunched_until;
@@ -323,7 +328,7 @@ impl Seat {
         }
         let sent_before = self.foreign.is_some_and(|(first, _)| command.sent_ns < first);
         let is_excused = command.sent_ns < self.excused_until;
-        self.crowded = is_excused || sent_before || (self.crowded && waiting > PATIENT);
+        self.crowded = command.foreign || is_excused || sent_before || (self.crowded && has_waited);
         self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, why: Why::Led });
         if command.foreign {
             return;
@@ -443,6 +448,8 @@ impl Seat {
     fn on_motion(&mut self, frame: &Frame, arrival: Arrival) {
         let Arrival { at, sent, .. } = arrival;
         if let Some((came, sent_before)) = self.came.replace((at, sent)) {
+            // Whoever had given it up tries once more.
+            self.astray &= at < came + LED;
             let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
             if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
                 (self.bunched_until, self.heaped) = (at + BUNCHED, true);
@@ -458,6 +465,10 @@ impl Seat {
             self.hold(at);
         }
         let is_deaf = self.moving.is_some_and(|current| current.why != Why::Led);
+        if is_deaf && !self.astray && self.is_led_away(frame, at) {
+            self.astray = true;
+            self.excuse(at + SEEN);
+        }
         if self.stopped || is_deaf || self.queue.len() >= DEPTH {
             return;
         }
@@ -475,12 +486,19 @@ impl Seat {
             foreign,
         });
         if self.moving.is_none() {
-            self.begin_next(at);
+            self.begin_next(at, false);
         } else if !self.heaped {
             let ahead: u64 = self.queue.iter().rev().skip(1).map(|command| command.time_ns).sum();
             let end = self.moving.map_or(at, |current| current.end);
             self.waited_ns = self.waited_ns.max(ahead + end.saturating_sub(at));
         }
+    }
+
+    fn is_led_away(&self, frame: &Frame, at: u64) -> bool {
+        let place = self.place(at);
+        let axes = frame.axes.min(self.settings.axes);
+        let far = |axis: usize| (f64::from(frame.positions[axis]) + self.zero[axis] - place[axis]).abs();
+        (0..axes).any(|axis| far(axis) > VISIBLE_MM * PULSES_PER_MM)
     }
 
     /// How long its move takes, ms: its Time, or the difference to that of the absolute frame before.

@@ -56,7 +56,7 @@ impl Watch {
         }
         if self.live.is_moving() {
             while let Some(controller) = self.beats.take_led(now) {
-                if !self.positions[controller].is_behind(now) {
+                if !self.positions[controller].is_full(now) {
                     self.ask_beat(controller, true, now);
                 }
             }
