@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::late::Late;
+use super::late::Overdue;
 use super::proof::Traffic;
 use crate::time::MonoTime;
 
@@ -38,7 +38,7 @@ struct Count {
     traffic: Traffic,
     at: MonoTime,
     /// What it has not counted of all that was sent before.
-    late: Late,
+    late: Overdue,
 }
 
 /// What a count says.
@@ -75,7 +75,7 @@ impl Counter {
     pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<Said> {
         let packets = self.told.take()?;
         let anew = std::mem::take(&mut self.anew);
-        let count = Count { packets, traffic, at: now, late: Late::default() };
+        let count = Count { packets, traffic, at: now, late: Overdue::default() };
         let Some(first) = self.first.filter(|first| now.since(first.at) < STALE) else {
             self.first = Some(count);
             return None;
@@ -86,7 +86,7 @@ impl Counter {
         let tolerated = TOLERATED + sent / DOUBLED;
         let fits = grown <= sent + first.late.most(now) + tolerated && grown + tolerated >= acked;
         if now.since(first.at) >= SPAN || !fits || anew {
-            let late = if fits { first.late.after(sent, grown, now) } else { Late::default() };
+            let late = if fits { first.late.after(sent, grown, now) } else { Overdue::default() };
             self.first = Some(Count { late, ..count });
         }
         if anew {

@@ -10,14 +10,14 @@ const HELD_FOR: Duration = Duration::from_secs(15);
 
 /// Datagrams that may still arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Late {
+pub(super) struct Overdue {
     young: u64,
     old: u64,
     /// Since when what is missing counts as young.
     turned: MonoTime,
 }
 
-impl Late {
+impl Overdue {
     /// How many may arrive from `now` on.
     pub(super) fn most(self, now: MonoTime) -> u64 {
         let Self { young, old, .. } = self.aged(now);
@@ -49,12 +49,12 @@ mod tests {
     #[test]
     fn what_is_missing_may_come_for_a_while_and_is_lost_after_it() {
         let s = |seconds: u64| MonoTime::from_nanos(seconds * 1_000_000_000);
-        let late = Late::default().after(100, 40, s(100));
+        let late = Overdue::default().after(100, 40, s(100));
         assert_eq!([101, 114, 116, 129, 130].map(|at| late.most(s(at))), [60, 60, 60, 60, 0]);
         let come = late.after(10, 60, s(102));
         assert_eq!((come.most(s(103)), come.after(10, 90, s(103)).most(s(104))), (10, 0));
         // What is missed again and again is no more than what the last half a minute has.
-        let thin = (0..1_000).fold(Late::default(), |late, at| late.after(100, 99, s(at)));
+        let thin = (0..1_000).fold(Overdue::default(), |late, at| late.after(100, 99, s(at)));
         assert!((15..=30).contains(&thin.most(s(1_000))), "{thin:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Decides if a controller that is back is the one it was, and has not rebooted: its identity, and its count of datagrams.
 //!
 //! DP34 counts the datagrams that a controller received, round after 65,535. Since it was last read, it must have grown
-//! by at least the frames that were acked and at most by all that was sent, and by what was held back before ([`Late`]); whether
+//! by at least the frames that were acked and at most by all that was sent, and by what was held back before ([`Overdue`]); whether
 //! reads count is left open. A
 //! controller that rebooted began at 0 and hardly ever meets that; where it counts more than it could since, somebody else
 //! sent to it.
@@ -9,7 +9,7 @@
 //! An MBOX controller has no DP34. That one did not reboot is proved by its answers: it needs a second to start, and then
 //! homes, so whoever has answered all the while has not.
 
-use super::late::Late;
+use super::late::Overdue;
 use crate::time::MonoTime;
 
 /// What was read of a controller.
@@ -64,7 +64,7 @@ pub(super) struct Baseline {
     homed: bool,
     traffic: Traffic,
     /// What it had not counted then of all that was sent before.
-    late: Late,
+    late: Overdue,
 }
 
 /// What a sighting says beside the baseline.
@@ -86,7 +86,7 @@ impl Baseline {
 
     pub(super) fn of(sighting: &Sighting, traffic: Traffic) -> Self {
         let Sighting { identity, packets, homed, .. } = *sighting;
-        Self { identity, packets, homed, traffic, late: Late::default() }
+        Self { identity, packets, homed, traffic, late: Overdue::default() }
     }
 
     /// The one that follows it, of a sighting that it believes.
