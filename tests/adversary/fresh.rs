@@ -168,6 +168,8 @@ fn nothing_is_left_on_at_a_seat_that_stays_out_since_it_went_astray_or_was_cut_o
                         hall.ether.turns(0, Weather::Cut, 600);
                     }
                     hall.pass(3_500);
+                    let table = hall.runtime.live.table();
+                    println!("{} Hz, deaf {deaf}: {:?}, {:?}", kind.hz, table[0].standing, table[0].why);
                 }
                 let before = frames(hall, 0);
                 hall.pass(1_000);
