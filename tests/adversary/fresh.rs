@@ -12,6 +12,9 @@ use super::ether::{Ether, Weather};
 use super::hall::{Hall, Thread, breaches, open, seats};
 use super::seat::{MS, Settings};
 
+/// Something that somebody does.
+type Ask = fn(&mut Hall<'_, '_>);
+
 const WET: usize = 3;
 const WET_AT_REST: usize = 4;
 
@@ -303,7 +306,7 @@ fn no_seat_that_vibrates_and_follows_is_cut_off() {
 /// Nothing that is asked at any tick of a seat's way out or in, or of a pause, moves a seat as none may, or panics.
 #[test]
 fn no_two_requests_one_after_the_other_move_a_seat_as_none_may() {
-    let asks: [(&str, fn(&mut Hall<'_, '_>)); 10] = [
+    let asks: [(&str, Ask); 10] = [
         ("pause", |hall| hall.ask(Transition::Pause)),
         ("resume", |hall| hall.ask(Transition::Resume)),
         ("stop", |hall| hall.ask(Transition::Stop)),
