@@ -64,7 +64,7 @@ fn moving(played: &Played, from: usize) -> usize {
 }
 
 #[test]
-fn a_stop_slows_every_seat_from_the_next_frame_on_then_holds_three_frames_and_sends_no_more() {
+fn a_stop_slows_every_seat_from_the_next_frame_on_then_holds_for_70_ms_and_sends_no_more() {
     for hz in [50_u32, 100, 333, 1000] {
         for part in 0..20 {
             let at = hz * 4 + hz * part / 4;
@@ -95,7 +95,7 @@ fn the_first_frame_after_a_stop_is_slower_than_the_one_before() {
 }
 
 #[test]
-fn a_pause_tells_the_seats_three_times_to_hold_and_then_nothing_and_resume_joins_the_film_where_it_waited() {
+fn a_pause_tells_the_seats_for_70_ms_to_hold_and_then_nothing_and_resume_joins_the_film_where_it_waited() {
     let smooth = ride().play();
     let played =
         ride().with(600, Event::Ask(Transition::Pause)).with(1_000, Event::Ask(Transition::Resume)).play();
@@ -107,7 +107,7 @@ fn a_pause_tells_the_seats_three_times_to_hold_and_then_nothing_and_resume_joins
     let quiet = frames.windows(2).position(|pair| pair[1].at.since(pair[0].at) > Duration::from_secs(3));
     let quiet = quiet.expect("nothing is sent for as long as the pause lasts");
     let rest = frames[..=quiet].iter().rev().take_while(|f| pulses(f) == pulses(frames[quiet])).count();
-    assert!((3..=5).contains(&rest), "the last of the slowing holds as well: {rest}");
+    assert!((7..=9).contains(&rest), "the last of the slowing holds as well: {rest}");
     assert!(frames.iter().all(|frame| frame.request.time_ms == 10), "none keeps those of the join waiting");
     // From the end on both shows send the same.
     let tail = |played: &Played| played.lane(0).rev_pulses(700);
@@ -298,13 +298,13 @@ fn a_pause_in_whichever_tick_a_seat_is_told_that_it_is_out_keeps_it_out() {
             .with(pause + 100, Event::Ask(Transition::Resume))
             .play();
         assert_eq!(played.ended.ending, Ending::Completed, "{back}");
-        assert!(played.lane(1).count() < told + 20, "{back}: {} frames", played.lane(1).count());
+        assert!(played.lane(1).count() < told + 40, "{back}: {} frames", played.lane(1).count());
         assert_eq!(played.lane(1).rev_pulses(3), [0; 3], "{back}: at park");
     }
 }
 
 #[test]
-fn a_lost_controller_is_brought_to_rest_told_so_three_times_and_gets_nothing_until_it_is_back() {
+fn a_lost_controller_is_brought_to_rest_told_so_for_70_ms_and_gets_nothing_until_it_is_back() {
     let smooth = two_seats().play();
     let played = two_seats().with(500, Event::Alarm(Alarm::Leave(1))).play();
     assert_eq!(bytes(&played, 0), bytes(&smooth, 0), "the other plays on");
@@ -420,7 +420,7 @@ fn a_stall_in_the_middle_of_a_stop_leaves_the_seat_where_the_stall_left_it() {
     let late = Event::Late(Duration::from_millis(300));
     let played = ride().with(500, Event::Stop).with(505, late).with(700, Event::Leave).play();
     let frames: Vec<i32> = played.lane(0).map(pulses).collect();
-    assert_eq!(frames.len(), 505 + 3, "three hold frames after the stall: {}", frames.len());
+    assert_eq!(frames.len(), 505 + 7, "70 ms of hold frames after the stall: {}", frames.len());
     assert!(frames[504..].iter().all(|pulses| *pulses == frames[504]));
 }
 

@@ -27,7 +27,7 @@ fn pulses_of_cue(played: &Played, axis: usize, at: ShowTime) -> i32 {
 }
 
 #[test]
-fn a_show_joins_the_cue_follows_it_parks_and_closes_with_three_hold_frames() {
+fn a_show_joins_the_cue_follows_it_parks_and_closes_with_hold_frames() {
     let played = Virtual::new(swell(3, 6, 40.0, 0.4)).play();
     assert_eq!(played.ended.ending, Ending::Completed);
     assert_eq!(played.ended.missed, 0);
@@ -46,7 +46,10 @@ fn a_show_joins_the_cue_follows_it_parks_and_closes_with_three_hold_frames() {
         .rev()
         .take_while(|frame| frame.request.positions.iter().all(|axis| axis.0 == 0))
         .count();
-    assert!((4..10).contains(&at_rest), "the last pose of the way to park, three hold frames: {at_rest}");
+    assert!(
+        (8..14).contains(&at_rest),
+        "the last pose of the way to park, and 70 ms of hold frames: {at_rest}"
+    );
 }
 
 #[test]

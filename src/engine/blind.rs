@@ -27,6 +27,8 @@ const SPEED_SHARE: f64 = 0.98;
 const STEP_SHARE: f64 = 0.9;
 /// How long the whole way may take, ms: it is gone without knowing where the seat is, and a stop waits for it.
 pub(super) const LONGEST_WAY_MS: u32 = 1_000;
+/// How long a line takes that leads nowhere, seconds.
+const STILL_S: f64 = 0.1;
 /// From one size of steps to the next that is tried, and how many are: the largest is 800 times the gentlest.
 const HARDER: f64 = 1.12;
 const TRIES: usize = 60;
@@ -126,7 +128,8 @@ impl Grid {
     }
 }
 
-/// The next line of that way to rest; none once all axes rest, or where no frame can bring them there.
+/// The next line of that way to rest, and of the rest of [`LONGEST_WAY_MS`]; none once that is over, or where no frame can bring
+/// the axes there.
 pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
     let mut axes = *axes;
     // Each axis as gently as it can alone: one that is short of room is not to brake the others.
@@ -135,7 +138,11 @@ pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
     }
     let harder = gentlest(&axes, grid)?;
     slow(&mut axes, harder);
-    if rest(&axes) { None } else { go(&mut axes, grid) }
+    if rest(&axes) {
+        // Vibration and effects end with the first of them that arrives.
+        return line(&mut axes, grid, STILL_S).filter(|leg| leg.lasts_ms <= grid.left_ms);
+    }
+    go(&mut axes, grid)
 }
 
 /// How many times as large as they are the steps have to be.
@@ -170,7 +177,12 @@ fn rest(axes: &[Axis]) -> bool {
 
 /// Goes one line on at the present speeds; none where that leads out of a stroke, or takes too long.
 fn go(axes: &mut [Axis], grid: Grid) -> Option<Leg> {
-    let needs_s = axes.iter().map(Axis::needs_s).fold(0.0, f64::max);
+    line(axes, grid, 0.0)
+}
+
+/// The same with a line that takes `least_s` at the least.
+fn line(axes: &mut [Axis], grid: Grid, least_s: f64) -> Option<Leg> {
+    let needs_s = axes.iter().map(Axis::needs_s).fold(least_s, f64::max);
     let (ticks, lasts_ms) = grid.line(needs_s)?;
     let mut to = [0.0; MAX_AXES];
     for (axis, to) in axes.iter_mut().zip(&mut to) {
@@ -254,10 +266,12 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_that_is_slower_than_one_step_rests_at_once() {
+    fn a_lane_that_is_slower_than_one_step_rests_at_once_and_is_told_so_for_the_rest_of_a_second() {
         let grid = grid(100.0, 3_000);
-        assert_eq!(next_leg(&one(axis(75.0, -50.0, 10.0, grid.rate)), grid), None);
-        assert_eq!(next_leg(&[Axis::PADDING; MAX_AXES], grid), None);
+        let slow = one(axis(75.0, -50.0, 10.0, grid.rate));
+        let leg = next_leg(&slow, grid).expect("it is told");
+        assert!((leg.to[0] * 150.0 - 75.0).abs() < 1e-9 && leg.lasts_ms >= 100, "{leg:?}");
+        assert_eq!(next_leg(&slow, Grid { left_ms: 90, ..grid }), None, "it has been told for long enough");
     }
 
     #[test]
@@ -324,6 +338,7 @@ mod tests {
                 pose = leg.to;
                 at += u64::from(leg.lasts_ms);
                 grid.index += u64::from(leg.ticks);
+                grid.left_ms -= leg.lasts_ms;
             }
         }
 

@@ -32,7 +32,7 @@ use crate::time::{Rate, ShowTime};
 use crate::timeline::{EffectSet, Hint, Timeline};
 use crate::wire::Timing;
 use rest::Holds;
-use rider::{HOLD_FRAMES, Part, Rider};
+use rider::{Part, Rider, hold_frames};
 use slew::Slew;
 use stamps::Stamps;
 use switch::{Retired, Scenes, Switch};
@@ -215,7 +215,7 @@ impl Engine {
             trim_ms: 0,
             late_answers: 0,
             frames: 0,
-            holds: Holds::default(),
+            holds: Holds::new(show.rate),
             playhead: show.start,
             reached: show.start,
             slew: Slew::new(show.rate),
@@ -284,7 +284,7 @@ impl Engine {
 
     /// True if lanes rest in a pause, have been told so, and nobody has asked yet for the way on: nothing is sent to them.
     #[must_use]
-    pub const fn waits_in_pause(&self) -> bool {
+    pub fn waits_in_pause(&self) -> bool {
         matches!(self.phase, Phase::Resting(Rest::Paused))
             && self.sends_nothing()
             && !self.resuming
@@ -343,9 +343,9 @@ impl Engine {
 
     /// Whether the lanes were stopped, rest, and have been told so.
     #[must_use]
-    pub const fn is_told_to_rest(&self) -> bool {
+    pub fn is_told_to_rest(&self) -> bool {
         match self.phase {
-            Phase::Resting(Rest::Stopped) => self.holds.are_over(),
+            Phase::Resting(Rest::Stopped) => self.is_told(),
             Phase::Done => true,
             _ => false,
         }

@@ -2,37 +2,42 @@
 
 use std::time::Duration;
 
-use super::{Beat, Engine, HOLD_FRAMES, Part, Phase, Rest, Rider, Step};
+use super::rider::hold_frames;
+use super::{Beat, Engine, Part, Phase, Rest, Rider, Step};
 use crate::plan::{Curve, Scene};
-use crate::time::ShowTime;
+use crate::time::{Rate, ShowTime};
 use crate::timeline::Hint;
 
-/// The hold frames of a rest so far. Where the show is to go on soon each tick sends one. Else there are three, and then none: one
-/// that came later would take a seat back that somebody has moved by hand meanwhile.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Holds(u8);
+/// The hold frames that a rest has yet to send. Where the show is to go on soon each tick sends one. Else they end with the rest's
+/// first tenth of a second: one that came later would take a seat back that somebody has moved by hand meanwhile.
+#[derive(Debug, Clone)]
+pub(super) struct Holds {
+    all: u8,
+    left: u8,
+}
 
 impl Holds {
+    pub(super) fn new(rate: Rate) -> Self {
+        Self { all: hold_frames(rate), left: 0 }
+    }
+
     /// A rest begins.
     pub(super) const fn begin(&mut self) {
-        self.0 = 0;
+        self.left = self.all;
     }
 
     /// A rest of which no frame tells.
     pub(super) const fn skip(&mut self) {
-        self.0 = HOLD_FRAMES;
+        self.left = 0;
     }
 
     /// True if a rest has been told often enough.
     pub(super) const fn are_over(&self) -> bool {
-        self.0 >= HOLD_FRAMES
+        self.left == 0
     }
 
-    /// True if this tick sends one.
-    const fn next(&mut self, rest: Rest) -> bool {
-        let is_due = !self.are_over() || matches!(rest, Rest::Late | Rest::Ended);
-        self.0 = self.0.saturating_add(1);
-        is_due
+    const fn count(&mut self) {
+        self.left = self.left.saturating_sub(1);
     }
 }
 
@@ -92,9 +97,10 @@ impl Engine {
 
     /// What a tick at rest sends.
     pub(super) fn hold(&mut self, rest: Rest, time_ms: u32) -> Step {
-        if !self.holds.next(rest) {
+        if matches!(rest, Rest::Paused | Rest::Stopped) && self.is_told() {
             return Step::Quiet;
         }
+        self.holds.count();
         if matches!(rest, Rest::Paused | Rest::Stopped) {
             self.stamps.hold();
         }

@@ -12,8 +12,15 @@ use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
 use crate::time::{Rate, ShowTime};
 
-/// Hold frames that end a lane's motion.
-pub(super) const HOLD_FRAMES: u8 = 3;
+/// For how long frames hold a lane that has come to rest, and three at the least: if none of them arrives, that is known by then, and
+/// what it has on does not stay on.
+const HOLD: Duration = Duration::from_millis(70);
+
+/// Hold frames that end a motion.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "70 of a thousand a second")]
+pub(super) fn hold_frames(rate: Rate) -> u8 {
+    (HOLD.as_secs_f64() * rate.hz()).round().clamp(3.0, 255.0) as u8
+}
 
 /// One that falls out is read at rest after a second or two, if it answers at all.
 const AWAITED_FOR: Duration = Duration::from_secs(3);
@@ -49,6 +56,8 @@ pub(super) struct Rider {
     pub(super) wanted: Mix,
     /// Whether it is out on the course that is followed.
     pub(super) out: bool,
+    /// Hold frames that end a motion of it.
+    holds: u8,
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
     /// Whether it has just come to be away, and is to be looked at before it can come back.
@@ -86,6 +95,7 @@ impl Rider {
             part: Part::Unseen,
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
+            holds: hold_frames(rate),
             leaving: None,
             fallen: None,
             awaited: 0,
@@ -151,15 +161,14 @@ impl Rider {
     /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
     pub(super) fn leave(&mut self) {
         if self.is_there() {
-            self.leaving.get_or_insert(HOLD_FRAMES);
+            self.leaving.get_or_insert(self.holds);
         }
     }
 
-    /// Nobody knows which frames reach it. One that rests is left where it is.
+    /// Nobody knows which frames reach it. One that rests is told so on: it may not have heard of it, and vibrate.
     pub(super) fn go_blind(&mut self) {
         match self.part {
-            Part::With | Part::Braking(_) => self.part = Part::Blind(0),
-            Part::Still => self.fall_out(Fall::Gap),
+            Part::With | Part::Braking(_) | Part::Still => self.part = Part::Blind(0),
             Part::Blind(_) | Part::Unseen | Part::Away => {}
         }
     }
@@ -296,7 +305,7 @@ impl Rider {
             self.leaving = None;
             return;
         }
-        let left = self.leaving.get_or_insert(HOLD_FRAMES);
+        let left = self.leaving.get_or_insert(self.holds);
         match left.checked_sub(1) {
             Some(fewer) => *left = fewer,
             None => (self.part, self.leaving) = (Part::Unseen, None),

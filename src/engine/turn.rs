@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::switch::{Goal, Switch};
-use super::{Ending, Engine, HOLD_FRAMES, Phase, Rest, Rider};
+use super::{Ending, Engine, Phase, Rest, Rider, hold_frames};
 use crate::plan::{Course, From, Request, Scene, To};
 use crate::time::ShowTime;
 
@@ -97,7 +97,7 @@ impl Engine {
             self.homeward = true;
             self.come_down(Rest::Ended);
         } else if !self.riders.iter().any(Rider::is_awaited) {
-            self.phase = Phase::Closing(HOLD_FRAMES);
+            self.phase = Phase::Closing(hold_frames(self.show.rate));
         }
     }
 
@@ -262,7 +262,7 @@ impl Engine {
             Goal::Home | Goal::Park
                 if course.settled() <= course.start && !self.riders.iter().any(Rider::is_missing) =>
             {
-                Phase::Closing(HOLD_FRAMES)
+                Phase::Closing(hold_frames(self.show.rate))
             }
             Goal::Home | Goal::Park => Phase::Parking,
             Goal::Again | Goal::Cue | Goal::Lanes => Phase::Riding,

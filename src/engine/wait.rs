@@ -97,11 +97,16 @@ impl Engine {
         self.phase = Phase::Resting(Rest::Stopped);
     }
 
+    /// True if lanes at rest have been told so, or so often that it is known which of them have not heard of it.
+    pub(super) fn is_told(&self) -> bool {
+        self.holds.are_over() && !self.riders.iter().any(Rider::is_blind)
+    }
+
     /// Whether no frame tells a lane that it is to rest.
-    pub(super) const fn sends_nothing(&self) -> bool {
+    pub(super) fn sends_nothing(&self) -> bool {
         match self.phase {
             Phase::Waiting | Phase::Done => true,
-            Phase::Resting(Rest::Paused | Rest::Stopped) => self.holds.are_over(),
+            Phase::Resting(Rest::Paused | Rest::Stopped) => self.is_told(),
             _ => false,
         }
     }

@@ -162,6 +162,11 @@ impl Looker {
         let _ = sender.send(lane, write.emit(&mut [0; MAX_LEN]));
     }
 
+    /// True if it has answered something of what it was asked last.
+    pub(super) const fn has_answered(&self) -> bool {
+        self.seen.answered != 0 || self.seen.axes != 0
+    }
+
     /// Hears a datagram; says whether it was an answer to what was asked.
     pub(super) fn hear(&mut self, octets: &[u8]) -> bool {
         let reply = RegisterReply::parse(octets).ok();

@@ -30,7 +30,7 @@ use crate::wire::{Dialect, ReplyCode};
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
 
-/// So often effects are switched off at a controller in an emergency stop: a datagram may be lost, and nobody answers.
+/// So often effects are switched off at a controller that gets no more frames: a datagram may be lost, and nobody answers.
 const DARKENED: u8 = 3;
 /// A controller that was not seen for so long after the hall was cleared holds up nobody.
 const SILENT_AFTER: Duration = Duration::from_secs(3);
@@ -57,7 +57,7 @@ pub struct Watch {
     heard: u64,
     notices: Vec<Notice>,
     changes: Vec<Change>,
-    /// How often the effects of each controller are still to be switched off.
+    /// How often the effects of each controller are still to be switched off, should it get no more frames.
     lit: Vec<u8>,
     /// Since when positions are read anew, because the hall was cleared.
     anew: Option<MonoTime>,
@@ -146,6 +146,7 @@ impl Watch {
             Sent::Posted { lane, frame, asked, at } => {
                 self.health.on_sent(usize::from(lane), frame, asked, at);
                 self.positions[usize::from(lane)].on_sent(at);
+                self.lit[usize::from(lane)] = DARKENED;
             }
             Sent::Failed { .. } => {}
             Sent::Joined { lane } => {
@@ -342,24 +343,22 @@ impl Watch {
     fn tell_lane(&mut self, controller: usize, change: Change) {
         let lane = u16::try_from(controller).expect("fewer controllers than ports");
         match change.to {
-            HealthState::Stopped => {
-                // Frames have left effects on; between shows none of ours are.
-                self.lit[controller] = if self.live.is_moving() { DARKENED } else { 0 };
-                self.alarm(Alarm::Cut(lane));
-            }
+            HealthState::Stopped => self.alarm(Alarm::Cut(lane)),
             HealthState::Rejoining => self.alarm(Alarm::Found(lane)),
             to if !to.may_move() => self.alarm(Alarm::Leave(lane)),
             _ => {}
         }
     }
 
-    /// Switches off the effects that the last frame left on at a controller in an emergency stop, with each of the next looks.
+    /// Switches off the effects that the last frame may have left on at a controller that gets no more, with each of the next looks;
+    /// those that find it silent do not count.
     fn darken(&mut self, controller: usize) {
-        if self.lit[controller] > 0 {
-            self.lit[controller] -= 1;
-            self.lookers[controller].darken(controller, &self.sender);
-            self.health.on_other_sent(controller, 1);
+        if self.lit[controller] == 0 || self.stands(controller).may_move() {
+            return;
         }
+        self.lit[controller] -= u8::from(self.lookers[controller].has_answered());
+        self.lookers[controller].darken(controller, &self.sender);
+        self.health.on_other_sent(controller, 1);
     }
 
     /// What finds no room waits for the next look: the tick thread hears all of it, in this order.
