@@ -3,6 +3,7 @@
 
 use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
 use std::sync::{Arc, PoisonError, RwLock};
+use std::thread::Thread;
 use std::time::Duration;
 
 use tokio::sync::{oneshot, watch};
@@ -85,12 +86,25 @@ impl Inbox {
 
 /// Where the supervisor puts the newest status.
 #[derive(Debug)]
-pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Arc<Desk>>>);
+pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Led>>);
+
+/// The hall of now, which is another with every configuration.
+#[derive(Debug)]
+struct Led {
+    desk: Arc<Desk>,
+    /// Who is woken by each ask; `None` before it runs.
+    supervisor: Option<Thread>,
+}
 
 impl StatusSource {
     /// From now on a stop goes to that desk: the hall was opened anew.
     pub fn lead(&self, desk: Arc<Desk>) {
-        *self.1.write().unwrap_or_else(PoisonError::into_inner) = desk;
+        self.1.write().unwrap_or_else(PoisonError::into_inner).desk = desk;
+    }
+
+    /// From now on that thread is woken by each ask. What was asked before is there to be taken.
+    pub fn wakes(&self, supervisor: Thread) {
+        self.1.write().unwrap_or_else(PoisonError::into_inner).supervisor = Some(supervisor);
     }
 
     /// Makes a status known to all who watch.
@@ -104,7 +118,7 @@ impl StatusSource {
 pub struct Handle {
     asks: SyncSender<Asked>,
     status: watch::Receiver<Arc<Status>>,
-    desk: Arc<RwLock<Arc<Desk>>>,
+    led: Arc<RwLock<Led>>,
 }
 
 /// The ends of a hall: for its surfaces, and for its supervisor. `desk` is the tick thread's.
@@ -112,21 +126,30 @@ pub struct Handle {
 pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
     let (asks, inbox) = mpsc::sync_channel(ASKS);
     let (source, status) = watch::channel(Arc::new(first));
-    let desk = Arc::new(RwLock::new(desk));
-    (Handle { asks, status, desk: Arc::clone(&desk) }, Inbox(inbox), StatusSource(source, desk))
+    let led = Arc::new(RwLock::new(Led { desk, supervisor: None }));
+    (Handle { asks, status, led: Arc::clone(&led) }, Inbox(inbox), StatusSource(source, led))
 }
 
 impl Handle {
     /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
     pub fn stop(&self) {
-        self.desk.read().unwrap_or_else(PoisonError::into_inner).stop();
+        self.led.read().unwrap_or_else(PoisonError::into_inner).desk.stop();
     }
 
     /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
     pub fn note_stop(&self, who: Who) {
         let (reply, _) = oneshot::channel();
         let note = Asked { desired: Desired { ask: Command::Stop, who }, asked_at: Monotonic.now(), reply };
-        drop(self.asks.try_send(note));
+        drop(self.queue(note));
+    }
+
+    /// Puts it into the queue, and wakes who takes it from there.
+    fn queue(&self, asked: Asked) -> Result<(), TrySendError<Asked>> {
+        self.asks.try_send(asked)?;
+        if let Some(supervisor) = &self.led.read().unwrap_or_else(PoisonError::into_inner).supervisor {
+            supervisor.unpark();
+        }
+        Ok(())
     }
 
     /// The newest status.
@@ -175,7 +198,7 @@ impl Handle {
         if asked.is_stale(Monotonic.now()) {
             return Err(late(asked.desired.ask.word()));
         }
-        match self.asks.try_send(asked) {
+        match self.queue(asked) {
             Ok(()) => Ok(Posted(answer)),
             // It is done with its flag; what would follow is its line in the journal.
             Err(TrySendError::Full(asked)) if asked.desired.ask == Command::Stop => {

@@ -67,6 +67,11 @@ impl Conductor {
         self.left
     }
 
+    /// Whether no signal that asks for the end was seen before this one.
+    pub(super) const fn hears_first_of_the_end(&self) -> bool {
+        self.ended.is_none()
+    }
+
     /// Whether a signal that asks for the end has found nobody to hear it; `asked` says whether there is one.
     pub(super) fn is_ended(&mut self, asked: bool, now: MonoTime) -> bool {
         asked && now.since(*self.ended.get_or_insert(now)) >= LEFT_TO_KEEPER

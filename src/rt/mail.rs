@@ -176,6 +176,7 @@ pub struct Mail {
     alarms: Consumer<Alarm>,
     news: Producer<News>,
     planner: Option<Thread>,
+    leader: Option<Thread>,
     live: Arc<Live>,
     unposted: u64,
 }
@@ -222,6 +223,7 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
         alarms,
         news,
         planner: None,
+        leader: None,
         live,
         unposted: 0,
     };
@@ -241,6 +243,11 @@ impl Mail {
     /// Names the planner's thread, which is woken when there is something for it.
     pub fn wakes(&mut self, planner: Thread) {
         self.planner = Some(planner);
+    }
+
+    /// Names the thread of whoever leads the hall, which is woken when there is news.
+    pub fn wakes_leader(&mut self, leader: Option<Thread>) {
+        self.leader = leader;
     }
 
     /// Records that found no room so far.
@@ -314,23 +321,29 @@ impl Mail {
     /// Where nobody reads it, news is lost; where the hall stands is in [`Live`] as well.
     pub(super) fn tell(&mut self, news: News) {
         let _ = self.news.push(news);
+        self.wake_leader();
+    }
+
+    /// Has whoever leads the hall look at what there is, be it no news.
+    pub(super) fn wake_leader(&self) {
+        wake(self.leader.as_ref());
     }
 
     /// Has the planner do it. It has as many places as courses that can be under way, so there is room.
     pub(super) fn task(&mut self, task: Task) {
         self.unposted += u64::from(self.tasks.push(task).is_err());
-        self.wake();
+        wake(self.planner.as_ref());
     }
 
     /// Whether the planner can be given a whole show: to load one, and to free the one before.
     pub(super) fn has_room_for_a_show(&self) -> bool {
         self.tasks.slots() >= 2
     }
+}
 
-    /// One system call where the planner sleeps, none where it works; it never waits.
-    fn wake(&self) {
-        if let Some(planner) = &self.planner {
-            planner.unpark();
-        }
+/// One system call where the thread sleeps, none where it works; it never waits.
+fn wake(thread: Option<&Thread>) {
+    if let Some(thread) = thread {
+        thread.unpark();
     }
 }

@@ -179,7 +179,11 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             tell_state(conductor, mail);
             mail.tell(news);
         }
-        if self.leave.load(Ordering::Relaxed) || conductor.is_ended(desk.is_ended(), now) {
+        let asked = desk.is_ended();
+        if asked && conductor.hears_first_of_the_end() {
+            mail.wake_leader();
+        }
+        if self.leave.load(Ordering::Relaxed) || conductor.is_ended(asked, now) {
             conductor.leave(engine, now);
         }
         while let Some(answer) = mail.answer() {

@@ -11,7 +11,7 @@ use std::io;
 use std::net::SocketAddrV4;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::thread;
+use std::thread::{self, Thread};
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -185,14 +185,17 @@ impl Runtime {
     }
 
     /// Runs it on the calling thread, which becomes the tick thread, until it is told to leave. Before the first tick `lead`
-    /// gets the runtime.
+    /// gets the runtime, and says which thread is woken by news of it.
     ///
     /// # Errors
     /// [`RuntimeError::Thread`]; nothing was sent then.
     ///
     /// # Panics
     /// If one of its threads panicked.
-    pub fn run(self, lead: impl FnOnce(RuntimeHandle, Line)) -> Result<RuntimeEnd, RuntimeError> {
+    pub fn run(
+        self,
+        lead: impl FnOnce(RuntimeHandle, Line) -> Option<Thread>,
+    ) -> Result<RuntimeEnd, RuntimeError> {
         let granted = realtime::request();
         let (runtime, line, Parts { acks, plans, mut ticks }) = self.part(granted.clone());
         let (config, desk) = (Arc::clone(&runtime.config), Arc::clone(&runtime.desk));
@@ -208,7 +211,7 @@ impl Runtime {
             ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
             let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &desk, &leave);
-            lead(runtime, line);
+            ticks.mail.wakes_leader(lead(runtime, line));
             let ended = ticks.run();
             live.close();
             let run = helpers.end(&ticks, ended, granted, origin);

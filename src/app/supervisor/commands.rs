@@ -1,6 +1,6 @@
 //! Executes the commands of surfaces.
 
-use super::{ANSWER, LOOK_FOR_ANSWER, Supervisor};
+use super::{ANSWER, Supervisor, park_until};
 use crate::control::{Asked, Code, Command, Desired, LevelsChange, Problem, Who, overtaken};
 use crate::rt::Command as TickCommand;
 use crate::settings::{LONGEST_WHY, Out};
@@ -87,7 +87,7 @@ impl Supervisor {
             if matches!(self.mirror.state, State::Stopping | State::Stopped | State::Fault) {
                 return;
             }
-            Monotonic.sleep_until(Monotonic.now() + LOOK_FOR_ANSWER);
+            park_until(until);
         }
     }
 

@@ -64,10 +64,12 @@ impl Supervisor {
         work: impl FnOnce() -> JobResult + Send + 'static,
     ) {
         let (tell, done) = channel();
+        let supervisor = std::thread::current();
         let thread = std::thread::Builder::new().name(word.to_owned());
         let spawned = thread.spawn(move || {
             let _ = crate::sys::realtime::normal_priority();
             drop(tell.send(work())); // a supervisor that is gone wants no answer
+            supervisor.unpark();
         });
         match (spawned, asked) {
             (Ok(_), asked) => self.job = Some(Job { word, done, asked }),

@@ -34,6 +34,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
+use std::thread;
 use std::time::Duration;
 
 use super::runtime::{RuntimeEnd, RuntimeHandle};
@@ -57,16 +58,12 @@ use state_mirror::StateMirror;
 use status::Rates;
 use strangers::Strangers;
 
-/// How long an ask is waited for before the supervisor looks after everything else.
-const LOOK: Duration = Duration::from_millis(10);
-/// From one status to the next.
+/// From one status to the next: nothing is looked for more rarely than that.
 const TELL: Duration = Duration::from_millis(100);
 /// Notes that are kept.
 const NOTES: usize = 5;
 /// How long the tick thread has to answer a command; a tick takes a second at most.
 const ANSWER: Duration = Duration::from_secs(2);
-/// How often its answer is looked for.
-const LOOK_FOR_ANSWER: Duration = Duration::from_micros(200);
 
 /// What a supervisor has whatever the configuration is.
 #[derive(Debug)]
@@ -189,8 +186,11 @@ impl Supervisor {
     /// Keeps the hall until `closed` says what it came to.
     #[must_use]
     pub fn run(mut self, closed: &Receiver<Box<RuntimeEnd>>) -> SupervisorEnd {
+        self.ports.source.wakes(thread::current());
         loop {
-            if let Some(asked) = self.ports.inbox.next(LOOK) {
+            let asked = self.ports.inbox.next(Duration::ZERO);
+            let rests = asked.is_none();
+            if let Some(asked) = asked {
                 self.on_asked(asked);
             }
             self.look_after();
@@ -202,6 +202,9 @@ impl Supervisor {
                 let journal = self.record.into_journal();
                 let ended = record::ending(self.ended);
                 return SupervisorEnd { ports: self.ports, closed, reload: self.reload, ended, journal };
+            }
+            if rests {
+                park_until(self.told + TELL);
             }
         }
     }
@@ -314,7 +317,7 @@ impl Supervisor {
             if Monotonic.now() >= until {
                 return Err(state_mirror::no_answer(ANSWER));
             }
-            Monotonic.sleep_until(Monotonic.now() + LOOK_FOR_ANSWER);
+            park_until(until);
         }
     }
 
@@ -333,4 +336,9 @@ impl Supervisor {
         let status = self.publish();
         asked.answer(result.map(|()| status));
     }
+}
+
+/// Sleeps until that instant, or until somebody has something for the supervisor.
+fn park_until(instant: MonoTime) {
+    thread::park_timeout(instant.since(Monotonic.now()));
 }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::thread::{self, JoinHandle};
+use std::thread::{self, JoinHandle, Thread};
 use std::time::Duration;
 
 use jiff::Zoned;
@@ -58,6 +58,7 @@ struct Ticks {
     commands: Consumer<TickCommand>,
     news: Producer<News>,
     told: Option<News>,
+    supervisor: Thread,
 }
 
 impl Ticks {
@@ -94,6 +95,7 @@ impl Ticks {
             self.tell(&machine);
             self.news.push(answer.map_or_else(News::Refused, |()| News::Taken)).unwrap();
         }
+        self.supervisor.unpark();
     }
 
     fn tell(&mut self, machine: &Machine) {
@@ -288,6 +290,7 @@ impl Double {
             commands,
             news,
             told: None,
+            supervisor: thread::current(),
         };
         let thread = Some(thread::spawn(|| ticks.run()));
         Self { machine, ports, rounds, thread }
