@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::thread::Thread;
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, PopError, Producer, RingBuffer};
 
 use super::live::Live;
 use crate::belief::Evidence;
@@ -165,6 +165,39 @@ pub enum News {
     Unplanned(Unplanned),
 }
 
+/// The number of a command, from 0 in the order in which they are given. It needs no place beside the command: the mailbox keeps
+/// the order.
+pub type Ticket = u32;
+
+/// Whom the tick thread tells: news, and the ticket of the command that it answers, where it does.
+pub type NewsOut = Producer<(Option<Ticket>, News)>;
+
+/// Where the tick thread's news comes out.
+#[derive(Debug)]
+pub struct NewsIn(Consumer<(Option<Ticket>, News)>);
+
+impl NewsIn {
+    /// The next, for whoever does not care which command it answers.
+    ///
+    /// # Errors
+    /// Where there is none.
+    pub fn pop(&mut self) -> Result<News, PopError> {
+        self.0.pop().map(|(_, news)| news)
+    }
+
+    /// The next, with the ticket of the command that it answers.
+    pub fn next(&mut self) -> Option<(Option<Ticket>, News)> {
+        self.0.pop().ok()
+    }
+}
+
+/// The mailbox for so much news.
+#[must_use]
+pub fn news(places: usize) -> (NewsOut, NewsIn) {
+    let (news, news_end) = RingBuffer::new(places);
+    (news, NewsIn(news_end))
+}
+
 /// The tick thread's ends.
 #[derive(Debug)]
 pub struct Mail {
@@ -173,8 +206,10 @@ pub struct Mail {
     tasks: Producer<Task>,
     answers: Consumer<Answer>,
     commands: Consumer<Command>,
+    /// Commands taken so far.
+    taken: Ticket,
     alarms: Consumer<Alarm>,
-    news: Producer<News>,
+    news: NewsOut,
     planner: Option<Thread>,
     leader: Option<Thread>,
     live: Arc<Live>,
@@ -197,7 +232,7 @@ pub struct MailEnds {
     /// From the ack thread: what it sees of the controllers.
     pub alarms: Producer<Alarm>,
     /// To whoever leads the show: what the hall does.
-    pub news: Consumer<News>,
+    pub news: NewsIn,
 }
 
 /// Mailboxes for a play of that many lanes.
@@ -213,13 +248,14 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     let (commands_end, commands) = RingBuffer::new(COMMANDS);
     // Some for each lane at once, and some more.
     let (alarms_end, alarms) = RingBuffer::new(4 * lanes + COMMANDS);
-    let (news, news_end) = RingBuffer::new(NEWS);
+    let (news, news_end) = news(NEWS);
     let mail = Mail {
         sent,
         ticks: reports,
         tasks,
         answers,
         commands,
+        taken: 0,
         alarms,
         news,
         planner: None,
@@ -305,8 +341,12 @@ impl Mail {
         self.live.on_state(machine.state());
     }
 
-    pub(super) fn command(&mut self) -> Option<Command> {
-        self.commands.pop().ok()
+    /// The next command, with its ticket.
+    pub(super) fn command(&mut self) -> Option<(Ticket, Command)> {
+        let command = self.commands.pop().ok()?;
+        let ticket = self.taken;
+        self.taken = ticket.wrapping_add(1);
+        Some((ticket, command))
     }
 
     pub(super) fn alarm(&mut self) -> Option<Alarm> {
@@ -320,6 +360,15 @@ impl Mail {
 
     /// Where nobody reads it, news is lost; where the hall stands is in [`Live`] as well.
     pub(super) fn tell(&mut self, news: News) {
+        self.put((None, news));
+    }
+
+    /// Answers a command.
+    pub(super) fn reply(&mut self, ticket: Ticket, news: News) {
+        self.put((Some(ticket), news));
+    }
+
+    fn put(&mut self, news: (Option<Ticket>, News)) {
         let _ = self.news.push(news);
         self.wake_leader();
     }

@@ -25,7 +25,8 @@ pub use desk::Desk;
 pub use line::{Line, line};
 pub use live::{Live, Phase, Times};
 pub use mail::{
-    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, Planning, Sent, Task, TickReport, mailboxes,
+    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, NewsOut, Planning, Sent, Task, TickReport,
+    Ticket, mailboxes, news,
 };
 pub use places::Places;
 pub use planning::PlanLoop;
@@ -165,7 +166,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             conductor.alarm(alarm, engine, now);
         }
         for _ in 0..COMMANDS_PER_TICK {
-            let Some(command) = mail.command() else { break };
+            let Some((ticket, command)) = mail.command() else { break };
             let news = match command {
                 Command::Load(show) => load(show, conductor.machine().state(), engine, lanes, mail),
                 Command::Request(request) => told(conductor.request(request, engine, now)),
@@ -177,7 +178,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             };
             // What it led to goes before the answer, so that whoever hears the answer knows it.
             tell_state(conductor, mail);
-            mail.tell(news);
+            mail.reply(ticket, news);
         }
         let asked = desk.is_ended();
         if asked && conductor.hears_first_of_the_end() {

@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 use std::thread::{self, Thread};
 use std::time::Duration;
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Producer, RingBuffer};
 
 use super::helpers::{EndFlags, Helpers};
 use super::run::Run;
@@ -26,7 +26,7 @@ use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, News, Order, Places, PlanLoop,
+    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, NewsIn, Order, Places, PlanLoop,
     Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
@@ -72,7 +72,7 @@ pub struct Runtime {
     plans: PlanLoop,
     line: Line,
     commands: Producer<Command>,
-    news: Consumer<News>,
+    news: NewsIn,
     orders: Producer<Order>,
 }
 
@@ -90,7 +90,7 @@ pub struct RuntimeHandle {
     /// What is asked of the hall.
     pub commands: Producer<Command>,
     /// What the hall does; every command is answered.
-    pub news: Consumer<News>,
+    pub news: NewsIn,
     /// What the ack thread is told.
     pub orders: Producer<Order>,
     /// What the system granted the tick thread.

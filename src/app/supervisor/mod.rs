@@ -43,7 +43,7 @@ use crate::control::model::Ending;
 use crate::control::{Asked, Inbox, Problem, Status, StatusSource};
 use crate::journal::Journal;
 use crate::library::Library;
-use crate::rt::{Command as TickCommand, News};
+use crate::rt::{Command as TickCommand, News, Ticket};
 use crate::settings::SettingsFile;
 use crate::state::{Cause, State};
 use crate::sys::clock::Monotonic;
@@ -236,16 +236,16 @@ impl Supervisor {
 
     /// Hears what the tick thread has to say, and does what a new state needs.
     fn take_news(&mut self) {
-        while let Ok(news) = self.runtime.news.pop() {
-            self.hear(news);
+        while let Some((ticket, news)) = self.runtime.news.next() {
+            self.hear(ticket, news);
         }
     }
 
-    fn hear(&mut self, news: News) {
+    fn hear(&mut self, ticket: Option<Ticket>, news: News) {
         if let News::Unplanned(what) = news {
             self.note(self.name_unplanned(what));
         }
-        if let Some((from, to)) = self.mirror.hear(news) {
+        if let Some((from, to)) = self.mirror.hear(ticket, news) {
             self.on_state(from, to);
         }
     }

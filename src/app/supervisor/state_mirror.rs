@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::control::{Code, Problem};
-use crate::rt::News;
+use crate::rt::{News, Ticket};
 use crate::state::{Cause, Next, State};
 use crate::time::MonoTime;
 
@@ -14,8 +14,8 @@ pub(super) struct StateMirror {
     pub(super) cause: Cause,
     pub(super) next: Next,
     pub(super) since: MonoTime,
-    /// Commands that were given and not answered yet, even if nobody waits any more.
-    open: u32,
+    /// Commands that were given: the ticket of the next.
+    given: Ticket,
     /// The answer to the command that was given last.
     answer: Option<Result<(), Problem>>,
 }
@@ -23,21 +23,25 @@ pub(super) struct StateMirror {
 impl StateMirror {
     pub(super) const fn new(now: MonoTime) -> Self {
         let (state, cause, next) = (State::Boot, Cause::Started, Next::AwaitAnswers);
-        Self { state, cause, next, since: now, open: 0, answer: None }
+        Self { state, cause, next, since: now, given: 0, answer: None }
     }
 
     /// Takes news; says from which state to which the hall went, where it did.
-    pub(super) fn hear(&mut self, news: News) -> Option<(State, State)> {
-        match news {
+    pub(super) fn hear(&mut self, ticket: Option<Ticket>, news: News) -> Option<(State, State)> {
+        let answer = match news {
             News::Entered { state, cause, next, at } => {
                 let from = self.state;
                 (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
                 return (from != state).then_some((from, state));
             }
-            News::Taken => self.on_answer(Ok(())),
-            News::Refused(refusal) => self.on_answer(Err(refusal.into())),
-            News::NotLoaded(state) => self.on_answer(Err(not_loaded(state))),
-            News::Unplanned(_) => {} // of no state, and no answer
+            News::Taken => Ok(()),
+            News::Refused(refusal) => Err(refusal.into()),
+            News::NotLoaded(state) => Err(not_loaded(state)),
+            News::Unplanned(_) => return None, // of no state, and no answer
+        };
+        // One that was given up on may still be answered.
+        if ticket == Some(self.given.wrapping_sub(1)) {
+            self.answer = Some(answer);
         }
         None
     }
@@ -48,17 +52,9 @@ impl StateMirror {
         Some(end.since(now).as_secs_f64())
     }
 
-    /// Answers come in the order of the commands: one that was given up on is not taken for that of the next.
-    fn on_answer(&mut self, answer: Result<(), Problem>) {
-        self.open = self.open.saturating_sub(1);
-        if self.open == 0 {
-            self.answer = Some(answer);
-        }
-    }
-
     /// A command was given: its answer is waited for.
     pub(super) fn expect(&mut self) {
-        self.open += 1;
+        self.given = self.given.wrapping_add(1);
         self.answer = None;
     }
 

@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle, Thread};
 use std::time::Duration;
 
 use jiff::Zoned;
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 use tempfile::TempDir;
 use tokio::runtime;
 
@@ -22,7 +22,7 @@ use crate::journal::{Journal, Limits};
 use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
-use crate::rt::{Command as TickCommand, Desk, Live, News, line};
+use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Ticket, line};
 use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, Readiness, State};
 use crate::sys::clock::Monotonic;
@@ -56,7 +56,8 @@ struct Ticks {
     rounds: Arc<AtomicU64>,
     desk: Arc<Desk>,
     commands: Consumer<TickCommand>,
-    news: Producer<News>,
+    taken: Ticket,
+    news: NewsOut,
     told: Option<News>,
     supervisor: Thread,
 }
@@ -79,6 +80,8 @@ impl Ticks {
         machine.tick(now);
         self.tell(&machine);
         while let Ok(command) = self.commands.pop() {
+            let ticket = Some(self.taken);
+            self.taken += 1;
             let answer = match command {
                 TickCommand::Request(request) => machine.request(request, now),
                 TickCommand::Seek(_) => machine.request(crate::state::Transition::Seek, now),
@@ -87,13 +90,13 @@ impl Ticks {
                     Ok(())
                 }
                 TickCommand::Load(_) if machine.may_send_motion() => {
-                    self.news.push(News::NotLoaded(machine.state())).unwrap();
+                    self.news.push((ticket, News::NotLoaded(machine.state()))).unwrap();
                     continue;
                 }
                 TickCommand::Load(_) => Ok(()),
             };
             self.tell(&machine);
-            self.news.push(answer.map_or_else(News::Refused, |()| News::Taken)).unwrap();
+            self.news.push((ticket, answer.map_or_else(News::Refused, |()| News::Taken))).unwrap();
         }
         self.supervisor.unpark();
     }
@@ -102,7 +105,7 @@ impl Ticks {
         let (state, cause, next, at) = (machine.state(), machine.cause(), machine.next(), machine.since());
         let news = News::Entered { state, cause, next, at };
         if self.told.replace(news) != Some(news) {
-            self.news.push(news).unwrap();
+            self.news.push((None, news)).unwrap();
         }
     }
 }
@@ -173,7 +176,7 @@ impl Rig {
         let config = Arc::new(config(folder.path()));
         let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
         let (commands, commands_end) = RingBuffer::new(64);
-        let (news, news_end) = RingBuffer::new(256);
+        let (news, news_end) = rt::news(256);
         let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
         let (sender, _) = Ports::open(config.show.bind, &peers).unwrap().split();
         let (line, _) = line(sender, 2);
@@ -279,7 +282,7 @@ impl Rig {
 }
 
 impl Double {
-    fn start(desk: Arc<Desk>, commands: Consumer<TickCommand>, news: Producer<News>) -> Self {
+    fn start(desk: Arc<Desk>, commands: Consumer<TickCommand>, news: NewsOut) -> Self {
         let machine = Arc::new(Mutex::new(Machine::new(Monotonic.now())));
         let (ports, rounds) = (Arc::<AtomicBool>::default(), Arc::<AtomicU64>::default());
         let ticks = Ticks {
@@ -288,6 +291,7 @@ impl Double {
             rounds: Arc::clone(&rounds),
             desk,
             commands,
+            taken: 0,
             news,
             told: None,
             supervisor: thread::current(),

@@ -28,9 +28,9 @@ fn an_answer_that_came_too_late_is_not_taken_for_that_of_the_next_command() {
     let mut known = StateMirror::new(MonoTime::default());
     known.expect();
     known.expect();
-    known.hear(News::NotLoaded(State::Paused));
+    known.hear(Some(0), News::NotLoaded(State::Paused));
     assert!(known.take_answer().is_none());
-    known.hear(News::Taken);
+    known.hear(Some(1), News::Taken);
     assert_eq!(known.take_answer(), Some(Ok(())));
 }
 
@@ -332,7 +332,7 @@ fn a_park_between_shows_leaves_the_next_show_where_it_is_to_begin() {
 #[test]
 fn a_move_that_was_not_found_is_a_warning_with_the_name_of_the_seat_and_what_to_do() {
     let mut rig = Rig::playing();
-    rig.supervisor.hear(News::Unplanned(Unplanned::Lane(1)));
+    rig.supervisor.hear(None, News::Unplanned(Unplanned::Lane(1)));
     let warnings = rig.supervisor.status().warnings;
     let told =
         warnings.iter().find(|one| one.text.starts_with("B1: it stays where it is")).expect("it is told");
