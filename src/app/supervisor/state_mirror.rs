@@ -1,11 +1,14 @@
-//! Mirrors the state of the hall from the tick thread's news, with the result of the command that awaits its answer.
+//! Mirrors the state of the hall from the tick thread's news, and words its answers.
 
 use std::time::Duration;
 
 use crate::control::{Code, Problem};
-use crate::rt::{News, Ticket};
+use crate::rt::News;
 use crate::state::{Cause, Next, State};
 use crate::time::MonoTime;
+
+/// How long the tick thread has to answer a command; a tick takes a second at most.
+pub(super) const ANSWER: Duration = Duration::from_secs(2);
 
 /// What is known of the hall's state.
 #[derive(Debug)]
@@ -14,36 +17,25 @@ pub(super) struct StateMirror {
     pub(super) cause: Cause,
     pub(super) next: Next,
     pub(super) since: MonoTime,
-    /// Commands that were given: the ticket of the next.
-    given: Ticket,
-    /// The answer to the command that was given last.
-    answer: Option<Result<(), Problem>>,
 }
 
 impl StateMirror {
     pub(super) const fn new(now: MonoTime) -> Self {
         let (state, cause, next) = (State::Boot, Cause::Started, Next::AwaitAnswers);
-        Self { state, cause, next, since: now, given: 0, answer: None }
+        Self { state, cause, next, since: now }
     }
 
     /// Takes news; says from which state to which the hall went, where it did.
-    pub(super) fn hear(&mut self, ticket: Option<Ticket>, news: News) -> Option<(State, State)> {
-        let answer = match news {
-            News::Entered { state, cause, next, at } => {
-                let from = self.state;
-                (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
-                return (from != state).then_some((from, state));
-            }
-            News::Taken => Ok(()),
-            News::Refused(refusal) => Err(refusal.into()),
-            News::NotLoaded(state) => Err(not_loaded(state)),
-            News::Unplanned(_) => return None, // of no state, and no answer
-        };
-        // One that was given up on may still be answered.
-        if ticket == Some(self.given.wrapping_sub(1)) {
-            self.answer = Some(answer);
-        }
-        None
+    pub(super) fn hear(&mut self, news: News) -> Option<(State, State)> {
+        let News::Entered { state, cause, next, at } = news else { return None };
+        let from = self.state;
+        (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
+        (from != state).then_some((from, state))
+    }
+
+    /// True if a stop is in effect.
+    pub(super) const fn is_stopping(&self) -> bool {
+        matches!(self.state, State::Stopping | State::Stopped | State::Fault)
     }
 
     /// Seconds until the state ends by itself; `None` if it does not.
@@ -51,15 +43,15 @@ impl StateMirror {
         let end = self.since + self.state.lasts()?;
         Some(end.since(now).as_secs_f64())
     }
+}
 
-    /// A command was given: its answer is waited for.
-    pub(super) fn expect(&mut self) {
-        self.given = self.given.wrapping_add(1);
-        self.answer = None;
-    }
-
-    pub(super) const fn take_answer(&mut self) -> Option<Result<(), Problem>> {
-        self.answer.take()
+/// The answer to a command; `None` where the news is none.
+pub(super) fn answer(news: News) -> Option<Result<(), Problem>> {
+    match news {
+        News::Taken => Some(Ok(())),
+        News::Refused(refusal) => Some(Err(refusal.into())),
+        News::NotLoaded(state) => Some(Err(not_loaded(state))),
+        News::Entered { .. } | News::Unplanned(_) => None,
     }
 }
 
@@ -73,10 +65,10 @@ pub(super) fn busy() -> Problem {
 }
 
 /// The tick thread says nothing.
-pub(super) fn no_answer(after: Duration) -> Problem {
+pub(super) fn no_answer() -> Problem {
     Problem::new(
         Code::Timeout,
-        format!("the tick thread did not answer within {} s", after.as_secs()),
+        format!("the tick thread did not answer within {} s", ANSWER.as_secs()),
         "look at the status before asking again: it may still be done",
     )
 }

@@ -13,6 +13,7 @@ use rtrb::{Consumer, RingBuffer};
 use tempfile::TempDir;
 use tokio::runtime;
 
+use super::act::Act;
 use super::{Carryover, ServiceLog, Signals, Supervisor, SupervisorPorts};
 use crate::app::runtime::RuntimeHandle;
 use crate::config::{self, Config};
@@ -24,7 +25,7 @@ use crate::log::Log;
 use crate::net::Ports;
 use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Ticket, line};
 use crate::settings::SettingsFile;
-use crate::state::{Event, Finding, Machine, Readiness, State};
+use crate::state::{Event, Finding, Machine, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{Policy, RealTime};
 use crate::time::{Clock as _, MonoTime};
@@ -142,9 +143,10 @@ impl Rig {
         }
         rig.tell(Event::Identified(Finding { homed: true, at_park: true, crashed: false }));
         rig.ask(Command::Load { cue: "one".to_owned() }).unwrap();
-        rig.supervisor.readiness = Some(Readiness::NotPreflighted);
-        rig.supervisor.preflighted = Some(super::ready::Preflighted::passing(2));
-        rig.wait_until(|supervisor| supervisor.readiness == Some(Readiness::Ready));
+        rig.supervisor.features.readiness.preflighted = Some(super::preflighted::Preflighted::passing(2));
+        rig.supervisor.procedures.add(Vec::new());
+        rig.settle();
+        assert!(rig.supervisor.features.readiness.is_told_ready());
         assert_eq!(rig.state(), State::Parked);
         rig
     }
@@ -208,7 +210,7 @@ impl Rig {
         while self.double.rounds.load(Ordering::Acquire) < rounds + 2 {
             thread::yield_now();
         }
-        self.supervisor.look_after();
+        self.do_all();
     }
 
     /// Asks the supervisor something as a surface does, and waits for the answer.
@@ -236,8 +238,9 @@ impl Rig {
         thread::spawn(move || runtime.block_on(posted.answer()))
     }
 
-    /// Has the supervisor hear what was asked, and look after nothing else.
+    /// Has the supervisor hear what was asked, once it has done what it was about, and look after nothing else.
     pub(super) fn hear(&mut self) {
+        self.do_begun();
         let asked = self.supervisor.ports.inbox.next(PATIENCE).expect("something was asked");
         self.supervisor.on_asked(asked);
     }
@@ -248,7 +251,7 @@ impl Rig {
         let until = Monotonic.now() + PATIENCE;
         while !is_so(&self.supervisor) {
             assert!(Monotonic.now() < until, "it is {}: {:?}", self.state(), self.supervisor.notes);
-            self.supervisor.look_after();
+            self.supervisor.turn();
             thread::yield_now();
         }
     }
@@ -256,8 +259,32 @@ impl Rig {
     /// Has the supervisor look after all until it is free, and what came of that is done.
     #[track_caller]
     pub(super) fn settle(&mut self) {
-        self.wait_until(|supervisor| supervisor.job.is_none());
-        self.supervisor.look_after();
+        self.wait_until(|supervisor| supervisor.hall.job.is_none());
+        self.do_all();
+        self.wait_until(|supervisor| supervisor.hall.job.is_none() && supervisor.procedures.is_empty());
+    }
+
+    /// Has the supervisor do all that there is to do now.
+    fn do_all(&mut self) {
+        self.supervisor.turn();
+        self.wait_until(|supervisor| supervisor.procedures.is_empty());
+    }
+
+    /// Has the supervisor do that.
+    pub(super) fn does(&mut self, acts: Vec<Act>) {
+        self.supervisor.procedures.add(acts);
+        self.do_begun();
+    }
+
+    /// Has the supervisor do all that it is about, and look after nothing else.
+    pub(super) fn do_begun(&mut self) {
+        let until = Monotonic.now() + PATIENCE;
+        while !self.supervisor.procedures.is_empty() {
+            assert!(Monotonic.now() < until, "it is {}", self.state());
+            self.supervisor.take_news();
+            self.supervisor.go_on();
+            thread::yield_now();
+        }
     }
 
     /// Has all of that happen at the state machine at once.
@@ -268,7 +295,7 @@ impl Rig {
     /// Has the supervisor hear of a state, and look after nothing else.
     pub(super) fn hear_of(&mut self, state: State) {
         let until = Monotonic.now() + PATIENCE;
-        while self.supervisor.mirror.state != state {
+        while self.supervisor.hall.mirror.state != state {
             assert!(Monotonic.now() < until, "it is {}", self.state());
             self.supervisor.take_news();
             thread::yield_now();

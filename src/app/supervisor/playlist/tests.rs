@@ -5,6 +5,7 @@ use std::path::Path;
 use super::*;
 use crate::app::supervisor::testing::Rig;
 use crate::control::LevelsChange;
+use crate::playlist::{Playlist, Schedule};
 use crate::state::{Event, PlayMode};
 
 const JOINING: State = State::Playing(PlayMode::Joining);
@@ -20,28 +21,29 @@ fn list() -> List {
 /// A hall whose first entry plays.
 fn playing() -> Rig {
     let mut rig = Rig::playing();
-    rig.supervisor.list = Some(list());
+    rig.supervisor.features.onward.list = Some(list());
     rig
 }
 
 /// A hall that is armed, and loads the second entry, whose time has come.
 fn due() -> Rig {
     let mut rig = Rig::armed();
-    rig.supervisor.list = Some(list());
-    rig.supervisor.fetch_entry(1, Some(Start::Time), None);
+    rig.supervisor.features.onward.list = Some(list());
+    let acts = rig.supervisor.features.onward.fetch(1, Some(Start::Time));
+    rig.does(acts);
     rig
 }
 
 fn cue(rig: &Rig) -> Option<&str> {
-    rig.supervisor.cued.as_ref().map(|cued| cued.id.as_str())
+    rig.supervisor.hall.cued.as_ref().map(|cued| cued.id.as_str())
 }
 
 /// The seats have parked, and the next cue is on its way.
 fn end_show(rig: &mut Rig) {
     rig.happens(|machine, now| machine.event(Event::Parked, now));
     rig.hear_of(State::Parked);
-    rig.supervisor.end_show();
-    assert!(rig.supervisor.job.is_some());
+    rig.do_begun();
+    assert!(rig.supervisor.hall.job.is_some());
 }
 
 /// Has something asked, with nothing looked after in between.
@@ -62,11 +64,11 @@ fn an_entry_goes_on_to_the_next_once_its_cue_came_to_its_end() {
 #[test]
 fn a_cue_that_a_person_loads_beside_the_playlist_goes_on_to_nothing() {
     let mut rig = Rig::parked();
-    rig.supervisor.list = Some(list());
+    rig.supervisor.features.onward.list = Some(list());
     rig.ask(Command::Load { cue: "three".to_owned() }).unwrap();
     rig.ask(Command::Arm { seats_empty: false }).unwrap();
     rig.ask(Command::Go).unwrap();
-    assert_eq!(rig.supervisor.place(), None);
+    assert_eq!(rig.supervisor.features.onward.place(&rig.supervisor.hall), None);
     rig.tell(Event::CueEnded);
     rig.tell(Event::Parked);
     rig.settle();
@@ -104,7 +106,7 @@ fn nothing_goes_on_after_a_stop_that_was_cleared_before_the_next_cue_was_loaded(
     rig.tell(Event::CueEnded);
     end_show(&mut rig);
     // By the stop socket, of which no word may come.
-    rig.supervisor.runtime.desk.stop();
+    rig.supervisor.hall.desk.stop();
     rig.hear_of(State::Stopped);
     rig.happens(|machine, now| {
         machine.request(Transition::Clear, now).unwrap();
@@ -175,7 +177,7 @@ fn a_show_that_a_person_lets_go_stays_the_one_that_is_loaded() {
     ask_in_between(&mut rig, Command::Go);
     rig.settle();
     assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("one")));
-    assert_eq!(rig.supervisor.list.as_ref().unwrap().current, 0);
+    assert_eq!(rig.supervisor.features.onward.list.as_ref().unwrap().current, 0);
     let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
     rig.ask(Command::Levels(half)).unwrap();
 }
