@@ -140,16 +140,15 @@ impl Handle {
     pub fn note_stop(&self, who: Who) {
         let (reply, _) = oneshot::channel();
         let note = Asked { desired: Desired { ask: Command::Stop, who }, asked_at: Monotonic.now(), reply };
-        drop(self.queue(note));
+        drop(self.asks.try_send(note));
+        self.wake();
     }
 
-    /// Puts it into the queue, and wakes who takes it from there.
-    fn queue(&self, asked: Asked) -> Result<(), TrySendError<Asked>> {
-        self.asks.try_send(asked)?;
+    /// Has the supervisor look into the queue.
+    fn wake(&self) {
         if let Some(supervisor) = &self.led.read().unwrap_or_else(PoisonError::into_inner).supervisor {
             supervisor.unpark();
         }
-        Ok(())
     }
 
     /// The newest status.
@@ -198,7 +197,9 @@ impl Handle {
         if asked.is_stale(Monotonic.now()) {
             return Err(late(asked.desired.ask.word()));
         }
-        match self.queue(asked) {
+        let queued = self.asks.try_send(asked);
+        self.wake();
+        match queued {
             Ok(()) => Ok(Posted(answer)),
             // It is done with its flag; what would follow is its line in the journal.
             Err(TrySendError::Full(asked)) if asked.desired.ask == Command::Stop => {
@@ -308,5 +309,35 @@ mod tests {
         let problem = handle.post(who(Role::View), Command::Go).unwrap_err();
         assert_eq!((problem.code, problem.status), (Code::Role, 403));
         assert!(inbox.next(NOW).is_none());
+    }
+
+    #[test]
+    fn whoever_takes_what_is_asked_can_sleep_until_somebody_asks() {
+        let (handle, inbox, source) = {
+            let desk = Arc::new(Desk::new(std::iter::empty()));
+            handle(desk, Status::starting("Hall 1"))
+        };
+        let (tell, told) = mpsc::channel();
+        let supervisor = std::thread::spawn(move || {
+            source.wakes(std::thread::current());
+            tell.send(None).unwrap();
+            for _ in 0..2 {
+                let asked = std::iter::repeat_with(|| {
+                    inbox.next(NOW).or_else(|| {
+                        std::thread::park();
+                        None
+                    })
+                });
+                let asked = asked.flatten().next().unwrap();
+                tell.send(Some(asked.desired.ask)).unwrap();
+            }
+        });
+        let hears = || told.recv_timeout(Duration::from_secs(20)).expect("it is woken");
+        assert_eq!(hears(), None);
+        handle.post(who(Role::Operate), Command::Pause).unwrap();
+        assert_eq!(hears(), Some(Command::Pause));
+        handle.note_stop(who(Role::View));
+        assert_eq!(hears(), Some(Command::Stop));
+        supervisor.join().unwrap();
     }
 }

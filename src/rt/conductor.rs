@@ -284,7 +284,11 @@ mod tests {
         let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
         let mut conductor = Conductor::of_a_hall(ms(0));
         let asked = [(100, false), (1_000, true), (1_499, true), (1_500, true)];
-        let ends = asked.map(|(at, asked)| conductor.is_ended(asked, ms(at)));
-        assert_eq!(ends, [false, false, false, true]);
+        let heard = asked.map(|(at, asked)| {
+            let first = asked && conductor.hears_first_of_the_end();
+            (first, conductor.is_ended(asked, ms(at)))
+        });
+        let first_heard = [(false, false), (true, false), (false, false), (false, true)];
+        assert_eq!(heard, first_heard, "whoever leads the hall is woken once");
     }
 }

@@ -186,7 +186,7 @@ impl NewsIn {
     }
 
     /// The next, with the ticket of the command that it answers.
-    pub fn next(&mut self) -> Option<(Option<Ticket>, News)> {
+    pub fn take(&mut self) -> Option<(Option<Ticket>, News)> {
         self.0.pop().ok()
     }
 }
@@ -394,5 +394,40 @@ impl Mail {
 fn wake(thread: Option<&Thread>) {
     if let Some(thread) = thread {
         thread.unpark();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn whoever_leads_the_hall_can_sleep_until_there_is_news_and_an_answer_names_its_command() {
+        let (mut mail, ends) = mailboxes(1, Rate::from_hz(100.0), Arc::default());
+        let MailEnds { mut commands, mut news, .. } = ends;
+        let (tell, told) = std::sync::mpsc::channel();
+        let leader = thread::spawn(move || {
+            let take = || {
+                news.take().or_else(|| {
+                    thread::park();
+                    None
+                })
+            };
+            tell.send(std::iter::repeat_with(take).flatten().take(3).collect::<Vec<_>>()).unwrap();
+        });
+        mail.wakes_leader(Some(leader.thread().clone()));
+        for _ in 0..2 {
+            commands.push(Command::Request(Transition::Arm)).unwrap();
+        }
+        mail.tell(News::NotLoaded(State::Boot));
+        while let Some((ticket, _)) = mail.command() {
+            mail.reply(ticket, News::Taken);
+        }
+        let told = told.recv_timeout(Duration::from_secs(20)).expect("it is woken");
+        assert_eq!(told.iter().map(|(ticket, _)| *ticket).collect::<Vec<_>>(), [None, Some(0), Some(1)]);
+        leader.join().unwrap();
     }
 }

@@ -2,6 +2,7 @@
 //! job and at the end of a show.
 
 use super::act::{Act, Feature, SupervisorEvent};
+use super::figures::Figures;
 use super::gear::GearLimits;
 use super::hall::{HallContext, ShowChange};
 use super::homing::Homing;
@@ -12,8 +13,6 @@ use super::readiness::ReadinessCheck;
 use super::record::Records;
 use super::seat_testing::SeatTesting;
 use super::show::ProvedShow;
-use super::status::Rates;
-use super::strangers::Strangers;
 use crate::control::Problem;
 use crate::state::Cause;
 use crate::time::ShowTime;
@@ -29,22 +28,6 @@ pub(super) struct Features {
     pub(super) gear: GearLimits,
     pub(super) records: Records,
     pub(super) figures: Figures,
-}
-
-/// What is counted of the last while.
-#[derive(Debug, Default)]
-pub(super) struct Figures {
-    pub(super) rates: Rates,
-    pub(super) strangers: Strangers,
-}
-
-impl Feature for Figures {
-    fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, _out: &mut Vec<Act>) {
-        if let SupervisorEvent::Round(table) = event {
-            self.rates.note(table, hall.now);
-            self.strangers.note(table, hall.now);
-        }
-    }
 }
 
 impl Features {

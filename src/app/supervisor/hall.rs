@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::hall_settings::HallSettings;
 use super::show::ProvedShow;
 use super::state_mirror::StateMirror;
+use crate::app::runtime::RuntimeHandle;
 use crate::config::Config;
 use crate::control::{Code, Problem};
 use crate::engine::Unplanned;
@@ -91,6 +92,25 @@ pub(super) enum Undo {
 }
 
 impl HallContext {
+    /// A hall that opens, where that is set.
+    pub(super) fn new(runtime: &RuntimeHandle, settings: HallSettings, now: MonoTime) -> Self {
+        Self {
+            config: Arc::clone(&runtime.config),
+            desk: Arc::clone(&runtime.desk),
+            live: Arc::clone(&runtime.live),
+            leave: Arc::clone(&runtime.leave),
+            granted: runtime.granted.clone(),
+            mirror: StateMirror::new(now),
+            settings,
+            cued: None,
+            aside: None,
+            left_at: None,
+            ended: Cause::Started,
+            job: None,
+            now,
+        }
+    }
+
     /// True if the hall is at rest, and nobody has made it ready to go, so that another cue may be loaded, or controllers asked.
     ///
     /// # Errors
@@ -255,4 +275,40 @@ impl HallContext {
 
 const fn rides(state: State) -> bool {
     matches!(state, State::Playing(_) | State::Paused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, proved};
+
+    #[test]
+    fn what_is_not_taken_up_is_changed_back() {
+        let mut hall = hall(State::Parked, "one");
+        let mut settings = hall.settings.clone();
+        settings.trim_ms = 40;
+        let start = ShowTime::from_millis(2_000);
+        for change in [ShowChange::Settings(Box::new(settings)), ShowChange::Start(start)] {
+            let Undo::Change(back) = hall.apply(change) else { panic!("it can be changed back") };
+            let is = |hall: &HallContext| (hall.settings.trim_ms, hall.cued.as_ref().unwrap().start);
+            assert_ne!(is(&hall), (0, ShowTime::ZERO));
+            hall.apply(back);
+            assert_eq!(is(&hall), (0, ShowTime::ZERO));
+        }
+        let other = Box::new(proved("two", &hall.config));
+        assert!(matches!(hall.apply(ShowChange::Cue(other, None)), Undo::Unload));
+        assert_eq!(hall.cued.unwrap().id, "two");
+    }
+
+    #[test]
+    fn the_place_where_a_show_was_left_is_kept_where_it_is_neither_at_its_beginning_nor_past_its_end() {
+        for (film_ms, kept) in [(999, false), (1_000, true), (3_999, true), (4_000, false)] {
+            let mut hall = hall(State::Stopping, "one");
+            let film = ShowTime::from_millis(film_ms);
+            hall.live.on_tick(&crate::rt::TickReport { late_ns: 0, missed: 0, show: film });
+            hall.note_place(State::Paused, State::Stopping);
+            hall.keep_place();
+            assert_eq!(hall.cued.unwrap().left_at, kept.then_some(film));
+        }
+    }
 }

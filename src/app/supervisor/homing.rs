@@ -111,3 +111,96 @@ impl Feature for Homing {
 const fn tell(event: Event) -> Act {
     Act::Tick(TickCommand::Event(event))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, row, told};
+    use crate::device::home::HomeError;
+
+    /// One under way, and the flag that calls it off.
+    fn begun(hall: &mut HallContext) -> (Homing, Arc<AtomicBool>) {
+        hall.mirror.state = State::Homing;
+        let mut homing = Homing::default();
+        let mut acts = told(&mut homing, &SupervisorEvent::Entered(State::Homing), hall);
+        let Some(Act::Start(Job::Home(lanes, called_off))) = acts.pop() else { panic!("it begins") };
+        assert_eq!(lanes, hall.lanes_on().collect::<Vec<_>>());
+        (homing, called_off)
+    }
+
+    fn event(acts: &[Act]) -> Option<Event> {
+        match acts {
+            [] => None,
+            [Act::Tick(TickCommand::Event(event))] => Some(*event),
+            _ => panic!("{acts:?}"),
+        }
+    }
+
+    #[test]
+    fn seats_that_are_home_have_to_be_seen_after_that_before_the_hall_is() {
+        let mut hall = hall(State::Parked, "one");
+        let (mut homing, _) = begun(&mut hall);
+        let since = hall.now;
+        let acts = homing.take(Finding::Homed(vec![(0, Ok(())), (1, Ok(()))]), &hall);
+        assert!(matches!(&acts[..], [Act::Order(Order::Homed(0)), Act::Order(Order::Homed(1))]), "{acts:?}");
+        for (seen, home) in [([STALE, Duration::ZERO], None), ([STALE, STALE], Some(Event::Homed))] {
+            let table = seen.map(|later| row(since + later));
+            assert_eq!(event(&told(&mut homing, &SupervisorEvent::Round(&table), &hall)), home);
+        }
+        assert!(matches!(homing, Homing::Idle), "it is told once");
+    }
+
+    #[test]
+    fn a_seat_that_is_home_and_not_seen_in_time_is_trouble_and_one_that_is_out_is_not_waited_for() {
+        let mut hall = hall(State::Parked, "one");
+        hall.settings.only = Some(["B".to_owned()].into());
+        let (mut homing, _) = begun(&mut hall);
+        let since = hall.now;
+        homing.take(Finding::Homed(vec![(1, Ok(()))]), &hall);
+        let table = [row(since), row(since)];
+        hall.now = since + SEEN_WITHIN;
+        assert_eq!(event(&told(&mut homing, &SupervisorEvent::Round(&table), &hall)), None);
+        hall.now = hall.now + Duration::from_millis(1);
+        let trouble = event(&told(&mut homing, &SupervisorEvent::Round(&table), &hall));
+        assert_eq!(trouble, Some(Event::Trouble(Trouble::Homing(1))));
+    }
+
+    #[test]
+    fn a_hall_that_leaves_the_state_calls_homing_off_and_hears_of_no_end_of_it() {
+        for leaving in [SupervisorEvent::Entered(State::Stopped), SupervisorEvent::Leaving] {
+            let mut hall = hall(State::Parked, "one");
+            let (mut homing, called_off) = begun(&mut hall);
+            told(&mut homing, &leaving, &hall);
+            assert!(called_off.load(Ordering::Acquire));
+            let failed = Finding::Homed(vec![(0, Err(HomeError::Unsearched(1)))]);
+            assert!(homing.take(failed, &hall).is_empty());
+            assert!(told(&mut homing, &SupervisorEvent::Round(&[row(hall.now)]), &hall).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_seat_that_does_not_home_is_named_and_is_trouble() {
+        let mut hall = hall(State::Parked, "one");
+        let (mut homing, _) = begun(&mut hall);
+        let acts = homing.take(Finding::Homed(vec![(1, Err(HomeError::Unsearched(1)))]), &hall);
+        let [Act::Note(note), trouble] = &acts[..] else { panic!("{acts:?}") };
+        assert!(note.starts_with("B1: "), "{note}");
+        assert!(
+            matches!(trouble, Act::Tick(TickCommand::Event(Event::Trouble(Trouble::Homing(1))))),
+            "{trouble:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_homes_in_a_hall_that_closes_or_whose_line_is_in_use() {
+        for (close, job) in [(true, None), (false, Some("preflight"))] {
+            let mut hall = hall(State::Homing, "one");
+            if close {
+                hall.close();
+            }
+            hall.job = job;
+            let mut homing = Homing::default();
+            assert!(told(&mut homing, &SupervisorEvent::Entered(State::Homing), &hall).is_empty());
+        }
+    }
+}

@@ -6,9 +6,9 @@ use jiff::Zoned;
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::{HallContext, SetAside};
 use super::job::{Again, Job, JobResult};
-use super::service_log::kept;
-use crate::control::{Command, Severity, Warning, Who};
+use crate::control::{Command, Desired, Severity, Warning, Who};
 use crate::journal::{PlaylistPlace, stamp};
+use crate::log::{Line, Priority};
 use crate::settings::{LoadedShow, Out, Settings, seats_out};
 use crate::time::ShowTime;
 
@@ -71,11 +71,11 @@ impl Lasting {
         for (group, since) in &hall.settings.out {
             let names: Vec<&str> = hall.names_of(group).collect();
             if !names.is_empty() {
-                out.push(kept(&seats_out(&names, since, &now)));
+                out.push(kept(seats_out(&names, since, &now)));
             }
         }
         let words = self.came_back.as_ref();
-        out.extend(words.map(|words| kept(&format!("as it was before the start: {words}"))));
+        out.extend(words.map(|words| kept(format!("as it was before the start: {words}"))));
     }
 
     /// What is worth a word of it.
@@ -109,10 +109,9 @@ impl Feature for Lasting {
         match event {
             // A show begins: what was before is over.
             SupervisorEvent::Begun(_) => self.came_back = None,
-            SupervisorEvent::Done(desired) if matches!(desired.ask, Command::Arm { .. }) => {
-                if std::mem::take(&mut self.unsaid) {
-                    self.say(hall, out);
-                }
+            SupervisorEvent::Done(Desired { ask: Command::Arm { .. }, .. }) if self.unsaid => {
+                self.unsaid = false;
+                self.say(hall, out);
             }
             SupervisorEvent::Entered(_) if hall.may("load").is_ok() => {
                 out.extend(self.ready.take().map(|again| Act::Take(JobResult::Again(again))));
@@ -133,6 +132,11 @@ fn loaded(hall: &HallContext, playlist: Option<PlaylistPlace>) -> Option<LoadedS
     Some(LoadedShow { cue: cued.id.clone(), sha256: cued.sha256.clone(), playlist, film_ms })
 }
 
+/// Says something that was set before the program started.
+fn kept(text: String) -> Act {
+    Act::Log(Line::new(Priority::Notice, "kept", text))
+}
+
 impl Out {
     /// Taken out just now.
     pub(super) fn now(who: &Who, why: Option<String>) -> Self {
@@ -143,4 +147,52 @@ impl Out {
 
 const fn millis(film: ShowTime) -> i64 {
     film.as_nanos() / 1_000_000
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{desired, hall, proved, told};
+    use crate::control::Surface;
+    use crate::state::State;
+
+    #[test]
+    fn what_came_back_is_said_at_the_first_arm_after_a_start_and_not_again() {
+        let hall = hall(State::Armed, "one");
+        let mut lasting = Lasting::since_start(Some("motion 60 %".to_owned()));
+        let asks = [Command::Pause, Command::Arm { seats_empty: false }, Command::Arm { seats_empty: true }];
+        let said = asks
+            .map(|ask| told(&mut lasting, &SupervisorEvent::Done(&desired(Surface::Http, ask)), &hall).len());
+        assert_eq!(said, [0, 1, 0]);
+    }
+
+    #[test]
+    fn what_was_loaded_before_waits_for_the_hall_to_rest_and_is_kept_meanwhile() {
+        let mut hall = hall(State::Parking, "one");
+        let mut lasting = Lasting::default();
+        let before = loaded(&hall, None).unwrap();
+        lasting.load_again(before.clone());
+        let again = || (None, Ok(Box::new(proved("one", &hall.config))));
+        assert!(lasting.take(again(), &hall).is_none());
+        hall.cued = None;
+        assert_eq!(lasting.settings(&hall, None).show, Some(before.clone()));
+        assert!(told(&mut lasting, &SupervisorEvent::Entered(State::Stopping), &hall).is_empty());
+        hall.mirror.state = State::Stopped;
+        let acts = told(&mut lasting, &SupervisorEvent::Entered(State::Stopped), &hall);
+        let [Act::Take(JobResult::Again(again))] = <[Act; 1]>::try_from(acts).unwrap() else {
+            panic!("it is taken up")
+        };
+        assert_eq!(lasting.take(again, &hall).unwrap().1, Some(before));
+    }
+
+    #[test]
+    fn while_seats_are_tested_what_was_loaded_before_lasts() {
+        let mut hall = hall(State::Armed, "one");
+        let test = Box::new(proved("test", &hall.config));
+        hall.apply(super::super::hall::ShowChange::Test(test, None));
+        assert_eq!(hall.cued.as_ref().unwrap().id, "test");
+        assert_eq!(loaded(&hall, None).unwrap().cue, "one");
+        hall.end_test();
+        assert_eq!(hall.cued.as_ref().unwrap().id, "one");
+    }
 }

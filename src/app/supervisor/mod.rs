@@ -8,6 +8,7 @@ mod act;
 mod belts;
 mod commands;
 mod features;
+mod figures;
 mod gear;
 mod hall;
 mod hall_settings;
@@ -49,7 +50,6 @@ use std::thread;
 use std::time::Duration;
 
 use jiff::Zoned;
-use rtrb::Producer;
 
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
@@ -57,9 +57,9 @@ use crate::control::model::Ending;
 use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who};
 use crate::journal::Journal;
 use crate::library::Library;
-use crate::rt::{Command as TickCommand, News, NewsIn, Order, Ticket};
+use crate::rt::{News, Ticket};
 use crate::settings::{Settings, SettingsFile};
-use crate::state::{Cause, State};
+use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 use act::{Act, SupervisorEvent};
@@ -71,7 +71,6 @@ use list::List;
 use procedures::Procedures;
 use record::Records;
 use shared_link::SharedLink;
-use state_mirror::StateMirror;
 use status::StatusParts;
 
 /// From one status to the next.
@@ -121,11 +120,10 @@ pub struct Supervisor {
     ports: SupervisorPorts,
     /// When the hall opened.
     opened: MonoTime,
-    commands: Producer<TickCommand>,
+    /// The ways to the tick thread and the ack thread, and back.
+    runtime: RuntimeHandle,
     /// The ticket of the next command.
     given: Ticket,
-    news: NewsIn,
-    orders: Producer<Order>,
     hall: HallContext,
     features: Features,
     procedures: Procedures,
@@ -152,35 +150,18 @@ impl Supervisor {
         let settings = carryover.settings(&runtime.config);
         ports.source.lead(Arc::clone(&runtime.desk));
         examine(library.clone());
-        let RuntimeHandle { config, desk, live, leave, commands, news, orders, granted } = runtime;
+        let hall = HallContext::new(&runtime, settings, now);
         let tools = Tools {
-            config: Arc::clone(&config),
+            config: Arc::clone(&hall.config),
             library,
             line: SharedLink::of(line),
             settings: ports.settings_file.folder().to_owned(),
         };
-        let hall = HallContext {
-            config,
-            desk,
-            live,
-            leave,
-            granted,
-            mirror: StateMirror::new(now),
-            settings,
-            cued: None,
-            aside: None,
-            left_at: None,
-            ended: Cause::Started,
-            job: None,
-            now,
-        };
         let mut supervisor = Self {
             ports,
             opened: now,
-            commands,
+            runtime,
             given: 0,
-            news,
-            orders,
             hall,
             features: Features::new(Records::new(journal), carryover.lasting),
             procedures: Procedures::default(),
@@ -240,7 +221,7 @@ impl Supervisor {
 
     /// Hears what the tick thread has to say.
     fn take_news(&mut self) {
-        while let Some((ticket, news)) = self.news.next() {
+        while let Some((ticket, news)) = self.runtime.news.take() {
             match (ticket, state_mirror::answer(news)) {
                 (Some(ticket), Some(answer)) => {
                     if let Some((undo, problem)) = self.procedures.answered(ticket, answer) {

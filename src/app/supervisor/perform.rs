@@ -2,6 +2,7 @@
 
 use super::act::{Act, ShowBegun, SupervisorEvent};
 use super::hall::{ShowChange, Undo};
+use super::procedures::Awaited;
 use super::reload::reload;
 use super::state_mirror::{ANSWER, busy};
 use super::{Supervisor, belts};
@@ -19,7 +20,7 @@ impl Supervisor {
         loop {
             while let Some(act) = self.procedures.next_act() {
                 if let Err(problem) = self.perform(act) {
-                    self.procedures.fail(problem);
+                    self.procedures.first().fail(problem);
                 }
             }
             let Some(done) = self.procedures.take_done() else { return };
@@ -52,9 +53,9 @@ impl Supervisor {
                 }
             }
             Act::AwaitStop if self.hall.mirror.is_stopping() => {}
-            Act::AwaitStop => self.procedures.await_stop(self.hall.now + ANSWER),
-            Act::Otherwise(acts) => self.procedures.or_else(acts),
-            Act::Name(name) => self.procedures.name(name),
+            Act::AwaitStop => self.procedures.first().wait(Awaited::Stop(self.hall.now + ANSWER)),
+            Act::Otherwise(acts) => self.procedures.first().otherwise = acts,
+            Act::Name(name) => self.procedures.first().name = Some(name),
             Act::Fail(problem) => return Err(problem),
             Act::CheckBelts => return belts::check(&self.hall),
             Act::Go { who, surface } => self.let_go(who, surface)?,
@@ -65,23 +66,23 @@ impl Supervisor {
             Act::Start(job) => {
                 self.hall.is_free()?;
                 let word = job.word();
-                self.jobs.start(job, || self.procedures.take_asked())?;
+                self.jobs.start(job, || self.procedures.first().asked.take())?;
                 self.hall.job = Some(word);
             }
             Act::Take(result) => {
                 let acts = self.features.take(result, &self.hall)?;
-                self.procedures.go_on_with(acts);
+                self.procedures.first().go_on_with(acts);
             }
             Act::EndShow => {
                 let acts = self.features.end_show(&mut self.hall);
-                self.procedures.go_on_with(acts);
+                self.procedures.first().go_on_with(acts);
             }
             Act::EndTest(how) => {
                 self.features.seats.end(how);
                 self.hall.end_test();
             }
             // Where it finds no room the controller is not looked at, and stays out.
-            Act::Order(order) => drop(self.orders.push(order)),
+            Act::Order(order) => drop(self.runtime.orders.push(order)),
             Act::Reload => {
                 self.reload = Some(reload(&self.hall, &self.ports.config)?);
                 self.hall.close();
@@ -101,7 +102,7 @@ impl Supervisor {
         let (counted, place) = (self.hall.count(), self.features.onward.place(&self.hall));
         let begun = Box::new(ShowBegun { who, surface, counted, place });
         let go = Act::Tick(TickCommand::Request(Transition::Go));
-        self.procedures.go_on_with(vec![go, Act::Begin(begun)]);
+        self.procedures.first().go_on_with(vec![go, Act::Begin(begun)]);
         Ok(())
     }
 
@@ -123,10 +124,11 @@ impl Supervisor {
 
     /// Gives the tick thread a command; what follows waits for its answer.
     fn give(&mut self, command: TickCommand, undo: Undo) {
-        if self.commands.push(command).is_err() {
+        if self.runtime.commands.push(command).is_err() {
             return self.undo(undo, busy());
         }
-        self.procedures.await_answer(self.given, undo, self.hall.now + ANSWER);
+        let awaited = Awaited::Answer(self.given, undo, self.hall.now + ANSWER);
+        self.procedures.first().wait(awaited);
         self.given = self.given.wrapping_add(1);
     }
 
@@ -145,6 +147,6 @@ impl Supervisor {
             }
             Undo::Readiness => return self.features.readiness.forget(),
         }
-        self.procedures.fail(problem);
+        self.procedures.first().fail(problem);
     }
 }

@@ -15,7 +15,7 @@ use crate::time::MonoTime;
 pub(super) struct Procedure {
     acts: VecDeque<Act>,
     /// What is done where one of them fails.
-    otherwise: Vec<Act>,
+    pub(super) otherwise: Vec<Act>,
     awaited: Option<Awaited>,
     /// The tick thread has been told at the end whether a show can be armed.
     has_told: bool,
@@ -26,7 +26,7 @@ pub(super) struct Procedure {
 
 /// What a procedure waits for, and how long.
 #[derive(Debug)]
-enum Awaited {
+pub(super) enum Awaited {
     /// The answer to the command of that ticket; where that is a refusal, it is undone so.
     Answer(Ticket, Undo, MonoTime),
     /// A stop in the state.
@@ -52,6 +52,14 @@ impl Procedures {
     /// True if nothing is to be done.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+
+    /// The one that is under way; one that does nothing where none is.
+    pub(super) fn first(&mut self) -> &mut Procedure {
+        if self.0.is_empty() {
+            self.add(Vec::new());
+        }
+        &mut self.0[0]
     }
 
     /// Until when something is waited for; `None` if nothing is.
@@ -99,59 +107,27 @@ impl Procedures {
         }
     }
 
-    /// Has the first do these before all else of it.
-    pub(super) fn go_on_with(&mut self, acts: Vec<Act>) {
-        if let Some(first) = self.0.front_mut() {
-            acts.into_iter().rev().for_each(|act| first.acts.push_front(act));
-        }
-    }
-
-    /// Has the first do these where it fails.
-    pub(super) fn or_else(&mut self, acts: Vec<Act>) {
-        if let Some(first) = self.0.front_mut() {
-            first.otherwise = acts;
-        }
-    }
-
-    /// Names the first.
-    pub(super) fn name(&mut self, name: String) {
-        if let Some(first) = self.0.front_mut() {
-            first.name = Some(name);
-        }
-    }
-
-    /// The ask that the first is for is answered by somebody else.
-    pub(super) fn take_asked(&mut self) -> Option<Asked> {
-        self.0.front_mut()?.asked.take()
-    }
-
-    /// The first waits for the answer to a command.
-    pub(super) fn await_answer(&mut self, ticket: Ticket, undo: Undo, until: MonoTime) {
-        self.wait(Awaited::Answer(ticket, undo, until));
-    }
-
-    /// The first waits until a stop is seen in the state.
-    pub(super) fn await_stop(&mut self, until: MonoTime) {
-        self.wait(Awaited::Stop(until));
-    }
-
-    fn wait(&mut self, awaited: Awaited) {
-        if let Some(first) = self.0.front_mut() {
-            first.awaited = Some(awaited);
-        }
-    }
-
-    /// The first has failed: nothing more of it is done but what was to be done then.
-    pub(super) fn fail(&mut self, problem: Problem) {
-        if let Some(first) = self.0.front_mut() {
-            first.acts = std::mem::take(&mut first.otherwise).into();
-            first.failed.get_or_insert(problem);
-        }
-    }
-
     /// Gives the asks of all of them, none of which goes on.
     pub(super) fn into_asked(self) -> impl Iterator<Item = Asked> {
         self.0.into_iter().filter_map(|one| one.asked)
+    }
+}
+
+impl Procedure {
+    /// Does these before all else that is to be done.
+    pub(super) fn go_on_with(&mut self, acts: Vec<Act>) {
+        acts.into_iter().rev().for_each(|act| self.acts.push_front(act));
+    }
+
+    /// Waits for that.
+    pub(super) fn wait(&mut self, awaited: Awaited) {
+        self.awaited = Some(awaited);
+    }
+
+    /// Nothing more of it is done but what was to be done then.
+    pub(super) fn fail(&mut self, problem: Problem) {
+        self.acts = std::mem::take(&mut self.otherwise).into();
+        self.failed.get_or_insert(problem);
     }
 }
 
@@ -179,11 +155,11 @@ mod tests {
     fn an_answer_that_came_too_late_is_not_taken_for_that_of_the_next_command() {
         let mut procedures = Procedures::default();
         procedures.add(vec![]);
-        procedures.await_answer(0, Undo::Nothing, ms(2_000));
+        procedures.first().wait(Awaited::Answer(0, Undo::Nothing, ms(2_000)));
         assert!(procedures.on_time(false, ms(1_999)).is_none());
         let (_, problem) = procedures.on_time(false, ms(2_000)).unwrap();
         assert_eq!(problem.code, Code::Timeout);
-        procedures.await_answer(1, Undo::Nothing, ms(4_000));
+        procedures.first().wait(Awaited::Answer(1, Undo::Nothing, ms(4_000)));
         assert!(procedures.answered(0, Err(busy())).is_none());
         assert_eq!(procedures.waits_until(), Some(ms(4_000)));
         assert!(procedures.answered(1, Ok(())).is_none());
@@ -196,9 +172,9 @@ mod tests {
         procedures.add(vec![note("one"), note("two")]);
         procedures.add(vec![note("other")]);
         procedures.next_act();
-        procedures.await_answer(0, Undo::Nothing, ms(2_000));
+        procedures.first().wait(Awaited::Answer(0, Undo::Nothing, ms(2_000)));
         assert!(procedures.next_act().is_none() && procedures.take_done().is_none());
-        procedures.go_on_with(vec![note("between")]);
+        procedures.first().go_on_with(vec![note("between")]);
         procedures.answered(0, Ok(()));
         assert_eq!(notes(&mut procedures), ["between", "two"]);
         assert!(procedures.take_done().is_some());
@@ -209,12 +185,12 @@ mod tests {
     fn a_procedure_that_fails_does_what_was_to_be_done_then_and_no_more() {
         let mut procedures = Procedures::default();
         procedures.add(vec![note("never")]);
-        procedures.or_else(vec![note("instead")]);
-        procedures.await_answer(7, Undo::Unload, ms(2_000));
+        procedures.first().otherwise = vec![note("instead")];
+        procedures.first().wait(Awaited::Answer(7, Undo::Unload, ms(2_000)));
         let Some((Undo::Unload, problem)) = procedures.answered(7, Err(busy())) else {
             panic!("it is undone")
         };
-        procedures.fail(problem.clone());
+        procedures.first().fail(problem.clone());
         assert_eq!(notes(&mut procedures), ["instead"]);
         assert_eq!(procedures.take_done().unwrap().failed, Some(problem));
     }
@@ -223,7 +199,7 @@ mod tests {
     fn a_stop_is_waited_for_until_it_is_seen() {
         let mut procedures = Procedures::default();
         procedures.add(vec![note("seen")]);
-        procedures.await_stop(ms(2_000));
+        procedures.first().wait(Awaited::Stop(ms(2_000)));
         procedures.on_time(false, ms(10));
         assert!(notes(&mut procedures).is_empty());
         procedures.on_time(true, ms(11));

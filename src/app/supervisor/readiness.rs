@@ -45,3 +45,26 @@ impl ReadinessCheck {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::hall;
+    use crate::state::State;
+
+    #[test]
+    fn the_tick_thread_is_told_once_of_each_change_and_again_where_it_did_not_hear() {
+        let mut hall = hall(State::Parked, "one");
+        let mut check = ReadinessCheck::default();
+        assert_eq!(check.tell(&hall), Some(Readiness::NotPreflighted));
+        assert_eq!(check.tell(&hall), None);
+        check.forget();
+        assert_eq!(check.tell(&hall), Some(Readiness::NotPreflighted));
+        check.preflighted = Some(Preflighted::failing_at(1, 2));
+        assert_eq!(check.tell(&hall), None);
+        hall.settings.only = Some(["A".to_owned()].into());
+        assert_eq!(check.tell(&hall), Some(Readiness::Ready), "the one that failed is out");
+        hall.cued = None;
+        assert_eq!(check.tell(&hall), Some(Readiness::NoCue));
+    }
+}

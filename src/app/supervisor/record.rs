@@ -239,3 +239,42 @@ fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
     let _ = now.subtract(before);
     Percentiles::of(&now)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, row, told};
+    use crate::journal::Limits;
+
+    #[test]
+    fn a_show_that_is_over_waits_for_the_fate_of_its_last_frames_but_not_for_ever() {
+        let folder = tempfile::tempdir().unwrap();
+        let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
+        let mut records = Records::new(Journal::open(folder.path(), limits, &Zoned::now()));
+        let mut hall = hall(State::Armed, "one");
+        let ms = Duration::from_millis;
+        for (asked, later, settled) in [
+            (1, ms(100), false),
+            (0, Duration::ZERO, false),
+            (0, ms(100), true),
+            (1, SETTLED_WITHIN + ms(1), true),
+        ] {
+            let begun = ShowBegun {
+                who: "anna".to_owned(),
+                surface: Surface::Http,
+                counted: hall.count(),
+                place: None,
+            };
+            told(&mut records, &SupervisorEvent::Begun(&begun), &hall);
+            assert!(records.is_under_way());
+            records.end(&hall);
+            assert!(!records.is_under_way());
+            let over = hall.now;
+            hall.now = over + later;
+            let mut row = row(hall.now);
+            row.counts.asked = asked;
+            told(&mut records, &SupervisorEvent::Round(&[row]), &hall);
+            assert_eq!(records.open.is_none(), settled, "{asked} open, {later:?} after the end");
+        }
+    }
+}

@@ -76,3 +76,64 @@ fn may_test(hall: &HallContext) -> Result<(), Problem> {
     let detail = format!("cannot test while {}", hall.mirror.state);
     Err(Problem::new(Code::State, detail, "load any cue and arm, with nobody on the seats, then test"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, row, told};
+    use crate::rt::TickReport;
+    use crate::time::ShowTime;
+
+    #[test]
+    fn seats_are_tested_in_an_armed_hall_alone_be_it_that_it_was_one_when_the_test_was_asked_for() {
+        let mut hall = hall(State::Armed, "one");
+        let row = ["A".to_owned()];
+        assert!(matches!(&SeatTesting::make(&row, &hall).unwrap()[..], [Act::Start(Job::Test(Some(_)))]));
+        let unknown = SeatTesting::make(&["Z".to_owned()], &hall).unwrap_err();
+        assert_eq!(unknown.code, Code::Unknown);
+        hall.mirror.state = State::Parked;
+        assert_eq!(SeatTesting::make(&row, &hall).unwrap_err().code, Code::State);
+        let mut testing = SeatTesting::default();
+        let made = SeatTest::make(&hall.config).unwrap();
+        assert_eq!(testing.take(made, None, &hall).unwrap_err().code, Code::State);
+        assert!(testing.test.is_none());
+    }
+
+    #[test]
+    fn a_test_that_does_not_begin_ends_and_leaves_the_cue_before_it() {
+        let hall = hall(State::Armed, "one");
+        let mut testing = SeatTesting::default();
+        let acts = testing.take(SeatTest::make(&hall.config).unwrap(), None, &hall).unwrap();
+        let [Act::Otherwise(instead), Act::Stage(ShowChange::Test(..)), Act::Go { .. }] = &acts[..] else {
+            panic!("{acts:?}")
+        };
+        assert!(matches!(instead[..], [Act::EndTest(_), Act::Stage(ShowChange::Again)]), "{instead:?}");
+        testing.end("did not begin");
+        let status = testing.test.unwrap().status;
+        assert_eq!((status.running, &*status.step), (false, "did not begin"));
+    }
+
+    #[test]
+    fn each_part_that_is_over_has_a_line_for_each_seat_under_test() {
+        let mut hall = hall(State::Armed, "one");
+        hall.settings.only = Some(["B".to_owned()].into());
+        let mut testing = SeatTesting::default();
+        testing.take(SeatTest::make(&hall.config).unwrap(), None, &hall).unwrap();
+        let table = |acked| {
+            let mut row = row(hall.now);
+            (row.counts.asked, row.counts.acked) = (acked, acked);
+            [row, row]
+        };
+        let mut lines = |ms: i64, acked: u64| {
+            let show = ShowTime::from_millis(ms);
+            hall.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+            told(&mut testing, &SupervisorEvent::Round(&table(acked)), &hall)
+        };
+        assert!(lines(0, 0).is_empty() && lines(1_500, 10).is_empty());
+        let told = lines(7_500, 50);
+        let [Act::Record(line)] = &told[..] else { panic!("{told:?}") };
+        assert_eq!(line, "B1 a1: 40 of 40 acked, p99 -");
+        let status = testing.test.unwrap().status;
+        assert_eq!((status.done, status.rows.len(), status.rows[0].passed), (1, 1, true));
+    }
+}

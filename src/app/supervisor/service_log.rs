@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::act::Act;
 use super::warnings::NOTE;
 use crate::control::{Severity, Status, Warning};
 use crate::journal::Action;
@@ -120,9 +119,4 @@ impl ServiceLog {
             Line::new(Priority::Notice, format!("ask-{word}"), format!("{who}: {what}: {result}{often}"));
         self.put(line.with("operator", who.clone()));
     }
-}
-
-/// Says something that was set before the program started.
-pub(super) fn kept(text: &str) -> Act {
-    Act::Log(Line::new(Priority::Notice, "kept", text))
 }

@@ -1,8 +1,5 @@
 //! The status: how all of it stands, in the words of the hall.
 
-use std::collections::VecDeque;
-use std::time::Duration;
-
 use jiff::Zoned;
 
 use super::belts;
@@ -18,8 +15,6 @@ use crate::state::Next;
 use crate::time::MonoTime;
 use crate::tracker;
 
-/// Over how long the rate of acks is counted.
-const RATED: Duration = Duration::from_secs(1);
 /// The least and the greatest bound of the buckets, µs.
 const BOUNDS_US: [f64; 16] = [
     5.0,
@@ -39,34 +34,6 @@ const BOUNDS_US: [f64; 16] = [
     200_000.0,
     1_000_000.0,
 ];
-
-/// What was counted of the last second.
-#[derive(Debug, Default)]
-pub(super) struct Rates {
-    /// Asked and acked by controller, oldest first.
-    counted: VecDeque<(MonoTime, Vec<(u64, u64)>)>,
-}
-
-impl Rates {
-    /// Notes what is counted now.
-    pub(super) fn note(&mut self, table: &[Row], now: MonoTime) {
-        let counted = |row: &Row| (row.counts.asked - row.counts.in_flight(), row.counts.acked);
-        self.counted.push_back((now, table.iter().map(counted).collect()));
-        while self.counted.len() > 1 && self.counted.front().is_some_and(|(at, _)| now.since(*at) > RATED) {
-            self.counted.pop_front();
-        }
-    }
-
-    /// Acks over frames whose fate is known, of the last second; `None` if there were none.
-    fn of(&self, controller: usize) -> Option<f64> {
-        let (_, first) = self.counted.front()?;
-        let (_, last) = self.counted.back()?;
-        let (before, now) = (first.get(controller)?, last.get(controller)?);
-        let asked = now.0.saturating_sub(before.0);
-        #[expect(clippy::cast_precision_loss, reason = "at most some thousand")]
-        (asked > 0).then(|| now.1.saturating_sub(before.1) as f64 / asked as f64)
-    }
-}
 
 /// What the status is made of.
 #[derive(Debug, Clone, Copy)]

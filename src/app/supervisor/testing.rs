@@ -11,24 +11,34 @@ use std::time::Duration;
 use jiff::Zoned;
 use rtrb::{Consumer, RingBuffer};
 use tempfile::TempDir;
-use tokio::runtime;
+use tokio::runtime::Builder;
 
-use super::act::Act;
+use super::act::{Act, Feature, SupervisorEvent};
+use super::hall::HallContext;
+use super::hall_settings::HallSettings;
+use super::show::ProvedShow;
 use super::{Carryover, ServiceLog, Signals, Supervisor, SupervisorPorts};
 use crate::app::runtime::RuntimeHandle;
 use crate::config::{self, Config};
-use crate::control::{Command, Handle, Inbox, Problem, Role, Status, StatusSource, Surface, Who, handle};
+use crate::control::{
+    Command, Desired, Handle, Inbox, Problem, Role, Status, StatusSource, Surface, Who, handle,
+};
+use crate::cue::{self, Source};
 use crate::engine::Mix;
+use crate::health::{HealthState, Why};
 use crate::journal::{Journal, Limits};
 use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
-use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Ticket, line};
+use crate::observe::ControllerState;
+use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Row, Ticket, line};
 use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{Policy, RealTime};
 use crate::time::{Clock as _, MonoTime};
+use crate::timeline::Timeline;
+use crate::tracker::Counts;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -134,6 +144,67 @@ pub(super) fn config(folder: &Path) -> Config {
     config::load(&path).unwrap()
 }
 
+/// The hall as features see it, in that state, with a cue of that name loaded; nobody leads it.
+pub(super) fn hall(state: State, cue: &str) -> HallContext {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Arc::new(config(folder.path()));
+    let (runtime, ..) = runtime(&config);
+    let settings = HallSettings::new(&config);
+    let mut hall = HallContext::new(&runtime, settings, MonoTime::from_nanos(1_000_000_000));
+    hall.mirror.state = state;
+    hall.cued = Some(proved(cue, &config));
+    hall
+}
+
+/// A cue of four seconds that was proved.
+pub(super) fn proved(id: &str, config: &Config) -> ProvedShow {
+    let cue = cue::read(Path::new(id), RIDE.as_bytes(), &Source::Native).unwrap();
+    ProvedShow::prove(id.to_owned(), config, Timeline::new(cue), String::new()).unwrap()
+}
+
+/// A controller that is well, of which that was told then.
+pub(super) fn row(at: MonoTime) -> Row {
+    Row {
+        counts: Counts::default(),
+        ack_ns: None,
+        standing: HealthState::Ok,
+        why: Why::Acked,
+        state: ControllerState::default(),
+        homed: Some(true),
+        at,
+    }
+}
+
+/// What a feature has done for that.
+pub(super) fn told(feature: &mut dyn Feature, event: &SupervisorEvent<'_>, hall: &HallContext) -> Vec<Act> {
+    let mut acts = Vec::new();
+    feature.on(event, hall, &mut acts);
+    acts
+}
+
+/// Somebody of that surface wants that.
+pub(super) fn desired(surface: Surface, ask: Command) -> Desired {
+    Desired { ask, who: Who { role: Role::Engineer, surface, name: "anna".to_owned() } }
+}
+
+/// The ways to a hall of two lanes, and what is at their ends.
+fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsOut) {
+    let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
+    let (commands, commands_end) = RingBuffer::new(64);
+    let (news, news_end) = rt::news(256);
+    let runtime = RuntimeHandle {
+        config: Arc::clone(config),
+        desk,
+        live: Arc::new(Live::new(2)),
+        leave: Arc::default(),
+        commands,
+        news: news_end,
+        orders: RingBuffer::new(16).0,
+        granted: RealTime { policy: Policy::Other, priority: 0, memory_locked: false, refusals: vec![] },
+    };
+    (runtime, commands_end, news)
+}
+
 impl Rig {
     /// One of a hall that is parked and ready to be armed, with a cue loaded.
     pub(super) fn parked() -> Self {
@@ -176,22 +247,11 @@ impl Rig {
         let folder = tempfile::tempdir().unwrap();
         let carryover = ready(folder.path());
         let config = Arc::new(config(folder.path()));
-        let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
-        let (commands, commands_end) = RingBuffer::new(64);
-        let (news, news_end) = rt::news(256);
+        let (runtime, commands_end, news) = runtime(&config);
+        let desk = Arc::clone(&runtime.desk);
         let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
         let (sender, _) = Ports::open(config.show.bind, &peers).unwrap().split();
         let (line, _) = line(sender, 2);
-        let runtime = RuntimeHandle {
-            config: Arc::clone(&config),
-            desk: Arc::clone(&desk),
-            live: Arc::new(Live::new(2)),
-            leave: Arc::default(),
-            commands,
-            news: news_end,
-            orders: RingBuffer::new(16).0,
-            granted: RealTime { policy: Policy::Other, priority: 0, memory_locked: false, refusals: vec![] },
-        };
         let library = library::Hall::new(&folder.path().join("hall.toml"), &config.store);
         let library = Library::open(&config.show.library, library).unwrap();
         let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
@@ -232,9 +292,9 @@ impl Rig {
     }
 
     fn post_as(&self, surface: Surface, ask: Command) -> JoinHandle<Result<Arc<Status>, Problem>> {
-        let who = Who { role: Role::Engineer, surface, name: "anna".to_owned() };
+        let Desired { ask, who } = desired(surface, ask);
         let posted = self.handle.post(who, ask).unwrap();
-        let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let runtime = Builder::new_current_thread().enable_time().build().unwrap();
         thread::spawn(move || runtime.block_on(posted.answer()))
     }
 
@@ -285,6 +345,13 @@ impl Rig {
             self.supervisor.go_on();
             thread::yield_now();
         }
+    }
+
+    /// Has the tick thread wait while that is done.
+    pub(super) fn while_it_waits<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        let machine = Arc::clone(&self.double.machine);
+        let _held = machine.lock().unwrap();
+        act(self)
     }
 
     /// Has all of that happen at the state machine at once.

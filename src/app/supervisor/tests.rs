@@ -353,3 +353,35 @@ fn a_homing_that_is_stopped_tells_no_further_seat_to_home() {
     assert_eq!(rig.state(), State::Stopped);
     assert!(matches!(rig.supervisor.features.homing, Homing::Idle));
 }
+
+#[test]
+fn what_is_asked_waits_for_what_was_asked_before_it_and_neither_holds_up_the_status() {
+    let mut rig = Rig::parked();
+    let (arm, disarm) = (rig.post(ARM), rig.post(Command::Disarm));
+    rig.while_it_waits(|rig| {
+        let given = rig.supervisor.given;
+        rig.supervisor.told = MonoTime::default();
+        for _ in 0..3 {
+            rig.supervisor.turn();
+        }
+        assert_eq!(rig.supervisor.given, given + 1, "the second was given before the first was answered");
+        assert_ne!(rig.supervisor.told, MonoTime::default(), "no status while something is waited for");
+        assert!(!arm.is_finished());
+    });
+    rig.wait_until(|_| arm.is_finished() && disarm.is_finished());
+    arm.join().unwrap().unwrap();
+    disarm.join().unwrap().unwrap();
+    assert_eq!(rig.state(), State::Parked);
+}
+
+#[test]
+fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_close() {
+    let mut rig = Rig::armed();
+    let go = || vec![Act::Go { who: "the playlist".to_owned(), surface: Surface::Schedule }];
+    rig.supervisor.hall.close();
+    rig.does(go());
+    assert_eq!(rig.state(), State::Armed);
+    rig.supervisor.hall.leave.store(false, Ordering::Release);
+    rig.does(go());
+    assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
+}

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::*;
-use crate::app::supervisor::testing::Rig;
+use crate::app::supervisor::testing::{Rig, hall, told};
 use crate::control::LevelsChange;
 use crate::playlist::{Playlist, Schedule};
 use crate::state::{Event, PlayMode};
@@ -189,4 +189,37 @@ fn a_playlist_that_was_loaded_before_is_at_the_entry_where_it_was_or_at_that_of_
     assert_eq!(list.nearest(0, "three"), 2, "somebody has changed it meanwhile");
     assert_eq!(list.nearest(0, "beside"), 0, "a cue that was loaded beside it");
     assert_eq!(list.nearest(7, "beside"), 2);
+}
+
+/// What is done for a wall clock that passes the time of the second entry in that state.
+fn at_its_time(state: State) -> Vec<Act> {
+    let text = "title = \"Day\"\ntimezone = \"UTC\"\n[[entry]]\ncue = \"one\"\n[[entry]]\ncue = \"two\"\nat = \"19:00\"\n";
+    let playlist = Playlist::parse(Path::new("day.toml"), text).unwrap();
+    let list = List { playlist, cues: vec![(None, 4.0); 2], current: 1, ..list() };
+    let mut onward = Onward { list: Some(list), ..Onward::default() };
+    let hall = hall(state, "two");
+    let wall = |text: &str| text.parse::<Zoned>().unwrap();
+    let before = wall("2026-11-22T18:59:59+00:00[UTC]");
+    assert!(told(&mut onward, &SupervisorEvent::Clock(&before), &hall).is_empty());
+    let starts_in = onward.list.as_ref().unwrap().starts_in(&before);
+    assert_eq!(starts_in, Some(std::time::Duration::from_secs(1)));
+    let at = wall("2026-11-22T19:00:00.01+00:00[UTC]");
+    let acts = told(&mut onward, &SupervisorEvent::Clock(&at), &hall);
+    assert!(told(&mut onward, &SupervisorEvent::Clock(&at), &hall).is_empty(), "once");
+    acts
+}
+
+#[test]
+fn the_time_of_an_entry_starts_it_in_an_armed_hall_and_is_noted_in_any_other() {
+    let acts = at_its_time(State::Armed);
+    let [Act::Name(_), Act::TellReadiness, Act::CheckBelts, Act::Go { surface: Surface::Schedule, .. }] =
+        &acts[..]
+    else {
+        panic!("{acts:?}")
+    };
+    for state in [State::Parked, State::Recovering, State::Stopped, State::Playing(PlayMode::Following)] {
+        let acts = at_its_time(state);
+        let [Act::Note(note)] = &acts[..] else { panic!("{acts:?}") };
+        assert!(note.contains("nobody had armed the hall"), "{note}");
+    }
 }
