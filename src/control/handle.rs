@@ -1,7 +1,7 @@
 //! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
 //! stop, which waits for neither.
 
-use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
+use std::sync::mpsc::{self, SyncSender, TrySendError};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::Thread;
 use std::time::Duration;
@@ -62,24 +62,18 @@ impl Asked {
 pub struct Inbox(mpsc::Receiver<Asked>);
 
 impl Inbox {
-    /// The next ask, waited for so long; `None` if nobody asked. None as well where all surfaces are gone. What has gone
+    /// The next ask, waited for so long; `None` if nobody asked, or all surfaces are gone. What has gone
     /// stale while it waited is answered here and never comes out: nobody expects it any more.
     #[must_use]
     pub fn next(&self, wait: Duration) -> Option<Asked> {
         let until = Monotonic.now() + wait;
         loop {
-            match self.0.recv_timeout(until.since(Monotonic.now())) {
-                Ok(asked) if asked.is_stale(Monotonic.now()) => {
-                    let problem = late(asked.desired.ask.word());
-                    asked.answer(Err(problem));
-                }
-                Ok(asked) => return Some(asked),
-                Err(RecvTimeoutError::Timeout) => return None,
-                Err(RecvTimeoutError::Disconnected) => {
-                    Monotonic.sleep_until(until);
-                    return None;
-                }
+            let asked = self.0.recv_timeout(until.since(Monotonic.now())).ok()?;
+            if !asked.is_stale(Monotonic.now()) {
+                return Some(asked);
             }
+            let problem = late(asked.desired.ask.word());
+            asked.answer(Err(problem));
         }
     }
 }
@@ -103,7 +97,7 @@ impl StatusSource {
     }
 
     /// From now on that thread is woken by each ask. What was asked before is there to be taken.
-    pub fn wakes(&self, supervisor: Thread) {
+    pub(crate) fn wakes(&self, supervisor: Thread) {
         self.1.write().unwrap_or_else(PoisonError::into_inner).supervisor = Some(supervisor);
     }
 

@@ -167,10 +167,10 @@ pub enum News {
 
 /// The number of a command, from 0 in the order in which they are given. It needs no place beside the command: the mailbox keeps
 /// the order.
-pub type Ticket = u32;
+pub(crate) type Ticket = u32;
 
 /// Whom the tick thread tells: news, and the ticket of the command that it answers, where it does.
-pub type NewsOut = Producer<(Option<Ticket>, News)>;
+pub(crate) type NewsOut = Producer<(Option<Ticket>, News)>;
 
 /// Where the tick thread's news comes out.
 #[derive(Debug)]
@@ -186,14 +186,14 @@ impl NewsIn {
     }
 
     /// The next, with the ticket of the command that it answers.
-    pub fn take(&mut self) -> Option<(Option<Ticket>, News)> {
+    pub(crate) fn take(&mut self) -> Option<(Option<Ticket>, News)> {
         self.0.pop().ok()
     }
 }
 
 /// The mailbox for so much news.
 #[must_use]
-pub fn news(places: usize) -> (NewsOut, NewsIn) {
+pub(crate) fn news(places: usize) -> (NewsOut, NewsIn) {
     let (news, news_end) = RingBuffer::new(places);
     (news, NewsIn(news_end))
 }
@@ -282,7 +282,7 @@ impl Mail {
     }
 
     /// Names the thread of whoever leads the hall, which is woken when there is news.
-    pub fn wakes_leader(&mut self, leader: Option<Thread>) {
+    pub(crate) fn wakes_leader(&mut self, leader: Option<Thread>) {
         self.leader = leader;
     }
 

@@ -24,10 +24,12 @@ pub use conductor::Conductor;
 pub use desk::Desk;
 pub use line::{Line, line};
 pub use live::{Live, Phase, Times};
+pub(crate) use mail::Ticket;
 pub use mail::{
-    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, NewsOut, Planning, Sent, Task, TickReport,
-    Ticket, mailboxes, news,
+    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, Planning, Sent, Task, TickReport, mailboxes,
 };
+#[cfg(test)]
+pub(crate) use mail::{NewsOut, news};
 pub use places::Places;
 pub use planning::PlanLoop;
 pub use spin::{Spinning, Spun};

@@ -12,7 +12,6 @@ use super::playlist::Onward;
 use super::readiness::ReadinessCheck;
 use super::record::Records;
 use super::seat_testing::SeatTesting;
-use super::show::ProvedShow;
 use crate::control::Problem;
 use crate::state::Cause;
 use crate::time::ShowTime;
@@ -60,7 +59,10 @@ impl Features {
     /// Where it has come to nothing, or may not be taken up any more.
     pub(super) fn take(&mut self, result: JobResult, hall: &HallContext) -> Result<Vec<Act>, Problem> {
         match result {
-            JobResult::Loaded(cued) => take_up(cued?, hall),
+            JobResult::Loaded(cued) => {
+                let cued = cued?;
+                hall.may("load").map(|()| vec![Act::Stage(ShowChange::Cue(cued, None))])
+            }
             JobResult::Listed(listed) => self.onward.take_list(listed?, hall),
             JobResult::Entry(entry, cued) => self.onward.take_entry(entry, cued, hall),
             JobResult::Again(again) => Ok(self.take_again(again, hall)),
@@ -115,10 +117,4 @@ impl Features {
         hall.keep_place();
         self.onward.on_show_over(hall)
     }
-}
-
-/// Takes up a cue that was proved.
-fn take_up(cued: Box<ProvedShow>, hall: &HallContext) -> Result<Vec<Act>, Problem> {
-    hall.may("load")?;
-    Ok(vec![Act::Stage(ShowChange::Cue(cued, None))])
 }

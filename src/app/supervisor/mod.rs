@@ -14,7 +14,6 @@ mod hall;
 mod hall_settings;
 mod homing;
 mod job;
-mod jobs;
 mod lasting;
 mod list;
 mod perform;
@@ -38,8 +37,9 @@ mod testing;
 mod tests;
 mod warnings;
 
-pub use reload::{Carryover, Signals};
-pub use service_log::ServiceLog;
+pub(crate) use reload::Carryover;
+pub use reload::Signals;
+pub(crate) use service_log::ServiceLog;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -65,8 +65,7 @@ use crate::time::{Clock as _, MonoTime};
 use act::{Act, SupervisorEvent};
 use features::Features;
 use hall::HallContext;
-use job::Tools;
-use jobs::Jobs;
+use job::{Jobs, Tools};
 use list::List;
 use procedures::Procedures;
 use record::Records;
@@ -80,43 +79,43 @@ const NOTES: usize = 5;
 
 /// What a supervisor has whatever the configuration is.
 #[derive(Debug)]
-pub struct SupervisorPorts {
+pub(crate) struct SupervisorPorts {
     /// What surfaces ask.
-    pub inbox: Inbox,
+    pub(crate) inbox: Inbox,
     /// Where the status goes.
-    pub source: StatusSource,
+    pub(crate) source: StatusSource,
     /// The file of the configuration.
-    pub config: PathBuf,
+    pub(crate) config: PathBuf,
     /// When the program started.
-    pub began: MonoTime,
+    pub(crate) began: MonoTime,
     /// What the system asks of the program.
-    pub signals: Signals,
+    pub(crate) signals: Signals,
     /// Whom to tell what happens.
-    pub service_log: ServiceLog,
+    pub(crate) service_log: ServiceLog,
     /// What was set in the hall before, or before the program started.
-    pub carryover: Carryover,
+    pub(crate) carryover: Carryover,
     /// Where what is set is kept.
-    pub settings_file: SettingsFile,
+    pub(crate) settings_file: SettingsFile,
 }
 
 /// What is left once the hall has closed.
 #[derive(Debug)]
-pub struct SupervisorEnd {
+pub(crate) struct SupervisorEnd {
     /// For the next supervisor.
-    pub ports: SupervisorPorts,
+    pub(crate) ports: SupervisorPorts,
     /// What the hall came to.
-    pub closed: Box<RuntimeEnd>,
+    pub(crate) closed: Box<RuntimeEnd>,
     /// The configuration to open the next hall with; `None` if the program ends.
-    pub reload: Option<Arc<Config>>,
+    pub(crate) reload: Option<Arc<Config>>,
     /// How its last show ended; stopped where there was none.
-    pub ended: Ending,
+    pub(crate) ended: Ending,
     /// The journal, still open.
-    pub journal: Journal,
+    pub(crate) journal: Journal,
 }
 
 /// The supervisor of one hall.
 #[derive(Debug)]
-pub struct Supervisor {
+pub(crate) struct Supervisor {
     ports: SupervisorPorts,
     /// When the hall opened.
     opened: MonoTime,
@@ -138,7 +137,7 @@ pub struct Supervisor {
 impl Supervisor {
     /// The supervisor of a hall that has just opened. Ahead of the first tick: what was latched stays so.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         mut ports: SupervisorPorts,
         runtime: RuntimeHandle,
         line: crate::rt::Line,
@@ -183,7 +182,7 @@ impl Supervisor {
 
     /// Keeps the hall until `closed` says what it came to.
     #[must_use]
-    pub fn run(mut self, closed: &Receiver<Box<RuntimeEnd>>) -> SupervisorEnd {
+    pub(crate) fn run(mut self, closed: &Receiver<Box<RuntimeEnd>>) -> SupervisorEnd {
         self.ports.source.wakes(thread::current());
         loop {
             let rests = self.turn();

@@ -16,7 +16,7 @@ use crate::state::State;
 
 /// What goes over from a hall to the one that is opened with another configuration, or comes from before the start.
 #[derive(Debug, Default)]
-pub struct Carryover {
+pub(crate) struct Carryover {
     /// What was set and loaded; `None` if nobody has set anything.
     pub(super) settings: Option<Settings>,
     pub(super) lasting: Lasting,
@@ -31,13 +31,13 @@ pub struct Carryover {
 impl Carryover {
     /// Of a program that has just started, and found that.
     #[must_use]
-    pub fn of(kept: Kept) -> Self {
+    pub(crate) fn of(kept: Kept) -> Self {
         let lasting = Lasting::since_start(kept.settings.as_ref().and_then(Settings::words));
         Self { settings: kept.settings, lasting, untold: kept.said, ..Self::default() }
     }
 
     /// What is set goes to the desk of a hall before its first look at the controllers: nobody waits for a seat that is out.
-    pub fn set_desk(&self, config: &Config, desk: &Desk) {
+    pub(crate) fn set_desk(&self, config: &Config, desk: &Desk) {
         self.settings(config).set(desk, &[]);
     }
 
@@ -48,7 +48,7 @@ impl Carryover {
     }
 
     /// Adds something that a person should know.
-    pub fn note(&mut self, note: String) {
+    pub(crate) fn note(&mut self, note: String) {
         self.untold.push(note);
     }
 }

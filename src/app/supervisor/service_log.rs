@@ -16,7 +16,7 @@ const ROUND: Duration = Duration::from_secs(2);
 
 /// Who is told, and what was told before.
 #[derive(Debug)]
-pub struct ServiceLog {
+pub(crate) struct ServiceLog {
     notifier: Notifier,
     log: Log,
     ready: bool,
@@ -28,7 +28,7 @@ pub struct ServiceLog {
 impl ServiceLog {
     /// One that speaks to the service manager and to a log.
     #[must_use]
-    pub fn new(log: Log) -> Self {
+    pub(crate) fn new(log: Log) -> Self {
         Self { notifier: Notifier::default(), log, ready: false, stopping: false, warned: BTreeMap::new() }
     }
 

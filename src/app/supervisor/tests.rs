@@ -2,6 +2,7 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::channel;
+use std::thread::JoinHandle;
 
 use super::homing::Homing;
 use super::job::{Job, JobResult};
@@ -357,7 +358,8 @@ fn a_homing_that_is_stopped_tells_no_further_seat_to_home() {
 #[test]
 fn what_is_asked_waits_for_what_was_asked_before_it_and_neither_holds_up_the_status() {
     let mut rig = Rig::parked();
-    let (arm, disarm) = (rig.post(ARM), rig.post(Command::Disarm));
+    let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
+    let asked = [Command::Trim(40), Command::Levels(half)].map(|ask| rig.post(ask));
     rig.while_it_waits(|rig| {
         let given = rig.supervisor.given;
         rig.supervisor.told = MonoTime::default();
@@ -366,12 +368,14 @@ fn what_is_asked_waits_for_what_was_asked_before_it_and_neither_holds_up_the_sta
         }
         assert_eq!(rig.supervisor.given, given + 1, "the second was given before the first was answered");
         assert_ne!(rig.supervisor.told, MonoTime::default(), "no status while something is waited for");
-        assert!(!arm.is_finished());
+        assert!(!asked[0].is_finished());
     });
-    rig.wait_until(|_| arm.is_finished() && disarm.is_finished());
-    arm.join().unwrap().unwrap();
-    disarm.join().unwrap().unwrap();
-    assert_eq!(rig.state(), State::Parked);
+    rig.wait_until(|_| asked.iter().all(JoinHandle::is_finished));
+    for answer in asked {
+        answer.join().unwrap().unwrap();
+    }
+    let settings = &rig.supervisor.hall.settings;
+    assert_eq!((settings.trim_ms, settings.levels.motion), (40, 0.5), "the second has undone the first");
 }
 
 #[test]
