@@ -127,7 +127,14 @@ fn round(links: &[Link]) -> Round {
                 let pose = engine.pose(index);
                 let (stamped, bytes) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
                 black_box(bytes);
-                let taken = Taken { frame: stamped.frame, asked: true, pose, lasts_ms: beat.lasts_ms, at };
+                let taken = Taken {
+                    frame: stamped.frame,
+                    asked: true,
+                    pose,
+                    lasts_ms: beat.lasts_ms,
+                    shakes: stamped.shakes,
+                    at,
+                };
                 places.sent(index, &taken, Delivery::Sent);
             }
         });

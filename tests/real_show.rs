@@ -101,10 +101,10 @@ impl Leader {
         self.wait_until("the film", |leader| (leader.control.live.show() >= film).then_some(()));
     }
 
-    /// Waits until that many further ticks have sent.
+    /// Waits until that many further ticks have passed.
     fn wait_for_ticks(&mut self, ticks: u64) {
-        let then = self.control.live.ticks() + ticks;
-        self.wait_until("ticks", |leader| (leader.control.live.ticks() >= then).then_some(()));
+        let then = self.control.live.beats() + ticks;
+        self.wait_until("ticks", |leader| (leader.control.live.beats() >= then).then_some(()));
     }
 
     /// Everything but the end: a pause, a seek each way, levels, a trim, and a seat that is off for a while.

@@ -12,7 +12,7 @@ use crate::wire::{Access, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCod
 
 /// DP34: datagrams received; SMC alone.
 const PACKETS: u16 = 0x34;
-/// From the first count to the second: hold frames come ten times a second, and whoever asks between shows does so four times.
+/// From the first count to the second: whoever asks at rest does so four times a second.
 const BETWEEN: Duration = Duration::from_millis(800);
 /// Reads of each count, and how long each is waited for.
 const TRIES: u32 = 2;

@@ -16,6 +16,8 @@ pub enum Source {
     Report,
     /// The controller said that it is home: its axes are at 0 (SMC manual 5.7).
     Homing,
+    /// Some of the registers, while frames led the seat: it tells whether the seat follows, and not where it is by now.
+    Passing,
 }
 
 /// Where a seat was found.
@@ -96,7 +98,8 @@ impl Evidence {
         let by = match word >> BY {
             0 => Source::Registers,
             1 => Source::Report,
-            _ => Source::Homing,
+            2 => Source::Homing,
+            _ => Source::Passing,
         };
         let reading = Reading {
             pose,
@@ -123,6 +126,7 @@ impl Evidence {
             Source::Registers => 0,
             Source::Report => 1,
             Source::Homing => 2,
+            Source::Passing => 3,
         };
         let rests = if reading.rests { RESTS } else { 0 };
         let moves = if reading.moves { MOVES } else { 0 };

@@ -7,6 +7,7 @@
 //! ([`Belief::allows`]). Tick thread; told the time; allocates nothing.
 
 mod evidence;
+mod history;
 mod span;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ mod tests;
 use std::time::Duration;
 
 pub use evidence::{Evidence, Reading, Source};
+use history::History;
 use span::Spans;
 
 use crate::motion::{MAX_AXES, Pose, Window};
@@ -31,6 +33,13 @@ pub const FRESH: Duration = Duration::from_millis(1_500);
 const QUIET: Duration = Duration::from_millis(500);
 /// What a seat may take to come to rest after the Time of its last frame is over; a reading before that is of a motion.
 const SETTLE: Duration = Duration::from_millis(50);
+/// So long after its frames a seat may be where they have led it: on their way, in the controller's queue, in its filters. Three
+/// periods come to it: more frames than that in its queue it goes through in haste, or lags behind the film for good.
+const FOLLOWS: Duration = Duration::from_millis(100);
+/// A reading from before this says nothing of a seat that frames lead: where they led it then is not kept.
+const STALE: Duration = Duration::from_millis(400);
+/// How far from wherever frames have led it a seat may be found that follows them, strokes: 1.5 mm of 150.
+const ASTRAY: f64 = 0.01;
 /// Rounding to pulses, and the step from one whole millisecond to the next, may take a frame past the greatest speed by this.
 const ROUNDING: f64 = 1.01;
 /// How far from where it was left a seat at rest has to be found to have been moved, in strokes: 0.075 mm of 150.
@@ -89,6 +98,28 @@ pub struct Tally {
     pub hurried: u64,
 }
 
+/// What a look at the evidence has brought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Found {
+    /// Nothing that keeps frames from leading the seat on.
+    Nothing,
+    /// From now on nobody knows which frames arrive.
+    Gap,
+    /// The seat is elsewhere than its frames have led it, though they are acked.
+    Astray,
+}
+
+/// Why nobody knows where a seat is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fall {
+    /// Nobody knows which frames reached it.
+    Gap,
+    /// It was found elsewhere than acked frames led it.
+    Astray,
+    /// It was out, and is to take part again.
+    PutBack,
+}
+
 /// A frame that the kernel took.
 #[derive(Debug, Clone, Copy)]
 pub struct Taken<'a> {
@@ -100,6 +131,8 @@ pub struct Taken<'a> {
     pub pose: &'a Pose,
     /// How long it takes, ms.
     pub lasts_ms: u32,
+    /// The greatest amplitude of vibration that it asks of any slot, strokes.
+    pub shakes: f64,
     /// When it was sent.
     pub at: MonoTime,
 }
@@ -117,6 +150,7 @@ pub struct Belief {
     within: u16,
     known: Known,
     spans: Spans,
+    history: History,
     acked: Option<FrameNo>,
     /// The version of the reading that was taken last.
     reading: u32,
@@ -149,6 +183,7 @@ impl Belief {
             within: 0,
             known: Known::Nothing,
             spans: Spans::default(),
+            history: History::at([0.0; MAX_AXES]),
             acked: None,
             reading: 0,
             busy_until: MonoTime::default(),
@@ -178,8 +213,8 @@ impl Belief {
         self.gap
     }
 
-    /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it. Says whether a gap has begun.
-    pub fn look(&mut self, evidence: &Evidence, told: MonoTime, now: MonoTime) -> bool {
+    /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it.
+    pub fn look(&mut self, evidence: &Evidence, told: MonoTime, now: MonoTime) -> Found {
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {
@@ -193,14 +228,16 @@ impl Belief {
             && let Some((version, reading)) = evidence.reading()
         {
             self.reading = version;
-            self.measure(&reading, now);
+            if self.measure(&reading, now) == Found::Astray {
+                return Found::Astray;
+            }
         }
-        let begins = !self.gap && self.has_gap(told, now);
-        if begins {
-            self.gap = true;
-            self.tally.gaps += 1;
+        if self.gap || !self.has_gap(told, now) {
+            return Found::Nothing;
         }
-        begins
+        self.gap = true;
+        self.tally.gaps += 1;
+        Found::Gap
     }
 
     /// Where the seat has been led once all frames are confirmed and their Time is over. Where no acks are asked for, what
@@ -218,12 +255,13 @@ impl Belief {
         self.gap &= self.asks;
     }
 
-    /// Takes a reading of where the seat is. One from before the last frame was over says nothing. One that finds it where it
-    /// was left confirms that; else it has to have found the seat at rest, or nobody knows any more where it is. Axes that a
-    /// reading does not tell are where they were if those that it tells are.
-    fn measure(&mut self, reading: &Reading, now: MonoTime) {
-        if self.busy_until > MonoTime::default() && reading.at < self.busy_until + SETTLE {
-            return;
+    /// Takes a reading of where the seat is. One from before the last frame was over tells only whether the seat follows. One that
+    /// finds it where it was left confirms that; else it has to have found the seat at rest, or nobody knows any more where it
+    /// is. Axes that a reading does not tell are where they were if those that it tells are.
+    fn measure(&mut self, reading: &Reading, now: MonoTime) -> Found {
+        let is_led = self.busy_until > MonoTime::default() && reading.at < self.busy_until + SETTLE;
+        if is_led || reading.by == Source::Passing {
+            return self.hold_against(reading, now);
         }
         let told = reading.slots & self.own;
         let is_a_point = self.spans.is_a_point();
@@ -234,7 +272,7 @@ impl Belief {
         if !agrees && !reading.rests {
             self.within &= !told;
             self.known = Known::Contradicted(now);
-            return;
+            return Found::Nothing;
         }
         let mut pose = *self.spans.last();
         (0..MAX_AXES).filter(|slot| told >> slot & 1 == 1).for_each(|slot| pose[slot] = reading.pose[slot]);
@@ -242,6 +280,32 @@ impl Belief {
         self.spans = Spans::at(pose);
         self.known = Known::Measured(reading.at, reading.by);
         self.gap &= self.within != self.own;
+        Found::Nothing
+    }
+
+    /// Holds a reading of a seat that frames lead against where they have led it since shortly before: a controller may ack frames
+    /// and not execute them, while it homes by itself or somebody jogs its seat.
+    fn hold_against(&mut self, reading: &Reading, now: MonoTime) -> Found {
+        if now.since(reading.at) > STALE {
+            return Found::Nothing;
+        }
+        let follows = FOLLOWS + 3 * self.period;
+        let since = reading.at.before(follows);
+        let is_astray = |slot: &usize| {
+            let place = reading.pose[*slot];
+            let (low, high) = self.spans.reach(*slot);
+            let (low, high, shakes) = self
+                .history
+                .reach(*slot, since)
+                .map_or((low, high, 0.0), |led| (low.min(led.0), high.max(led.1), led.2));
+            !(low - shakes - ASTRAY..=high + shakes + ASTRAY).contains(&place)
+        };
+        let known = reading.slots & self.within;
+        if !(0..MAX_AXES).filter(|slot| known >> slot & 1 == 1).any(|slot| is_astray(&slot)) {
+            return Found::Nothing;
+        }
+        (self.within, self.known) = (0, Known::Contradicted(now));
+        Found::Astray
     }
 
     /// That the ack thread is slow is no gap at first: what an ack may still be read for is not missing. Of a span the oldest
@@ -340,12 +404,13 @@ impl Belief {
 
     /// Notes a frame that the kernel took.
     pub fn taken(&mut self, taken: &Taken<'_>) {
-        let Taken { frame, asked, pose, lasts_ms, at } = *taken;
+        let Taken { frame, asked, pose, lasts_ms, shakes, at } = *taken;
         let lasts = Duration::from_millis(u64::from(lasts_ms));
         let behind = self.busy_until.since(at);
         self.tally.late += u64::from(behind > lasts.max(self.period));
         self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
         self.busy_until = self.busy_until.max(at) + lasts;
+        self.history.push(self.spans.last(), pose, shakes, (at, self.busy_until));
         // What was refused before it is missing as well, until it is acked.
         let since = self.refused_since.take().unwrap_or(at);
         self.spans.push(frame, asked, pose, since);

@@ -44,14 +44,21 @@ impl Bench {
     }
 
     /// A look of a tick up to which the ack thread has told all.
-    fn look(&mut self, when: u64) -> bool {
+    fn look(&mut self, when: u64) -> Found {
         self.belief.look(&self.evidence, ms(when), ms(when))
     }
 
     fn send(&mut self, place: f64, lasts_ms: u32, when: u64) {
         let frame = FrameNo(self.next);
         self.next += 1;
-        self.belief.taken(&Taken { frame, asked: true, pose: &at(place), lasts_ms, at: ms(when) });
+        self.belief.taken(&Taken {
+            frame,
+            asked: true,
+            pose: &at(place),
+            lasts_ms,
+            shakes: 0.0,
+            at: ms(when),
+        });
     }
 
     fn ack(&self, frame: u32) {
@@ -109,7 +116,7 @@ fn unheard(until: u64) -> (Bench, u64) {
     for tick in 0..=until / 10 {
         let begins = bench.look(10 * tick);
         bench.ack(1);
-        if begins {
+        if begins == Found::Gap {
             gap = 10 * tick;
         }
         bench.send(f64::from(u32::try_from(tick).unwrap()) * 2.0 / 150.0, 10, 10 * tick);
@@ -146,7 +153,7 @@ fn that_the_ack_thread_is_slow_is_no_gap_for_a_tenth_of_a_second() {
     for tick in 0..20 {
         let told = ms(10 * tick.min(3));
         let begins = bench.belief.look(&bench.evidence, told, ms(10 * tick));
-        assert_eq!(begins, tick == 11, "at {tick}");
+        assert_eq!(begins == Found::Gap, tick == 11, "at {tick}");
         bench.send(0.0, 10, 10 * tick);
     }
 }
@@ -156,7 +163,7 @@ fn frames_that_the_kernel_does_not_take_for_fifty_milliseconds_are_a_gap_with_ac
     for asks in [true, false] {
         let mut belief = Belief::new(&window(), PERIOD, asks);
         let evidence = Evidence::default();
-        let begins = |belief: &mut Belief, when| belief.look(&evidence, ms(when), ms(when));
+        let begins = |belief: &mut Belief, when| belief.look(&evidence, ms(when), ms(when)) == Found::Gap;
         belief.refused(ms(0));
         assert!(!begins(&mut belief, 50));
         belief.refused(ms(50));
@@ -193,7 +200,14 @@ fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() 
     let mut belief = Belief::new(&window(), PERIOD, false);
     let evidence = Evidence::default();
     let pose = at(0.0);
-    belief.taken(&Taken { frame: FrameNo(1), asked: false, pose: &pose, lasts_ms: 3_000, at: ms(0) });
+    belief.taken(&Taken {
+        frame: FrameNo(1),
+        asked: false,
+        pose: &pose,
+        lasts_ms: 3_000,
+        shakes: 0.0,
+        at: ms(0),
+    });
     belief.look(&evidence, ms(0), ms(2_000));
     assert!(belief.pose(ms(2_000)).is_none());
     belief.look(&evidence, ms(0), ms(3_000));
@@ -210,7 +224,14 @@ fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
     belief.look(&evidence, ms(0), ms(0));
     assert!(belief.pose(ms(0)).is_none() && belief.is_measured_in_part());
     let pose = [0.1; MAX_AXES];
-    belief.taken(&Taken { frame: FrameNo(1), asked: true, pose: &pose, lasts_ms: 700, at: ms(0) });
+    belief.taken(&Taken {
+        frame: FrameNo(1),
+        asked: true,
+        pose: &pose,
+        lasts_ms: 700,
+        shakes: 0.0,
+        at: ms(0),
+    });
     evidence.on_ack(FrameNo(1));
     belief.look(&evidence, ms(500), ms(500));
     assert!(belief.pose(ms(500)).is_none(), "it is on its way");
@@ -241,12 +262,70 @@ fn what_the_kernel_refused_and_what_was_lost_behind_it_are_one_gap() {
     let mut bench = Bench::found(0.0);
     bench.send(0.001, 10, 0);
     bench.ack(1);
-    assert!(!bench.look(10));
+    assert_eq!(bench.look(10), Found::Nothing);
     for tick in 1..=3 {
         bench.belief.refused(ms(10 * tick));
-        assert!(!bench.look(10 * tick + 5));
+        assert_eq!(bench.look(10 * tick + 5), Found::Nothing);
     }
     bench.send(0.002, 10, 40);
-    assert!(!bench.look(60), "its ack may still come");
-    assert!(bench.look(61), "the kernel took none from 10 ms on, and no ack came since");
+    assert_eq!(bench.look(60), Found::Nothing, "its ack may still come");
+    assert_eq!(bench.look(61), Found::Gap, "the kernel took none from 10 ms on, and no ack came since");
+}
+
+/// Frames at 60 mm/s from 30 mm on, each of them acked, until 500 ms.
+fn ridden() -> Bench {
+    let mut bench = Bench::found(0.2);
+    for tick in 0..50 {
+        bench.send(0.2 + f64::from(tick) * 0.004, 10, 10 * u64::from(tick));
+        bench.ack(tick + 1);
+        assert_eq!(bench.look(10 * u64::from(tick)), Found::Nothing);
+    }
+    bench
+}
+
+/// What one answer makes known that finds the axis there, asked for at `made`.
+fn passes(bench: &mut Bench, place: f64, made: u64, when: u64) -> Found {
+    let reading =
+        Reading { rests: false, slots: 1, by: Source::Passing, ..Reading::at_rest(at(place), ms(made)) };
+    bench.evidence.on_reading(&reading);
+    bench.look(when)
+}
+
+#[test]
+fn a_seat_that_follows_a_tenth_of_a_second_late_follows_and_one_that_acks_and_does_not_move_is_found_out() {
+    // It is sent to 59.4 mm, and was to 51 mm 140 ms ago.
+    for place in [0.396, 0.34, 0.335] {
+        assert_eq!(passes(&mut ridden(), place, 498, 500), Found::Nothing, "{place}");
+    }
+    for place in [0.2, 0.29, 0.41] {
+        let mut bench = ridden();
+        assert_eq!(passes(&mut bench, place, 498, 500), Found::Astray, "{place}");
+        assert_eq!((bench.belief.pose(ms(500)), bench.belief.known()), (None, Known::Contradicted(ms(500))));
+        assert!(!bench.allows(0.396, 10, 510), "no frame may lead it from anywhere");
+    }
+}
+
+#[test]
+fn an_answer_that_came_late_is_held_against_all_since_it_was_asked_for_and_one_much_too_late_against_nothing()
+{
+    assert_eq!(passes(&mut ridden(), 0.28, 350, 500), Found::Nothing, "it was there 300 ms ago");
+    assert_eq!(passes(&mut ridden(), 0.9, 350, 500), Found::Astray);
+    assert_eq!(passes(&mut ridden(), 0.9, 90, 500), Found::Nothing);
+}
+
+#[test]
+fn a_seat_that_vibrates_is_as_far_off_as_it_was_told_to_vibrate() {
+    let mut bench = ridden();
+    let taken =
+        Taken { frame: FrameNo(51), asked: true, pose: &at(0.4), lasts_ms: 10, shakes: 0.03, at: ms(500) };
+    bench.belief.taken(&taken);
+    assert_eq!(passes(&mut bench, 0.43, 505, 510), Found::Nothing);
+    assert_eq!(passes(&mut bench, 0.45, 505, 510), Found::Astray);
+}
+
+#[test]
+fn what_one_answer_tells_in_passing_confirms_nothing_of_a_seat_at_rest() {
+    let mut bench = Bench::found(0.2);
+    assert_eq!(passes(&mut bench, 0.2, 900, 900), Found::Nothing);
+    assert_eq!(bench.belief.known(), Known::Measured(ms(0), Source::Registers));
 }

@@ -24,6 +24,7 @@ pub use slew::MAX_SPEED_UP;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::belief::Fall;
 use crate::cue::Vibration;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::plan::{Course, Scene};
@@ -214,7 +215,7 @@ impl Engine {
             trim_ms: 0,
             late_answers: 0,
             frames: 0,
-            holds: Holds::new(show.rate),
+            holds: Holds::default(),
             playhead: show.start,
             reached: show.start,
             slew: Slew::new(show.rate),
@@ -262,21 +263,32 @@ impl Engine {
         self.riders[lane].slow_down(self.frames - 1, self.show.rate, longest_ms, farthest)
     }
 
-    /// A lane that has just fallen out, and is to be looked at; each is said once.
-    pub fn take_fallen(&mut self) -> Option<usize> {
-        self.riders.iter_mut().position(Rider::take_fall)
+    /// A lane that has just fallen out, and is to be looked at, and why; each is said once.
+    pub fn take_fallen(&mut self) -> Option<(usize, Fall)> {
+        let mut riders = self.riders.iter_mut().enumerate();
+        riders.find_map(|(lane, rider)| rider.take_fall().map(|fall| (lane, fall)))
     }
 
-    /// Whether a lane is led, or would be if it were seen.
+    /// True if a lane is led, or would be if it were seen.
     #[must_use]
     pub fn takes_part(&self, lane: usize) -> bool {
-        self.riders[lane].part != Part::Away
+        self.riders[lane].is_there() || self.is_unseen(lane)
     }
 
-    /// Whether a lane takes part that nobody has told of where it stands.
+    /// True if a lane is to take part that nobody has told of where it stands.
     #[must_use]
     pub fn is_unseen(&self, lane: usize) -> bool {
-        self.riders[lane].part == Part::Unseen
+        let rider = &self.riders[lane];
+        rider.part == Part::Unseen && rider.wanted.on
+    }
+
+    /// True if lanes rest in a pause, have been told so, and nobody has asked yet for the way on: nothing is sent to them.
+    #[must_use]
+    pub const fn waits_in_pause(&self) -> bool {
+        matches!(self.phase, Phase::Resting(Rest::Paused))
+            && self.sends_nothing()
+            && !self.resuming
+            && !self.homeward
     }
 
     /// Whether no frame has led any lane since all rested.
@@ -351,7 +363,10 @@ impl Engine {
         self.riders.iter_mut().for_each(|rider| rider.pass(missed));
         if matches!(self.phase, Phase::Closing(0) | Phase::Done) {
             self.phase = Phase::Done;
-            self.riders.iter_mut().filter(|rider| rider.is_blind()).for_each(Rider::fall_out);
+            self.riders
+                .iter_mut()
+                .filter(|rider| rider.is_blind())
+                .for_each(|rider| rider.fall_out(Fall::Gap));
             return Step::Over;
         }
         if self.phase == Phase::Waiting {

@@ -2,19 +2,20 @@
 
 use super::wait::is_at;
 use super::{Ending, Engine, Mix, Part, Phase, Rest};
-use crate::belief::KnownPose;
+use crate::belief::{Fall, KnownPose};
 use crate::motion::Pose;
 use crate::time::{ShowTime, TRIM_MS};
 
 impl Engine {
     /// Parks, three hold frames, and the end. Asking again changes nothing.
     ///
-    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end
-    /// at once: nothing has been set in motion, and the lanes may still be on a slow way to park, or where nobody knows.
+    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end, and no
+    /// frame goes out; between shows once that was read. One that was let go ends at once: nothing has been set in motion, and the
+    /// lanes may still be on a slow way to park, or where nobody knows.
     pub fn park(&mut self) {
         let is_over = self.phase == Phase::Done;
         let is_fresh = self.frames == 0 && self.rest().is_none();
-        if (is_over || is_fresh) && self.is_astray() {
+        if is_over || self.phase == Phase::Waiting || (is_fresh && self.is_astray()) {
             self.rest_untold();
         } else if is_over || self.is_homeward() {
             return;
@@ -107,25 +108,32 @@ impl Engine {
 
     /// Sets what a lane makes of the cue.
     pub fn mix(&mut self, lane: usize, mix: Mix) {
+        let sends_nothing = self.sends_nothing();
         let rider = &mut self.riders[lane];
         rider.refused &= rider.wanted.on == mix.on;
+        let is_put_back = mix.on && !rider.wanted.on;
         rider.wanted = mix;
+        // While it was out nobody minded where it stands.
+        if is_put_back && rider.part == Part::Unseen && !sends_nothing {
+            rider.fall_out(Fall::PutBack);
+        }
     }
 
     /// Brings one lane to rest; after three hold frames nothing goes to it.
     pub fn leave(&mut self, lane: usize) {
-        if self.sends_nothing() {
-            return self.cut(lane);
+        if !self.sends_nothing() {
+            self.brake(lane);
+            self.riders[lane].leave();
+        } else if self.takes_part(lane) {
+            self.riders[lane].step_out();
         }
-        self.brake(lane);
-        self.riders[lane].leave();
     }
 
     /// Nobody knows which frames reach a lane: it is brought to rest by frames that are slow enough from wherever it may be
     /// ([`Engine::slow_down`]), and then it is away, until it is found.
     pub fn go_blind(&mut self, lane: usize) {
         if self.sends_nothing() {
-            return self.fall_out(lane);
+            return self.fall_out(lane, Fall::Gap);
         }
         self.riders[lane].go_blind();
     }
@@ -141,8 +149,8 @@ impl Engine {
     }
 
     /// The same, and it is to be looked at.
-    pub fn fall_out(&mut self, lane: usize) {
-        self.riders[lane].fall_out();
+    pub fn fall_out(&mut self, lane: usize, why: Fall) {
+        self.riders[lane].fall_out(why);
     }
 
     /// A lane's seat is known to be at rest in that pose, `near` of which is noise. One that was away is there again, and joins the
@@ -153,6 +161,8 @@ impl Engine {
         let rider = &mut self.riders[lane];
         let at_park = is_at(&rider.window, known.pose(), &rider.window.park(), near);
         match rider.part {
+            // One that is out is left where it stands.
+            Part::Unseen | Part::Away if !rider.wanted.on => rider.part = Part::Unseen,
             // The course begins at park.
             Part::Unseen | Part::Still if is_fresh && at_park => rider.begin_at_park(known),
             Part::Unseen | Part::Away => {

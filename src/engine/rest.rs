@@ -4,51 +4,34 @@ use std::time::Duration;
 
 use super::{Beat, Engine, HOLD_FRAMES, Part, Phase, Rest, Rider, Step};
 use crate::plan::{Curve, Scene};
-use crate::time::{Rate, ShowTime};
+use crate::time::ShowTime;
 use crate::timeline::Hint;
 
-/// Hold frames of a pause, per second.
-const HOLD_HZ: f64 = 10.0;
-
-/// Which ticks of a rest send a hold frame. Each takes one period, however long it is to the next: a controller that is still
-/// busy with one keeps the frames of a join waiting, and hurries or lags from then on.
-#[derive(Debug, Clone)]
-pub(super) struct Holds {
-    /// One in so many ticks of a pause.
-    every: u32,
-    ticks: u32,
-}
+/// The hold frames of a rest so far. Where the show is to go on soon each tick sends one. Else there are three, and then none: one
+/// that came later would take a seat back that somebody has moved by hand meanwhile.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Holds(u8);
 
 impl Holds {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 100 periods")]
-    pub(super) fn new(rate: Rate) -> Self {
-        Self { every: ((rate.hz() / HOLD_HZ).round() as u32).max(1), ticks: 0 }
-    }
-
     /// A rest begins.
     pub(super) const fn begin(&mut self) {
-        self.ticks = 0;
+        self.0 = 0;
     }
 
     /// A rest of which no frame tells.
     pub(super) const fn skip(&mut self) {
-        self.ticks = HOLD_FRAMES as u32;
+        self.0 = HOLD_FRAMES;
     }
 
-    /// Whether a stop has been told often enough.
+    /// True if a rest has been told often enough.
     pub(super) const fn are_over(&self) -> bool {
-        self.ticks >= HOLD_FRAMES as u32
+        self.0 >= HOLD_FRAMES
     }
 
-    /// Whether this tick sends one.
-    fn next(&mut self, rest: Rest) -> bool {
-        let is_due = match rest {
-            Rest::Late | Rest::Ended => true,
-            Rest::Paused => self.ticks.is_multiple_of(self.every),
-            Rest::Stopped => self.ticks < u32::from(HOLD_FRAMES),
-        };
-        self.ticks =
-            if rest == Rest::Stopped { self.ticks.saturating_add(1) } else { (self.ticks + 1) % self.every };
+    /// True if this tick sends one.
+    const fn next(&mut self, rest: Rest) -> bool {
+        let is_due = !self.are_over() || matches!(rest, Rest::Late | Rest::Ended);
+        self.0 = self.0.saturating_add(1);
         is_due
     }
 }
@@ -58,7 +41,10 @@ impl Engine {
     pub(super) fn come_down(&mut self, rest: Rest) {
         self.drop_switch();
         if let Phase::Resting(_) = self.phase {
-            self.holds.begin();
+            // Lanes that have been told so are left alone.
+            if !self.sends_nothing() {
+                self.holds.begin();
+            }
             self.phase = Phase::Resting(rest);
             return;
         }

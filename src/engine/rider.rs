@@ -6,7 +6,7 @@ use super::blind::{self, Axis, Grid, LONGEST_WAY_MS};
 use super::fader::Fader;
 use super::mix::Mix;
 use super::trail::Trail;
-use crate::belief::KnownPose;
+use crate::belief::{Fall, KnownPose};
 use crate::limiter::{Admitted, Counts, Limiter, Provenance};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
 use crate::plan::{Course, LaneScene, Place};
@@ -14,6 +14,9 @@ use crate::time::{Rate, ShowTime};
 
 /// Hold frames that end a lane's motion.
 pub(super) const HOLD_FRAMES: u8 = 3;
+
+/// One that falls out is read at rest after a second or two, if it answers at all.
+const AWAITED_FOR: Duration = Duration::from_secs(3);
 
 /// How quickly the level of vibration changes, per second.
 const VIBRATION_RATE: f64 = 4.0;
@@ -30,7 +33,7 @@ pub(super) enum Part {
     Blind(u32),
     /// Rests where it is, until a course leads on from there.
     Still,
-    /// Nothing goes to it: nobody has told yet where it stands.
+    /// Nothing goes to it: nobody has told yet where it stands, or it is out and at park.
     Unseen,
     /// Nothing goes to it, until it is said to be found.
     Away,
@@ -49,7 +52,11 @@ pub(super) struct Rider {
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
     /// Whether it has just come to be away, and is to be looked at before it can come back.
-    fallen: bool,
+    fallen: Option<Fall>,
+    /// Ticks for which whoever parks still waits for it to come back.
+    awaited: u32,
+    /// Ticks for which that is so once it has stepped out.
+    patience: u32,
     /// Ticks for which its last frame leads it, this one included.
     ahead: u32,
     /// Whether it was away, and is not where the others are yet.
@@ -80,7 +87,9 @@ impl Rider {
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             leaving: None,
-            fallen: false,
+            fallen: None,
+            awaited: 0,
+            patience: ticks(AWAITED_FOR, rate),
             ahead: 0,
             returning: false,
             refused: false,
@@ -103,7 +112,9 @@ impl Rider {
 
     /// Another tick begins, after so many that were missed.
     pub(super) fn pass(&mut self, missed: u64) {
-        self.ahead = self.ahead.saturating_sub(u32::try_from(missed + 1).unwrap_or(u32::MAX));
+        let ticks = u32::try_from(missed + 1).unwrap_or(u32::MAX);
+        self.ahead = self.ahead.saturating_sub(ticks);
+        self.awaited = self.awaited.saturating_sub(ticks);
     }
 
     /// Whether a frame goes to it in this tick.
@@ -133,7 +144,8 @@ impl Rider {
             state.position = *position;
         }
         self.brake = Brake::new(&self.window, &states);
-        self.part = Part::Braking(Duration::ZERO);
+        // One that was on its way out is told so by whatever course leads on.
+        (self.part, self.leaving) = (Part::Braking(Duration::ZERO), None);
     }
 
     /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
@@ -147,7 +159,7 @@ impl Rider {
     pub(super) fn go_blind(&mut self) {
         match self.part {
             Part::With | Part::Braking(_) => self.part = Part::Blind(0),
-            Part::Still => self.fall_out(),
+            Part::Still => self.fall_out(Fall::Gap),
             Part::Blind(_) | Part::Unseen | Part::Away => {}
         }
     }
@@ -159,31 +171,37 @@ impl Rider {
                 (self.part, self.ahead) = (Part::Unseen, 0);
             }
             Part::Unseen | Part::Away => {}
-            Part::With | Part::Braking(_) | Part::Still | Part::Blind(_) => self.fall_out(),
+            Part::With | Part::Braking(_) | Part::Still | Part::Blind(_) => self.fall_out(Fall::Gap),
         }
     }
 
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
-        (self.part, self.leaving, self.ahead) = (Part::Away, None, 0);
+        (self.part, self.leaving, self.ahead, self.awaited) = (Part::Away, None, 0, 0);
+    }
+
+    /// The same, and it is looked at: it may be back soon.
+    pub(super) const fn step_out(&mut self) {
+        self.cut();
+        self.awaited = self.patience;
     }
 
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
-    pub(super) const fn fall_out(&mut self) {
-        self.cut();
-        self.fallen = true;
+    pub(super) const fn fall_out(&mut self, why: Fall) {
+        self.step_out();
+        self.fallen = Some(why);
     }
 
-    /// Whether it has just fallen out; said once.
-    pub(super) const fn take_fall(&mut self) -> bool {
-        std::mem::replace(&mut self.fallen, false)
+    /// Why it has just fallen out; said once.
+    pub(super) const fn take_fall(&mut self) -> Option<Fall> {
+        self.fallen.take()
     }
 
     /// It is there (again), at rest in that pose.
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
         self.limiter.restart(known);
-        (self.part, self.leaving, self.ahead) = (Part::Still, None, 0);
+        (self.part, self.leaving, self.ahead, self.awaited) = (Part::Still, None, 0, 0);
         (self.refused, self.returning) = (false, true);
     }
 
@@ -200,15 +218,19 @@ impl Rider {
         self.trail.rest(*self.pose());
         self.limiter.rest();
         if self.is_blind() {
-            self.fall_out();
+            self.fall_out(Fall::Gap);
         } else if self.is_there() {
             self.part = Part::Still;
         }
     }
 
-    /// Goes on counting what the limiter has to do where another left off.
-    pub(super) const fn count_on(&mut self, before: &Self) {
+    /// Goes on where another left off: with what the limiter had to do, and away where that was.
+    pub(super) fn go_on_from(&mut self, before: &Self) {
         self.limiter.count_on(before.limiter.counts());
+        if before.part == Part::Away {
+            self.cut();
+            self.awaited = before.awaited;
+        }
     }
 
     /// What the limiter had to do.
@@ -237,7 +259,10 @@ impl Rider {
     ) -> Pose {
         self.on_cue = self.part == Part::With && course.is_on_cue(lane, at);
         match self.part {
-            Part::With => course.pose(lane, at, &self.window, cue),
+            Part::With => {
+                self.count_stowed(course.is_settled(lane, at));
+                course.pose(lane, at, &self.window, cue)
+            }
             Part::Braking(since) => self.brake_on(since + time),
             Part::Still => {
                 self.count_holds();
@@ -258,8 +283,21 @@ impl Rider {
         if let Some(left) = &mut self.leaving {
             *left -= 1;
             if *left == 0 {
-                self.fall_out();
+                self.fall_out(Fall::Gap);
             }
+        }
+    }
+
+    /// One that is out, and at park, gets three more frames: whoever works on it is safe from those of the others.
+    fn count_stowed(&mut self, is_settled: bool) {
+        if !(self.out && self.wants_out() && is_settled) {
+            self.leaving = None;
+            return;
+        }
+        let left = self.leaving.get_or_insert(HOLD_FRAMES);
+        match left.checked_sub(1) {
+            Some(fewer) => *left = fewer,
+            None => (self.part, self.leaving) = (Part::Unseen, None),
         }
     }
 
@@ -281,7 +319,7 @@ impl Rider {
         }
         let grid = Grid { rate, index, longest_ms, left_ms: LONGEST_WAY_MS.saturating_sub(since_ms) };
         let Some(leg) = blind::next_leg(&axes, grid) else {
-            self.fall_out();
+            self.fall_out(Fall::Gap);
             return None;
         };
         self.trail.push(Duration::from_millis(u64::from(leg.lasts_ms)), leg.to);
@@ -329,6 +367,21 @@ impl Rider {
             Part::Braking(_) | Part::Blind(_) | Part::Unseen | Part::Away => false,
         };
         apart && !self.refused
+    }
+
+    /// Whether it may still come to park: it has just stepped out and is looked at, or is about to.
+    pub(super) const fn is_awaited(&self) -> bool {
+        self.wanted.on && (self.awaited > 0 || self.is_blind())
+    }
+
+    /// Whether it is there again, and the others left for park without it.
+    pub(super) fn is_left_behind(&self) -> bool {
+        self.part == Part::Still && self.needs_a_course()
+    }
+
+    /// Whether a park is not over without it.
+    pub(super) fn is_missing(&self) -> bool {
+        self.is_awaited() || self.is_left_behind()
     }
 
     /// Hears that no such course could be planned.
@@ -387,4 +440,9 @@ impl Rider {
         self.fader = Fader::at(level);
         self.window.set_level(level);
     }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand ticks")]
+fn ticks(span: Duration, rate: Rate) -> u32 {
+    (span.as_secs_f64() * rate.hz()) as u32
 }

@@ -57,12 +57,14 @@ pub struct Lane {
 }
 
 /// A frame that was written: its number, and whether it asks for a reply.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stamped {
     /// Its number.
     pub frame: FrameNo,
     /// True if it asks for a reply.
     pub asked: bool,
+    /// The greatest amplitude of vibration that it asks of any slot, strokes.
+    pub shakes: f64,
 }
 
 impl Lane {
@@ -74,7 +76,7 @@ impl Lane {
         mix: Mix,
         buf: &'b mut [u8; MAX_LEN],
     ) -> (Stamped, &'b [u8]) {
-        let stamped = self.stamp();
+        let mut stamped = self.stamp();
         let slots = self.window.slots();
         let mut positions = [Pulses(0); MAX_AXES];
         let mut vibration = [Vibration::NONE; MAX_AXES];
@@ -82,7 +84,9 @@ impl Lane {
             positions[index] = slot.pulses(pose[index]);
             if let Some(axis) = slot.axis.filter(|_| self.vibrates) {
                 let cue::Vibration { hz, amplitude } = mix.vibration(beat.vibration[axis]);
-                vibration[index] = Vibration::from_hz(hz, amplitude * slot.to_stroke * slot.stroke_pulses);
+                let strokes = amplitude * slot.to_stroke;
+                vibration[index] = Vibration::from_hz(hz, strokes * slot.stroke_pulses);
+                stamped.shakes = stamped.shakes.max(strokes);
             }
         }
         let motion = Motion {
@@ -136,7 +140,7 @@ impl Lane {
         let frame = self.next_frame;
         self.next_frame = frame.next();
         let asked = frame.asks(self.ack_every);
-        Stamped { frame, asked }
+        Stamped { frame, asked, shakes: 0.0 }
     }
 }
 

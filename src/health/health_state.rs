@@ -58,7 +58,9 @@ pub enum Why {
     Moved(usize),
     /// It is not known where the frames to this controller have led its seat.
     Unsure(usize),
-    /// That was so three times within a minute.
+    /// The seat of this controller is elsewhere than acked frames have led it.
+    Astray(usize),
+    /// One of these was so three times within a minute.
     Unsteady(usize),
     /// Not all axes of this controller tell where they are.
     Unread(usize),
@@ -136,6 +138,7 @@ impl Why {
             | Self::Silent(controller)
             | Self::Moved(controller)
             | Self::Unsure(controller)
+            | Self::Astray(controller)
             | Self::Unsteady(controller)
             | Self::Unread(controller)
             | Self::Ambiguous(controller)

@@ -58,7 +58,7 @@ impl HealthTable {
             found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
             found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
             found.moved = found.moved.or(when(member.moved, Why::Moved(controller)));
-            found.unsure = found.unsure.or(when(member.unsure, Why::Unsure(controller)));
+            found.unsure = found.unsure.or(member.unsure);
             let outside = |(axis, pulses)| Why::Outside { controller, axis, pulses };
             found.outside = found.outside.or(member.outside.map(outside));
             found.outside = found.outside.or(when(member.ambiguous, Why::Ambiguous(controller)));

@@ -6,6 +6,7 @@ use super::Why;
 use super::counter::{Counter, Said};
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
 use super::window::Window;
+use crate::belief::Fall;
 use crate::motion::{MAX_AXES, Pulses};
 use crate::time::MonoTime;
 use crate::wire::{DPFE, FrameNo};
@@ -78,8 +79,8 @@ pub(super) struct Member {
     pub(super) first_error: Option<Why>,
     /// Its seat was found elsewhere than frames left it.
     pub(super) moved: bool,
-    /// Nobody knows where its frames have led it.
-    pub(super) unsure: bool,
+    /// Nobody knows where its seat is, and why.
+    pub(super) unsure: Option<Why>,
     /// When it was sent to last before each of the last two times that nobody knew that any more.
     falls: [Option<MonoTime>; 2],
     /// The axis, from 0, that told a position outside of its stroke, and which.
@@ -125,7 +126,7 @@ impl Member {
             refusing: false,
             first_error: None,
             moved: false,
-            unsure: false,
+            unsure: None,
             falls: [None; 2],
             outside: None,
             ambiguous: false,
@@ -190,9 +191,12 @@ impl Member {
         self.traffic.sent += datagrams;
     }
 
-    /// A beat was sent at `at`: with no frames going out, an answer to it is the sign of life that is waited for.
+    /// A beat was sent at `at`: with no frames going there, an answer to it is the sign of life that is waited for.
     pub(super) fn on_beat_sent(&mut self, at: MonoTime) {
         self.traffic.sent += 1;
+        if self.flows(at) {
+            return;
+        }
         self.unheard = self.unheard.saturating_add(BEAT_WEIGHT);
         self.waiting.get_or_insert(at);
         self.unanswered.get_or_insert(at);
@@ -213,11 +217,12 @@ impl Member {
         self.on_alarm(DPFE, sighting.alarm);
         let is_well = sighting.error == 0 && sighting.alarm == 0;
         self.refusing &= !is_well;
-        if let Some(why) = self.against(sighting) {
+        if let Some(why) = self.against(sighting, at) {
             self.crowd_untold |= self.must_rehome.is_none() && matches!(why, Why::OtherMaster(_));
             self.must_rehome.get_or_insert(why);
         } else {
-            self.baseline = Some(Baseline::of(sighting, self.traffic));
+            let renewed = |before: Baseline| before.renewed(sighting, self.traffic, at);
+            self.baseline = Some(self.baseline.map_or_else(|| Baseline::of(sighting, self.traffic), renewed));
             (self.trusted, self.gap) = (false, false);
             self.seen = is_well.then_some(at);
         }
@@ -228,10 +233,10 @@ impl Member {
         self.must_be_home = true;
     }
 
-    fn against(&self, sighting: &Sighting) -> Option<Why> {
+    fn against(&self, sighting: &Sighting, now: MonoTime) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.baseline {
-            Some(baseline) => baseline.judge(sighting, self.traffic, self.gap),
+            Some(baseline) => baseline.judge(sighting, self.traffic, self.gap, now),
             None if self.trusted => Verdict::Same,
             None => Verdict::Unproved,
         };
@@ -321,12 +326,28 @@ impl Member {
     }
 
     /// Nobody knows where its frames have led it: what was seen of it is from before the last of them.
-    pub(super) fn on_fell_out(&mut self) {
-        (self.unsure, self.seen, self.reading) = (true, None, false);
+    pub(super) fn on_fell_out(&mut self, why: Fall) {
+        let why = match why {
+            Fall::Gap => Why::Unsure(self.controller),
+            Fall::Astray => Why::Astray(self.controller),
+            Fall::PutBack => Why::NotSeenYet,
+        };
+        (self.unsure, self.seen, self.reading) = (Some(why), None, false);
+        if why == Why::NotSeenYet {
+            return;
+        }
         let [last, before] = self.falls;
         self.falls = [Some(self.asked), last];
         if before.is_some_and(|first| self.asked.since(first) < UNSTEADY) {
             self.first_error.get_or_insert(Why::Unsteady(self.controller));
+        }
+    }
+
+    /// DPF0 was read by itself. Some seats are played without ever having been homed by it: only the loss of it tells something.
+    pub(super) fn on_zero(&mut self, homed: bool) {
+        let was_home = self.must_be_home || self.baseline.is_some_and(|baseline| baseline.homed());
+        if was_home && !homed {
+            self.must_rehome.get_or_insert(Why::NotHome(self.controller));
         }
     }
 
@@ -378,10 +399,14 @@ impl Member {
 
     /// True if frames go there, and it is time to read its packet counter; if so, it counts as sent.
     pub(super) fn take_count(&mut self, now: MonoTime) -> bool {
-        let flows = self.framed.is_some_and(|at| now.since(at) < FLOWS);
-        let due = flows && self.counter.take_turn(self.controller, now);
+        let due = self.flows(now) && self.counter.take_turn(self.controller, now);
         self.traffic.sent += u64::from(due);
         due
+    }
+
+    /// True if frames go there.
+    fn flows(&self, now: MonoTime) -> bool {
+        self.framed.is_some_and(|at| now.since(at) < FLOWS)
     }
 
     pub(super) const fn is_poor(&self) -> bool {
@@ -405,11 +430,11 @@ impl Member {
     /// Whatever was on its way, or was seen, does not count from here on.
     pub(super) fn forget(&mut self) {
         self.seen = None;
-        (self.moved, self.unsure) = (false, false);
+        (self.moved, self.unsure) = (false, None);
         self.reading = false;
         self.next_read = None;
         // Who it is when it is back, and whether it rebooted, is for a sighting to prove.
-        self.counter = Counter::default();
+        self.counter = self.counter.anew();
         self.rest();
     }
 

@@ -10,6 +10,7 @@ mod counter;
 mod groups;
 mod health_state;
 mod judge;
+mod late;
 mod member;
 mod proof;
 #[cfg(test)]
@@ -24,6 +25,7 @@ pub use health_state::{Change, HealthState, Notice, Why};
 pub use proof::{Identity, Sighting};
 pub use words::ACKS_OFF;
 
+use crate::belief::Fall;
 use crate::config::LossPolicy;
 use crate::motion::Pulses;
 use crate::observe;
@@ -163,6 +165,11 @@ impl HealthTable {
         self.members[controller].on_beat_sent(at);
     }
 
+    /// What DPF0 says, read by itself, of whether a controller knows its zero.
+    pub fn on_zero(&mut self, controller: usize, homed: bool) {
+        self.members[controller].on_zero(homed);
+    }
+
     /// It has answered something that this thread or another one asked.
     pub fn on_answer(&mut self, controller: usize, at: MonoTime) {
         self.members[controller].on_answer(at);
@@ -196,8 +203,8 @@ impl HealthTable {
 
     /// It is not known where the frames to a controller have led its seat, and none goes there any more: its group is out until it was
     /// looked at.
-    pub fn on_fell_out(&mut self, controller: usize) {
-        self.members[controller].on_fell_out();
+    pub fn on_fell_out(&mut self, controller: usize, why: Fall) {
+        self.members[controller].on_fell_out(why);
     }
 
     /// A seat was found, but not all of its axes tell where they are: its group is out until it was homed.

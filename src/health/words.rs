@@ -78,8 +78,13 @@ impl fmt::Display for Why {
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
             Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
+            Self::Astray(_) => {
+                "it acks frames and is elsewhere than they have led it: it homes by itself or is jogged (PA96 to PA98), or its \
+                 filters delay it too much"
+            }
             Self::Unsteady(_) => {
-                "frames to it, or its acks, were missing for over 50 ms three times within a minute: check the network"
+                "three times within a minute frames to it or its acks were missing for over 50 ms, or it was elsewhere than \
+                 they led it: check the network, and whether it is jogged"
             }
             Self::Ambiguous(_) => {
                 "in either order of their words its positions are inside the stroke, and nothing says which is true: home it"

@@ -1,5 +1,6 @@
-//! While nothing moves, no frame asks and no ack tells that a controller lives. Then each is asked by a beat, four times a
-//! second, where its axes stand, three at a time. Ack thread; allocates nothing.
+//! Each controller is asked again and again where its axes stand, three at a time, and whether it knows its zero: four times a
+//! second while nothing moves, since no ack tells then that it lives, and more often while frames flow, since an ack does not tell
+//! that a seat follows them. Ack thread; allocates nothing.
 
 use std::time::Duration;
 
@@ -16,15 +17,21 @@ use crate::wire::{
 
 /// From one beat to the next.
 const EVERY: Duration = Duration::from_millis(250);
+/// From one to the next of one controller while frames flow: each of at most three reads is made more often than eight times a
+/// second.
+const EVERY_LED: Duration = Duration::from_millis(40);
 /// DP5e: the inputs that are active.
 const INPUTS: u16 = 0x5e;
+/// DPF0: 2 once the controller knows its zero.
+const RESET: u16 = 0xf0;
+const RESET_DONE: u16 = 2;
 
 /// Who beats, and when next.
 #[derive(Debug)]
 pub(super) struct Beats {
     next: MonoTime,
-    /// Which of its axes each is asked for.
-    turn: usize,
+    /// When the next one is asked while frames flow, and which.
+    next_led: (MonoTime, usize),
     hearts: Vec<Heart>,
 }
 
@@ -36,6 +43,8 @@ struct Heart {
     axes: usize,
     /// Whether its inputs are asked for as well: somebody waits for a belt.
     inputs: bool,
+    /// How often it was asked: of what it tells, one is asked for at a time.
+    turn: usize,
 }
 
 impl Beats {
@@ -45,10 +54,11 @@ impl Beats {
             dialect: one.dialect,
             axes: axes_to_read(one, lane).min(DP_POSITIONS.len()),
             inputs: one.belt_inputs != 0,
+            turn: 0,
         };
         Self {
             next: MonoTime::default(),
-            turn: 0,
+            next_led: (MonoTime::default(), 0),
             hearts: controllers.iter().zip(lanes).map(heart).collect(),
         }
     }
@@ -58,18 +68,31 @@ impl Beats {
         let due = now >= self.next;
         if due {
             self.next = now + EVERY;
-            self.turn = self.turn.wrapping_add(1);
         }
         due
     }
 
-    /// Asks a controller; says for which register, where the kernel took it.
-    pub(super) fn send(&self, controller: usize, sender: &Sender) -> Option<u16> {
-        let Heart { code, axes, inputs, .. } = self.hearts[controller];
-        let inputs =
-            inputs.then_some(ReadRequest { channel: 0, accept: code, reply: code, start: INPUTS, num: 1 });
-        let reads = || position_reads(axes, code, code).chain(inputs);
-        let read = reads().nth(self.turn % reads().count().max(1))?;
+    /// Whom to ask next while frames flow, if it is time: one controller after the other, so that there is no heap of answers.
+    pub(super) fn take_led(&mut self, now: MonoTime) -> Option<usize> {
+        let (at, controller) = self.next_led;
+        if now < at || self.hearts.is_empty() {
+            return None;
+        }
+        let others = u32::try_from(self.hearts.len()).unwrap_or(u32::MAX);
+        let next = at.max(now.before(EVERY_LED)) + EVERY_LED / others;
+        self.next_led = (next, (controller + 1) % self.hearts.len());
+        Some(controller)
+    }
+
+    /// Asks a controller, also whether it knows its zero where frames lead it; says for which register, where the kernel took it.
+    pub(super) fn send(&mut self, controller: usize, is_led: bool, sender: &Sender) -> Option<u16> {
+        let Heart { code, axes, inputs, turn, .. } = &mut self.hearts[controller];
+        *turn = turn.wrapping_add(1);
+        let (code, axes) = (*code, *axes);
+        let read = |start| ReadRequest { channel: 0, accept: code, reply: code, start, num: 1 };
+        let others = inputs.then_some(read(INPUTS)).into_iter().chain(is_led.then_some(read(RESET)));
+        let reads = || position_reads(axes, code, code).chain(others.clone());
+        let read = reads().nth(*turn % reads().count().max(1))?;
         let delivery = sender.send(controller, read.emit(&mut [0; MAX_LEN]));
         (!matches!(delivery, Delivery::Failed(_))).then_some(read.start)
     }
@@ -95,6 +118,13 @@ impl Beats {
         Some((first, positions(reply.values(dialect), dialect)))
     }
 
+    /// Whether it knows its zero, where this is the answer to a beat that asked for that.
+    pub(super) fn hear_zero(octets: &[u8]) -> Option<bool> {
+        let reply = RegisterReply::parse(octets).ok()?;
+        let is_ours = (reply.access, reply.channel, reply.start, reply.num) == (Access::Read, 0, RESET, 1);
+        reply.data.get(0).filter(|_| is_ours).map(|state| state == RESET_DONE)
+    }
+
     /// The inputs that are active, where this is the answer to a beat that asked for them.
     pub(super) fn hear_inputs(&self, controller: usize, octets: &[u8]) -> Option<u16> {
         let reply = RegisterReply::parse(octets).ok().filter(|_| self.hearts[controller].inputs)?;
@@ -109,10 +139,14 @@ mod tests {
     use super::*;
     use crate::wire::{ReplyCode, Words, position_words};
 
+    fn beats(heart: Heart) -> Beats {
+        Beats { next: MonoTime::default(), next_led: (MonoTime::default(), 0), hearts: vec![heart] }
+    }
+
     #[test]
     fn an_answer_to_a_beat_tells_of_three_axes_and_no_other_answer_is_one() {
-        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 6, inputs: false };
-        let mut beats = Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] };
+        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 6, inputs: false, turn: 0 };
+        let mut beats = beats(heart);
         let mut hear = |start, stand: [i32; 3]| {
             let words: Vec<u16> =
                 stand.iter().flat_map(|at| position_words(Pulses(*at), Dialect::Smc)).collect();
@@ -135,8 +169,8 @@ mod tests {
 
     #[test]
     fn inputs_are_heard_where_they_are_asked_for() {
-        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 3, inputs: true };
-        let mut beats = Beats { next: MonoTime::default(), turn: 0, hearts: vec![heart] };
+        let heart = Heart { code: Code(1), dialect: Dialect::Smc, axes: 3, inputs: true, turn: 0 };
+        let mut beats = beats(heart);
         let reply = |start| RegisterReply {
             access: Access::Read,
             code: ReplyCode::EmergencyStop,

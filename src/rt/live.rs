@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::TickReport;
 use super::table::Row;
 use crate::belief::Evidence;
+use crate::engine::Engine;
 use crate::state::{PlayMode, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
@@ -279,9 +280,18 @@ impl Live {
     }
 
     /// Notes where the hall stands.
-    pub(super) fn on_state(&self, state: State) {
-        self.moving.store(state.may_send_motion(), Ordering::Release);
+    pub(super) fn on_state(&self, state: State, engine: &Engine) {
+        let moving = state.may_send_motion();
+        self.moving.store(moving && !engine.waits_in_pause(), Ordering::Release);
+        if moving {
+            self.on_show(engine.film());
+        }
         self.enter(Phase::of(state));
+    }
+
+    /// Notes where the film is.
+    pub(crate) fn on_show(&self, film: ShowTime) {
+        self.show_ns.store(film.as_nanos(), Ordering::Relaxed);
     }
 
     /// Notes how often a person has cleared.
@@ -313,7 +323,6 @@ impl Live {
 
     /// Notes a tick that sent.
     pub fn on_tick(&self, report: &TickReport) {
-        self.show_ns.store(report.show.as_nanos(), Ordering::Relaxed);
         self.ticks.fetch_add(1, Ordering::Relaxed);
         self.missed.fetch_add(report.missed, Ordering::Relaxed);
     }

@@ -7,6 +7,7 @@ use rtrb::{Consumer, PopError, Producer, RingBuffer};
 
 use super::live::Live;
 use crate::belief::Evidence;
+use crate::belief::Fall;
 use crate::engine::{Engine, Unplanned};
 use crate::fanout::Lane;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
@@ -54,6 +55,8 @@ pub enum Sent {
     FellOut {
         /// The controller.
         lane: u16,
+        /// Why.
+        why: Fall,
     },
     /// A seat was found, but not all of its axes tell where they are: it has to be homed.
     Unread {
@@ -69,8 +72,6 @@ pub struct TickReport {
     pub late_ns: u64,
     /// Ticks slept through before it.
     pub missed: u64,
-    /// Show time after it.
-    pub show: ShowTime,
 }
 
 /// The planner's answer.
@@ -336,9 +337,9 @@ impl Mail {
     }
 
     /// Shows how far the play is.
-    pub(super) fn look(&self, machine: &Machine) {
+    pub(super) fn look(&self, machine: &Machine, engine: &Engine) {
         self.live.on_clears(machine.clears());
-        self.live.on_state(machine.state());
+        self.live.on_state(machine.state(), engine);
     }
 
     /// The next command, with its ticket.

@@ -127,7 +127,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let tick = self.grid.take(now);
         self.conductor.mind_gap(tick.missed, &mut self.engine, now);
         self.take_mail(now);
-        let moving = self.conductor.machine().may_send_motion();
+        // In a pause nothing is sent: what follows begins as any motion does.
+        let moving = self.conductor.machine().may_send_motion() && !self.engine.waits_in_pause();
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving);
         let step = if goes_on { self.engine.tick(tick.missed) } else { Step::Quiet };
@@ -208,25 +209,26 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             let at = clock.now();
             let Some(beat) = places.admit(index, engine, beat, at) else { continue };
             let pose = engine.pose(index);
-            let (Stamped { frame, asked }, datagram) =
+            let (Stamped { frame, asked, shakes }, datagram) =
                 lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
             first.get_or_insert(at);
             // Posted before it is sent: a reply can overtake what is posted after.
             mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
             let delivery = sink.send(index, datagram);
-            places.sent(index, &Taken { frame, asked, pose, lasts_ms: beat.lasts_ms, at }, delivery);
+            let taken = Taken { frame, asked, pose, lasts_ms: beat.lasts_ms, shakes, at };
+            places.sent(index, &taken, delivery);
             if let Delivery::Failed(_) = delivery {
                 mail.post(Sent::Failed { lane: places::number(index), frame });
             }
             mail.clamps(index, engine.clamps(index).clamps);
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
-        let report = TickReport { late_ns, missed: tick.missed, show: self.engine.film() };
+        let report = TickReport { late_ns, missed: tick.missed };
         self.mail.report(report);
     }
 
     fn hand_on(&mut self) {
-        self.mail.look(self.conductor.machine());
+        self.mail.look(self.conductor.machine(), &self.engine);
         tell_state(&mut self.conductor, &mut self.mail);
         while self.mail.has_room_for_news()
             && let Some(what) = self.engine.take_unplanned()
@@ -239,8 +241,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         while let Some(lane) = self.engine.take_joined() {
             self.mail.post(Sent::Joined { lane: places::number(lane) });
         }
-        while let Some(lane) = self.engine.take_fallen() {
-            self.mail.post(Sent::FellOut { lane: places::number(lane) });
+        while let Some((lane, why)) = self.engine.take_fallen() {
+            self.mail.post(Sent::FellOut { lane: places::number(lane), why });
         }
         while let Some(course) = self.engine.take_retired() {
             self.mail.task(Task::Retire(course));

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
-use crate::belief::{Belief, Taken, Tally};
+use crate::belief::{Belief, Fall, Found, Taken, Tally};
 use crate::engine::{Beat, Engine};
 use crate::fanout::Lane;
 use crate::net::Delivery;
@@ -91,8 +91,10 @@ impl Places {
             self.lose_sight(engine, mail, now);
         }
         for lane in 0..self.lanes.len() {
-            if self.take_evidence(lane, mail, now) {
-                engine.go_blind(lane);
+            match self.take_evidence(lane, mail, now) {
+                Found::Nothing => {}
+                Found::Gap => engine.go_blind(lane),
+                Found::Astray => engine.fall_out(lane, Fall::Astray),
             }
             let Place { belief, .. } = &self.lanes[lane];
             let is_unseen = engine.is_unseen(lane);
@@ -102,7 +104,7 @@ impl Places {
             if let Some(known) = belief.pose(now) {
                 engine.found(lane, &known, belief.near());
             } else if is_unseen && moving && self.waits.is_none() {
-                engine.fall_out(lane);
+                engine.fall_out(lane, Fall::Gap);
             }
         }
     }
@@ -153,7 +155,7 @@ impl Places {
         self.waits = None;
         for (lane, Place { belief, .. }) in self.lanes.iter().enumerate() {
             if engine.takes_part(lane) && !belief.is_known_since(since, now) {
-                engine.fall_out(lane);
+                engine.fall_out(lane, Fall::Gap);
             }
         }
         true
@@ -173,12 +175,12 @@ impl Places {
                 engine.cut(lane);
                 mail.post(Sent::Unread { lane: number(lane) });
             }
-            None => engine.fall_out(lane),
+            None => engine.fall_out(lane, Fall::Gap),
         }
     }
 
-    fn take_evidence(&mut self, lane: usize, mail: &Mail, now: MonoTime) -> bool {
-        let Some(evidence) = mail.evidence(lane) else { return false };
+    fn take_evidence(&mut self, lane: usize, mail: &Mail, now: MonoTime) -> Found {
+        let Some(evidence) = mail.evidence(lane) else { return Found::Nothing };
         self.lanes[lane].belief.look(evidence, mail.told(), now)
     }
 
@@ -193,7 +195,7 @@ impl Places {
             return Some(beat);
         }
         belief.withheld();
-        engine.fall_out(lane);
+        engine.fall_out(lane, Fall::Gap);
         None
     }
 

@@ -20,6 +20,8 @@ const TIMES: u32 = 3;
 const REST_REPEATED: Duration = Duration::from_millis(500);
 /// An answer that comes later than this is none; so long after an answer was repeated others may be.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+/// A repeated answer is hardly older than this.
+const REPEATED: Duration = Duration::from_millis(300);
 /// An answer is lost rather than late after this.
 const LATE: Duration = Duration::from_millis(300);
 /// Requests that may be open at a time; of more the older ones count.
@@ -67,6 +69,8 @@ pub(super) struct Positions {
     asked: [VecDeque<MonoTime>; BLOCKS],
     /// When the newest answer was made, at the earliest.
     answered: MonoTime,
+    /// When the last frame went to it.
+    sent: MonoTime,
     /// Until when answers may be repeated.
     repeats_until: MonoTime,
 }
@@ -81,6 +85,7 @@ impl Positions {
             told,
             asked: std::array::from_fn(|_| VecDeque::with_capacity(OPEN)),
             answered: MonoTime::default(),
+            sent: MonoTime::default(),
             repeats_until: MonoTime::default(),
             outside: None,
             ordered: false,
@@ -124,12 +129,42 @@ impl Positions {
         asked
     }
 
-    /// Hears an answer: where axes are, from `first` on. One that nobody waits for tells of no place; says whether somebody did.
-    pub(super) fn answer(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> bool {
-        let Some(made) = self.open(first, at).pop_front() else { return false };
+    /// True if no further request finds a place, since answers are lost.
+    pub(super) fn is_full(&mut self, now: MonoTime) -> bool {
+        (0..REGISTERS).step_by(AXES_PER_BLOCK).any(|first| self.open(first, now).len() == OPEN)
+    }
+
+    /// Hears an answer: where axes are, from `first` on. One that nobody waits for tells of no place. Gives what it tells by itself.
+    pub(super) fn answer(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> Option<Reading> {
+        let newest = self.open(first, at).back().copied();
+        let made = self.open(first, at).pop_front()?;
         self.answered = self.answered.max(made);
         self.hear(first, positions, made, at, Source::Registers);
-        true
+        // Whether a seat follows its frames is a question of now: it is looked at once more than needs be where this is an older answer.
+        let newest = newest.unwrap_or(made);
+        let made = if self.may_be_repeated(at) { newest.before(REPEATED) } else { newest };
+        Some(self.in_passing(first, positions, made))
+    }
+
+    /// What one answer tells of the axes from `first` on, of however many the seat has.
+    fn in_passing(&self, first: usize, positions: &[Pulses], made: MonoTime) -> Reading {
+        let own = self.seat.axes.min(MAX_AXES - self.first_slot);
+        let mut reading = Reading {
+            slots: 0,
+            rests: false,
+            by: Source::Passing,
+            ..Reading::at_rest([0.0; MAX_AXES], made)
+        };
+        for (axis, pulses) in (first..own).zip(positions) {
+            reading.pose[self.first_slot + axis] = self.seat.fraction(*pulses);
+            reading.slots |= 1 << (self.first_slot + axis);
+        }
+        reading
+    }
+
+    /// True while any answer may be an older one that the network repeats.
+    fn may_be_repeated(&self, at: MonoTime) -> bool {
+        at < self.repeats_until
     }
 
     /// The network repeats answers: for a while each may be from before a move.
@@ -158,7 +193,8 @@ impl Positions {
             let is_outside = !(-OUTSIDE..=end + OUTSIDE).contains(&fraction);
             let other = self.outside.filter(|(other, _)| *other != axis);
             self.outside = if is_outside { Some((axis, *pulses)) } else { other };
-            if !is_own {
+            // What may be from before the last frame says nothing of where it comes to rest.
+            if !is_own || made < self.sent {
                 continue;
             }
             self.by = by;
@@ -213,8 +249,8 @@ impl Positions {
     }
 
     /// A frame went to it: where it stood before says nothing of whether it rests.
-    pub(super) const fn on_sent(&mut self) {
-        (self.home, self.told) = (false, [None; MAX_AXES]);
+    pub(super) const fn on_sent(&mut self, at: MonoTime) {
+        (self.home, self.told, self.sent) = (false, [None; MAX_AXES], at);
     }
 
     /// The axis, from 0, that is not inside its stroke, and where it says that it is.
@@ -237,7 +273,7 @@ impl Positions {
         if self.is_ambiguous() || is_beyond {
             return None;
         }
-        let rest = if now < self.repeats_until { REST_REPEATED } else { REST };
+        let rest = if self.may_be_repeated(now) { REST_REPEATED } else { REST };
         for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
             let slot = self.first_slot + axis;
             match self.told[axis] {
@@ -325,7 +361,7 @@ mod tests {
         look(&mut positions, 0, &[Pulses(0); 6], 100);
         let homed = positions.reading(ms(100)).unwrap();
         assert_eq!((homed.slots, homed.by), (0xff, Source::Homing));
-        positions.on_sent();
+        positions.on_sent(ms(100));
         assert_eq!(positions.reading(ms(100)), None, "frames have led them since");
         look(&mut positions, 0, &[Pulses(0); 6], 150);
         assert_eq!(positions.reading(ms(150)).unwrap().slots, 0b11_1111);
@@ -370,7 +406,7 @@ mod tests {
     fn an_answer_that_nobody_waits_for_tells_no_place_and_a_seat_is_looked_at_for_longer_then() {
         let mut positions = seat(1);
         look(&mut positions, 0, &[Pulses(7)], 0);
-        assert!(!positions.answer(0, &[Pulses(90_000)], ms(90)));
+        assert_eq!(positions.answer(0, &[Pulses(90_000)], ms(90)), None);
         positions.on_repeated(ms(90));
         assert_eq!(positions.told().unwrap()[0], Pulses(7));
         for (at, rests) in [(200, false), (450, false), (501, true)] {

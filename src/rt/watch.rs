@@ -16,6 +16,7 @@ use super::positions::Positions;
 use super::sight::{Looker, axes_to_read};
 use super::standby::{Seen, Standby};
 use super::table::{Row, Turns};
+use crate::belief::Reading;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Change, HealthState, HealthTable, Notice};
@@ -145,13 +146,13 @@ impl Watch {
         match sent {
             Sent::Posted { lane, frame, asked, at } => {
                 self.health.on_sent(usize::from(lane), frame, asked, at);
-                self.positions[usize::from(lane)].on_sent();
+                self.positions[usize::from(lane)].on_sent(at);
             }
             Sent::Failed { .. } => {}
             Sent::Joined { lane } => {
                 self.on_joined(self.health.groups().group_of(usize::from(lane)));
             }
-            Sent::FellOut { lane } => self.health.on_fell_out(usize::from(lane)),
+            Sent::FellOut { lane, why } => self.health.on_fell_out(usize::from(lane), why),
             Sent::Unread { lane } => self.health.on_unread(usize::from(lane)),
         }
     }
@@ -212,10 +213,23 @@ impl Watch {
     /// A seat answers where some of its axes are. What nobody asked for here may be the answer to what the control plane asked;
     /// else it was repeated on its way.
     fn on_answer(&mut self, controller: usize, first: usize, told: &[Pulses], at: MonoTime) {
-        if self.positions[controller].answer(first, told, at) {
+        if let Some(passing) = self.positions[controller].answer(first, told, at) {
             self.on_positions(controller, at);
+            self.on_passing(controller, &passing, at);
         } else if !self.is_asked_otherwise() {
             self.positions[controller].on_repeated(at);
+        }
+    }
+
+    /// A seat that frames lead is hardly ever read as a whole between two of them: what a part of it tells is for the tick thread as
+    /// well.
+    fn on_passing(&self, controller: usize, passing: &Reading, at: MonoTime) {
+        let positions = &self.positions[controller];
+        if !self.live.is_moving() || positions.reading(at).is_some() {
+            return;
+        }
+        if let Some(evidence) = self.live.evidence(controller) {
+            evidence.on_reading(passing);
         }
     }
 
@@ -286,6 +300,16 @@ impl Watch {
         self.positions[controller].told()
     }
 
+    /// Hears an answer to a beat that asked whether a controller that is led knows its zero; says whether it is one.
+    pub(super) fn hear_zero(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
+        let zero = Beats::hear_zero(octets).filter(|_| self.live.is_moving());
+        if let Some(homed) = zero {
+            self.health.on_zero(controller, homed);
+            self.health.on_status(controller, at);
+        }
+        zero.is_some()
+    }
+
     /// Hears an answer to a beat that asked for inputs: a sign of life, and which are active; none where it is none.
     pub(super) fn hear_inputs(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> Option<u16> {
         let inputs = self.beats.hear_inputs(controller, octets)?;
@@ -295,7 +319,8 @@ impl Watch {
 
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
     fn mind_rest(&mut self, controller: usize, at: MonoTime) {
-        let is_set = matches!(self.phase, Phase::Parking | Phase::Joining) && !self.live.is_moving();
+        let is_set =
+            matches!(self.phase, Phase::Parking | Phase::Joining | Phase::Paused) && !self.live.is_moving();
         if !is_set || self.standby.is_none() || !self.stands(controller).may_move() {
             return;
         }

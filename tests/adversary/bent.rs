@@ -13,6 +13,9 @@ const EXCHANGED_MS: [u64; 3] = [1_000, 1_500, 2_500];
 /// So old is what a controller tells at the most.
 const STALE_MS: [u64; 3] = [20, 40, 60];
 
+/// For so long a seat is deaf at the least: it takes some tenths of a second to see it.
+const DEAF_MS: [u64; 3] = [500, 800, 2_000];
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bent {
     /// Another master sends frames of its own to a seat for a while.
@@ -29,13 +32,15 @@ pub(crate) enum Bent {
     Lie,
     /// Registers say for a while where a seat was.
     Stale,
+    /// In a show as well seats are jogged at their keys, or home by themselves: they ack frames and do not execute them.
+    Deaf,
 }
 
 impl Bent {
     /// Of which kinds its halls are, or its hall is, one after the other.
     pub(crate) fn kinds(self, dice: &mut Dice) -> &'static [Kind] {
         match self {
-            Self::Master | Self::Stale => &KINDS,
+            Self::Master | Self::Stale | Self::Deaf => &KINDS,
             Self::Exchange => dice.pick(&[&KINDS[2..3], &KINDS[6..7], &MBOXES[2..3]]),
             Self::Reload => &RELOADED[dice.range(0, RELOADED.len() as u64) as usize],
             Self::Fewer => &FEWER[dice.range(0, FEWER.len() as u64) as usize],
@@ -58,7 +63,7 @@ impl Bent {
         match self {
             Self::Master | Self::Stale => 5,
             Self::Exchange | Self::Lie => 12,
-            Self::Reload | Self::Fewer => 8,
+            Self::Reload | Self::Fewer | Self::Deaf => 8,
             Self::Mbox => 25,
         }
     }
@@ -91,6 +96,14 @@ impl Bent {
                 let dark = dice.pick(&[1_000, 1_500]);
                 hall.note(|| format!("seat {}: its power goes for {dark} ms", seat + 1));
                 hall.ether.world().lines[seat].seat.reboot(now, dark * MS);
+            }
+            Self::Deaf => {
+                let mm = dice.range(0, 120) as f64 - 60.0;
+                let jogged = (dice.range(0, hall.kind.axes[seat].min(6) as u64) as usize, mm);
+                let jogged = (!dice.one_in(3)).then_some(jogged);
+                let ms = dice.pick(&DEAF_MS);
+                hall.note(|| format!("seat {}: deaf for {ms} ms or more, jogged {jogged:?}", seat + 1));
+                hall.ether.world().lines[seat].seat.seize(jogged, now, ms * MS);
             }
             Self::Stale => {
                 let ms = dice.pick(&STALE_MS);

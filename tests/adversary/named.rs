@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use kinocue::engine::Mix;
 use kinocue::state::{PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind};
@@ -12,6 +13,8 @@ use super::seat::{MS, Settings};
 const THREE: Kind = KINDS[0];
 const SIX: Kind = KINDS[1];
 const EIGHT: Kind = KINDS[3];
+/// Two seats, at 50 frames a second.
+const TWO: Kind = KINDS[6];
 const FAST: Kind = KINDS[7];
 
 /// How far apart each axis may stand from where it is meant to be, mm.
@@ -213,6 +216,47 @@ fn a_seat_that_is_still_being_jogged_when_park_is_asked_for_is_not_yanked() {
 }
 
 #[test]
+fn a_seat_that_was_jogged_just_before_park_is_there_before_the_hall_says_that_it_is_parked() {
+    for (by_mm, ms) in [(-20.0, 50), (-20.0, 300), (-60.0, 10), (-60.0, 700)] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(1_500);
+            hall.stops();
+            hall.is_cleared();
+            hall.pass(2_000);
+            let now = hall.ether.ns();
+            assert!(hall.ether.world().lines[0].seat.jog(0, by_mm, now), "it rests");
+            hall.pass(ms);
+            assert!(hall.parks(), "{:?}", hall.state);
+        });
+        assert_no_breach(&ether);
+        assert_at_park(&ether, 3);
+    }
+}
+
+#[test]
+fn nor_does_it_go_on_to_say_so_of_one_that_was_jogged_up_while_it_was_parked() {
+    for ms in [10, 50, 150, 300, 600] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.load(0);
+            assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
+            hall.pass(300);
+            let now = hall.ether.ns();
+            assert!(hall.ether.world().lines[0].seat.jog(0, 15.0, now), "it rests");
+            hall.pass(ms);
+            hall.ask(Transition::Park);
+            for state in [State::Parking, State::Parked] {
+                assert!(hall.comes_to(|now| now == state, 30_000), "{:?}", hall.state);
+            }
+        });
+        assert_no_breach(&ether);
+        assert_at_park(&ether, 3);
+    }
+}
+
+#[test]
 fn a_seat_that_was_jogged_just_before_go_is_not_yanked() {
     for passes in [100, 300, 500, 700] {
         let ether = ether(SIX, |_| {});
@@ -386,6 +430,24 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
 }
 
 #[test]
+fn a_seat_that_is_cut_off_on_its_way_to_park_is_there_before_the_hall_says_that_it_is_parked() {
+    for (at, length) in [(0, 150), (300, 90), (300, 600), (900, 150)] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(600);
+            hall.ask(Transition::Park);
+            hall.pass(at);
+            hall.ether.turns(0, Weather::Cut, length);
+            assert!(hall.comes_to(|state| state == State::Parked, 30_000), "{:?}", hall.state);
+            hall.pass(50);
+            assert_at_park(&hall.ether, 3);
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
 fn a_seat_whose_power_went_is_sent_nothing_when_it_comes_back_with_another_zero() {
     for park in [false, true] {
         let ether = ether(THREE, |_| {});
@@ -500,4 +562,90 @@ fn nor_at_a_thousand_frames_a_second() {
 fn nor_does_whoever_parks_out_of_a_pause() {
     assert_on_time(THREE, true);
     assert_on_time(FAST, true);
+}
+
+// Seats that ack frames and do not execute them, and seats that frames must not lead.
+
+#[test]
+fn a_seat_that_is_jogged_at_its_keys_in_a_show_is_sent_no_more_and_joins_again_from_where_it_was_left() {
+    for (kind, mm) in [(THREE, 80.0), (FAST, 60.0), (SIX, -25.0)] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ether.world().lines[0].seat.seize(Some((0, mm)), hall.ether.ns(), 600 * MS);
+            hall.pass(500);
+            let frames = hall.ether.world().lines[0].frames;
+            hall.pass(50);
+            assert_eq!(hall.ether.world().lines[0].frames, frames, "{kind:?}: nothing goes to it");
+            hall.pass(3_000);
+            assert!(hall.ether.world().lines[0].frames > frames, "{kind:?}: it joins again");
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_homes_by_itself_in_a_show_is_not_led_until_somebody_has_homed_it() {
+    for kind in [THREE, EIGHT] {
+        let ether = ether(kind, |_| {});
+        lead(kind, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ether.world().lines[0].seat.seize(None, hall.ether.ns(), 2_500 * MS);
+            hall.pass(500);
+            let frames = hall.ether.world().lines[0].frames;
+            hall.pass(4_000);
+            assert_eq!(hall.ether.world().lines[0].frames, frames, "{kind:?}: nothing goes to it");
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_is_jogged_in_a_pause_gets_no_frame_and_joins_from_there() {
+    for park in [false, true] {
+        let ether = ether(SIX, |_| {});
+        lead(SIX, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(700);
+            hall.ask(Transition::Pause);
+            hall.pass(1_500);
+            let frames = hall.ether.world().lines[0].frames;
+            assert!(hall.ether.jog(0, 1, 45.0, hall.ether.ns()));
+            hall.pass(2_000);
+            assert_eq!(hall.ether.world().lines[0].frames, frames, "a pause sends nothing");
+            if park {
+                assert!(hall.parks(), "{:?}", hall.state);
+            } else {
+                hall.ask(Transition::Resume);
+                hall.follows(6_000);
+            }
+        });
+        assert_no_breach(&ether);
+    }
+}
+
+#[test]
+fn a_seat_that_was_taken_out_is_parked_gets_no_frame_and_comes_back_from_where_it_was_jogged_to() {
+    let two = TWO;
+    let ether = ether(two, |_| {});
+    lead(two, &ether, false, |hall| {
+        hall.ride(0);
+        hall.pass(500);
+        let mix = hall.runtime.desk.mix(0);
+        hall.set(0, Mix { on: false, ..mix });
+        hall.pass(3_000);
+        assert!(mm(&hall.ether, 0).abs() < NEAR_MM, "parked, at {} mm", mm(&hall.ether, 0));
+        let frames = hall.ether.world().lines[0].frames;
+        assert!(hall.ether.jog(0, 0, 45.0, hall.ether.ns()));
+        hall.pass(600);
+        // While it still moves.
+        hall.set(0, mix);
+        hall.pass(300);
+        assert_eq!(hall.ether.world().lines[0].frames, frames, "nothing goes to one that moves");
+        hall.pass(3_000);
+        assert!(hall.ether.world().lines[0].frames > frames, "it is back");
+    });
+    assert_no_breach(&ether);
 }

@@ -21,10 +21,12 @@ fn assert_no_more(bent: Bent, open: usize, share: f64) {
     assert_at_most(most, first, count, Some(bent));
 }
 
-// Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits.
+// Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits. Nor does
+// anything tell of one that moves it after its last answer, while the answers are on their way. A park that waits for a seat leads
+// more of them than one that ends without it.
 #[test]
 fn no_more_histories_than_are_open_move_a_seat_too_fast_while_another_master_sends_to_it() {
-    assert_no_more(Bent::Master, 0, 0.005);
+    assert_no_more(Bent::Master, 3, 0.005);
 }
 
 #[test]
@@ -57,4 +59,10 @@ fn none_does_whose_controllers_say_after_a_reboot_that_they_know_their_zero() {
 #[test]
 fn no_more_than_are_open_do_whose_controllers_answer_with_where_they_were_up_to_60_ms_before() {
     assert_no_more(Bent::Stale, 4, 0.02);
+}
+
+// Open: where the network repeats or loses answers as well it takes longer to see it.
+#[test]
+fn none_does_whose_seats_are_jogged_or_home_by_themselves_in_a_show_and_ack_what_they_do_not_execute() {
+    assert_no_more(Bent::Deaf, 0, 0.002);
 }

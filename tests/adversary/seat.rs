@@ -29,6 +29,9 @@ const ADMITTED: u64 = 50 * MS;
 const BOUT: u64 = 1_000 * MS;
 /// For how long a seat is looked at before it counts as at rest.
 const UNSEEN: u64 = 150 * MS;
+/// A seat that does not hear is seen to be elsewhere once it is so far from where it is led, mm, and within so long.
+const VISIBLE_MM: f64 = 1.5;
+const SEEN: u64 = 350 * MS;
 /// Axes that have registers of their positions, and the first of the two of each.
 pub(crate) const REGISTERS: usize = 6;
 const POSITIONS: [u16; REGISTERS] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
@@ -43,6 +46,8 @@ pub(crate) struct Settings {
     pub(crate) mbox: bool,
     /// Whether it says that it knows its zero though it does not (DPF0).
     pub(crate) lies: bool,
+    /// Whether it leaves reads of its positions unanswered.
+    pub(crate) shy: bool,
     /// Whether the upper word of a position comes first.
     pub(crate) high_first: bool,
     /// PA06.
@@ -81,7 +86,18 @@ struct Move {
     to: [f64; 12],
     begin: u64,
     end: u64,
-    homes: bool,
+    why: Why,
+}
+
+/// What a move is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Why {
+    /// A frame, or a person where none comes.
+    Led,
+    /// It homes; what it is told meanwhile it acks and does not do.
+    Homes,
+    /// It is jogged at its keys, and the same.
+    Keys,
 }
 
 /// How a datagram came.
@@ -128,8 +144,10 @@ pub(crate) struct Seat {
     stale: Option<(u64, [f64; 12])>,
     /// When the first and the last frame came of another master that sends for a while.
     foreign: Option<(u64, u64)>,
-    /// Until when a hall may not know of them, and whether they have left it more to do than it has time.
+    /// What was sent before then is not judged: a hall could not know of them, or that the seat was deaf; and whether they have left it more to do than it has time.
     excused_until: u64,
+    /// Whether it was led visibly elsewhere by the frames that come now, since it does not hear.
+    astray: bool,
     crowded: bool,
     /// Moves that were hurried though the network brought them as they were sent; and the longest wait in the queue.
     pub(crate) hurried: u32,
@@ -165,6 +183,7 @@ impl Seat {
             stale: None,
             foreign: None,
             excused_until: 0,
+            astray: false,
             crowded: false,
             hurried: 0,
             waited_ns: 0,
@@ -197,11 +216,11 @@ impl Seat {
     }
 
     /// Goes somewhere by itself.
-    fn go(&mut self, to: [f64; 12], mm_s: f64, now: u64, homes: bool) {
+    fn go(&mut self, to: [f64; 12], mm_s: f64, now: u64, why: Why) {
         self.hold(now);
         let far = (0..12).map(|axis| (to[axis] - self.rest[axis]).abs()).fold(0.0, f64::max);
         let takes = (far / PULSES_PER_MM / mm_s * 1e9) as u64;
-        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes.max(200 * MS), homes });
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes.max(200 * MS), why });
     }
 
     /// Somebody jogs an axis by so many millimetres, within its stroke; not while it is led or stopped. The next frame ends it.
@@ -212,9 +231,34 @@ impl Seat {
         }
         let mut to = self.rest;
         to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
-        self.go(to, JOG_MM_S, now, false);
+        self.go(to, JOG_MM_S, now, Why::Led);
         self.jogged = true;
         true
+    }
+
+    /// Somebody takes it out of the hands of whoever leads it, for that long at least: jogs an axis at its keys, or has it home where
+    /// none is given. It acks what it is told meanwhile, and does not do it.
+    pub(crate) fn seize(&mut self, jogged: Option<(usize, f64)>, now: u64, lasts: u64) {
+        self.advance(now);
+        if self.rebooting || self.stopped || self.moving.is_some_and(|current| current.why != Why::Led) {
+            return;
+        }
+        let mut to = self.place(now);
+        let why = match jogged {
+            Some((axis, mm)) => {
+                to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
+                Why::Keys
+            }
+            None => {
+                (to, self.homed) = (self.zero, false);
+                Why::Homes
+            }
+        };
+        self.go(to, JOG_MM_S, now, why);
+        if let Some(own) = &mut self.moving {
+            own.end = own.end.max(now + lasts);
+        }
+        (self.executed, self.astray) = (None, false);
     }
 
     /// Its power goes, and is back after that long: it knows its place no longer.
@@ -248,7 +292,7 @@ impl Seat {
         match (pressed, self.settings.stop_mode) {
             (true, 1) => {
                 let zero = self.zero;
-                self.go(zero, OWN_MM_S, now, false);
+                self.go(zero, OWN_MM_S, now, Why::Led);
             }
             (true, _) => self.hold(now),
             // Only a reset ends it.
@@ -260,15 +304,17 @@ impl Seat {
     }
 
     fn advance_moves(&mut self, now: u64) {
-        while let Some(Move { to, end, homes, .. }) = self.moving.filter(|current| current.end <= now) {
+        while let Some(Move { to, end, why, .. }) = self.moving.filter(|current| current.end <= now) {
             self.rest = to;
             self.moving = None;
-            self.homed |= homes;
-            self.begin_next(end);
+            self.homed |= why == Why::Homes;
+            self.begin_next(end, true);
         }
     }
 
-    fn begin_next(&mut self, now: u64) {
+    /// Begins with the next command; what has waited behind another master's is not judged, whatever the hall could know: no reading
+    /// tells of a queue.
+    fn begin_next(&mut self, now: u64, has_waited: bool) {
         let waiting = self.queue.len();
         let Some(command) = self.queue.pop_front() else { return };
         let bunched = self.heaped || now < self.bunched_until;
@@ -281,8 +327,9 @@ impl Seat {
             *to = command.to[axis] + self.zero[axis];
         }
         let sent_before = self.foreign.is_some_and(|(first, _)| command.sent_ns < first);
-        self.crowded = now < self.excused_until || sent_before || (self.crowded && waiting > PATIENT);
-        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, homes: false });
+        let is_excused = command.sent_ns < self.excused_until;
+        self.crowded = command.foreign || is_excused || sent_before || (self.crowded && has_waited);
+        self.moving = Some(Move { from: self.rest, to, begin: now, end: now + takes, why: Why::Led });
         if command.foreign {
             return;
         }
@@ -348,6 +395,9 @@ impl Seat {
                     words::motion_reply(octets, x, 0, inputs)
                 }
             }
+            Heard::Read { channel: 0, start, .. } if self.settings.shy && POSITIONS.contains(&start) => {
+                return None;
+            }
             Heard::Read { channel, start, num } => {
                 let words: Vec<u16> = (start..start.saturating_add(num))
                     .map(|at| self.register(channel, at, arrival.at))
@@ -360,7 +410,7 @@ impl Seat {
                     self.homings += 1;
                     (self.zero, self.homed, self.stopped) = (zero, false, self.button.0);
                     (self.last_absolute, self.executed) = (None, None);
-                    self.go(zero, OWN_MM_S, arrival.at, true);
+                    self.go(zero, OWN_MM_S, arrival.at, Why::Homes);
                 }
                 words::register_reply(octets, x, 0, &[value])
             }
@@ -380,7 +430,7 @@ impl Seat {
         }
     }
 
-    /// Up to then nobody can know that another master sends to it.
+    /// Up to then nobody can know that another master sends to it, or that it does not hear.
     pub(crate) fn excuse(&mut self, until: u64) {
         self.excused_until = self.excused_until.max(until);
     }
@@ -398,6 +448,8 @@ impl Seat {
     fn on_motion(&mut self, frame: &Frame, arrival: Arrival) {
         let Arrival { at, sent, .. } = arrival;
         if let Some((came, sent_before)) = self.came.replace((at, sent)) {
+            // Whoever had given it up tries once more.
+            self.astray &= at < came + LED;
             let closer = (sent as f64 - sent_before as f64) - (at as f64 - came as f64);
             if closer.abs() > 0.4 * self.settings.period_ms * MS as f64 {
                 (self.bunched_until, self.heaped) = (at + BUNCHED, true);
@@ -412,8 +464,12 @@ impl Seat {
         if self.jogged {
             self.hold(at);
         }
-        let homes = self.moving.is_some_and(|current| current.homes);
-        if self.stopped || homes || self.queue.len() >= DEPTH {
+        let is_deaf = self.moving.is_some_and(|current| current.why != Why::Led);
+        if is_deaf && !self.astray && self.is_led_away(frame, at) {
+            self.astray = true;
+            self.excuse(at + SEEN);
+        }
+        if self.stopped || is_deaf || self.queue.len() >= DEPTH {
             return;
         }
         let time_ms = self.time_of(frame);
@@ -430,12 +486,19 @@ impl Seat {
             foreign,
         });
         if self.moving.is_none() {
-            self.begin_next(at);
+            self.begin_next(at, false);
         } else if !self.heaped {
             let ahead: u64 = self.queue.iter().rev().skip(1).map(|command| command.time_ns).sum();
             let end = self.moving.map_or(at, |current| current.end);
             self.waited_ns = self.waited_ns.max(ahead + end.saturating_sub(at));
         }
+    }
+
+    fn is_led_away(&self, frame: &Frame, at: u64) -> bool {
+        let place = self.place(at);
+        let axes = frame.axes.min(self.settings.axes);
+        let far = |axis: usize| (f64::from(frame.positions[axis]) + self.zero[axis] - place[axis]).abs();
+        (0..axes).any(|axis| far(axis) > VISIBLE_MM * PULSES_PER_MM)
     }
 
     /// How long its move takes, ms: its Time, or the difference to that of the absolute frame before.
@@ -478,7 +541,7 @@ impl Seat {
             let upper = (at == POSITIONS[axis]) == self.settings.high_first;
             return if upper { (position >> 16) as u16 } else { position as u16 };
         }
-        let homes = self.moving.is_some_and(|current| current.homes);
+        let homes = self.moving.is_some_and(|current| current.why == Why::Homes);
         match at {
             0x34 if self.settings.mbox => 0,
             0x34 => self.packets,

@@ -65,6 +65,7 @@ fn everything() -> Vec<(u64, Deed)> {
         (6_500, Deed::Trim(60)),
         (6_600, Deed::Mix(1, Mix { on: false, ..Mix::FULL })),
         (9_000, Deed::Mix(1, Mix::FULL)),
+        (9_010, Deed::Found(1, [0.0; MAX_AXES])),
         (9_100, Deed::Trim(-500)),
         (11_500, Deed::See(Alarm::Leave(1))),
         (12_000, Deed::Found(1, found)),
@@ -94,7 +95,7 @@ fn commands_alarms_levels_and_a_stop_neither_allocate_nor_free_on_the_tick_threa
     let refused: Vec<Why> = news.iter().filter_map(refusal).collect();
     assert_eq!(refused, [Why::Latched]);
     let counts = [0, 1].map(|controller| accounts.books.tracker().counts(controller));
-    assert!(counts[1].sent + 200 < counts[0].sent, "the second was away for a while");
+    assert!(counts[1].sent + 200 < counts[0].sent, "the second was away for a while: {counts:?}");
     for counts in counts {
         assert_eq!((counts.sent, counts.asked), (counts.acked, counts.acked));
     }

@@ -31,8 +31,8 @@ use rtrb::Producer;
 use super::counting::Calls;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(1);
-/// Frames whose replies may be under way; the least receive buffer that a system has by default holds them.
-const UNDER_WAY: u64 = 128;
+/// Frames whose replies may be under way; where they are of one controller alone, they are too few to be missing for a gap.
+const UNDER_WAY: u64 = 64;
 pub(crate) const CONTROLLERS: usize = 2;
 
 /// Something that happens before a tick.

@@ -305,7 +305,7 @@ mod tests {
         for (film_ms, kept) in [(999, false), (1_000, true), (3_999, true), (4_000, false)] {
             let mut hall = hall(State::Stopping, "one");
             let film = ShowTime::from_millis(film_ms);
-            hall.live.on_tick(&crate::rt::TickReport { late_ns: 0, missed: 0, show: film });
+            hall.live.on_show(film);
             hall.note_place(State::Paused, State::Stopping);
             hall.keep_place();
             assert_eq!(hall.cued.unwrap().left_at, kept.then_some(film));

@@ -81,7 +81,6 @@ fn may_test(hall: &HallContext) -> Result<(), Problem> {
 mod tests {
     use super::*;
     use crate::app::supervisor::testing::{hall, row, told};
-    use crate::rt::TickReport;
     use crate::time::ShowTime;
 
     #[test]
@@ -125,8 +124,7 @@ mod tests {
             [row, row]
         };
         let mut lines = |ms: i64, acked: u64| {
-            let show = ShowTime::from_millis(ms);
-            hall.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+            hall.live.on_show(ShowTime::from_millis(ms));
             told(&mut testing, &SupervisorEvent::Round(&table(acked)), &hall)
         };
         assert!(lines(0, 0).is_empty() && lines(1_500, 10).is_empty());

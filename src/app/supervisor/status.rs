@@ -50,7 +50,7 @@ impl StatusParts<'_> {
         let Self { hall, features, began } = *self;
         let (now, live, mirror) = (hall.now, &hall.live, &hall.mirror);
         let times = live.times();
-        let moving = live.is_moving();
+        let moving = mirror.state.may_send_motion();
         let preflighted = &features.readiness.preflighted;
         let position = |cued: &super::show::ProvedShow| if moving { live.show() } else { cued.start };
         Status {

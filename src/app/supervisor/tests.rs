@@ -10,7 +10,7 @@ use super::testing::Rig;
 use super::*;
 use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
-use crate::rt::{News, TickReport};
+use crate::rt::News;
 use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 
@@ -137,7 +137,7 @@ fn a_cue_that_is_gone_after_a_restart_is_named_and_the_hall_goes_on_without() {
 fn stopped_in_its_midst() -> Rig {
     let mut rig = Rig::playing();
     let show = ShowTime::from_millis(2_500);
-    rig.supervisor.hall.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.supervisor.hall.live.on_show(show);
     rig.ask(Command::Stop).unwrap();
     rig.tell(Event::AtRest);
     rig.ask(Command::Clear).unwrap();
@@ -174,7 +174,7 @@ fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before(
 fn a_show_that_is_stopped_on_its_way_to_park_after_its_end_is_over() {
     let mut rig = Rig::playing();
     let show = ShowTime::from_millis(3_900);
-    rig.supervisor.hall.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+    rig.supervisor.hall.live.on_show(show);
     rig.tell(Event::CueEnded);
     rig.ask(Command::Stop).unwrap();
     rig.tell(Event::AtRest);
@@ -211,7 +211,7 @@ fn where_a_crash_has_cut_a_show_is_known_to_five_seconds() {
     let rig = Rig::playing();
     for (film_ms, kept) in [(4_900, None), (12_340, Some(10_000))] {
         let show = ShowTime::from_millis(film_ms);
-        rig.supervisor.hall.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+        rig.supervisor.hall.live.on_show(show);
         assert_eq!(rig.supervisor.settings().show.unwrap().film_ms, kept);
     }
 }

@@ -8,7 +8,7 @@ use super::status::StatusParts;
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
-use crate::state::Next;
+use crate::state::{Next, State};
 
 /// In a new state all controllers have this long to be looked at before one that was not is worth a word.
 const FIRST_LOOK: Duration = Duration::from_secs(1);
@@ -40,6 +40,8 @@ impl StatusParts<'_> {
     ) -> Vec<Warning> {
         let Self { hall, features, .. } = *self;
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
+        let takes_part = |(lane, row): (usize, &Row)| hall.settings.is_on(lane) && row.standing.may_move();
+        warnings.extend(nobody(table, hall.mirror.state, takes_part));
         warnings.extend(self.of_strangers());
         warnings.extend(belts::warnings(hall, table));
         warnings.extend(self.of_the_machine());
@@ -137,4 +139,19 @@ fn in_two(id: &str, trouble: &str) -> Warning {
         text: text.to_owned(),
         remedy: remedy.to_owned(),
     }
+}
+
+/// A hall may play and park with all its seats out; what its state says is true of none of them then.
+fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> bool) -> Option<Warning> {
+    let is_looked_for = |row: &Row| row.why == Why::NotSeenYet;
+    if table.iter().all(is_looked_for) || table.iter().enumerate().any(takes_part) {
+        return None;
+    }
+    Some(Warning {
+        id: "no-seat".to_owned(),
+        severity: Severity::Error,
+        controller: None,
+        text: format!("no seat takes part: \"{state}\" is said of none"),
+        remedy: "take seats in (`kinocue enable`), or see at each what keeps it out".to_owned(),
+    })
 }

@@ -165,7 +165,7 @@ pub(super) fn start(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rt::{Desk, TickReport};
+    use crate::rt::Desk;
     use rtrb::{Consumer, RingBuffer};
     use std::iter;
 
@@ -175,7 +175,7 @@ mod tests {
         let desk = Arc::new(Desk::new(mixes.into_iter()));
         let control = Control { desk, live: Arc::default(), leave: Arc::default() };
         let show = ShowTime::from_millis(30_000);
-        control.live.on_tick(&TickReport { late_ns: 0, missed: 0, show });
+        control.live.on_show(show);
         let (commands, asked) = RingBuffer::new(4);
         let mut leader = Leader::new(control, ShowTime::from_millis(60_000));
         leader.commands = Some(commands);

@@ -198,7 +198,8 @@ mod tests {
         said.control.desk.set_trim_ms(10);
         (0..2).for_each(|lane| said.control.desk.set(lane, Mix { motion: 0.45, ..Mix::FULL }));
         let show = ShowTime::from_secs_f64(9.0);
-        said.control.live.on_tick(&TickReport { late_ns: 0, missed: 2, show });
+        said.control.live.on_show(show);
+        said.control.live.on_tick(&TickReport { late_ns: 0, missed: 2 });
         let past_the_end = "paused: 00:08.000 / 00:08.000, level 45 %, trim +10 ms, 2 missed";
         assert_eq!(paused(&said), past_the_end);
     }

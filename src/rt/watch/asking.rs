@@ -47,24 +47,30 @@ impl Watch {
         self.beats.send_all(controller, &self.sender)
     }
 
-    /// While nothing moves, no ack tells that a controller lives, nor where its seat is.
+    /// While nothing moves, no ack tells that a controller lives, nor where its seat is; and while frames flow none tells that a seat
+    /// follows them.
     pub(super) fn beat(&mut self, now: MonoTime) {
         // Preflight counts every datagram that a controller received: none of ours may come between.
-        if self.silent
-            || self.live.is_moving()
-            || self.is_hushed()
-            || self.is_asked_otherwise()
-            || !self.beats.take(now)
-        {
+        if self.silent || self.is_hushed() || self.is_asked_otherwise() {
             return;
         }
-        for controller in 0..self.lookers.len() {
-            if self.stands(controller).may_move()
-                && let Some(register) = self.beats.send(controller, &self.sender)
-            {
-                self.positions[controller].on_asked(register, now);
-                self.health.on_beat_sent(controller, now);
+        if self.live.is_moving() {
+            while let Some(controller) = self.beats.take_led(now) {
+                if !self.positions[controller].is_full(now) {
+                    self.ask_beat(controller, true, now);
+                }
             }
+        } else if self.beats.take(now) {
+            (0..self.lookers.len()).for_each(|controller| self.ask_beat(controller, false, now));
+        }
+    }
+
+    fn ask_beat(&mut self, controller: usize, is_led: bool, now: MonoTime) {
+        if self.stands(controller).may_move()
+            && let Some(register) = self.beats.send(controller, is_led, &self.sender)
+        {
+            self.positions[controller].on_asked(register, now);
+            self.health.on_beat_sent(controller, now);
         }
     }
 
