@@ -7,7 +7,7 @@ use jiff::Zoned;
 use super::act::{Act, Feature, SupervisorEvent};
 use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
-use super::job::Job;
+use super::job::{Job, JobResult};
 use super::list::List;
 use super::show::ProvedShow;
 use crate::control::{Code, Command, Problem, Surface};
@@ -34,6 +34,10 @@ pub(super) struct Onward {
     start: Option<Start>,
     /// Somebody wanted the hall to stay at rest since the show began.
     held: bool,
+    /// The entry that is being loaded follows one that is over.
+    follows: bool,
+    /// It came while the seats moved once more: it is taken up when they rest.
+    waits: Option<(usize, Box<ProvedShow>)>,
 }
 
 impl Onward {
@@ -74,7 +78,7 @@ impl Onward {
 
     /// Has the cue of an entry read, which starts then where that is due.
     pub(super) fn fetch(&mut self, entry: usize, start: Option<Start>) -> Vec<Act> {
-        self.start = start;
+        (self.start, self.follows, self.waits) = (start, false, None);
         let cue = self.list.as_ref().map(|list| list.playlist.entries[entry].cue.clone());
         cue.map(|cue| Act::Start(Job::Entry(entry, cue))).into_iter().collect()
     }
@@ -105,8 +109,14 @@ impl Onward {
     ) -> Result<Vec<Act>, Problem> {
         let start = self.start.take();
         let cued = cued?;
-        if start.is_none() {
-            hall.may("load")?;
+        if start.is_none()
+            && let Err(problem) = hall.may("load")
+        {
+            if !self.follows {
+                return Err(problem);
+            }
+            self.waits = Some((entry, cued));
+            return Ok(Vec::new());
         }
         let Some(list) = &mut self.list else { return Ok(Vec::new()) };
         list.current = entry;
@@ -143,6 +153,7 @@ impl Onward {
         let goes = list.entry().then == Then::Go && hall.mirror.state == State::Parked && !self.held;
         if hall.is_free().is_ok() {
             acts.extend(self.fetch(next, goes.then_some(Start::GoOn)));
+            self.follows = true;
         }
         acts
     }
@@ -179,8 +190,12 @@ impl Feature for Onward {
             },
             SupervisorEvent::Leaving => (self.start, self.held) = (None, true),
             // What was to start by itself was for the state before.
-            SupervisorEvent::Entered(_) => self.start = None,
-            SupervisorEvent::Begun(_) => (self.start, self.held) = (None, false),
+            SupervisorEvent::Entered(_) => {
+                self.start = None;
+                let ready = self.waits.take_if(|_| hall.may("load").is_ok());
+                out.extend(ready.map(|(entry, cued)| Act::Take(JobResult::Entry(entry, Ok(cued)))));
+            }
+            SupervisorEvent::Begun(_) => (self.start, self.held, self.waits) = (None, false, None),
             SupervisorEvent::Clock(wall) => out.extend(self.heed_schedule(wall, hall)),
             SupervisorEvent::Done(_) | SupervisorEvent::Round(_) => {}
         }

@@ -50,6 +50,7 @@ fn end_show(rig: &mut Rig) {
 fn ask_in_between(rig: &mut Rig, ask: Command) {
     drop(rig.post(ask));
     rig.hear();
+    rig.do_begun();
 }
 
 #[test]
@@ -95,6 +96,11 @@ fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() 
         end_show(&mut rig);
         ask_in_between(&mut rig, ask.clone());
         rig.settle();
+        if ask == Command::Park {
+            // The seats are looked at once more, and the cue waits for that.
+            assert_eq!((rig.state(), cue(&rig)), (State::Parking, Some("one")));
+            rig.tell(Event::Parked);
+        }
         let rests = if ask == Command::Stop { State::Stopped } else { State::Parked };
         assert_eq!((rig.state(), cue(&rig)), (rests, Some("two")), "{ask}");
     }
