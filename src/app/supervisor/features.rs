@@ -10,7 +10,7 @@ use super::job::{Again, JobResult};
 use super::lasting::Lasting;
 use super::playlist::Onward;
 use super::readiness::ReadinessCheck;
-use super::record::Records;
+use super::record::ShowRecords;
 use super::seat_testing::SeatTesting;
 use crate::control::Problem;
 use crate::state::Cause;
@@ -25,13 +25,13 @@ pub(super) struct Features {
     pub(super) readiness: ReadinessCheck,
     pub(super) lasting: Lasting,
     pub(super) gear: GearLimits,
-    pub(super) records: Records,
+    pub(super) records: ShowRecords,
     pub(super) figures: Figures,
 }
 
 impl Features {
     /// Those of a hall that has just opened.
-    pub(super) fn new(records: Records, lasting: Lasting) -> Self {
+    pub(super) fn new(records: ShowRecords, lasting: Lasting) -> Self {
         Self {
             onward: Onward::default(),
             homing: Homing::default(),

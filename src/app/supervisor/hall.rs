@@ -1,4 +1,4 @@
-//! The hall as all features of the supervisor see it. They change it by acts alone, so that whatever they read is what the tick
+//! The hall as all features of the supervisor see it. Acts change it, one after the other, so that whatever they read is what the tick
 //! thread has taken up.
 
 use std::collections::BTreeSet;

@@ -68,7 +68,7 @@ use hall::HallContext;
 use job::{Jobs, Tools};
 use list::List;
 use procedures::Procedures;
-use record::Records;
+use record::ShowRecords;
 use shared_link::SharedLink;
 use status::StatusParts;
 
@@ -162,7 +162,7 @@ impl Supervisor {
             runtime,
             given: 0,
             hall,
-            features: Features::new(Records::new(journal), carryover.lasting),
+            features: Features::new(ShowRecords::new(journal), carryover.lasting),
             procedures: Procedures::default(),
             jobs: Jobs::new(tools),
             told: now,

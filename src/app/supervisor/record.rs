@@ -1,4 +1,4 @@
-//! Records for the journal: commands with their operators, and shows.
+//! ShowRecords for the journal: commands with their operators, and shows.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -22,27 +22,27 @@ const NEWEST: usize = 20;
 
 /// What is written down, and what was lately.
 #[derive(Debug)]
-pub(super) struct Records {
+pub(super) struct ShowRecords {
     journal: Journal,
     folds: Folds,
     newest: VecDeque<JournalLine>,
     /// The show that is under way.
-    open: Option<Box<Open>>,
+    open: Option<Box<OpenShow>>,
 }
 
 /// A show that has begun.
 #[derive(Debug)]
-struct Open {
+struct OpenShow {
     record: ShowRecord,
     before: Counted,
     events: Vec<String>,
     /// How it ended; none while it goes on.
-    over: Option<Over>,
+    over: Option<ShowOver>,
 }
 
 /// The end of a show whose last frames may be on their way.
 #[derive(Debug)]
-struct Over {
+struct ShowOver {
     cause: Cause,
     end: String,
     at: MonoTime,
@@ -50,8 +50,8 @@ struct Over {
     missed: u64,
 }
 
-impl Records {
-    /// Records that go to a journal.
+impl ShowRecords {
+    /// ShowRecords that go to a journal.
     pub(super) fn new(journal: Journal) -> Self {
         Self { journal, folds: Folds::default(), newest: VecDeque::new(), open: None }
     }
@@ -164,13 +164,13 @@ impl Records {
         };
         self.journal.begin(&record);
         let before = counted.clone();
-        self.open = Some(Box::new(Open { record, before, events: Vec::new(), over: None }));
+        self.open = Some(Box::new(OpenShow { record, before, events: Vec::new(), over: None }));
     }
 
     /// A show is over. It is written down once its last frames have met their fate.
     pub(super) fn end(&mut self, hall: &HallContext) {
         let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) else { return };
-        open.over = Some(Over {
+        open.over = Some(ShowOver {
             cause: hall.ended,
             end: stamp(&Zoned::now()),
             at: hall.now,
@@ -191,8 +191,8 @@ impl Records {
     /// Writes down a show that is over, with what was counted so far.
     pub(super) fn close(&mut self, hall: &HallContext) {
         let Some(open) = self.open.take() else { return };
-        let Open { mut record, before, events, over } = *open;
-        let Some(Over { cause, end, ticks, missed, .. }) = over else { return };
+        let OpenShow { mut record, before, events, over } = *open;
+        let Some(ShowOver { cause, end, ticks, missed, .. }) = over else { return };
         let now = hall.live.table();
         let frames =
             |table: &[Row]| table.iter().map(|row| FrameCounts::from(&row.counts)).sum::<FrameCounts>();
@@ -213,7 +213,7 @@ impl Records {
     }
 }
 
-impl Feature for Records {
+impl Feature for ShowRecords {
     fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, _out: &mut Vec<Act>) {
         match event {
             SupervisorEvent::Entered(to) => self.event(format!("{to}: {}", hall.cause())),
@@ -250,7 +250,7 @@ mod tests {
     fn a_show_that_is_over_waits_for_the_fate_of_its_last_frames_but_not_for_ever() {
         let folder = tempfile::tempdir().unwrap();
         let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
-        let mut records = Records::new(Journal::open(folder.path(), limits, &Zoned::now()));
+        let mut records = ShowRecords::new(Journal::open(folder.path(), limits, &Zoned::now()));
         let mut hall = hall(State::Armed, "one");
         let ms = Duration::from_millis;
         for (asked, later, settled) in [

@@ -26,7 +26,7 @@ const LEAD_MS: u32 = 1_000;
 /// A test that is under way, or was.
 #[derive(Debug)]
 pub(super) struct SeatTest {
-    parts: Vec<Part>,
+    parts: Vec<TestPart>,
     /// The part that is under way, with what was counted when it began.
     now: Option<(usize, Vec<Row>)>,
     pub(super) status: TestStatus,
@@ -34,7 +34,7 @@ pub(super) struct SeatTest {
 
 /// One thing that is tested.
 #[derive(Debug, Clone, PartialEq)]
-struct Part {
+struct TestPart {
     name: String,
     from: ShowTime,
     to: ShowTime,
@@ -43,7 +43,7 @@ struct Part {
 }
 
 /// The parts of a test of a hall, and its cue as CSV.
-fn script(config: &Config) -> (Vec<Part>, String) {
+fn script(config: &Config) -> (Vec<TestPart>, String) {
     let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
     let effects: Vec<&str> = config.effects.iter().map(|effect| effect.name.as_str()).collect();
     let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
@@ -71,7 +71,7 @@ fn script(config: &Config) -> (Vec<Part>, String) {
         row(at, None, None);
         row(at + AXIS_MS * 5 / 12, Some(axis), None);
         row(at + AXIS_MS * 7 / 12, Some(axis), None);
-        parts.push(Part {
+        parts.push(TestPart {
             name: format!("a{}", axis + 1),
             from: time(at),
             to: time(at + AXIS_MS),
@@ -82,7 +82,12 @@ fn script(config: &Config) -> (Vec<Part>, String) {
     for (effect, name) in effects.iter().enumerate() {
         row(at, None, Some(effect));
         row(at + EFFECT_MS / 2, None, None);
-        parts.push(Part { name: (*name).to_owned(), from: time(at), to: time(at + EFFECT_MS), axis: None });
+        parts.push(TestPart {
+            name: (*name).to_owned(),
+            from: time(at),
+            to: time(at + EFFECT_MS),
+            axis: None,
+        });
         at += EFFECT_MS;
     }
     // It ends at rest: the last axis comes back before that.
