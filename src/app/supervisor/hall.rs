@@ -1,5 +1,5 @@
-//! The hall as all features of the supervisor see it. Acts change it, one after the other, so that whatever they read is what the tick
-//! thread has taken up.
+//! The hall as all features of the supervisor see it. Acts change it, one after the other, so that whatever they read is what the
+//! tick thread has taken up.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
