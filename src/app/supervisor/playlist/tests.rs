@@ -99,14 +99,22 @@ fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() 
             rig.tell(Event::Parked); // all were read once more
         }
         rig.settle();
-        if ask == Command::Park {
-            // The seats are looked at once more, and the cue waits for that.
-            assert_eq!((rig.state(), cue(&rig)), (State::Parking, Some("one")));
-            rig.tell(Event::Parked);
-        }
         let rests = if ask == Command::Stop { State::Stopped } else { State::Parked };
         assert_eq!((rig.state(), cue(&rig)), (rests, Some("two")), "{ask}");
     }
+}
+
+#[test]
+fn the_next_cue_that_comes_while_all_seats_are_read_once_more_is_loaded_after_that() {
+    let mut rig = playing();
+    rig.tell(Event::CueEnded);
+    end_show(&mut rig);
+    ask_in_between(&mut rig, Command::Park);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parking, Some("one")));
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
 }
 
 #[test]
