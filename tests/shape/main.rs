@@ -34,7 +34,7 @@ const ROWS: &[Row] = &[
     ("pairs of runs, but for names", repeats::but_for_names, Less, 250.0, 170.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 16.0, 2.0),
     // 490 more where the supervisor was taken apart into features that say what is to be done and are tested alone.
-    ("lines of code", counts::lines_of_code, Less, 48_974.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 48_978.0, 39_800.0),
     ("public items and fields", counts::public_items, Less, 2_835.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 538.0, 390.0),
