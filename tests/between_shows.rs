@@ -16,14 +16,14 @@ use kinocue::harness::{ORIGIN, swell};
 use kinocue::motion::{MAX_AXES, Pose};
 use kinocue::net::Delivery;
 use kinocue::rt::{
-    Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, Places, PlanLoop, Planning,
-    TickLoop, mailboxes,
+    Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, NewsIn, Places, PlanLoop,
+    Planning, TickLoop, mailboxes,
 };
 use kinocue::state::{Event, Finding, PlayMode, Readiness, State, Transition};
 use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
 use kinocue::timeline::Timeline;
 use kinocue::wire::{MotionRequest, Timing};
-use rtrb::{Consumer, Producer};
+use rtrb::Producer;
 
 /// Something that happens between shows.
 #[derive(Debug, Clone, Copy)]
@@ -77,7 +77,7 @@ struct Hands<'a> {
     commands: RefCell<Producer<Command>>,
     alarms: RefCell<Producer<Alarm>>,
     plans: RefCell<PlanLoop>,
-    news: RefCell<Consumer<News>>,
+    news: RefCell<NewsIn>,
     states: RefCell<Vec<State>>,
     live: &'a Live,
     /// Where the seat is.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use rtrb::{Consumer, Producer};
+use rtrb::Producer;
 
 use super::company::Company;
 use super::prepare::{Preparation, Unready};
@@ -27,7 +27,7 @@ use crate::plain;
 use crate::plan::PlanError;
 use crate::proof::{self, Digest, Proof, Terms, Violation};
 use crate::rt::{
-    AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, News, Places, PlanLoop, Planning, Watch, mailboxes,
+    AckLoop, Alarm, Command, Desk, Live, Mail, MailEnds, NewsIn, Places, PlanLoop, Planning, Watch, mailboxes,
 };
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
@@ -142,7 +142,7 @@ pub struct PlayHandle {
     /// What is asked of the hall.
     pub commands: Producer<Command>,
     /// What the hall does.
-    pub news: Consumer<News>,
+    pub news: NewsIn,
 }
 
 /// What came of a play.

@@ -252,7 +252,7 @@ fn keep(
     feeder: &mut Option<WatchdogThread>,
 ) -> Result<SupervisorEnd, ServeError> {
     let (tell, closed) = channel();
-    let mut failed = None;
+    let mut supervisor = Err(io::ErrorKind::NotFound.into());
     ports.carryover.set_desk(runtime.config(), &runtime.desk());
     let (leaves, left) = channel();
     let run = runtime.run(|handle, line| {
@@ -265,15 +265,18 @@ fn keep(
             // Where nobody waits any more, it hung.
             drop(leaves.send(kept.run(&closed)));
         });
-        if let Err(cause) = thread {
-            failed = Some(cause);
-            leave.store(true, std::sync::atomic::Ordering::Release);
+        match thread {
+            Ok(thread) => supervisor = Ok(thread.thread().clone()),
+            Err(cause) => {
+                supervisor = Err(cause);
+                leave.store(true, std::sync::atomic::Ordering::Release);
+            }
         }
+        supervisor.as_ref().ok().cloned()
     })?;
-    if let Some(cause) = failed {
-        return Err(ServeError::System(cause));
-    }
+    let supervisor = supervisor.map_err(ServeError::System)?;
     drop(tell.send(Box::new(run)));
+    supervisor.unpark();
     left.recv_timeout(SUPERVISOR_ENDS).map_err(|_| ServeError::Supervisor)
 }
 

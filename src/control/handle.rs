@@ -1,8 +1,9 @@
 //! How surfaces reach the hall: a bounded queue of asks, each with the way back for its answer; the newest status; and the
 //! stop, which waits for neither.
 
-use std::sync::mpsc::{self, RecvTimeoutError, SyncSender, TrySendError};
+use std::sync::mpsc::{self, SyncSender, TrySendError};
 use std::sync::{Arc, PoisonError, RwLock};
+use std::thread::Thread;
 use std::time::Duration;
 
 use tokio::sync::{oneshot, watch};
@@ -61,36 +62,43 @@ impl Asked {
 pub struct Inbox(mpsc::Receiver<Asked>);
 
 impl Inbox {
-    /// The next ask, waited for so long; `None` if nobody asked. None as well where all surfaces are gone. What has gone
+    /// The next ask, waited for so long; `None` if nobody asked, or all surfaces are gone. What has gone
     /// stale while it waited is answered here and never comes out: nobody expects it any more.
     #[must_use]
     pub fn next(&self, wait: Duration) -> Option<Asked> {
         let until = Monotonic.now() + wait;
         loop {
-            match self.0.recv_timeout(until.since(Monotonic.now())) {
-                Ok(asked) if asked.is_stale(Monotonic.now()) => {
-                    let problem = late(asked.desired.ask.word());
-                    asked.answer(Err(problem));
-                }
-                Ok(asked) => return Some(asked),
-                Err(RecvTimeoutError::Timeout) => return None,
-                Err(RecvTimeoutError::Disconnected) => {
-                    Monotonic.sleep_until(until);
-                    return None;
-                }
+            let asked = self.0.recv_timeout(until.since(Monotonic.now())).ok()?;
+            if !asked.is_stale(Monotonic.now()) {
+                return Some(asked);
             }
+            let problem = late(asked.desired.ask.word());
+            asked.answer(Err(problem));
         }
     }
 }
 
 /// Where the supervisor puts the newest status.
 #[derive(Debug)]
-pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Arc<Desk>>>);
+pub struct StatusSource(watch::Sender<Arc<Status>>, Arc<RwLock<Led>>);
+
+/// The hall of now, which is another with every configuration.
+#[derive(Debug)]
+struct Led {
+    desk: Arc<Desk>,
+    /// Who is woken by each ask; `None` before it runs.
+    supervisor: Option<Thread>,
+}
 
 impl StatusSource {
     /// From now on a stop goes to that desk: the hall was opened anew.
     pub fn lead(&self, desk: Arc<Desk>) {
-        *self.1.write().unwrap_or_else(PoisonError::into_inner) = desk;
+        self.1.write().unwrap_or_else(PoisonError::into_inner).desk = desk;
+    }
+
+    /// From now on that thread is woken by each ask. What was asked before is there to be taken.
+    pub(crate) fn wakes(&self, supervisor: Thread) {
+        self.1.write().unwrap_or_else(PoisonError::into_inner).supervisor = Some(supervisor);
     }
 
     /// Makes a status known to all who watch.
@@ -104,7 +112,7 @@ impl StatusSource {
 pub struct Handle {
     asks: SyncSender<Asked>,
     status: watch::Receiver<Arc<Status>>,
-    desk: Arc<RwLock<Arc<Desk>>>,
+    led: Arc<RwLock<Led>>,
 }
 
 /// The ends of a hall: for its surfaces, and for its supervisor. `desk` is the tick thread's.
@@ -112,14 +120,14 @@ pub struct Handle {
 pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
     let (asks, inbox) = mpsc::sync_channel(ASKS);
     let (source, status) = watch::channel(Arc::new(first));
-    let desk = Arc::new(RwLock::new(desk));
-    (Handle { asks, status, desk: Arc::clone(&desk) }, Inbox(inbox), StatusSource(source, desk))
+    let led = Arc::new(RwLock::new(Led { desk, supervisor: None }));
+    (Handle { asks, status, led: Arc::clone(&led) }, Inbox(inbox), StatusSource(source, led))
 }
 
 impl Handle {
     /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
     pub fn stop(&self) {
-        self.desk.read().unwrap_or_else(PoisonError::into_inner).stop();
+        self.led.read().unwrap_or_else(PoisonError::into_inner).desk.stop();
     }
 
     /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
@@ -127,6 +135,14 @@ impl Handle {
         let (reply, _) = oneshot::channel();
         let note = Asked { desired: Desired { ask: Command::Stop, who }, asked_at: Monotonic.now(), reply };
         drop(self.asks.try_send(note));
+        self.wake();
+    }
+
+    /// Has the supervisor look into the queue.
+    fn wake(&self) {
+        if let Some(supervisor) = &self.led.read().unwrap_or_else(PoisonError::into_inner).supervisor {
+            supervisor.unpark();
+        }
     }
 
     /// The newest status.
@@ -175,7 +191,9 @@ impl Handle {
         if asked.is_stale(Monotonic.now()) {
             return Err(late(asked.desired.ask.word()));
         }
-        match self.asks.try_send(asked) {
+        let queued = self.asks.try_send(asked);
+        self.wake();
+        match queued {
             Ok(()) => Ok(Posted(answer)),
             // It is done with its flag; what would follow is its line in the journal.
             Err(TrySendError::Full(asked)) if asked.desired.ask == Command::Stop => {
@@ -285,5 +303,35 @@ mod tests {
         let problem = handle.post(who(Role::View), Command::Go).unwrap_err();
         assert_eq!((problem.code, problem.status), (Code::Role, 403));
         assert!(inbox.next(NOW).is_none());
+    }
+
+    #[test]
+    fn whoever_takes_what_is_asked_can_sleep_until_somebody_asks() {
+        let (handle, inbox, source) = {
+            let desk = Arc::new(Desk::new(std::iter::empty()));
+            handle(desk, Status::starting("Hall 1"))
+        };
+        let (tell, told) = mpsc::channel();
+        let supervisor = std::thread::spawn(move || {
+            source.wakes(std::thread::current());
+            tell.send(None).unwrap();
+            for _ in 0..2 {
+                let asked = std::iter::repeat_with(|| {
+                    inbox.next(NOW).or_else(|| {
+                        std::thread::park();
+                        None
+                    })
+                });
+                let asked = asked.flatten().next().unwrap();
+                tell.send(Some(asked.desired.ask)).unwrap();
+            }
+        });
+        let hears = || told.recv_timeout(Duration::from_secs(20)).expect("it is woken");
+        assert_eq!(hears(), None);
+        handle.post(who(Role::Operate), Command::Pause).unwrap();
+        assert_eq!(hears(), Some(Command::Pause));
+        handle.note_stop(who(Role::View));
+        assert_eq!(hears(), Some(Command::Stop));
+        supervisor.join().unwrap();
     }
 }

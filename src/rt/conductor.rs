@@ -67,6 +67,11 @@ impl Conductor {
         self.left
     }
 
+    /// Whether no signal that asks for the end was seen before this one.
+    pub(super) const fn hears_first_of_the_end(&self) -> bool {
+        self.ended.is_none()
+    }
+
     /// Whether a signal that asks for the end has found nobody to hear it; `asked` says whether there is one.
     pub(super) fn is_ended(&mut self, asked: bool, now: MonoTime) -> bool {
         asked && now.since(*self.ended.get_or_insert(now)) >= LEFT_TO_KEEPER
@@ -279,7 +284,11 @@ mod tests {
         let ms = |ms: u64| MonoTime::from_nanos(ms * 1_000_000);
         let mut conductor = Conductor::of_a_hall(ms(0));
         let asked = [(100, false), (1_000, true), (1_499, true), (1_500, true)];
-        let ends = asked.map(|(at, asked)| conductor.is_ended(asked, ms(at)));
-        assert_eq!(ends, [false, false, false, true]);
+        let heard = asked.map(|(at, asked)| {
+            let first = asked && conductor.hears_first_of_the_end();
+            (first, conductor.is_ended(asked, ms(at)))
+        });
+        let first_heard = [(false, false), (true, false), (false, false), (false, true)];
+        assert_eq!(heard, first_heard, "whoever leads the hall is woken once");
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::thread::Thread;
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, PopError, Producer, RingBuffer};
 
 use super::live::Live;
 use crate::belief::Evidence;
@@ -166,6 +166,39 @@ pub enum News {
     Unplanned(Unplanned),
 }
 
+/// The number of a command, from 0 in the order in which they are given. It needs no place beside the command: the mailbox keeps
+/// the order.
+pub(crate) type Ticket = u32;
+
+/// Whom the tick thread tells: news, and the ticket of the command that it answers, where it does.
+pub(crate) type NewsOut = Producer<(Option<Ticket>, News)>;
+
+/// Where the tick thread's news comes out.
+#[derive(Debug)]
+pub struct NewsIn(Consumer<(Option<Ticket>, News)>);
+
+impl NewsIn {
+    /// The next, for whoever does not care which command it answers.
+    ///
+    /// # Errors
+    /// Where there is none.
+    pub fn pop(&mut self) -> Result<News, PopError> {
+        self.0.pop().map(|(_, news)| news)
+    }
+
+    /// The next, with the ticket of the command that it answers.
+    pub(crate) fn take(&mut self) -> Option<(Option<Ticket>, News)> {
+        self.0.pop().ok()
+    }
+}
+
+/// The mailbox for so much news.
+#[must_use]
+pub(crate) fn news(places: usize) -> (NewsOut, NewsIn) {
+    let (news, news_end) = RingBuffer::new(places);
+    (news, NewsIn(news_end))
+}
+
 /// The tick thread's ends.
 #[derive(Debug)]
 pub struct Mail {
@@ -174,9 +207,12 @@ pub struct Mail {
     tasks: Producer<Task>,
     answers: Consumer<Answer>,
     commands: Consumer<Command>,
+    /// Commands taken so far.
+    taken: Ticket,
     alarms: Consumer<Alarm>,
-    news: Producer<News>,
+    news: NewsOut,
     planner: Option<Thread>,
+    leader: Option<Thread>,
     live: Arc<Live>,
     unposted: u64,
 }
@@ -197,7 +233,7 @@ pub struct MailEnds {
     /// From the ack thread: what it sees of the controllers.
     pub alarms: Producer<Alarm>,
     /// To whoever leads the show: what the hall does.
-    pub news: Consumer<News>,
+    pub news: NewsIn,
 }
 
 /// Mailboxes for a play of that many lanes.
@@ -213,16 +249,18 @@ pub fn mailboxes(lanes: usize, rate: Rate, live: Arc<Live>) -> (Mail, MailEnds) 
     let (commands_end, commands) = RingBuffer::new(COMMANDS);
     // Some for each lane at once, and some more.
     let (alarms_end, alarms) = RingBuffer::new(4 * lanes + COMMANDS);
-    let (news, news_end) = RingBuffer::new(NEWS);
+    let (news, news_end) = news(NEWS);
     let mail = Mail {
         sent,
         ticks: reports,
         tasks,
         answers,
         commands,
+        taken: 0,
         alarms,
         news,
         planner: None,
+        leader: None,
         live,
         unposted: 0,
     };
@@ -242,6 +280,11 @@ impl Mail {
     /// Names the planner's thread, which is woken when there is something for it.
     pub fn wakes(&mut self, planner: Thread) {
         self.planner = Some(planner);
+    }
+
+    /// Names the thread of whoever leads the hall, which is woken when there is news.
+    pub(crate) fn wakes_leader(&mut self, leader: Option<Thread>) {
+        self.leader = leader;
     }
 
     /// Records that found no room so far.
@@ -299,8 +342,12 @@ impl Mail {
         self.live.on_state(machine.state(), engine);
     }
 
-    pub(super) fn command(&mut self) -> Option<Command> {
-        self.commands.pop().ok()
+    /// The next command, with its ticket.
+    pub(super) fn command(&mut self) -> Option<(Ticket, Command)> {
+        let command = self.commands.pop().ok()?;
+        let ticket = self.taken;
+        self.taken = ticket.wrapping_add(1);
+        Some((ticket, command))
     }
 
     pub(super) fn alarm(&mut self) -> Option<Alarm> {
@@ -314,24 +361,74 @@ impl Mail {
 
     /// Where nobody reads it, news is lost; where the hall stands is in [`Live`] as well.
     pub(super) fn tell(&mut self, news: News) {
+        self.put((None, news));
+    }
+
+    /// Answers a command.
+    pub(super) fn reply(&mut self, ticket: Ticket, news: News) {
+        self.put((Some(ticket), news));
+    }
+
+    fn put(&mut self, news: (Option<Ticket>, News)) {
         let _ = self.news.push(news);
+        self.wake_leader();
+    }
+
+    /// Has whoever leads the hall look at what there is, be it no news.
+    pub(super) fn wake_leader(&self) {
+        wake(self.leader.as_ref());
     }
 
     /// Has the planner do it. It has as many places as courses that can be under way, so there is room.
     pub(super) fn task(&mut self, task: Task) {
         self.unposted += u64::from(self.tasks.push(task).is_err());
-        self.wake();
+        wake(self.planner.as_ref());
     }
 
     /// Whether the planner can be given a whole show: to load one, and to free the one before.
     pub(super) fn has_room_for_a_show(&self) -> bool {
         self.tasks.slots() >= 2
     }
+}
 
-    /// One system call where the planner sleeps, none where it works; it never waits.
-    fn wake(&self) {
-        if let Some(planner) = &self.planner {
-            planner.unpark();
+/// One system call where the thread sleeps, none where it works; it never waits.
+fn wake(thread: Option<&Thread>) {
+    if let Some(thread) = thread {
+        thread.unpark();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn whoever_leads_the_hall_can_sleep_until_there_is_news_and_an_answer_names_its_command() {
+        let (mut mail, ends) = mailboxes(1, Rate::from_hz(100.0), Arc::default());
+        let MailEnds { mut commands, mut news, .. } = ends;
+        let (tell, told) = std::sync::mpsc::channel();
+        let leader = thread::spawn(move || {
+            let take = || {
+                news.take().or_else(|| {
+                    thread::park();
+                    None
+                })
+            };
+            tell.send(std::iter::repeat_with(take).flatten().take(3).collect::<Vec<_>>()).unwrap();
+        });
+        mail.wakes_leader(Some(leader.thread().clone()));
+        for _ in 0..2 {
+            commands.push(Command::Request(Transition::Arm)).unwrap();
         }
+        mail.tell(News::NotLoaded(State::Boot));
+        while let Some((ticket, _)) = mail.command() {
+            mail.reply(ticket, News::Taken);
+        }
+        let told = told.recv_timeout(Duration::from_secs(20)).expect("it is woken");
+        assert_eq!(told.iter().map(|(ticket, _)| *ticket).collect::<Vec<_>>(), [None, Some(0), Some(1)]);
+        leader.join().unwrap();
     }
 }

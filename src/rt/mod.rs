@@ -24,9 +24,12 @@ pub use conductor::Conductor;
 pub use desk::Desk;
 pub use line::{Line, line};
 pub use live::{Live, Phase, Times};
+pub(crate) use mail::Ticket;
 pub use mail::{
-    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, Planning, Sent, Task, TickReport, mailboxes,
+    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, Planning, Sent, Task, TickReport, mailboxes,
 };
+#[cfg(test)]
+pub(crate) use mail::{NewsOut, news};
 pub use places::Places;
 pub use planning::PlanLoop;
 pub use spin::{Spinning, Spun};
@@ -166,7 +169,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             conductor.alarm(alarm, engine, now);
         }
         for _ in 0..COMMANDS_PER_TICK {
-            let Some(command) = mail.command() else { break };
+            let Some((ticket, command)) = mail.command() else { break };
             let news = match command {
                 Command::Load(show) => load(show, conductor.machine().state(), engine, lanes, mail),
                 Command::Request(request) => told(conductor.request(request, engine, now)),
@@ -178,9 +181,13 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             };
             // What it led to goes before the answer, so that whoever hears the answer knows it.
             tell_state(conductor, mail);
-            mail.tell(news);
+            mail.reply(ticket, news);
         }
-        if self.leave.load(Ordering::Relaxed) || conductor.is_ended(desk.is_ended(), now) {
+        let asked = desk.is_ended();
+        if asked && conductor.hears_first_of_the_end() {
+            mail.wake_leader();
+        }
+        if self.leave.load(Ordering::Relaxed) || conductor.is_ended(asked, now) {
             conductor.leave(engine, now);
         }
         while let Some(answer) = mail.answer() {

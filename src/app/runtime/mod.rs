@@ -11,10 +11,10 @@ use std::io;
 use std::net::SocketAddrV4;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::thread;
+use std::thread::{self, Thread};
 use std::time::Duration;
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Producer, RingBuffer};
 
 use super::helpers::{EndFlags, Helpers};
 use super::run::Run;
@@ -26,7 +26,7 @@ use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, News, Order, Places, PlanLoop,
+    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, NewsIn, Order, Places, PlanLoop,
     Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
@@ -72,7 +72,7 @@ pub struct Runtime {
     plans: PlanLoop,
     line: Line,
     commands: Producer<Command>,
-    news: Consumer<News>,
+    news: NewsIn,
     orders: Producer<Order>,
 }
 
@@ -90,7 +90,7 @@ pub struct RuntimeHandle {
     /// What is asked of the hall.
     pub commands: Producer<Command>,
     /// What the hall does; every command is answered.
-    pub news: Consumer<News>,
+    pub news: NewsIn,
     /// What the ack thread is told.
     pub orders: Producer<Order>,
     /// What the system granted the tick thread.
@@ -185,14 +185,17 @@ impl Runtime {
     }
 
     /// Runs it on the calling thread, which becomes the tick thread, until it is told to leave. Before the first tick `lead`
-    /// gets the runtime.
+    /// gets the runtime, and says which thread is woken by news of it.
     ///
     /// # Errors
     /// [`RuntimeError::Thread`]; nothing was sent then.
     ///
     /// # Panics
     /// If one of its threads panicked.
-    pub fn run(self, lead: impl FnOnce(RuntimeHandle, Line)) -> Result<RuntimeEnd, RuntimeError> {
+    pub fn run(
+        self,
+        lead: impl FnOnce(RuntimeHandle, Line) -> Option<Thread>,
+    ) -> Result<RuntimeEnd, RuntimeError> {
         let granted = realtime::request();
         let (runtime, line, Parts { acks, plans, mut ticks }) = self.part(granted.clone());
         let (config, desk) = (Arc::clone(&runtime.config), Arc::clone(&runtime.desk));
@@ -208,7 +211,7 @@ impl Runtime {
             ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
             let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &desk, &leave);
-            lead(runtime, line);
+            ticks.mail.wakes_leader(lead(runtime, line));
             let ended = ticks.run();
             live.close();
             let run = helpers.end(&ticks, ended, granted, origin);

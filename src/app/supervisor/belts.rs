@@ -3,14 +3,13 @@
 
 use std::time::Duration;
 
-use super::Supervisor;
+use super::hall::HallContext;
 use crate::config::{Belts, Controller};
 use crate::control::{Code, Problem, Severity, Warning};
 use crate::observe::ControllerState;
 use crate::rt::Row;
 use crate::state::State;
-use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, MonoTime};
+use crate::time::MonoTime;
 
 /// What was told longer ago says nothing of now: while nothing moves the inputs are read every half a second or so.
 const FRESH: Duration = Duration::from_secs(3);
@@ -58,56 +57,55 @@ impl Unbuckled<'_> {
     }
 }
 
-impl Supervisor {
-    /// Those that take part and are not buckled.
-    fn unbuckled(&self, table: &[Row], now: MonoTime) -> Vec<Unbuckled<'_>> {
-        let config = &self.runtime.config;
-        let all: Vec<_> = (config.controllers.iter().enumerate())
-            .filter(|(lane, one)| one.belt_inputs != 0 && self.settings.is_on(*lane))
-            .map(|(lane, one)| (one, table.get(lane).and_then(|row| open(one, &row.state, now))))
-            .collect();
-        let closed = |one: &Controller, open: Option<u16>| open.is_some_and(|open| open != one.belt_inputs);
-        let one_is_closed =
-            |group: &str| all.iter().any(|(other, open)| other.group == group && closed(other, *open));
-        let holds = |one: &Controller| match config.show.belts {
-            Belts::Shown => false,
-            Belts::One => !one_is_closed(&one.group),
-            Belts::All => true,
-        };
-        let unbuckled = all.iter().filter(|(_, open)| *open != Some(0));
-        unbuckled
-            .map(|&(controller, open)| Unbuckled { controller, open, holds: holds(controller) })
-            .collect()
-    }
+/// Those that take part and are not buckled.
+fn unbuckled<'h>(hall: &'h HallContext, table: &[Row]) -> Vec<Unbuckled<'h>> {
+    let config = &hall.config;
+    let all: Vec<_> = (config.controllers.iter().enumerate())
+        .filter(|(lane, one)| one.belt_inputs != 0 && hall.settings.is_on(*lane))
+        .map(|(lane, one)| (one, table.get(lane).and_then(|row| open(one, &row.state, hall.now))))
+        .collect();
+    let closed = |one: &Controller, open: Option<u16>| open.is_some_and(|open| open != one.belt_inputs);
+    let one_is_closed =
+        |group: &str| all.iter().any(|(other, open)| other.group == group && closed(other, *open));
+    let holds = |one: &Controller| match config.show.belts {
+        Belts::Shown => false,
+        Belts::One => !one_is_closed(&one.group),
+        Belts::All => true,
+    };
+    let unbuckled = all.iter().filter(|(_, open)| *open != Some(0));
+    unbuckled.map(|&(controller, open)| Unbuckled { controller, open, holds: holds(controller) }).collect()
+}
 
-    /// True if nobody has to be buckled before the seats move.
-    pub(super) fn are_buckled(&self) -> Result<(), Problem> {
-        match self.awaited_belts(&self.runtime.live.table(), Monotonic.now()) {
-            None => Ok(()),
-            Some(who) => {
-                let remedy = "have them buckled, or take out the seats where nobody sits";
-                Err(Problem::new(Code::State, format!("cannot go: not buckled: {who}"), remedy))
-            }
+/// True if nobody has to be buckled before the seats move.
+///
+/// # Errors
+/// Who has to be.
+pub(super) fn check(hall: &HallContext) -> Result<(), Problem> {
+    match awaited(hall, &hall.live.table()) {
+        None => Ok(()),
+        Some(who) => {
+            let remedy = "have them buckled, or take out the seats where nobody sits";
+            Err(Problem::new(Code::State, format!("cannot go: not buckled: {who}"), remedy))
         }
     }
+}
 
-    /// Whose belts GO waits for; `None` if it need not.
-    fn awaited_belts(&self, table: &[Row], now: MonoTime) -> Option<String> {
-        let unbuckled = self.unbuckled(table, now);
-        let holding = unbuckled.iter().filter(|one| one.holds);
-        let who: Vec<_> = holding.map(|one| format!("{} ({})", one.controller.name, one.words())).collect();
-        (!who.is_empty()).then(|| who.join(", "))
-    }
+/// Whose belts GO waits for; `None` if it need not.
+fn awaited(hall: &HallContext, table: &[Row]) -> Option<String> {
+    let unbuckled = unbuckled(hall, table);
+    let holding = unbuckled.iter().filter(|one| one.holds);
+    let who: Vec<_> = holding.map(|one| format!("{} ({})", one.controller.name, one.words())).collect();
+    (!who.is_empty()).then(|| who.join(", "))
+}
 
-    /// What a person does next.
-    pub(super) fn next_action(&self, table: &[Row], now: MonoTime) -> String {
-        let waits = (self.mirror.state == State::Armed).then(|| self.awaited_belts(table, now)).flatten();
-        waits.map_or_else(|| self.next(), |who| format!("GO waits until these are buckled: {who}"))
-    }
+/// What a person does first, where GO waits for belts.
+pub(super) fn next_action(hall: &HallContext, table: &[Row]) -> Option<String> {
+    let who = (hall.mirror.state == State::Armed).then(|| awaited(hall, table)).flatten()?;
+    Some(format!("GO waits until these are buckled: {who}"))
+}
 
-    pub(super) fn of_belts(&self, table: &[Row]) -> Vec<Warning> {
-        self.unbuckled(table, Monotonic.now()).iter().map(Unbuckled::warning).collect()
-    }
+pub(super) fn warnings(hall: &HallContext, table: &[Row]) -> Vec<Warning> {
+    unbuckled(hall, table).iter().map(Unbuckled::warning).collect()
 }
 
 #[cfg(test)]
@@ -119,6 +117,8 @@ mod tests {
     use crate::control::Command;
     use crate::health::{HealthState, Why};
     use crate::observe::Heard;
+    use crate::sys::clock::Monotonic;
+    use crate::time::Clock as _;
     use crate::tracker::Counts;
 
     const BELTS: u16 = 0b11;
@@ -126,17 +126,17 @@ mod tests {
     /// An armed hall whose two seats have two belts each; `inputs` is what they told just now.
     fn armed(rule: Belts, inputs: [Option<u16>; 2]) -> Rig {
         let mut rig = Rig::armed();
-        let mut config = (*rig.supervisor.runtime.config).clone();
+        let mut config = (*rig.supervisor.hall.config).clone();
         config.show.belts = rule;
         config.controllers.iter_mut().for_each(|one| one.belt_inputs = BELTS);
-        rig.supervisor.runtime.config = Arc::new(config);
+        rig.supervisor.hall.config = Arc::new(config);
         tell(&rig, inputs);
         rig
     }
 
     fn tell(rig: &Rig, inputs: [Option<u16>; 2]) {
         let at = Monotonic.now();
-        rig.supervisor.runtime.live.on_table(|rows| {
+        rig.supervisor.hall.live.on_table(|rows| {
             *rows = inputs.map(|inputs| row(inputs, at)).into();
         });
     }
@@ -207,7 +207,7 @@ mod tests {
         let rig = armed(Belts::All, [Some(0), Some(0)]);
         let then = Monotonic.now();
         let state = row(Some(0), then).state;
-        let controller = &rig.supervisor.runtime.config.controllers[0];
+        let controller = &rig.supervisor.hall.config.controllers[0];
         assert_eq!(open(controller, &state, then + FRESH), Some(0));
         assert_eq!(open(controller, &state, then + FRESH + Duration::from_millis(1)), None);
     }

@@ -1,23 +1,28 @@
 //! What show-control gear may do in a hall that people lead: go on where it paused itself, take in what it took out itself,
 //! and set levels up to what a person has set. The address that its messages come from proves nothing.
 
-use super::Supervisor;
+use super::act::{Act, Feature, SupervisorEvent};
+use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
 use crate::control::{Code, Command, Desired, Levels, LevelsChange, Problem};
 use crate::state::State;
+use crate::time::MonoTime;
 
-/// What has to be known of the hall before an ask, to tell afterwards whose doing something is.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Before {
-    state: State,
+/// What has to be known of gear, to tell its doing from that of people.
+#[derive(Debug, Default)]
+pub(super) struct GearLimits {
+    /// Since when the hall is paused by gear, and by no person; where that is not the pause of now, it is an old one.
+    paused: Option<MonoTime>,
+    /// True if the hall was paused when what is done now was asked.
+    was_paused: bool,
 }
 
-impl Supervisor {
+impl GearLimits {
     /// True if it may be done for whom it is asked for.
     ///
     /// # Errors
     /// Where gear would undo what a person did.
-    pub(super) fn may_ask(&self, desired: &Desired) -> Result<(), Problem> {
+    pub(super) fn may_ask(&self, desired: &Desired, hall: &HallContext) -> Result<(), Problem> {
         let Desired { ask, who } = desired;
         if !who.surface.is_gear() || matches!(ask, Command::Stop | Command::Pause) {
             return Ok(());
@@ -26,52 +31,60 @@ impl Supervisor {
             let detail = format!("{} may not {}: {why}", who.surface, ask.word());
             Err(Problem::new(Code::Role, detail, remedy))
         };
-        if self.mirror.state == State::Paused && self.gear_paused != Some(self.mirror.since) {
+        let mirror = &hall.mirror;
+        if mirror.state == State::Paused && self.paused != Some(mirror.since) {
             return refused("it did not pause the hall", "a person goes on where a person paused");
         }
         match ask {
-            Command::Resume if !matches!(self.mirror.state, State::Paused | State::Playing(_)) => {
+            Command::Resume if !hall.is_on_cue() => {
                 refused("nothing is paused", "a person looks at the hall first")
             }
             Command::Enable(name)
-                if self.settings.out.get(self.group(name)).is_some_and(|out| !out.surface.is_gear()) =>
+                if hall.settings.out.get(group(hall, name)).is_some_and(|out| !out.surface.is_gear()) =>
             {
                 refused(&format!("it did not take {name} out"), "a person takes in whom a person took out")
             }
             _ => Ok(()),
         }
     }
+}
 
-    /// How things stand before an ask is done.
-    pub(super) const fn before(&self) -> Before {
-        Before { state: self.mirror.state }
-    }
-
-    /// Notes whose doing it is what was done.
-    pub(super) fn note_doer(&mut self, desired: &Desired, before: Before) {
-        let by_gear = desired.who.surface.is_gear();
-        match &desired.ask {
-            Command::Pause if !by_gear => self.gear_paused = None,
-            Command::Pause if before.state != State::Paused => self.gear_paused = Some(self.mirror.since),
+impl Feature for GearLimits {
+    fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, _out: &mut Vec<Act>) {
+        match event {
+            SupervisorEvent::Asked(_) => self.was_paused = hall.mirror.state == State::Paused,
+            SupervisorEvent::Done(Desired { ask: Command::Pause, who }) => {
+                if !who.surface.is_gear() {
+                    self.paused = None;
+                } else if !self.was_paused {
+                    self.paused = Some(hall.mirror.since);
+                }
+            }
             _ => {}
         }
     }
+}
 
-    /// Sets levels for gear: no higher than a person has set, which it is told where it asked for more.
-    pub(super) fn levels_of_gear(&mut self, change: &LevelsChange) -> Result<(), Problem> {
-        let (change, over) = self.settings.within(change);
-        self.set(|settings| settings.change_below(&change))?;
-        if over.is_empty() {
-            return Ok(());
-        }
+/// Sets levels for gear: no higher than a person has set, which it is told where it asked for more.
+///
+/// # Errors
+/// Where it is no change.
+pub(super) fn levels(change: &LevelsChange, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    let (change, over) = hall.settings.within(change);
+    let mut settings = hall.settings.clone();
+    settings.change_below(&change)?;
+    let mut acts = vec![Act::Stage(ShowChange::Settings(Box::new(settings)))];
+    if !over.is_empty() {
         let detail = format!("a person has set less than was asked for: {}", over.join(", "));
-        Err(Problem::new(Code::Role, detail, "a person raises it, on the console or with `kinocue level`"))
+        let remedy = "a person raises it, on the console or with `kinocue level`";
+        acts.push(Act::Fail(Problem::new(Code::Role, detail, remedy)));
     }
+    Ok(acts)
+}
 
-    fn group<'n>(&'n self, name: &'n str) -> &'n str {
-        let controllers = &self.runtime.config.controllers;
-        controllers.iter().find(|one| one.name == name).map_or(name, |one| &one.group)
-    }
+fn group<'n>(hall: &'n HallContext, name: &'n str) -> &'n str {
+    let controllers = &hall.config.controllers;
+    controllers.iter().find(|one| one.name == name).map_or(name, |one| &one.group)
 }
 
 impl HallSettings {
@@ -159,7 +172,7 @@ mod tests {
         rig.ask_as(Surface::Osc, disable()).unwrap();
         rig.ask(disable()).unwrap();
         role(rig.ask_as(Surface::Osc, enable()));
-        assert!(rig.supervisor.settings.out.contains_key("A1"));
+        assert!(rig.supervisor.hall.settings.out.contains_key("A1"));
     }
 
     #[test]
@@ -173,7 +186,7 @@ mod tests {
             if asked > is {
                 assert!(role(answer).ends_with("motion is 60 %"));
             }
-            assert_eq!(rig.supervisor.settings.levels.motion, is, "{asked} was asked");
+            assert_eq!(rig.supervisor.hall.settings.levels.motion, is, "{asked} was asked");
         }
         let rows = |a: f64, b: f64| LevelsChange {
             rows: [("A".to_owned(), a), ("B".to_owned(), b)].into(),
@@ -181,7 +194,7 @@ mod tests {
         };
         rig.ask(Command::Levels(rows(0.5, 1.0))).unwrap();
         role(rig.ask_as(Surface::Text, Command::Levels(rows(1.0, 0.1))));
-        let levels = &rig.supervisor.settings.levels.rows;
+        let levels = &rig.supervisor.hall.settings.levels.rows;
         assert_eq!(
             (levels["A"], levels["B"]),
             (0.5, 0.1),

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::Supervisor;
-use super::job::JobResult;
-use crate::app::runtime::{DeviceJob, Finding, run_on_devices};
-use crate::rt::{Command as TickCommand, Order};
-use crate::state::{Event, Trouble};
-use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, MonoTime};
+use super::act::{Act, Feature, SupervisorEvent};
+use super::hall::HallContext;
+use super::job::Job;
+use crate::app::runtime::Finding;
+use crate::rt::{Command as TickCommand, Order, Row};
+use crate::state::{Event, State, Trouble};
+use crate::time::MonoTime;
 
 /// How long controllers that are home have to be seen.
 const SEEN_WITHIN: Duration = Duration::from_secs(5);
@@ -19,85 +19,188 @@ const SEEN_WITHIN: Duration = Duration::from_secs(5);
 const STALE: Duration = Duration::from_millis(300);
 
 /// How far a homing is, which is over as soon as the hall leaves that state.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) enum Homing {
+    /// There is none.
+    #[default]
+    Idle,
     /// The controllers are told to, and watched; called off, none of them is told any more.
     UnderWay(Arc<AtomicBool>),
     /// They are home since then, and have to be seen.
     Settling(MonoTime),
 }
 
-impl Supervisor {
-    /// Sends somebody to home all that take part. Where that cannot be, the state machine ends the homing when its time is
-    /// over.
-    pub(super) fn begin_homing(&mut self) {
-        if self.is_free().is_err() {
-            return;
-        }
-        let lanes: Vec<usize> =
-            (0..self.runtime.config.controllers.len()).filter(|lane| self.settings.is_on(*lane)).collect();
-        let called_off = Arc::default();
-        self.homing = Some(Homing::UnderWay(Arc::clone(&called_off)));
-        let (config, line) = (self.runtime.config.clone(), self.line.clone());
-        self.send("homing", None, move || {
-            let job = DeviceJob::Home { lanes, called_off };
-            JobResult::Homed(run_on_devices(&mut line.hold(), &config.controllers, job, &mut |_| {}))
-        });
-    }
-
+impl Homing {
     /// The hall homes no longer: no further seat begins to. What has begun is the controllers' own.
-    pub(super) fn call_off_homing(&mut self) {
-        if let Some(Homing::UnderWay(called_off)) = self.homing.take() {
+    fn call_off(&mut self) {
+        if let Self::UnderWay(called_off) = std::mem::take(self) {
             called_off.store(true, Ordering::Release);
         }
     }
 
+    /// Sends somebody to home all that take part. Where that cannot be, the state machine ends the homing when its time is
+    /// over.
+    fn begin(&mut self, hall: &HallContext) -> Option<Act> {
+        hall.is_free().ok()?;
+        let called_off = Arc::default();
+        *self = Self::UnderWay(Arc::clone(&called_off));
+        Some(Act::Start(Job::Home(hall.lanes_on().collect(), called_off)))
+    }
+
     /// Takes what became of the seats: those that are home are looked at anew.
-    pub(super) fn on_homed(&mut self, finding: Finding) {
-        let Finding::Homed(results) = finding else { return };
-        let mut failed = None;
+    pub(super) fn take(&mut self, finding: Finding, hall: &HallContext) -> Vec<Act> {
+        let Finding::Homed(results) = finding else { return Vec::new() };
+        let (mut acts, mut failed) = (Vec::new(), None);
+        let is_over = matches!(self, Self::Idle);
         for (controller, result) in results {
             match result {
                 Ok(()) => {
                     let index = u16::try_from(controller).expect("fewer controllers than ports");
-                    // Where it finds no room the controller is not looked at, and stays out.
-                    let _ = self.runtime.orders.push(Order::Homed(index));
+                    acts.push(Act::Order(Order::Homed(index)));
                 }
                 // Of what was called off nobody waits for an end.
-                Err(_) if self.homing.is_none() => {}
+                Err(_) if is_over => {}
                 Err(error) => {
-                    self.note(format!("{}: {error}", self.runtime.config.controllers[controller].name));
+                    acts.push(Act::Note(format!("{}: {error}", hall.config.controllers[controller].name)));
                     failed.get_or_insert(controller);
                 }
             }
         }
-        if self.homing.is_none() {
-            return;
-        }
         match failed {
-            Some(controller) => {
-                let _ = self.command(TickCommand::Event(Event::Trouble(Trouble::Homing(controller))));
-            }
-            None => self.homing = Some(Homing::Settling(Monotonic.now())),
+            _ if is_over => {}
+            Some(controller) => acts.push(tell(Event::Trouble(Trouble::Homing(controller)))),
+            None => *self = Self::Settling(hall.now),
         }
+        acts
     }
 
     /// Says that the seats are home once all of them were seen.
-    pub(super) fn settle_homing(&mut self) {
-        let Some(Homing::Settling(since)) = self.homing else { return };
-        let now = Monotonic.now();
-        let table = self.runtime.live.table();
+    fn settle(&mut self, table: &[Row], hall: &HallContext) -> Option<Act> {
+        let Self::Settling(since) = *self else { return None };
         let open = table.iter().enumerate().find(|(lane, row)| {
-            self.settings.is_on(*lane) && (row.at < since + STALE || !row.standing.may_move())
+            hall.settings.is_on(*lane) && (row.at < since + STALE || !row.standing.may_move())
         });
         let event = match open {
             None if !table.is_empty() => Event::Homed,
-            Some((controller, _)) if now.since(since) > SEEN_WITHIN => {
+            Some((controller, _)) if hall.now.since(since) > SEEN_WITHIN => {
                 Event::Trouble(Trouble::Homing(controller))
             }
-            _ => return,
+            _ => return None,
         };
-        self.homing = None;
-        let _ = self.command(TickCommand::Event(event));
+        *self = Self::Idle;
+        Some(tell(event))
+    }
+}
+
+impl Feature for Homing {
+    fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, out: &mut Vec<Act>) {
+        match event {
+            SupervisorEvent::Entered(to) => {
+                self.call_off();
+                if *to == State::Homing {
+                    out.extend(self.begin(hall));
+                }
+            }
+            SupervisorEvent::Leaving => self.call_off(),
+            SupervisorEvent::Round(table) => out.extend(self.settle(table, hall)),
+            _ => {}
+        }
+    }
+}
+
+const fn tell(event: Event) -> Act {
+    Act::Tick(TickCommand::Event(event))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, row, told};
+    use crate::device::home::HomeError;
+
+    /// One under way, and the flag that calls it off.
+    fn begun(hall: &mut HallContext) -> (Homing, Arc<AtomicBool>) {
+        hall.mirror.state = State::Homing;
+        let mut homing = Homing::default();
+        let mut acts = told(&mut homing, &SupervisorEvent::Entered(State::Homing), hall);
+        let Some(Act::Start(Job::Home(lanes, called_off))) = acts.pop() else { panic!("it begins") };
+        assert_eq!(lanes, hall.lanes_on().collect::<Vec<_>>());
+        (homing, called_off)
+    }
+
+    fn event(acts: &[Act]) -> Option<Event> {
+        match acts {
+            [] => None,
+            [Act::Tick(TickCommand::Event(event))] => Some(*event),
+            _ => panic!("{acts:?}"),
+        }
+    }
+
+    #[test]
+    fn seats_that_are_home_have_to_be_seen_after_that_before_the_hall_is() {
+        let mut hall = hall(State::Parked, "one");
+        let (mut homing, _) = begun(&mut hall);
+        let since = hall.now;
+        let acts = homing.take(Finding::Homed(vec![(0, Ok(())), (1, Ok(()))]), &hall);
+        assert!(matches!(&acts[..], [Act::Order(Order::Homed(0)), Act::Order(Order::Homed(1))]), "{acts:?}");
+        for (seen, home) in [([STALE, Duration::ZERO], None), ([STALE, STALE], Some(Event::Homed))] {
+            let table = seen.map(|later| row(since + later));
+            assert_eq!(event(&told(&mut homing, &SupervisorEvent::Round(&table), &hall)), home);
+        }
+        assert!(matches!(homing, Homing::Idle), "it is told once");
+    }
+
+    #[test]
+    fn a_seat_that_is_home_and_not_seen_in_time_is_trouble_and_one_that_is_out_is_not_waited_for() {
+        let mut hall = hall(State::Parked, "one");
+        hall.settings.only = Some(["B".to_owned()].into());
+        let (mut homing, _) = begun(&mut hall);
+        let since = hall.now;
+        homing.take(Finding::Homed(vec![(1, Ok(()))]), &hall);
+        let table = [row(since), row(since)];
+        hall.now = since + SEEN_WITHIN;
+        assert_eq!(event(&told(&mut homing, &SupervisorEvent::Round(&table), &hall)), None);
+        hall.now = hall.now + Duration::from_millis(1);
+        let trouble = event(&told(&mut homing, &SupervisorEvent::Round(&table), &hall));
+        assert_eq!(trouble, Some(Event::Trouble(Trouble::Homing(1))));
+    }
+
+    #[test]
+    fn a_hall_that_leaves_the_state_calls_homing_off_and_hears_of_no_end_of_it() {
+        for leaving in [SupervisorEvent::Entered(State::Stopped), SupervisorEvent::Leaving] {
+            let mut hall = hall(State::Parked, "one");
+            let (mut homing, called_off) = begun(&mut hall);
+            told(&mut homing, &leaving, &hall);
+            assert!(called_off.load(Ordering::Acquire));
+            let failed = Finding::Homed(vec![(0, Err(HomeError::Unsearched(1)))]);
+            assert!(homing.take(failed, &hall).is_empty());
+            assert!(told(&mut homing, &SupervisorEvent::Round(&[row(hall.now)]), &hall).is_empty());
+        }
+    }
+
+    #[test]
+    fn a_seat_that_does_not_home_is_named_and_is_trouble() {
+        let mut hall = hall(State::Parked, "one");
+        let (mut homing, _) = begun(&mut hall);
+        let acts = homing.take(Finding::Homed(vec![(1, Err(HomeError::Unsearched(1)))]), &hall);
+        let [Act::Note(note), trouble] = &acts[..] else { panic!("{acts:?}") };
+        assert!(note.starts_with("B1: "), "{note}");
+        assert!(
+            matches!(trouble, Act::Tick(TickCommand::Event(Event::Trouble(Trouble::Homing(1))))),
+            "{trouble:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_homes_in_a_hall_that_closes_or_whose_line_is_in_use() {
+        for (close, job) in [(true, None), (false, Some("preflight"))] {
+            let mut hall = hall(State::Homing, "one");
+            if close {
+                hall.close();
+            }
+            hall.job = job;
+            let mut homing = Homing::default();
+            assert!(told(&mut homing, &SupervisorEvent::Entered(State::Homing), &hall).is_empty());
+        }
     }
 }

@@ -1,16 +1,48 @@
-//! Runs slow work on a thread of its own, one job at a time; the command is answered when the job is done.
+//! Slow work, on a thread of its own, one job at a time.
 
-use std::sync::atomic::Ordering;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
 
-use super::Supervisor;
-use super::lasting::Again;
 use super::list::List;
-use super::ready::Preflighted;
+use super::preflighted::Preflighted;
 use super::seat_test::SeatTest;
-use super::show::ProvedShow;
-use crate::app::runtime::Finding;
+use super::shared_link::SharedLink;
+use super::show::{ProvedShow, no_cue, read};
+use crate::app::runtime::{DeviceJob, Finding, run_on_devices};
+use crate::config::Config;
 use crate::control::{Asked, Code, Problem};
+use crate::library::{CueId, Library};
+use crate::playlist::{PlaylistId, Shelf};
+use crate::settings::{LoadedShow, SettingsFile};
+
+/// What is to be done.
+#[derive(Debug)]
+pub(super) enum Job {
+    /// Read a cue of the library and prove it.
+    Load(CueId),
+    /// Check a playlist, and prove the cue of its first entry.
+    List(PlaylistId),
+    /// Prove the cue of an entry.
+    Entry(usize, CueId),
+    /// Load what was loaded before.
+    Again(LoadedShow),
+    /// Make a test of the seats of these rows; none for all.
+    Test(Option<BTreeSet<String>>),
+    /// Ask the controllers for all that preflight judges.
+    Preflight,
+    /// Home these controllers; called off, none of them is told any more.
+    Home(Vec<usize>, Arc<AtomicBool>),
+    /// Wait until a test lets it end.
+    #[cfg(test)]
+    Held(Receiver<()>),
+}
+
+/// What was loaded before: the playlist, where there was one, and the cue; each as it is now, or why it is not.
+pub(super) type Again = (Option<Result<Box<List>, Problem>>, Result<Box<ProvedShow>, Problem>);
 
 /// What came of a job.
 #[derive(Debug)]
@@ -23,94 +55,122 @@ pub(super) enum JobResult {
     Entry(usize, Result<Box<ProvedShow>, Problem>),
     /// What was loaded before was read and proved again.
     Again(Again),
-    /// A test of the seats is made, or why not.
-    Swept(Result<(Box<SeatTest>, Box<ProvedShow>), Problem>),
+    /// A test of the seats of these rows is made, or why not.
+    Tested(Result<(Box<SeatTest>, Box<ProvedShow>), Problem>, Option<BTreeSet<String>>),
     /// The controllers were asked for all that preflight judges.
     Preflighted(Box<Preflighted>),
     /// Controllers were homed.
     Homed(Finding),
 }
 
-/// A job under way.
-#[derive(Debug)]
-pub(super) struct Job {
-    word: &'static str,
-    done: Receiver<JobResult>,
-    asked: Option<Asked>,
+/// What jobs work with.
+#[derive(Debug, Clone)]
+pub(super) struct Tools {
+    pub(super) config: Arc<Config>,
+    pub(super) library: Library,
+    pub(super) line: SharedLink,
+    /// Where what is set is kept.
+    pub(super) settings: PathBuf,
 }
 
-impl Supervisor {
-    /// True if something long may begin; else why not. In a hall that closes nothing may: it would hold the port that the next
-    /// one opens.
-    pub(super) fn is_free(&self) -> Result<(), Problem> {
-        if self.runtime.leave.load(Ordering::Acquire) {
-            return Err(Problem::new(Code::Busy, "the hall is being closed", "ask again in a second"));
-        }
-        match &self.job {
-            None => Ok(()),
-            Some(job) => Err(Problem::new(
-                Code::Busy,
-                format!("{} is under way", job.word),
-                "ask again when it is done",
-            )),
+impl Job {
+    /// The word for it.
+    pub(super) const fn word(&self) -> &'static str {
+        match self {
+            Self::Load(_) | Self::Entry(..) | Self::Again(_) => "loading",
+            Self::List(_) => "playlist",
+            Self::Test(_) => "test",
+            Self::Preflight => "preflight",
+            Self::Home(..) => "homing",
+            #[cfg(test)]
+            Self::Held(_) => "preflight",
         }
     }
 
-    /// Sends somebody to do it; `asked` is answered once it is done.
-    pub(super) fn send(
-        &mut self,
-        word: &'static str,
-        asked: Option<Asked>,
-        work: impl FnOnce() -> JobResult + Send + 'static,
-    ) {
+    /// Does it.
+    pub(super) fn run(self, tools: &Tools) -> JobResult {
+        let Tools { config, library, line, settings } = tools;
+        let on_devices = |job| run_on_devices(&mut line.hold(), &config.controllers, job, &mut |_| {});
+        match self {
+            Self::Load(id) => JobResult::Loaded(read(library, config, &id)),
+            Self::List(id) => {
+                let list = List::read(&Shelf::new(&config.playlists()), library, config, &id);
+                JobResult::Listed(list.and_then(|list| {
+                    let cued = read(library, config, &list.entry().cue)?;
+                    Ok((Box::new(list), cued))
+                }))
+            }
+            Self::Entry(entry, id) => JobResult::Entry(entry, read(library, config, &id)),
+            Self::Again(loaded) => {
+                let _loading = SettingsFile::loading(settings);
+                let id = loaded.cue.parse().map_err(|error| no_cue(&loaded.cue, &error));
+                let cued = id.and_then(|id| read(library, config, &id));
+                let shelf = Shelf::new(&config.playlists());
+                let again = |place| List::again(&shelf, library, config, &place, &loaded.cue).map(Box::new);
+                JobResult::Again((loaded.playlist.clone().map(again), cued))
+            }
+            Self::Test(only) => JobResult::Tested(SeatTest::make(config), only),
+            Self::Preflight => {
+                let surveys = match on_devices(DeviceJob::Survey) {
+                    Finding::Surveyed(surveys) => surveys,
+                    Finding::Homed(_) => Vec::new(),
+                };
+                JobResult::Preflighted(Box::new(Preflighted::of(config, &surveys)))
+            }
+            Self::Home(lanes, called_off) => {
+                JobResult::Homed(on_devices(DeviceJob::Home { lanes, called_off }))
+            }
+            #[cfg(test)]
+            Self::Held(held) => {
+                let _ = held.recv();
+                JobResult::Homed(Finding::Surveyed(Vec::new()))
+            }
+        }
+    }
+}
+
+/// The thread for jobs.
+#[derive(Debug)]
+pub(super) struct Jobs {
+    tools: Tools,
+    running: Option<(Receiver<JobResult>, Option<Asked>)>,
+}
+
+impl Jobs {
+    pub(super) const fn new(tools: Tools) -> Self {
+        Self { tools, running: None }
+    }
+
+    /// Begins it, for what `asked` gives then; the thread that calls this is woken once it is done.
+    ///
+    /// # Errors
+    /// Where no thread can be had for it.
+    pub(super) fn start(&mut self, job: Job, asked: impl FnOnce() -> Option<Asked>) -> Result<(), Problem> {
         let (tell, done) = channel();
-        let thread = std::thread::Builder::new().name(word.to_owned());
+        let supervisor = thread::current();
+        let tools = self.tools.clone();
+        let thread = thread::Builder::new().name(job.word().to_owned());
         let spawned = thread.spawn(move || {
             let _ = crate::sys::realtime::normal_priority();
-            drop(tell.send(work())); // a supervisor that is gone wants no answer
+            drop(tell.send(job.run(&tools))); // a supervisor that is gone wants no answer
+            supervisor.unpark();
         });
-        match (spawned, asked) {
-            (Ok(_), asked) => self.job = Some(Job { word, done, asked }),
-            (Err(cause), Some(asked)) => self.answer(asked, Err(no_thread(&cause))),
-            (Err(cause), None) => self.note(no_thread(&cause).to_string()),
-        }
+        spawned.map_err(|cause| no_thread(&cause))?;
+        self.running = Some((done, asked()));
+        Ok(())
     }
 
-    /// Takes what a job has come to.
-    pub(super) fn end_errand(&mut self) {
-        let Some(job) = &self.job else { return };
-        let done = match job.done.try_recv() {
-            Ok(done) => Some(done),
-            Err(TryRecvError::Empty) => return,
-            Err(TryRecvError::Disconnected) => None,
+    /// What the job has come to, and for whom; `None` while it runs.
+    pub(super) fn take_done(&mut self) -> Option<(Result<JobResult, Problem>, Option<Asked>)> {
+        let result = match self.running.as_ref()?.0.try_recv() {
+            Ok(result) => Ok(result),
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => {
+                Err(Problem::new(Code::Check, "it ended before it was done", "look at the journal"))
+            }
         };
-        let asked = self.job.take().and_then(|job| job.asked);
-        let result = match done {
-            Some(JobResult::Loaded(cued)) => cued.and_then(|cued| self.take_up(*cued)),
-            Some(JobResult::Listed(listed)) => {
-                listed.and_then(|(list, cued)| self.take_up_list(*list, *cued))
-            }
-            Some(JobResult::Entry(entry, cued)) => cued.and_then(|cued| self.take_up_entry(entry, *cued)),
-            Some(JobResult::Again(again)) => self.take_up_again(again),
-            Some(JobResult::Swept(swept)) => {
-                swept.and_then(|(seat_test, cued)| self.take_up_seat_test(*seat_test, *cued))
-            }
-            Some(JobResult::Preflighted(preflighted)) => {
-                self.preflighted = Some(*preflighted);
-                Ok(())
-            }
-            Some(JobResult::Homed(finding)) => {
-                self.on_homed(finding);
-                Ok(())
-            }
-            None => Err(Problem::new(Code::Check, "it ended before it was done", "look at the journal")),
-        };
-        self.tell_readiness();
-        match (asked, result) {
-            (Some(asked), result) => self.answer(asked, result),
-            (None, Err(problem)) => self.note(problem.to_string()),
-            (None, Ok(())) => {}
-        }
+        let (_, asked) = self.running.take()?;
+        Some((result, asked))
     }
 }
 

@@ -1,19 +1,30 @@
 //! The supervisor of a hall: executes the commands of surfaces, prepares shows for the tick thread, runs slow work as jobs, and
-//! publishes the status ten times a second. A thread of the control plane; slow work is done elsewhere
-//! (`job`), so that a pause or a park never waits behind a preflight.
+//! publishes the status ten times a second. A thread of the control plane that sleeps until its next time is there or somebody
+//! has something for it; slow work is done elsewhere (`job`), so that a pause or a park never waits behind a preflight.
+//!
+//! What it knows is owned by features, which are told what happens and say what is to be done (`act`); the loop here does it.
 
+mod act;
 mod belts;
 mod commands;
+mod features;
+mod figures;
 mod gear;
+mod hall;
 mod hall_settings;
 mod homing;
 mod job;
 mod lasting;
 mod list;
-mod ready;
+mod perform;
+mod playlist;
+mod preflighted;
+mod procedures;
+mod readiness;
 mod record;
 mod reload;
 mod seat_test;
+mod seat_testing;
 mod service_log;
 mod shared_link;
 mod show;
@@ -26,122 +37,107 @@ mod testing;
 mod tests;
 mod warnings;
 
-pub use reload::{Carryover, Signals};
-pub use service_log::ServiceLog;
+pub(crate) use reload::Carryover;
+pub use reload::Signals;
+pub(crate) use service_log::ServiceLog;
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
+use std::thread;
 use std::time::Duration;
+
+use jiff::Zoned;
 
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
 use crate::control::model::Ending;
-use crate::control::{Asked, Inbox, Problem, Status, StatusSource};
+use crate::control::{Asked, Command, Desired, Inbox, Problem, Role, Status, StatusSource, Surface, Who};
 use crate::journal::Journal;
 use crate::library::Library;
-use crate::rt::{Command as TickCommand, News};
-use crate::settings::SettingsFile;
-use crate::state::{Cause, State};
+use crate::rt::{News, Ticket};
+use crate::settings::{Settings, SettingsFile};
+use crate::state::State;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
-use hall_settings::HallSettings;
-use job::Job;
-use ready::Preflighted;
-use record::Records;
+use act::{Act, SupervisorEvent};
+use features::Features;
+use hall::HallContext;
+use job::{Jobs, Tools};
+use list::List;
+use procedures::Procedures;
+use record::ShowRecords;
 use shared_link::SharedLink;
-use show::ProvedShow;
-use state_mirror::StateMirror;
-use status::Rates;
-use strangers::Strangers;
+use status::StatusParts;
 
-/// How long an ask is waited for before the supervisor looks after everything else.
-const LOOK: Duration = Duration::from_millis(10);
 /// From one status to the next.
 const TELL: Duration = Duration::from_millis(100);
 /// Notes that are kept.
 const NOTES: usize = 5;
-/// How long the tick thread has to answer a command; a tick takes a second at most.
-const ANSWER: Duration = Duration::from_secs(2);
-/// How often its answer is looked for.
-const LOOK_FOR_ANSWER: Duration = Duration::from_micros(200);
 
 /// What a supervisor has whatever the configuration is.
 #[derive(Debug)]
-pub struct SupervisorPorts {
+pub(crate) struct SupervisorPorts {
     /// What surfaces ask.
-    pub inbox: Inbox,
+    pub(crate) inbox: Inbox,
     /// Where the status goes.
-    pub source: StatusSource,
+    pub(crate) source: StatusSource,
     /// The file of the configuration.
-    pub config: PathBuf,
+    pub(crate) config: PathBuf,
     /// When the program started.
-    pub began: MonoTime,
+    pub(crate) began: MonoTime,
     /// What the system asks of the program.
-    pub signals: Signals,
+    pub(crate) signals: Signals,
     /// Whom to tell what happens.
-    pub service_log: ServiceLog,
+    pub(crate) service_log: ServiceLog,
     /// What was set in the hall before, or before the program started.
-    pub carryover: Carryover,
+    pub(crate) carryover: Carryover,
     /// Where what is set is kept.
-    pub settings_file: SettingsFile,
+    pub(crate) settings_file: SettingsFile,
 }
 
 /// What is left once the hall has closed.
 #[derive(Debug)]
-pub struct SupervisorEnd {
+pub(crate) struct SupervisorEnd {
     /// For the next supervisor.
-    pub ports: SupervisorPorts,
+    pub(crate) ports: SupervisorPorts,
     /// What the hall came to.
-    pub closed: Box<RuntimeEnd>,
+    pub(crate) closed: Box<RuntimeEnd>,
     /// The configuration to open the next hall with; `None` if the program ends.
-    pub reload: Option<Arc<Config>>,
+    pub(crate) reload: Option<Arc<Config>>,
     /// How its last show ended; stopped where there was none.
-    pub ended: Ending,
+    pub(crate) ended: Ending,
     /// The journal, still open.
-    pub journal: Journal,
+    pub(crate) journal: Journal,
 }
 
 /// The supervisor of one hall.
 #[derive(Debug)]
-pub struct Supervisor {
+pub(crate) struct Supervisor {
     ports: SupervisorPorts,
-    began: MonoTime,
+    /// When the hall opened.
+    opened: MonoTime,
+    /// The ways to the tick thread and the ack thread, and back.
     runtime: RuntimeHandle,
-    mirror: StateMirror,
-    settings: HallSettings,
-    cued: Option<ProvedShow>,
-    preflighted: Option<Preflighted>,
-    job: Option<Job>,
-    homing: Option<homing::Homing>,
-    /// What the tick thread was told of readiness.
-    readiness: Option<crate::state::Readiness>,
-    rates: Rates,
-    strangers: Strangers,
+    /// The ticket of the next command.
+    given: Ticket,
+    hall: HallContext,
+    features: Features,
+    procedures: Procedures,
+    jobs: Jobs,
+    /// When the status was told last.
     told: MonoTime,
-    line: SharedLink,
-    library: Library,
     /// What went wrong lately and no state says, newest last.
     notes: VecDeque<String>,
-    list: Option<list::List>,
-    onward: list::Onward,
-    seat_test: Option<seat_test::SeatTest>,
-    record: Records,
     reload: Option<Arc<Config>>,
-    /// Since when the hall is paused by gear, and by no person; where that is not the pause of now, it is an old one.
-    gear_paused: Option<MonoTime>,
-    lasting: lasting::Lasting,
-    /// A show has ended, and why.
-    show_over: bool,
-    ended: Cause,
 }
 
 impl Supervisor {
-    /// The supervisor of a hall that has just opened.
+    /// The supervisor of a hall that has just opened. Ahead of the first tick: what was latched stays so.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         mut ports: SupervisorPorts,
         runtime: RuntimeHandle,
         line: crate::rt::Line,
@@ -152,176 +148,217 @@ impl Supervisor {
         let carryover = std::mem::take(&mut ports.carryover);
         let settings = carryover.settings(&runtime.config);
         ports.source.lead(Arc::clone(&runtime.desk));
+        examine(library.clone());
+        let hall = HallContext::new(&runtime, settings, now);
+        let tools = Tools {
+            config: Arc::clone(&hall.config),
+            library,
+            line: SharedLink::of(line),
+            settings: ports.settings_file.folder().to_owned(),
+        };
         let mut supervisor = Self {
             ports,
-            began: now,
-            mirror: StateMirror::new(now),
-            settings,
+            opened: now,
             runtime,
-            cued: None,
-            preflighted: None,
-            job: None,
-            homing: None,
-            readiness: None,
-            rates: Rates::default(),
-            strangers: Strangers::default(),
+            given: 0,
+            hall,
+            features: Features::new(ShowRecords::new(journal), carryover.lasting),
+            procedures: Procedures::default(),
+            jobs: Jobs::new(tools),
             told: now,
-            line: SharedLink::of(line),
-            library,
             notes: carryover.notes,
-            list: None,
-            onward: list::Onward::default(),
-            seat_test: None,
-            record: Records::new(journal),
             reload: None,
-            gear_paused: None,
-            lasting: carryover.lasting,
-            show_over: false,
-            ended: Cause::Started,
         };
         carryover.untold.into_iter().for_each(|note| supervisor.note(note));
-        supervisor.examine_library();
+        supervisor.hall.set_desk();
+        if carryover.latched {
+            supervisor.hall.desk.stop();
+        }
         let show = carryover.settings.and_then(|settings| settings.show);
-        supervisor.begin(show, carryover.latched);
+        let acts = show.map(|show| supervisor.features.lasting.load_again(show));
+        supervisor.procedures.add(acts.into_iter().collect());
         supervisor
     }
 
     /// Keeps the hall until `closed` says what it came to.
     #[must_use]
-    pub fn run(mut self, closed: &Receiver<Box<RuntimeEnd>>) -> SupervisorEnd {
+    pub(crate) fn run(mut self, closed: &Receiver<Box<RuntimeEnd>>) -> SupervisorEnd {
+        self.ports.source.wakes(thread::current());
         loop {
-            if let Some(asked) = self.ports.inbox.next(LOOK) {
-                self.on_asked(asked);
-            }
-            self.look_after();
+            let rests = self.turn();
             if let Ok(closed) = closed.try_recv() {
-                self.end_record(self.ended);
-                self.close_record();
-                self.keep_settings();
-                self.ports.carryover = self.remember();
-                let journal = self.record.into_journal();
-                let ended = record::ending(self.ended);
-                return SupervisorEnd { ports: self.ports, closed, reload: self.reload, ended, journal };
+                return self.end(closed);
+            }
+            if rests {
+                thread::park_timeout(self.wakes_at().since(Monotonic.now()));
             }
         }
     }
 
-    /// Everything that nobody has to ask for.
-    fn look_after(&mut self) {
+    /// Does all that there is to do now, but for no more than one ask; says whether there is nothing more before somebody has
+    /// something or a time is there.
+    fn turn(&mut self) -> bool {
+        self.hall.now = Monotonic.now();
         self.take_news();
         self.heed_signals();
-        self.end_show();
-        self.settle_record();
-        self.follow_sweep();
-        self.end_errand();
-        self.settle_again();
-        self.heed_schedule();
-        self.settle_homing();
-        self.tell_readiness();
-        let now = Monotonic.now();
-        if now.since(self.told) >= TELL {
-            self.told = now;
-            let table = self.runtime.live.table();
-            self.rates.note(&table, now);
-            self.strangers.note(&table, now);
-            self.settle_folds();
-            self.say_journal();
-            self.keep_settings();
-            self.publish();
+        self.go_on();
+        // One ask after the other: what is done for one is done before the next is taken.
+        let is_free = self.procedures.is_empty();
+        let asked = if is_free { self.ports.inbox.next(Duration::ZERO) } else { None };
+        let nobody_asks = is_free && asked.is_none();
+        if let Some(asked) = asked {
+            self.on_asked(asked);
         }
+        if let Some((result, asked)) = self.jobs.take_done() {
+            self.hall.job = None;
+            self.procedures.add_for(asked, result.map(|result| vec![Act::Take(result)]));
+        }
+        self.on_time();
+        self.go_on();
+        nobody_asks || self.procedures.waits_until().is_some()
     }
 
-    /// Hears what the tick thread has to say, and does what a new state needs.
+    /// Hears what the tick thread has to say.
     fn take_news(&mut self) {
-        while let Ok(news) = self.runtime.news.pop() {
-            self.hear(news);
+        while let Some((ticket, news)) = self.runtime.news.take() {
+            match (ticket, state_mirror::answer(news)) {
+                (Some(ticket), Some(answer)) => {
+                    if let Some((undo, problem)) = self.procedures.answered(ticket, answer) {
+                        self.undo(undo, problem);
+                    }
+                }
+                _ => self.hear(news),
+            }
         }
     }
 
     fn hear(&mut self, news: News) {
         if let News::Unplanned(what) = news {
-            self.note(self.name_unplanned(what));
+            self.note(self.hall.name_unplanned(what));
         }
-        if let Some((from, to)) = self.mirror.hear(news) {
-            self.on_state(from, to);
+        let Some((from, to)) = self.hall.mirror.hear(news) else { return };
+        self.hall.note_place(from, to);
+        if matches!(to, State::Parking | State::Stopping) {
+            self.hall.ended = self.hall.mirror.cause;
         }
-    }
-
-    fn on_state(&mut self, from: State, to: State) {
-        self.forget_start();
-        self.call_off_homing();
-        self.note_place(from, to);
-        if to == State::Homing {
-            self.begin_homing();
-        }
-        if to == State::Parking || to == State::Stopping {
-            self.ended = self.mirror.cause;
-        }
-        let cause = self.cause();
-        self.say_state(to, &cause);
-        self.record.event(format!("{to}: {cause}"));
+        self.ports.service_log.say_state(to, &self.hall.cause());
         if from.may_send_motion() && !to.may_send_motion() {
-            self.show_over = true;
+            self.procedures.add(vec![Act::EndShow]);
+        }
+        self.happens(&SupervisorEvent::Entered(to));
+    }
+
+    /// Tells all features of it, and has done what they say.
+    fn happens(&mut self, event: &SupervisorEvent<'_>) {
+        let acts = self.features.on(event, &self.hall);
+        if !acts.is_empty() {
+            self.procedures.add(acts);
         }
     }
 
-    /// The engine is done, or rests for good: the next show needs another.
-    fn end_show(&mut self) {
-        if !std::mem::take(&mut self.show_over) {
+    /// Has done what somebody asks.
+    fn on_asked(&mut self, asked: Asked) {
+        let acts = self.features.gear.may_ask(&asked.desired, &self.hall).and_then(|()| {
+            self.happens(&SupervisorEvent::Asked(&asked.desired));
+            self.features.acts_for(&asked, &self.hall)
+        });
+        self.procedures.add_for(Some(asked), acts);
+        self.go_on();
+    }
+
+    /// Does what the system asks.
+    fn heed_signals(&mut self) {
+        if self.ports.signals.is_leaving() {
+            // Whatever moves parks first; the tick thread sees to that.
+            self.hall.close();
+            self.happens(&SupervisorEvent::Leaving);
+        }
+        // A job that is under way holds what the next hall needs: its end is waited for.
+        let is_free = self.procedures.is_empty() && self.hall.is_free().is_ok();
+        if is_free && self.ports.signals.reload.swap(false, Ordering::AcqRel) {
+            let result = self.perform(Act::Reload);
+            let who = Who { role: Role::Engineer, surface: Surface::Signal, name: "SIGHUP".to_owned() };
+            self.write_down(&Desired { ask: Command::Reload, who }, &result);
+            if let Err(problem) = result {
+                self.note(problem.to_string());
+            }
+        }
+    }
+
+    /// Does what is done when its time is there.
+    fn on_time(&mut self) {
+        if self.features.onward.list.is_some() {
+            self.happens(&SupervisorEvent::Clock(&Zoned::now()));
+        }
+        let now = self.hall.now;
+        if now.since(self.told) < TELL {
             return;
         }
-        let how = if self.ended == Cause::CueEnded { "completed" } else { "stopped" };
-        let played = self.record.is_under_way();
-        self.end_record(self.ended);
-        if self.runtime.leave.load(Ordering::Acquire) {
-            // There is no next show in this hall, and soon no tick thread to take it.
-            return;
+        self.told = now;
+        let acts = self.features.on(&SupervisorEvent::Round(&self.hall.live.table()), &self.hall);
+        // Also where there are none: at the end of each the tick thread is told of readiness that it was not told.
+        self.procedures.add(acts);
+        let log = &self.ports.service_log;
+        self.features.records.settle_folds(now).iter().for_each(|action| log.say_ask(action));
+        log.say_journal(self.features.records.news());
+        if self.ports.settings_file.take_mended() {
+            log.say_mended();
         }
-        if !played {
-            // Seats were brought to park between shows: what is next stays as it is.
-            return self.stage_again();
-        }
-        if self.end_seat_test(how) {
-            self.rewind();
-        } else {
-            self.keep_place();
-            self.on_show_over(self.ended);
-        }
+        self.keep_settings();
+        self.publish();
+    }
+
+    /// The next time at which there is something to do.
+    fn wakes_at(&self) -> MonoTime {
+        let told = self.told + TELL;
+        let until = self.procedures.waits_until().map_or(told, |until| until.min(told));
+        let starts = self.features.onward.list.as_ref().and_then(|list| list.starts_in(&Zoned::now()));
+        starts.map_or(until, |wait| until.min(Monotonic.now() + wait))
     }
 
     /// Notes what no state says, for the log and the warnings.
     fn note(&mut self, note: String) {
-        self.say_note(&note);
+        self.ports.service_log.say_note(&note);
         self.notes.push_back(note);
         if self.notes.len() > NOTES {
             self.notes.pop_front();
         }
     }
 
-    /// Gives the tick thread a command and waits for its answer, a tick or two.
-    fn command(&mut self, command: TickCommand) -> Result<(), Problem> {
-        self.take_news(); // so that there is room for the answer
-        if self.runtime.commands.push(command).is_err() {
-            return Err(state_mirror::busy());
-        }
-        self.mirror.expect();
-        let until = Monotonic.now() + ANSWER;
-        loop {
-            self.take_news();
-            if let Some(answer) = self.mirror.take_answer() {
-                return answer;
-            }
-            if Monotonic.now() >= until {
-                return Err(state_mirror::no_answer(ANSWER));
-            }
-            Monotonic.sleep_until(Monotonic.now() + LOOK_FOR_ANSWER);
-        }
+    /// Writes down what somebody asked, and what came of it.
+    fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
+        let state = self.hall.mirror.state;
+        let due = self.features.records.write_down(desired, result, state, self.hall.now);
+        due.iter().for_each(|action| self.ports.service_log.say_ask(action));
+    }
+
+    /// All that is to last.
+    fn settings(&self) -> Settings {
+        let place = self.features.onward.list.as_ref().map(List::place);
+        self.features.lasting.settings(&self.hall, place)
+    }
+
+    /// Has it kept.
+    fn keep_settings(&mut self) {
+        let settings = self.settings();
+        self.ports.settings_file.put(settings);
+    }
+
+    /// How all of it stands.
+    fn status(&self) -> Status {
+        let Self { hall, features, .. } = self;
+        let parts = StatusParts { hall, features, began: self.ports.began };
+        let table = hall.live.table();
+        let warnings = parts.warnings(&table, &self.notes, self.ports.settings_file.trouble());
+        parts.status(&table, warnings)
     }
 
     /// Puts the newest status where all can see it.
     fn publish(&mut self) -> Arc<Status> {
+        self.hall.now = Monotonic.now();
         let status = Arc::new(self.status());
-        self.speak(&status);
+        let ends = self.reload.is_none() && self.ports.signals.is_leaving();
+        self.ports.service_log.speak(&status, self.opened, ends, self.hall.now);
         self.ports.source.put(Arc::clone(&status));
         status
     }
@@ -333,4 +370,45 @@ impl Supervisor {
         let status = self.publish();
         asked.answer(result.map(|()| status));
     }
+
+    /// What goes over to the next hall.
+    fn remember(&mut self) -> Carryover {
+        let latched = self.hall.mirror.state.is_latched();
+        if latched {
+            let (state, cause) = (self.hall.mirror.state, self.hall.cause());
+            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
+        }
+        Carryover {
+            settings: Some(self.settings()),
+            lasting: self.features.lasting.go_over(),
+            latched,
+            notes: std::mem::take(&mut self.notes),
+            untold: Vec::new(),
+        }
+    }
+
+    /// The hall has closed.
+    fn end(mut self, closed: Box<RuntimeEnd>) -> SupervisorEnd {
+        for asked in std::mem::take(&mut self.procedures).into_asked() {
+            self.answer(asked, Err(state_mirror::no_answer()));
+        }
+        self.features.records.end(&self.hall);
+        self.features.records.close(&self.hall);
+        self.keep_settings();
+        self.ports.carryover = self.remember();
+        let ended = record::ending(self.hall.ended);
+        let journal = self.features.records.into_journal();
+        SupervisorEnd { ports: self.ports, closed, reload: self.reload, ended, journal }
+    }
+}
+
+/// Has every cue of the library checked that nobody has checked for this hall, one after the other, by processes of the lowest
+/// priority.
+fn examine(library: Library) {
+    let thread = thread::Builder::new().name("library".to_owned());
+    // Where there is no thread for it, each cue is checked when it is asked for.
+    let _ = thread.spawn(move || {
+        let _ = crate::sys::realtime::normal_priority();
+        library.examine_all();
+    });
 }

@@ -1,18 +1,18 @@
-//! Records for the journal: commands with their operators, and shows.
+//! ShowRecords for the journal: commands with their operators, and shows.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use jiff::Zoned;
 
-use super::Supervisor;
+use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
+use super::hall::{Counted, HallContext};
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
 use crate::journal::{Action, Folds, Journal, Outcome, ShowRecord, stamp};
-use crate::rt::{Row, Times};
-use crate::state::Cause;
-use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, MonoTime};
+use crate::rt::Row;
+use crate::state::{Cause, State};
+use crate::time::MonoTime;
 use crate::tracker::Histogram;
 
 /// How long the last frames of a show have to meet their fate, and the ack thread to tell it.
@@ -22,36 +22,27 @@ const NEWEST: usize = 20;
 
 /// What is written down, and what was lately.
 #[derive(Debug)]
-pub(super) struct Records {
+pub(super) struct ShowRecords {
     journal: Journal,
     folds: Folds,
     newest: VecDeque<JournalLine>,
     /// The show that is under way.
-    open: Option<Box<Open>>,
-}
-
-/// What was counted before a show.
-#[derive(Debug)]
-pub(super) struct Before {
-    ticks: u64,
-    missed: u64,
-    table: Vec<Row>,
-    times: Times,
+    open: Option<Box<OpenShow>>,
 }
 
 /// A show that has begun.
 #[derive(Debug)]
-struct Open {
+struct OpenShow {
     record: ShowRecord,
-    before: Before,
+    before: Counted,
     events: Vec<String>,
     /// How it ended; none while it goes on.
-    over: Option<Over>,
+    over: Option<ShowOver>,
 }
 
 /// The end of a show whose last frames may be on their way.
 #[derive(Debug)]
-struct Over {
+struct ShowOver {
     cause: Cause,
     end: String,
     at: MonoTime,
@@ -59,8 +50,8 @@ struct Over {
     missed: u64,
 }
 
-impl Records {
-    /// Records that go to a journal.
+impl ShowRecords {
+    /// ShowRecords that go to a journal.
     pub(super) fn new(journal: Journal) -> Self {
         Self { journal, folds: Folds::default(), newest: VecDeque::new(), open: None }
     }
@@ -111,52 +102,47 @@ impl Records {
             open.events.push(event);
         }
     }
-}
 
-impl Supervisor {
-    /// Writes down what somebody asked, and what came of it.
-    pub(super) fn write_down(&mut self, desired: &Desired, result: &Result<(), Problem>) {
+    /// Writes down what somebody asked in that state, and what came of it; gives the lines that are due.
+    pub(super) fn write_down(
+        &mut self,
+        desired: &Desired,
+        result: &Result<(), Problem>,
+        state: State,
+        now: MonoTime,
+    ) -> Vec<Action> {
         let at = stamp(&Zoned::now());
         let (who, what) = (desired.who.to_string(), desired.ask.to_string());
         let result = match result {
             Ok(()) => "done".to_owned(),
             Err(problem) => format!("{}; {}", problem.detail, problem.remedy),
         };
-        let state = self.mirror.state.to_string();
-        let action = Action { at, who, what, result, state, times: 1 }.shortened();
-        self.record.show(&action);
-        let written = self.record.folds.take(action, desired.ask.word(), Monotonic.now());
-        written.iter().for_each(|action| self.note_action(action));
+        let action = Action { at, who, what, result, state: state.to_string(), times: 1 }.shortened();
+        self.show(&action);
+        let due = self.folds.take(action, desired.ask.word(), now);
+        due.iter().for_each(|action| self.journal.note(action));
+        due
     }
 
-    /// Writes down the repeats of what was asked, once their time is over.
-    pub(super) fn settle_folds(&mut self) {
-        let due = self.record.folds.due(Monotonic.now());
-        due.iter().for_each(|action| self.note_action(action));
-    }
-
-    fn note_action(&mut self, action: &Action) {
-        self.say_ask(action);
-        self.record.journal.note(action);
-    }
-
-    /// What is counted so far; to be taken before a show is let go.
-    pub(super) fn count_before(&self) -> Before {
-        let live = &self.runtime.live;
-        Before { ticks: live.ticks(), missed: live.missed(), table: live.table(), times: live.times() }
+    /// Writes down the repeats of what was asked, once their time is over; gives their lines.
+    pub(super) fn settle_folds(&mut self, now: MonoTime) -> Vec<Action> {
+        let due = self.folds.due(now);
+        due.iter().for_each(|action| self.journal.note(action));
+        due
     }
 
     /// A show has just begun, and who let it go.
-    pub(super) fn begin_record(&mut self, who: &str, surface: Surface, before: Before) {
-        self.close_record();
-        let Some(cued) = &self.cued else { return };
-        let (now, config) = (Zoned::now(), &self.runtime.config);
-        let available = before
+    fn begin(&mut self, begun: &ShowBegun, hall: &HallContext) {
+        self.close(hall);
+        let Some(cued) = &hall.cued else { return };
+        let ShowBegun { who, surface, counted, place } = begun;
+        let (now, config) = (Zoned::now(), &hall.config);
+        let available = counted
             .table
             .iter()
             .enumerate()
-            .filter(|(lane, row)| self.settings.is_on(*lane) && row.standing.may_move());
-        let levels = &self.settings.levels;
+            .filter(|(lane, row)| hall.settings.is_on(*lane) && row.standing.may_move());
+        let levels = &hall.settings.levels;
         let off = levels.effects.iter().filter(|(_, on)| !**on);
         let record = ShowRecord {
             start: stamp(&now),
@@ -164,56 +150,54 @@ impl Supervisor {
             cue: cued.id.clone(),
             sha256: cued.sha256.clone(),
             title: cued.title.clone(),
-            playlist: self.place(),
+            playlist: place.clone(),
             level: levels.motion,
             vibration: levels.vibration,
-            trim_ms: self.settings.trim_ms,
+            trim_ms: hall.settings.trim_ms,
             effects_off: off.map(|(name, _)| name.clone()).collect(),
             seats_total: config.named().count(),
             seats_available: available.count(),
-            operator: who.to_owned(),
-            scheduled: surface == Surface::Schedule,
+            operator: who.clone(),
+            scheduled: *surface == Surface::Schedule,
             out_of_hours: config.log.hours.is_some_and(|hours| !hours.contains(now.time())),
             outcome: None,
         };
-        self.record.journal.begin(&record);
-        self.record.open = Some(Box::new(Open { record, before, events: Vec::new(), over: None }));
+        self.journal.begin(&record);
+        let before = counted.clone();
+        self.open = Some(Box::new(OpenShow { record, before, events: Vec::new(), over: None }));
     }
 
     /// A show is over. It is written down once its last frames have met their fate.
-    pub(super) fn end_record(&mut self, ended: Cause) {
-        let Some(open) = self.record.open.as_mut().filter(|open| open.over.is_none()) else { return };
-        let live = &self.runtime.live;
-        open.over = Some(Over {
-            cause: ended,
+    pub(super) fn end(&mut self, hall: &HallContext) {
+        let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) else { return };
+        open.over = Some(ShowOver {
+            cause: hall.ended,
             end: stamp(&Zoned::now()),
-            at: Monotonic.now(),
-            ticks: live.ticks().saturating_sub(open.before.ticks),
-            missed: live.missed().saturating_sub(open.before.missed),
+            at: hall.now,
+            ticks: hall.live.ticks().saturating_sub(open.before.ticks),
+            missed: hall.live.missed().saturating_sub(open.before.missed),
         });
     }
 
     /// Writes down a show that is over, once the ack thread has told the fate of every frame of it.
-    pub(super) fn settle_record(&mut self) {
-        let Some(over) = self.record.open.as_ref().and_then(|open| open.over.as_ref()) else { return };
+    fn settle(&mut self, table: &[Row], hall: &HallContext) {
+        let Some(over) = self.open.as_ref().and_then(|open| open.over.as_ref()) else { return };
         let told = |row: &Row| row.at > over.at && row.counts.in_flight() == 0;
-        let late = Monotonic.now().since(over.at) > SETTLED_WITHIN;
-        if late || self.runtime.live.table().iter().all(told) {
-            self.close_record();
+        if hall.now.since(over.at) > SETTLED_WITHIN || table.iter().all(told) {
+            self.close(hall);
         }
     }
 
     /// Writes down a show that is over, with what was counted so far.
-    pub(super) fn close_record(&mut self) {
-        let Some(open) = self.record.open.take() else { return };
-        let Open { mut record, before, events, over } = *open;
-        let Some(Over { cause, end, ticks, missed, .. }) = over else { return };
-        let live = &self.runtime.live;
-        let now = live.table();
+    pub(super) fn close(&mut self, hall: &HallContext) {
+        let Some(open) = self.open.take() else { return };
+        let OpenShow { mut record, before, events, over } = *open;
+        let Some(ShowOver { cause, end, ticks, missed, .. }) = over else { return };
+        let now = hall.live.table();
         let frames =
             |table: &[Row]| table.iter().map(|row| FrameCounts::from(&row.counts)).sum::<FrameCounts>();
         let failed = |table: &[Row]| table.iter().map(|row| row.counts.send_failed).sum::<u64>();
-        let after = live.times();
+        let after = hall.live.times();
         record.outcome = Some(Outcome {
             end,
             result: ending(cause),
@@ -225,7 +209,18 @@ impl Supervisor {
             lateness: percentiles(after.lateness, &before.times.lateness),
             ack: percentiles(after.acks, &before.times.acks),
         });
-        self.record.journal.show(&record);
+        self.journal.show(&record);
+    }
+}
+
+impl Feature for ShowRecords {
+    fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, _out: &mut Vec<Act>) {
+        match event {
+            SupervisorEvent::Entered(to) => self.event(format!("{to}: {}", hall.cause())),
+            SupervisorEvent::Begun(begun) => self.begin(begun, hall),
+            SupervisorEvent::Round(table) => self.settle(table, hall),
+            _ => {}
+        }
     }
 }
 
@@ -243,4 +238,43 @@ fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
     // What cannot be taken away was never in it.
     let _ = now.subtract(before);
     Percentiles::of(&now)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, row, told};
+    use crate::journal::Limits;
+
+    #[test]
+    fn a_show_that_is_over_waits_for_the_fate_of_its_last_frames_but_not_for_ever() {
+        let folder = tempfile::tempdir().unwrap();
+        let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
+        let mut records = ShowRecords::new(Journal::open(folder.path(), limits, &Zoned::now()));
+        let mut hall = hall(State::Armed, "one");
+        let ms = Duration::from_millis;
+        for (asked, later, settled) in [
+            (1, ms(100), false),
+            (0, Duration::ZERO, false),
+            (0, ms(100), true),
+            (1, SETTLED_WITHIN + ms(1), true),
+        ] {
+            let begun = ShowBegun {
+                who: "anna".to_owned(),
+                surface: Surface::Http,
+                counted: hall.count(),
+                place: None,
+            };
+            told(&mut records, &SupervisorEvent::Begun(&begun), &hall);
+            assert!(records.is_under_way());
+            records.end(&hall);
+            assert!(!records.is_under_way());
+            let over = hall.now;
+            hall.now = over + later;
+            let mut row = row(hall.now);
+            row.counts.asked = asked;
+            told(&mut records, &SupervisorEvent::Round(&[row]), &hall);
+            assert_eq!(records.open.is_none(), settled, "{asked} open, {later:?} after the end");
+        }
+    }
 }

@@ -1,19 +1,22 @@
 //! Signals of the system: to end, and to reload the configuration, for which another hall is opened.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::Supervisor;
+use super::hall::HallContext;
+use super::hall_settings::HallSettings;
 use super::lasting::Lasting;
-use crate::config;
-use crate::control::{Code, Command, Desired, Problem, Role, Surface, Who};
-use crate::settings::{LoadedShow, Settings};
+use crate::config::{self, Config};
+use crate::control::{Code, Problem};
+use crate::rt::Desk;
+use crate::settings::{Kept, Settings};
 use crate::state::State;
 
 /// What goes over from a hall to the one that is opened with another configuration, or comes from before the start.
 #[derive(Debug, Default)]
-pub struct Carryover {
+pub(crate) struct Carryover {
     /// What was set and loaded; `None` if nobody has set anything.
     pub(super) settings: Option<Settings>,
     pub(super) lasting: Lasting,
@@ -26,8 +29,26 @@ pub struct Carryover {
 }
 
 impl Carryover {
+    /// Of a program that has just started, and found that.
+    #[must_use]
+    pub(crate) fn of(kept: Kept) -> Self {
+        let lasting = Lasting::since_start(kept.settings.as_ref().and_then(Settings::words));
+        Self { settings: kept.settings, lasting, untold: kept.said, ..Self::default() }
+    }
+
+    /// What is set goes to the desk of a hall before its first look at the controllers: nobody waits for a seat that is out.
+    pub(crate) fn set_desk(&self, config: &Config, desk: &Desk) {
+        self.settings(config).set(desk, &[]);
+    }
+
+    pub(super) fn settings(&self, config: &Config) -> HallSettings {
+        self.settings
+            .as_ref()
+            .map_or_else(|| HallSettings::new(config), |before| HallSettings::with(config, before))
+    }
+
     /// Adds something that a person should know.
-    pub fn note(&mut self, note: String) {
+    pub(crate) fn note(&mut self, note: String) {
         self.untold.push(note);
     }
 }
@@ -49,72 +70,25 @@ impl Signals {
     }
 }
 
-impl Supervisor {
-    /// Takes up what goes over from the hall before. Ahead of the first tick: what was latched stays so.
-    pub(super) fn begin(&mut self, show: Option<LoadedShow>, latched: bool) {
-        self.set_desk();
-        if latched {
-            self.runtime.desk.stop();
-        }
-        if let Some(show) = show {
-            self.load_again(show);
-        }
+/// Reads the configuration anew, to open the hall with it. The old one is kept where the new one is bad, and while anything is
+/// armed.
+///
+/// # Errors
+/// Why it is not read.
+pub(super) fn reload(hall: &HallContext, path: &Path) -> Result<Arc<Config>, Problem> {
+    let idle = matches!(
+        hall.mirror.state,
+        State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
+    );
+    if !idle {
+        let detail = format!("cannot read the configuration anew while {}", hall.mirror.state);
+        return Err(Problem::new(Code::State, detail, "park, and disarm first"));
     }
-
-    /// What goes over to the next hall.
-    pub(super) fn remember(&mut self) -> Carryover {
-        let latched = self.mirror.state.is_latched();
-        if latched {
-            let (state, cause) = (self.mirror.state, self.cause());
-            self.note(format!("the hall was in {state} before the configuration was read anew: {cause}"));
-        }
-        Carryover {
-            settings: Some(self.settings()),
-            lasting: self.lasting.go_over(),
-            latched,
-            notes: std::mem::take(&mut self.notes),
-            untold: Vec::new(),
-        }
-    }
-
-    /// Does what the system asks.
-    pub(super) fn heed_signals(&mut self) {
-        if self.ports.signals.is_leaving() {
-            // Whatever moves parks first; the tick thread sees to that.
-            self.runtime.leave.store(true, Ordering::Release);
-            self.hold_back();
-            self.call_off_homing();
-        }
-        // A job that is under way holds what the next hall needs: its end is waited for.
-        if self.is_free().is_ok() && self.ports.signals.reload.swap(false, Ordering::AcqRel) {
-            let result = self.reload();
-            let who = Who { role: Role::Engineer, surface: Surface::Signal, name: "SIGHUP".to_owned() };
-            self.write_down(&Desired { ask: Command::Reload, who }, &result);
-            if let Err(problem) = result {
-                self.note(problem.to_string());
-            }
-        }
-    }
-
-    /// Reads the configuration anew, and has the hall opened with it. The old one is kept where the new one is bad, and while
-    /// anything is armed.
-    pub(super) fn reload(&mut self) -> Result<(), Problem> {
-        let idle = matches!(
-            self.mirror.state,
-            State::Boot | State::Recovering | State::Parked | State::Stopped | State::Fault
-        );
-        if !idle {
-            let detail = format!("cannot read the configuration anew while {}", self.mirror.state);
-            return Err(Problem::new(Code::State, detail, "park, and disarm first"));
-        }
-        self.is_free()?;
-        let config = config::load(&self.ports.config).map_err(|faults| {
-            let detail = format!("{} is bad; the old configuration is kept", self.ports.config.display());
-            let faults = faults.to_string().lines().map(str::to_owned).collect();
-            Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
-        })?;
-        self.reload = Some(Arc::new(config));
-        self.runtime.leave.store(true, Ordering::Release);
-        Ok(())
-    }
+    hall.is_free()?;
+    let config = config::load(path).map_err(|faults| {
+        let detail = format!("{} is bad; the old configuration is kept", path.display());
+        let faults = faults.to_string().lines().map(str::to_owned).collect();
+        Problem::new(Code::Check, detail, "correct it, and reload again").with(faults)
+    })?;
+    Ok(Arc::new(config))
 }

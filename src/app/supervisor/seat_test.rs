@@ -1,20 +1,16 @@
 //! The test of empty seats: each axis in turn moves slowly there and back, then each effect is on for a second. It is a cue
 //! like any other, made here, proved and joined like any other.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::Supervisor;
-use super::job::JobResult;
 use super::show::ProvedShow;
 use crate::config::Config;
 use crate::control::model::us;
-use crate::control::{Asked, Code, Problem, Surface, TestRow, TestStatus};
+use crate::control::{Code, Problem, TestRow, TestStatus};
 use crate::cue::{self, Source};
 use crate::motion::MAX_AXES;
-use crate::rt::{Command as TickCommand, Row};
-use crate::state::{State, Transition};
+use crate::rt::Row;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
 
@@ -30,26 +26,15 @@ const LEAD_MS: u32 = 1_000;
 /// A test that is under way, or was.
 #[derive(Debug)]
 pub(super) struct SeatTest {
-    parts: Vec<Part>,
+    parts: Vec<TestPart>,
     /// The part that is under way, with what was counted when it began.
     now: Option<(usize, Vec<Row>)>,
-    /// The rows under test; none for all.
-    only: Option<BTreeSet<String>>,
     pub(super) status: TestStatus,
-    /// The cue that was loaded before.
-    before: Option<Box<ProvedShow>>,
-}
-
-impl SeatTest {
-    /// The cue that was loaded before.
-    pub(super) fn before(&self) -> Option<&ProvedShow> {
-        self.before.as_deref()
-    }
 }
 
 /// One thing that is tested.
 #[derive(Debug, Clone, PartialEq)]
-struct Part {
+struct TestPart {
     name: String,
     from: ShowTime,
     to: ShowTime,
@@ -58,7 +43,7 @@ struct Part {
 }
 
 /// The parts of a test of a hall, and its cue as CSV.
-fn script(config: &Config) -> (Vec<Part>, String) {
+fn script(config: &Config) -> (Vec<TestPart>, String) {
     let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
     let effects: Vec<&str> = config.effects.iter().map(|effect| effect.name.as_str()).collect();
     let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
@@ -86,7 +71,7 @@ fn script(config: &Config) -> (Vec<Part>, String) {
         row(at, None, None);
         row(at + AXIS_MS * 5 / 12, Some(axis), None);
         row(at + AXIS_MS * 7 / 12, Some(axis), None);
-        parts.push(Part {
+        parts.push(TestPart {
             name: format!("a{}", axis + 1),
             from: time(at),
             to: time(at + AXIS_MS),
@@ -97,7 +82,12 @@ fn script(config: &Config) -> (Vec<Part>, String) {
     for (effect, name) in effects.iter().enumerate() {
         row(at, None, Some(effect));
         row(at + EFFECT_MS / 2, None, None);
-        parts.push(Part { name: (*name).to_owned(), from: time(at), to: time(at + EFFECT_MS), axis: None });
+        parts.push(TestPart {
+            name: (*name).to_owned(),
+            from: time(at),
+            to: time(at + EFFECT_MS),
+            axis: None,
+        });
         at += EFFECT_MS;
     }
     // It ends at rest: the last axis comes back before that.
@@ -114,117 +104,59 @@ fn park_of(config: &Config, axis: usize) -> f64 {
     taker.and_then(|one| one.seat.park.get(axis - one.axis_offset).copied()).unwrap_or(0.0)
 }
 
-impl Supervisor {
-    /// Tests the seats of some rows, or all. The hall has to be armed: whoever armed it has seen that nobody sits there.
-    pub(super) fn test(&mut self, rows: &[String], asked: Asked) {
-        let known = |row: &String| self.settings.levels.rows.contains_key(row);
-        let unknown: Vec<&String> = rows.iter().filter(|row| !known(row)).collect();
-        let named = unknown.first().map_or(Ok(()), |row| {
-            Err(Problem::new(Code::Unknown, format!("there is no row {row}"), "the status names the rows"))
-        });
-        if let Err(problem) = self.may_test().and(named).and_then(|()| self.is_free()) {
-            return self.answer(asked, Err(problem));
-        }
-        let only = (!rows.is_empty()).then(|| rows.iter().cloned().collect());
-        let config = self.runtime.config.clone();
-        self.send("test", Some(asked), move || {
-            let (parts, text) = script(&config);
-            let cue = cue::read(Path::new("test"), text.as_bytes(), &Source::Native);
-            let cued = cue.map_err(|faults| {
-                Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
-                    .with(faults.to_string().lines().map(str::to_owned).collect())
-            });
-            let cued = cued.and_then(|cue| {
-                ProvedShow::prove("test".to_owned(), &config, Timeline::new(cue), String::new())
-            });
-            let status = TestStatus {
-                running: true,
-                step: "begins".to_owned(),
-                done: 0,
-                total: parts.len(),
-                rows: Vec::new(),
-            };
-            let seat_test = SeatTest { parts, now: None, only, status, before: None };
-            JobResult::Swept(cued.map(|cued| (Box::new(seat_test), Box::new(cued))))
-        });
+impl SeatTest {
+    /// Makes one for a hall, and the cue for it.
+    ///
+    /// # Errors
+    /// Where no such cue fits its seats.
+    pub(super) fn make(config: &Config) -> Result<(Box<Self>, Box<ProvedShow>), Problem> {
+        let (parts, text) = script(config);
+        let cue = cue::read(Path::new("test"), text.as_bytes(), &Source::Native).map_err(|faults| {
+            Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
+                .with(faults.to_string().lines().map(str::to_owned).collect())
+        })?;
+        let cued = ProvedShow::prove("test".to_owned(), config, Timeline::new(cue), String::new())?;
+        let (step, total) = ("begins".to_owned(), parts.len());
+        let status = TestStatus { running: true, step, done: 0, total, rows: Vec::new() };
+        Ok((Box::new(Self { parts, now: None, status }), Box::new(cued)))
     }
 
-    fn may_test(&self) -> Result<(), Problem> {
-        if self.mirror.state == State::Armed {
-            return Ok(());
-        }
-        let detail = format!("cannot test while {}", self.mirror.state);
-        Err(Problem::new(Code::State, detail, "load any cue and arm, with nobody on the seats, then test"))
-    }
-
-    /// Takes up a test that was made, and lets it go, where the hall is still armed.
-    pub(super) fn take_up_seat_test(
+    /// The film is there, and so much is counted: judges the part that is over, of the lanes that are tested; a line for each of
+    /// its rows.
+    pub(super) fn follow(
         &mut self,
-        mut seat_test: SeatTest,
-        cued: ProvedShow,
-    ) -> Result<(), Problem> {
-        self.may_test()?;
-        self.settings.only = seat_test.only.take();
-        seat_test.before = self.cued.replace(cued).map(Box::new);
-        self.seat_test = Some(seat_test);
-        let before = self.count_before();
-        let begun = self.stage().and_then(|()| self.command(TickCommand::Request(Transition::Go)));
-        match &begun {
-            Ok(()) => self.begin_show("a test of the seats", Surface::Socket, before),
-            Err(_) => {
-                self.end_seat_test("did not begin");
-                self.stage_again();
-            }
+        film: ShowTime,
+        table: &[Row],
+        config: &Config,
+        is_on: impl Fn(usize) -> bool,
+    ) -> Vec<String> {
+        let part = self.parts.iter().position(|part| (part.from..part.to).contains(&film));
+        if self.now.as_ref().map(|(part, _)| *part) == part {
+            return Vec::new();
         }
-        begun
-    }
-
-    /// Follows a test that is under way.
-    pub(super) fn follow_sweep(&mut self) {
-        let (live, config) = (&self.runtime.live, &self.runtime.config);
-        let Some(seat_test) = self.seat_test.as_mut().filter(|seat_test| seat_test.status.running) else {
-            return;
-        };
-        let film = live.show();
-        let table = live.table();
-        let part = seat_test.parts.iter().position(|part| (part.from..part.to).contains(&film));
-        if seat_test.now.as_ref().map(|(part, _)| *part) == part {
-            return;
-        }
-        if let Some((done, before)) = seat_test.now.take() {
-            let part = &seat_test.parts[done];
-            let settings = &self.settings;
-            let tested =
-                config.controllers.iter().enumerate().filter(|(lane, one)| {
-                    settings.is_on(*lane) && part.axis.is_none_or(|axis| one.takes(axis))
-                });
+        let mut lines = Vec::new();
+        if let Some((done, before)) = self.now.take() {
+            let part = &self.parts[done];
+            let tested = config
+                .controllers
+                .iter()
+                .enumerate()
+                .filter(|(lane, one)| is_on(*lane) && part.axis.is_none_or(|axis| one.takes(axis)));
             for (lane, controller) in tested {
                 let (Some(now), Some(then)) = (table.get(lane), before.get(lane)) else { continue };
                 let row = row_of(&controller.name, &part.name, then, now);
                 let TestRow { asked, acked, .. } = row;
                 let p99 = row.p99_us.map_or_else(|| "-".to_owned(), |us| format!("{us} µs"));
-                let line = format!("{} {}: {acked} of {asked} acked, p99 {p99}", controller.name, part.name);
-                self.record.event(line);
-                seat_test.status.rows.push(row);
+                lines.push(format!("{} {}: {acked} of {asked} acked, p99 {p99}", controller.name, part.name));
+                self.status.rows.push(row);
             }
-            seat_test.status.done = done + 1;
+            self.status.done = done + 1;
         }
         if let Some(part) = part {
-            seat_test.status.step.clone_from(&seat_test.parts[part].name);
-            seat_test.now = Some((part, table));
+            self.status.step.clone_from(&self.parts[part].name);
+            self.now = Some((part, table.to_vec()));
         }
-    }
-
-    /// The test is over; says whether there was one. The cue that was loaded before is back.
-    pub(super) fn end_seat_test(&mut self, how: &str) -> bool {
-        let Some(seat_test) = self.seat_test.as_mut().filter(|seat_test| seat_test.status.running) else {
-            return false;
-        };
-        seat_test.status.running = false;
-        seat_test.status.step = how.to_owned();
-        self.settings.only = None;
-        self.cued = seat_test.before.take().map(|cued| *cued);
-        true
+        lines
     }
 }
 

@@ -3,22 +3,20 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::Supervisor;
 use super::warnings::NOTE;
 use crate::control::{Severity, Status, Warning};
 use crate::journal::Action;
 use crate::log::{Line, Log, Priority};
 use crate::sd::Notifier;
 use crate::state::State;
-use crate::sys::clock::Monotonic;
-use crate::time::Clock as _;
+use crate::time::MonoTime;
 
 /// How long controllers have to answer before the hall is ready without them.
 const ROUND: Duration = Duration::from_secs(2);
 
 /// Who is told, and what was told before.
 #[derive(Debug)]
-pub struct ServiceLog {
+pub(crate) struct ServiceLog {
     notifier: Notifier,
     log: Log,
     ready: bool,
@@ -30,7 +28,7 @@ pub struct ServiceLog {
 impl ServiceLog {
     /// One that speaks to the service manager and to a log.
     #[must_use]
-    pub fn new(log: Log) -> Self {
+    pub(crate) fn new(log: Log) -> Self {
         Self { notifier: Notifier::default(), log, ready: false, stopping: false, warned: BTreeMap::new() }
     }
 
@@ -56,54 +54,49 @@ impl ServiceLog {
         }
         self.warned = now;
     }
-}
 
-impl Supervisor {
-    /// Tells the service manager and the log what is new.
-    pub(super) fn speak(&mut self, status: &Status) {
-        let now = Monotonic.now();
+    /// Tells the service manager and the log what is new in a hall that opened then; `ends` says whether the program does.
+    pub(super) fn speak(&mut self, status: &Status, opened: MonoTime, ends: bool, now: MonoTime) {
         let line = format!("{}: {}; next: {}", status.state, status.cause, status.next);
-        let service_log = &mut self.ports.service_log;
-        service_log.warn(&status.warnings);
+        self.warn(&status.warnings);
         let heard = status.controllers.iter().all(|one| one.heard_s.is_some() || !one.enabled);
-        let told = if !service_log.ready && (heard || now.since(self.began) >= ROUND) {
-            service_log.ready = true;
-            service_log.notifier.ready(&line, now)
-        } else if !service_log.stopping && self.reload.is_none() && self.ports.signals.is_leaving() {
-            service_log.stopping = true;
-            service_log.notifier.stopping(&line, now)
+        let told = if !self.ready && (heard || now.since(opened) >= ROUND) {
+            self.ready = true;
+            self.notifier.ready(&line, now)
+        } else if !self.stopping && ends {
+            self.stopping = true;
+            self.notifier.stopping(&line, now)
         } else {
-            service_log.notifier.status(&line, now);
+            self.notifier.status(&line, now);
             Ok(())
         };
         if let Err(error) = told {
-            let text = format!("the service manager cannot be told: {error}");
-            service_log.log.say(Line::new(Priority::Warning, "notify", text));
+            self.say(Priority::Warning, "notify", format!("the service manager cannot be told: {error}"));
         }
+    }
+
+    /// Writes a line.
+    pub(super) fn put(&self, line: Line) {
+        self.log.say(line);
+    }
+
+    fn say(&self, priority: Priority, cause: &'static str, text: impl Into<String>) {
+        self.put(Line::new(priority, cause, text));
     }
 
     /// Says something that no state says: one such thing hides none that comes after it.
     pub(super) fn say_note(&self, note: &str) {
-        self.ports.service_log.log.say(Line::new(Priority::Warning, NOTE, note));
+        self.say(Priority::Warning, NOTE, note);
     }
 
-    /// Says how the journal goes, and the keeping of what is set.
-    pub(super) fn say_journal(&mut self) {
-        for news in self.record.news() {
-            self.ports.service_log.log.say(Line::new(Priority::Warning, "journal", news));
-        }
-        if self.ports.settings_file.take_mended() {
-            self.ports.service_log.log.say(Line::new(
-                Priority::Notice,
-                "settings",
-                "what people set is kept again",
-            ));
-        }
+    /// Says how the journal goes.
+    pub(super) fn say_journal(&self, news: Vec<String>) {
+        news.into_iter().for_each(|news| self.say(Priority::Warning, "journal", news));
     }
 
-    /// Says something that was set before the program started.
-    pub(super) fn say_kept(&self, text: &str) {
-        self.ports.service_log.log.say(Line::new(Priority::Notice, "kept", text));
+    /// Says that what people set is kept again.
+    pub(super) fn say_mended(&self) {
+        self.say(Priority::Notice, "settings", "what people set is kept again");
     }
 
     /// Says that the hall is in another state.
@@ -114,7 +107,7 @@ impl Supervisor {
             _ => Priority::Notice,
         };
         let line = Line::new(priority, format!("state-{state}"), format!("{state}: {cause}"));
-        self.ports.service_log.log.say(line.with("state", state.word()));
+        self.put(line.with("state", state.word()));
     }
 
     /// Says what somebody asked, and what came of it.
@@ -124,6 +117,6 @@ impl Supervisor {
         let word = what.split(' ').next().unwrap_or_default();
         let line =
             Line::new(Priority::Notice, format!("ask-{word}"), format!("{who}: {what}: {result}{often}"));
-        self.ports.service_log.log.say(line.with("operator", who.clone()));
+        self.put(line.with("operator", who.clone()));
     }
 }

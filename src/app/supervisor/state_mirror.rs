@@ -1,4 +1,4 @@
-//! Mirrors the state of the hall from the tick thread's news, with the result of the command that awaits its answer.
+//! Mirrors the state of the hall from the tick thread's news, and words its answers.
 
 use std::time::Duration;
 
@@ -7,6 +7,9 @@ use crate::rt::News;
 use crate::state::{Cause, Next, State};
 use crate::time::MonoTime;
 
+/// How long the tick thread has to answer a command; a tick takes a second at most.
+pub(super) const ANSWER: Duration = Duration::from_secs(2);
+
 /// What is known of the hall's state.
 #[derive(Debug)]
 pub(super) struct StateMirror {
@@ -14,32 +17,25 @@ pub(super) struct StateMirror {
     pub(super) cause: Cause,
     pub(super) next: Next,
     pub(super) since: MonoTime,
-    /// Commands that were given and not answered yet, even if nobody waits any more.
-    open: u32,
-    /// The answer to the command that was given last.
-    answer: Option<Result<(), Problem>>,
 }
 
 impl StateMirror {
     pub(super) const fn new(now: MonoTime) -> Self {
         let (state, cause, next) = (State::Boot, Cause::Started, Next::AwaitAnswers);
-        Self { state, cause, next, since: now, open: 0, answer: None }
+        Self { state, cause, next, since: now }
     }
 
     /// Takes news; says from which state to which the hall went, where it did.
     pub(super) fn hear(&mut self, news: News) -> Option<(State, State)> {
-        match news {
-            News::Entered { state, cause, next, at } => {
-                let from = self.state;
-                (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
-                return (from != state).then_some((from, state));
-            }
-            News::Taken => self.on_answer(Ok(())),
-            News::Refused(refusal) => self.on_answer(Err(refusal.into())),
-            News::NotLoaded(state) => self.on_answer(Err(not_loaded(state))),
-            News::Unplanned(_) => {} // of no state, and no answer
-        }
-        None
+        let News::Entered { state, cause, next, at } = news else { return None };
+        let from = self.state;
+        (self.state, self.cause, self.next, self.since) = (state, cause, next, at);
+        (from != state).then_some((from, state))
+    }
+
+    /// True if a stop is in effect.
+    pub(super) const fn is_stopping(&self) -> bool {
+        matches!(self.state, State::Stopping | State::Stopped | State::Fault)
     }
 
     /// Seconds until the state ends by itself; `None` if it does not.
@@ -47,23 +43,15 @@ impl StateMirror {
         let end = self.since + self.state.lasts()?;
         Some(end.since(now).as_secs_f64())
     }
+}
 
-    /// Answers come in the order of the commands: one that was given up on is not taken for that of the next.
-    fn on_answer(&mut self, answer: Result<(), Problem>) {
-        self.open = self.open.saturating_sub(1);
-        if self.open == 0 {
-            self.answer = Some(answer);
-        }
-    }
-
-    /// A command was given: its answer is waited for.
-    pub(super) fn expect(&mut self) {
-        self.open += 1;
-        self.answer = None;
-    }
-
-    pub(super) const fn take_answer(&mut self) -> Option<Result<(), Problem>> {
-        self.answer.take()
+/// The answer to a command; `None` where the news is none.
+pub(super) fn answer(news: News) -> Option<Result<(), Problem>> {
+    match news {
+        News::Taken => Some(Ok(())),
+        News::Refused(refusal) => Some(Err(refusal.into())),
+        News::NotLoaded(state) => Some(Err(not_loaded(state))),
+        News::Entered { .. } | News::Unplanned(_) => None,
     }
 }
 
@@ -77,10 +65,10 @@ pub(super) fn busy() -> Problem {
 }
 
 /// The tick thread says nothing.
-pub(super) fn no_answer(after: Duration) -> Problem {
+pub(super) fn no_answer() -> Problem {
     Problem::new(
         Code::Timeout,
-        format!("the tick thread did not answer within {} s", after.as_secs()),
+        format!("the tick thread did not answer within {} s", ANSWER.as_secs()),
         "look at the status before asking again: it may still be done",
     )
 }

@@ -1,25 +1,20 @@
 //! The status: how all of it stands, in the words of the hall.
 
-use std::collections::VecDeque;
-use std::time::Duration;
-
 use jiff::Zoned;
 
-use super::{Supervisor, belts};
+use super::belts;
+use super::features::Features;
+use super::hall::HallContext;
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
-    ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times,
+    ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
-use crate::engine::Unplanned;
 use crate::rt::Row;
-use crate::state::{Next, Whose};
-use crate::sys::clock::Monotonic;
-use crate::time::{Clock as _, MonoTime};
+use crate::state::Next;
+use crate::time::MonoTime;
 use crate::tracker;
 
-/// Over how long the rate of acks is counted.
-const RATED: Duration = Duration::from_secs(1);
 /// The least and the greatest bound of the buckets, µs.
 const BOUNDS_US: [f64; 16] = [
     5.0,
@@ -40,150 +35,103 @@ const BOUNDS_US: [f64; 16] = [
     1_000_000.0,
 ];
 
-/// What was counted of the last second.
-#[derive(Debug, Default)]
-pub(super) struct Rates {
-    /// Asked and acked by controller, oldest first.
-    counted: VecDeque<(MonoTime, Vec<(u64, u64)>)>,
+/// What the status is made of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StatusParts<'p> {
+    pub(super) hall: &'p HallContext,
+    pub(super) features: &'p Features,
+    /// When the program started.
+    pub(super) began: MonoTime,
 }
 
-impl Rates {
-    /// Notes what is counted now.
-    pub(super) fn note(&mut self, table: &[Row], now: MonoTime) {
-        let counted = |row: &Row| (row.counts.asked - row.counts.in_flight(), row.counts.acked);
-        self.counted.push_back((now, table.iter().map(counted).collect()));
-        while self.counted.len() > 1 && self.counted.front().is_some_and(|(at, _)| now.since(*at) > RATED) {
-            self.counted.pop_front();
-        }
-    }
-
-    /// Acks over frames whose fate is known, of the last second; `None` if there were none.
-    fn of(&self, controller: usize) -> Option<f64> {
-        let (_, first) = self.counted.front()?;
-        let (_, last) = self.counted.back()?;
-        let (before, now) = (first.get(controller)?, last.get(controller)?);
-        let asked = now.0.saturating_sub(before.0);
-        #[expect(clippy::cast_precision_loss, reason = "at most some thousand")]
-        (asked > 0).then(|| now.1.saturating_sub(before.1) as f64 / asked as f64)
-    }
-}
-
-impl Supervisor {
-    /// How all of it stands.
-    pub(super) fn status(&self) -> Status {
-        let now = Monotonic.now();
-        let live = &self.runtime.live;
-        let table = live.table();
+impl StatusParts<'_> {
+    /// How all of it stands, with what a person should know besides.
+    pub(super) fn status(&self, table: &[Row], warnings: Vec<Warning>) -> Status {
+        let Self { hall, features, began } = *self;
+        let (now, live, mirror) = (hall.now, &hall.live, &hall.mirror);
         let times = live.times();
-        let moving = self.mirror.state.may_send_motion();
-        let position = |cued: &super::ProvedShow| if moving { live.show() } else { cued.start };
+        let moving = mirror.state.may_send_motion();
+        let preflighted = &features.readiness.preflighted;
+        let position = |cued: &super::show::ProvedShow| if moving { live.show() } else { cued.start };
         Status {
-            hall: self.runtime.config.show.name.clone(),
+            hall: hall.config.show.name.clone(),
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            uptime_s: now.since(self.ports.began).as_secs_f64(),
-            state: self.mirror.state.into(),
-            cause: self.cause(),
-            next: self.next_action(&table, now),
-            arm_homes: self.mirror.next == Next::ArmAndHome,
-            may_clear: self.mirror.state.is_latched() || self.mirror.next == Next::Clear,
-            since_s: now.since(self.mirror.since).as_secs_f64(),
-            lapses_s: self.mirror.lapses(now),
+            uptime_s: now.since(began).as_secs_f64(),
+            state: mirror.state.into(),
+            cause: hall.cause(),
+            next: belts::next_action(hall, table).unwrap_or_else(|| self.next()),
+            arm_homes: mirror.next == Next::ArmAndHome,
+            may_clear: mirror.state.is_latched() || mirror.next == Next::Clear,
+            since_s: now.since(mirror.since).as_secs_f64(),
+            lapses_s: mirror.lapses(now),
             moving,
-            show: self.cued.as_ref().map(|cued| cued.status(position(cued))),
-            playlist: self.list.as_ref().map(|list| list.status(&Zoned::now())),
-            trim_ms: self.settings.trim_ms,
-            levels: self.settings.levels.clone(),
-            presets: self.runtime.config.presets.iter().map(|preset| preset.name.clone()).collect(),
+            show: hall.cued.as_ref().map(|cued| cued.status(position(cued))),
+            playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
+            trim_ms: hall.settings.trim_ms,
+            levels: hall.settings.levels.clone(),
+            presets: hall.config.presets.iter().map(|preset| preset.name.clone()).collect(),
             ticks: live.beats(),
             missed_ticks: live.missed(),
-            rate_hz: self.runtime.config.show.rate_hz,
+            rate_hz: hall.config.show.rate_hz,
             lateness: counted(&times.lateness),
             ack_latency: counted(&times.acks),
             realtime: RealTimeStatus {
-                policy: self.runtime.granted.policy.to_string(),
-                priority: self.runtime.granted.priority,
-                memory_locked: self.runtime.granted.memory_locked,
-                refusals: self.runtime.granted.refusals.clone(),
+                policy: hall.granted.policy.to_string(),
+                priority: hall.granted.priority,
+                memory_locked: hall.granted.memory_locked,
+                refusals: hall.granted.refusals.clone(),
             },
-            controllers: self.controllers(&table, now),
-            preflight: self.preflighted.as_ref().map(|it| it.status(now, |lane| self.settings.is_on(lane))),
-            warnings: self.warnings(&table),
-            test: self.seat_test.as_ref().map(|seat_test| seat_test.status.clone()),
-            journal: self.record.newest(),
+            controllers: self.controllers(table),
+            preflight: preflighted.as_ref().map(|it| it.status(now, |lane| hall.settings.is_on(lane))),
+            warnings,
+            test: features.seats.test.as_ref().map(|test| test.status.clone()),
+            journal: features.records.newest(),
         }
     }
 
     /// What a person does next; where a show was left in its midst, also how it goes on from there.
-    pub(super) fn next(&self) -> String {
-        let next = self.mirror.next;
-        match self.cued.as_ref().and_then(|cued| cued.left_at) {
+    fn next(&self) -> String {
+        let next = self.hall.mirror.next;
+        match self.hall.cued.as_ref().and_then(|cued| cued.left_at) {
             Some(film) if next == Next::Go => format!("{next}; or go on from {film}, where it was left"),
             Some(film) if next == Next::Arm => format!("{next}; it can go on from {film}, where it was left"),
             _ => next.to_string(),
         }
     }
 
-    /// Why the hall is in its state, with the name of whom that is about.
-    pub(super) fn cause(&self) -> String {
-        let cause = self.mirror.cause;
-        let config = &self.runtime.config;
-        match cause.whose() {
-            Some(Whose::Controller(index)) => match config.controllers.get(index) {
-                Some(controller) => format!("{}: {cause}", controller.name),
-                None => cause.to_string(),
-            },
-            Some(Whose::Group(index)) => {
-                format!("{}: {cause}", crate::health::Groups::of(&config.controllers).name(index))
-            }
-            None => cause.to_string(),
-        }
-    }
-
-    /// What could not be planned, with the name of whose move that is.
-    pub(super) fn name_unplanned(&self, what: Unplanned) -> String {
-        match what {
-            Unplanned::Seek => what.to_string(),
-            Unplanned::Lane(lane) => format!("{}: {what}", self.runtime.config.controllers[lane].name),
-        }
-    }
-
-    fn controllers(&self, table: &[Row], now: MonoTime) -> Vec<ControllerStatus> {
-        let config = &self.runtime.config;
+    fn controllers(&self, table: &[Row]) -> Vec<ControllerStatus> {
+        let config = &self.hall.config;
         let present = config.controllers.iter().enumerate();
         let mut all: Vec<_> =
-            present.map(|(index, one)| self.controller(index, one, table.get(index), now)).collect();
+            present.map(|(index, one)| self.controller(index, one, table.get(index))).collect();
         for (index, one) in config.absent.iter().enumerate() {
             all.insert(one.after + index, absent(&one.controller));
         }
         all
     }
 
-    fn controller(
-        &self,
-        index: usize,
-        controller: &Controller,
-        row: Option<&Row>,
-        now: MonoTime,
-    ) -> ControllerStatus {
+    fn controller(&self, index: usize, controller: &Controller, row: Option<&Row>) -> ControllerStatus {
+        let Self { hall, features, .. } = *self;
+        let now = hall.now;
         let counts = row.map(|row| row.counts).unwrap_or_default();
         let state = row.map(|row| row.state).unwrap_or_default();
         let ack = row.and_then(|row| row.ack_ns);
         let why = row.map_or_else(|| "not asked yet".to_owned(), |row| row.why.to_string());
         ControllerStatus {
-            enabled: self.settings.is_on(index),
+            enabled: hall.settings.is_on(index),
             health: row.map_or(Health::Unknown, |row| row.standing.into()),
-            why: match self.settings.out.get(self.settings.group(index)) {
+            why: match hall.settings.out.get(hall.settings.group(index)) {
                 Some(out) => format!("{}; {why}", out.words(&Zoned::now())),
                 None => why,
             },
             heard_s: state.heard_at.map(|at| now.since(at).as_secs_f64()),
-            ack_rate: self.rates.of(index),
+            ack_rate: features.figures.rates.of(index),
             ack_p50_us: ack.map(|ack| us(ack.p50)),
             ack_p99_us: ack.map(|ack| us(ack.p99)),
             frames: (&counts).into(),
             send_failed: counts.send_failed,
-            clamps: self.runtime.live.clamps(index),
+            clamps: hall.live.clamps(index),
             homed: row.and_then(|row| row.homed),
             emergency_stop: state.emergency_stop(),
             error: state.error.map(|heard| heard.value),

@@ -5,29 +5,40 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::thread::{self, JoinHandle};
+use std::thread::{self, JoinHandle, Thread};
 use std::time::Duration;
 
 use jiff::Zoned;
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 use tempfile::TempDir;
-use tokio::runtime;
+use tokio::runtime::Builder;
 
+use super::act::{Act, Feature, SupervisorEvent};
+use super::hall::HallContext;
+use super::hall_settings::HallSettings;
+use super::show::ProvedShow;
 use super::{Carryover, ServiceLog, Signals, Supervisor, SupervisorPorts};
 use crate::app::runtime::RuntimeHandle;
 use crate::config::{self, Config};
-use crate::control::{Command, Handle, Inbox, Problem, Role, Status, StatusSource, Surface, Who, handle};
+use crate::control::{
+    Command, Desired, Handle, Inbox, Problem, Role, Status, StatusSource, Surface, Who, handle,
+};
+use crate::cue::{self, Source};
 use crate::engine::Mix;
+use crate::health::{HealthState, Why};
 use crate::journal::{Journal, Limits};
 use crate::library::{self, Library};
 use crate::log::Log;
 use crate::net::Ports;
-use crate::rt::{Command as TickCommand, Desk, Live, News, line};
+use crate::observe::ControllerState;
+use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Row, Ticket, line};
 use crate::settings::SettingsFile;
-use crate::state::{Event, Finding, Machine, Readiness, State};
+use crate::state::{Event, Finding, Machine, State};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime::{Policy, RealTime};
 use crate::time::{Clock as _, MonoTime};
+use crate::timeline::Timeline;
+use crate::tracker::Counts;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -56,8 +67,10 @@ struct Ticks {
     rounds: Arc<AtomicU64>,
     desk: Arc<Desk>,
     commands: Consumer<TickCommand>,
-    news: Producer<News>,
+    taken: Ticket,
+    news: NewsOut,
     told: Option<News>,
+    supervisor: Thread,
 }
 
 impl Ticks {
@@ -78,6 +91,8 @@ impl Ticks {
         machine.tick(now);
         self.tell(&machine);
         while let Ok(command) = self.commands.pop() {
+            let ticket = Some(self.taken);
+            self.taken += 1;
             let answer = match command {
                 TickCommand::Request(request) => machine.request(request, now),
                 TickCommand::Seek(_) => machine.request(crate::state::Transition::Seek, now),
@@ -86,21 +101,22 @@ impl Ticks {
                     Ok(())
                 }
                 TickCommand::Load(_) if machine.may_send_motion() => {
-                    self.news.push(News::NotLoaded(machine.state())).unwrap();
+                    self.news.push((ticket, News::NotLoaded(machine.state()))).unwrap();
                     continue;
                 }
                 TickCommand::Load(_) => Ok(()),
             };
             self.tell(&machine);
-            self.news.push(answer.map_or_else(News::Refused, |()| News::Taken)).unwrap();
+            self.news.push((ticket, answer.map_or_else(News::Refused, |()| News::Taken))).unwrap();
         }
+        self.supervisor.unpark();
     }
 
     fn tell(&mut self, machine: &Machine) {
         let (state, cause, next, at) = (machine.state(), machine.cause(), machine.next(), machine.since());
         let news = News::Entered { state, cause, next, at };
         if self.told.replace(news) != Some(news) {
-            self.news.push(news).unwrap();
+            self.news.push((None, news)).unwrap();
         }
     }
 }
@@ -128,6 +144,67 @@ pub(super) fn config(folder: &Path) -> Config {
     config::load(&path).unwrap()
 }
 
+/// The hall as features see it, in that state, with a cue of that name loaded; nobody leads it.
+pub(super) fn hall(state: State, cue: &str) -> HallContext {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Arc::new(config(folder.path()));
+    let (runtime, ..) = runtime(&config);
+    let settings = HallSettings::new(&config);
+    let mut hall = HallContext::new(&runtime, settings, MonoTime::from_nanos(1_000_000_000));
+    hall.mirror.state = state;
+    hall.cued = Some(proved(cue, &config));
+    hall
+}
+
+/// A cue of four seconds that was proved.
+pub(super) fn proved(id: &str, config: &Config) -> ProvedShow {
+    let cue = cue::read(Path::new(id), RIDE.as_bytes(), &Source::Native).unwrap();
+    ProvedShow::prove(id.to_owned(), config, Timeline::new(cue), String::new()).unwrap()
+}
+
+/// A controller that is well, of which that was told then.
+pub(super) fn row(at: MonoTime) -> Row {
+    Row {
+        counts: Counts::default(),
+        ack_ns: None,
+        standing: HealthState::Ok,
+        why: Why::Acked,
+        state: ControllerState::default(),
+        homed: Some(true),
+        at,
+    }
+}
+
+/// What a feature has done for that.
+pub(super) fn told(feature: &mut dyn Feature, event: &SupervisorEvent<'_>, hall: &HallContext) -> Vec<Act> {
+    let mut acts = Vec::new();
+    feature.on(event, hall, &mut acts);
+    acts
+}
+
+/// Somebody of that surface wants that.
+pub(super) fn desired(surface: Surface, ask: Command) -> Desired {
+    Desired { ask, who: Who { role: Role::Engineer, surface, name: "anna".to_owned() } }
+}
+
+/// The ways to a hall of two lanes, and what is at their ends.
+fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsOut) {
+    let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
+    let (commands, commands_end) = RingBuffer::new(64);
+    let (news, news_end) = rt::news(256);
+    let runtime = RuntimeHandle {
+        config: Arc::clone(config),
+        desk,
+        live: Arc::new(Live::new(2)),
+        leave: Arc::default(),
+        commands,
+        news: news_end,
+        orders: RingBuffer::new(16).0,
+        granted: RealTime { policy: Policy::Other, priority: 0, memory_locked: false, refusals: vec![] },
+    };
+    (runtime, commands_end, news)
+}
+
 impl Rig {
     /// One of a hall that is parked and ready to be armed, with a cue loaded.
     pub(super) fn parked() -> Self {
@@ -137,9 +214,10 @@ impl Rig {
         }
         rig.tell(Event::Identified(Finding { homed: true, at_park: true, crashed: false }));
         rig.ask(Command::Load { cue: "one".to_owned() }).unwrap();
-        rig.supervisor.readiness = Some(Readiness::NotPreflighted);
-        rig.supervisor.preflighted = Some(super::ready::Preflighted::passing(2));
-        rig.wait_until(|supervisor| supervisor.readiness == Some(Readiness::Ready));
+        rig.supervisor.features.readiness.preflighted = Some(super::preflighted::Preflighted::passing(2));
+        rig.supervisor.procedures.add(Vec::new());
+        rig.settle();
+        assert!(rig.supervisor.features.readiness.is_told_ready());
         assert_eq!(rig.state(), State::Parked);
         rig
     }
@@ -169,22 +247,11 @@ impl Rig {
         let folder = tempfile::tempdir().unwrap();
         let carryover = ready(folder.path());
         let config = Arc::new(config(folder.path()));
-        let desk = Arc::new(Desk::new([Mix::FULL; 2].into_iter()));
-        let (commands, commands_end) = RingBuffer::new(64);
-        let (news, news_end) = RingBuffer::new(256);
+        let (runtime, commands_end, news) = runtime(&config);
+        let desk = Arc::clone(&runtime.desk);
         let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
         let (sender, _) = Ports::open(config.show.bind, &peers).unwrap().split();
         let (line, _) = line(sender, 2);
-        let runtime = RuntimeHandle {
-            config: Arc::clone(&config),
-            desk: Arc::clone(&desk),
-            live: Arc::new(Live::new(2)),
-            leave: Arc::default(),
-            commands,
-            news: news_end,
-            orders: RingBuffer::new(16).0,
-            granted: RealTime { policy: Policy::Other, priority: 0, memory_locked: false, refusals: vec![] },
-        };
         let library = library::Hall::new(&folder.path().join("hall.toml"), &config.store);
         let library = Library::open(&config.show.library, library).unwrap();
         let limits = Limits { max_size: 1 << 20, max_total: 1 << 20, max_age_days: 1 };
@@ -203,7 +270,7 @@ impl Rig {
         while self.double.rounds.load(Ordering::Acquire) < rounds + 2 {
             thread::yield_now();
         }
-        self.supervisor.look_after();
+        self.do_all();
     }
 
     /// Asks the supervisor something as a surface does, and waits for the answer.
@@ -225,14 +292,15 @@ impl Rig {
     }
 
     fn post_as(&self, surface: Surface, ask: Command) -> JoinHandle<Result<Arc<Status>, Problem>> {
-        let who = Who { role: Role::Engineer, surface, name: "anna".to_owned() };
+        let Desired { ask, who } = desired(surface, ask);
         let posted = self.handle.post(who, ask).unwrap();
-        let runtime = runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let runtime = Builder::new_current_thread().enable_time().build().unwrap();
         thread::spawn(move || runtime.block_on(posted.answer()))
     }
 
-    /// Has the supervisor hear what was asked, and look after nothing else.
+    /// Has the supervisor hear what was asked, once it has done what it was about, and look after nothing else.
     pub(super) fn hear(&mut self) {
+        self.do_begun();
         let asked = self.supervisor.ports.inbox.next(PATIENCE).expect("something was asked");
         self.supervisor.on_asked(asked);
     }
@@ -243,7 +311,7 @@ impl Rig {
         let until = Monotonic.now() + PATIENCE;
         while !is_so(&self.supervisor) {
             assert!(Monotonic.now() < until, "it is {}: {:?}", self.state(), self.supervisor.notes);
-            self.supervisor.look_after();
+            self.supervisor.turn();
             thread::yield_now();
         }
     }
@@ -251,8 +319,39 @@ impl Rig {
     /// Has the supervisor look after all until it is free, and what came of that is done.
     #[track_caller]
     pub(super) fn settle(&mut self) {
-        self.wait_until(|supervisor| supervisor.job.is_none());
-        self.supervisor.look_after();
+        self.wait_until(|supervisor| supervisor.hall.job.is_none());
+        self.do_all();
+        self.wait_until(|supervisor| supervisor.hall.job.is_none() && supervisor.procedures.is_empty());
+    }
+
+    /// Has the supervisor do all that there is to do now.
+    fn do_all(&mut self) {
+        self.supervisor.turn();
+        self.wait_until(|supervisor| supervisor.procedures.is_empty());
+    }
+
+    /// Has the supervisor do that.
+    pub(super) fn does(&mut self, acts: Vec<Act>) {
+        self.supervisor.procedures.add(acts);
+        self.do_begun();
+    }
+
+    /// Has the supervisor do all that it is about, and look after nothing else.
+    pub(super) fn do_begun(&mut self) {
+        let until = Monotonic.now() + PATIENCE;
+        while !self.supervisor.procedures.is_empty() {
+            assert!(Monotonic.now() < until, "it is {}", self.state());
+            self.supervisor.take_news();
+            self.supervisor.go_on();
+            thread::yield_now();
+        }
+    }
+
+    /// Has the tick thread wait while that is done.
+    pub(super) fn while_it_waits<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        let machine = Arc::clone(&self.double.machine);
+        let _held = machine.lock().unwrap();
+        act(self)
     }
 
     /// Has all of that happen at the state machine at once.
@@ -263,7 +362,7 @@ impl Rig {
     /// Has the supervisor hear of a state, and look after nothing else.
     pub(super) fn hear_of(&mut self, state: State) {
         let until = Monotonic.now() + PATIENCE;
-        while self.supervisor.mirror.state != state {
+        while self.supervisor.hall.mirror.state != state {
             assert!(Monotonic.now() < until, "it is {}", self.state());
             self.supervisor.take_news();
             thread::yield_now();
@@ -277,7 +376,7 @@ impl Rig {
 }
 
 impl Double {
-    fn start(desk: Arc<Desk>, commands: Consumer<TickCommand>, news: Producer<News>) -> Self {
+    fn start(desk: Arc<Desk>, commands: Consumer<TickCommand>, news: NewsOut) -> Self {
         let machine = Arc::new(Mutex::new(Machine::new(Monotonic.now())));
         let (ports, rounds) = (Arc::<AtomicBool>::default(), Arc::<AtomicU64>::default());
         let ticks = Ticks {
@@ -286,8 +385,10 @@ impl Double {
             rounds: Arc::clone(&rounds),
             desk,
             commands,
+            taken: 0,
             news,
             told: None,
+            supervisor: thread::current(),
         };
         let thread = Some(thread::spawn(|| ticks.run()));
         Self { machine, ports, rounds, thread }

@@ -2,36 +2,22 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::channel;
+use std::thread::JoinHandle;
 
-use super::job::JobResult;
+use super::homing::Homing;
+use super::job::{Job, JobResult};
 use super::testing::Rig;
 use super::*;
-use crate::control::{Code, Command, LevelsChange, Role, Surface, Who};
+use crate::control::{Code, Command, LevelsChange};
 use crate::engine::Unplanned;
 use crate::rt::News;
-use crate::settings::Out;
 use crate::state::{Event, Next, PlayMode, Trouble};
 use crate::time::ShowTime;
 
 const ARM: Command = Command::Arm { seats_empty: false };
 
-fn anna() -> Who {
-    Who { role: Role::Engineer, surface: Surface::Socket, name: "anna".to_owned() }
-}
-
 fn out(name: &str) -> Command {
     Command::Disable { name: name.to_owned(), why: None }
-}
-
-#[test]
-fn an_answer_that_came_too_late_is_not_taken_for_that_of_the_next_command() {
-    let mut known = StateMirror::new(MonoTime::default());
-    known.expect();
-    known.expect();
-    known.hear(News::NotLoaded(State::Paused));
-    assert!(known.take_answer().is_none());
-    known.hear(News::Taken);
-    assert_eq!(known.take_answer(), Some(Ok(())));
 }
 
 #[test]
@@ -40,7 +26,7 @@ fn a_hall_that_was_latched_is_so_with_another_configuration_too() {
     before.ask(Command::Stop).unwrap();
     let carryover = before.supervisor.remember();
     let mut rig = Rig::starting(carryover);
-    rig.wait_until(|supervisor| supervisor.mirror.state == State::Stopped);
+    rig.wait_until(|supervisor| supervisor.hall.mirror.state == State::Stopped);
     assert!(
         rig.supervisor.notes.iter().any(|note| note.contains("stopped by the operator")),
         "{:?}",
@@ -55,7 +41,7 @@ fn a_seat_that_is_out_is_out_from_the_first_tick_of_the_next_hall_on() {
     let mut before = Rig::parked();
     before.ask(out("B1")).unwrap();
     let rig = Rig::starting(before.supervisor.remember());
-    assert_eq!([0, 1].map(|lane| rig.supervisor.runtime.desk.mix(lane).on), [true, false]);
+    assert_eq!([0, 1].map(|lane| rig.supervisor.hall.desk.mix(lane).on), [true, false]);
 }
 
 /// What a supervisor that ends here leaves for one that starts after it, as its file does.
@@ -77,7 +63,7 @@ fn a_seat_that_was_taken_out_is_out_after_a_restart_and_whoever_arms_first_is_to
     before.ask(Command::Levels(LevelsChange { motion: Some(0.6), ..LevelsChange::default() })).unwrap();
     before.ask(Command::Trim(-40)).unwrap();
     let mut rig = Rig::starting(after_a_restart(before));
-    let desk = &rig.supervisor.runtime.desk;
+    let desk = &rig.supervisor.hall.desk;
     assert_eq!(([0, 1].map(|lane| desk.mix(lane).on), desk.trim_ms()), ([true, false], -40));
     assert!((desk.mix(0).motion - 0.6).abs() < 1e-6);
     let status = rig.supervisor.status();
@@ -101,7 +87,7 @@ fn a_seat_that_is_taken_out_again_stays_out_since_then_and_a_reason_can_be_added
     assert_eq!((&now.at, now.why.as_deref()), (&first.at, Some("broken leg")));
     let long = Command::Disable { name: "A1".to_owned(), why: Some("x".repeat(201)) };
     assert_eq!(rig.ask(long).unwrap_err().code, Code::Value);
-    assert!(rig.supervisor.settings.is_on(0));
+    assert!(rig.supervisor.hall.settings.is_on(0));
 }
 
 #[test]
@@ -118,24 +104,24 @@ fn what_was_loaded_is_loaded_after_a_restart_and_nothing_starts() {
     // Also where the program ends before it is loaded.
     assert_eq!(rig.supervisor.settings().show.unwrap().cue, "two");
     rig.settle();
-    assert_eq!(rig.supervisor.cued.as_ref().unwrap().id, "two");
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().id, "two");
     assert_eq!(rig.state(), State::Boot);
 }
 
 #[test]
 fn what_was_loaded_before_is_taken_up_once_the_seats_rest() {
     let mut rig = Rig::playing();
-    let cued = rig.supervisor.cued.take().unwrap();
-    rig.supervisor.take_up_again((None, Ok(Box::new(cued)))).unwrap();
-    assert!(rig.supervisor.cued.is_none(), "the seats move");
+    let cued = rig.supervisor.hall.cued.take().unwrap();
+    rig.does(vec![Act::Take(JobResult::Again((None, Ok(Box::new(cued)))))]);
+    assert!(rig.supervisor.hall.cued.is_none(), "the seats move");
     rig.tell(Event::CueEnded);
     rig.tell(Event::Parked);
-    assert_eq!(rig.supervisor.cued.as_ref().unwrap().id, "one");
-    let mut other = rig.supervisor.cued.take().unwrap();
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().id, "one");
+    let mut other = rig.supervisor.hall.cued.take().unwrap();
     rig.ask(Command::Load { cue: "two".to_owned() }).unwrap();
     other.id = "three".to_owned();
-    rig.supervisor.take_up_again((None, Ok(Box::new(other)))).unwrap();
-    assert_eq!(rig.supervisor.cued.as_ref().unwrap().id, "two", "a person has loaded that since");
+    rig.does(vec![Act::Take(JobResult::Again((None, Ok(Box::new(other)))))]);
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().id, "two", "a person has loaded that since");
 }
 
 #[test]
@@ -143,7 +129,7 @@ fn a_cue_that_is_gone_after_a_restart_is_named_and_the_hall_goes_on_without() {
     let carryover = after_a_restart(Rig::parked());
     let mut rig = Rig::starting(carryover);
     rig.settle();
-    assert!(rig.supervisor.cued.is_none() && rig.supervisor.settings().show.is_none());
+    assert!(rig.supervisor.hall.cued.is_none() && rig.supervisor.settings().show.is_none());
     assert!(rig.supervisor.notes.iter().any(|note| note.contains("one")), "{:?}", rig.supervisor.notes);
 }
 
@@ -151,7 +137,7 @@ fn a_cue_that_is_gone_after_a_restart_is_named_and_the_hall_goes_on_without() {
 fn stopped_in_its_midst() -> Rig {
     let mut rig = Rig::playing();
     let show = ShowTime::from_millis(2_500);
-    rig.supervisor.runtime.live.on_show(show);
+    rig.supervisor.hall.live.on_show(show);
     rig.ask(Command::Stop).unwrap();
     rig.tell(Event::AtRest);
     rig.ask(Command::Clear).unwrap();
@@ -175,12 +161,12 @@ fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before(
     assert_eq!(rig.ask(Command::GoFrom(ShowTime::from_millis(4_000))).unwrap_err().code, Code::Value);
     rig.ask(place).unwrap();
     assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
-    let cued = rig.supervisor.cued.as_ref().unwrap();
+    let cued = rig.supervisor.hall.cued.as_ref().unwrap();
     assert_eq!((cued.start, cued.left_at), (ShowTime::from_millis(2_500), None));
     rig.tell(Event::Joined);
     rig.tell(Event::CueEnded);
     rig.tell(Event::Parked);
-    let cued = rig.supervisor.cued.as_ref().unwrap();
+    let cued = rig.supervisor.hall.cued.as_ref().unwrap();
     assert_eq!((cued.start, cued.left_at), (ShowTime::ZERO, None), "the next one is whole");
 }
 
@@ -188,12 +174,12 @@ fn a_show_that_was_stopped_goes_on_from_there_once_a_person_asks_and_not_before(
 fn a_show_that_is_stopped_on_its_way_to_park_after_its_end_is_over() {
     let mut rig = Rig::playing();
     let show = ShowTime::from_millis(3_900);
-    rig.supervisor.runtime.live.on_show(show);
+    rig.supervisor.hall.live.on_show(show);
     rig.tell(Event::CueEnded);
     rig.ask(Command::Stop).unwrap();
     rig.tell(Event::AtRest);
-    rig.wait_until(|supervisor| supervisor.mirror.state == State::Stopped);
-    assert_eq!(rig.supervisor.cued.as_ref().unwrap().left_at, None);
+    rig.wait_until(|supervisor| supervisor.hall.mirror.state == State::Stopped);
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().left_at, None);
 }
 
 #[test]
@@ -201,7 +187,7 @@ fn a_plain_go_after_a_stop_begins_at_the_beginning() {
     let mut rig = stopped_in_its_midst();
     rig.ask(ARM).unwrap();
     rig.ask(Command::Go).unwrap();
-    assert_eq!(rig.supervisor.cued.as_ref().unwrap().start, ShowTime::ZERO);
+    assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().start, ShowTime::ZERO);
     assert_eq!(rig.supervisor.status().show.unwrap().resume_s, None);
 }
 
@@ -216,7 +202,7 @@ fn where_a_show_was_left_lasts_over_a_restart_unless_the_cue_is_another_by_then(
             after_a_restart(before)
         });
         rig.settle();
-        assert_eq!(rig.supervisor.cued.as_ref().unwrap().left_at, left_at, "{change}");
+        assert_eq!(rig.supervisor.hall.cued.as_ref().unwrap().left_at, left_at, "{change}");
     }
 }
 
@@ -225,7 +211,7 @@ fn where_a_crash_has_cut_a_show_is_known_to_five_seconds() {
     let rig = Rig::playing();
     for (film_ms, kept) in [(4_900, None), (12_340, Some(10_000))] {
         let show = ShowTime::from_millis(film_ms);
-        rig.supervisor.runtime.live.on_show(show);
+        rig.supervisor.hall.live.on_show(show);
         assert_eq!(rig.supervisor.settings().show.unwrap().film_ms, kept);
     }
 }
@@ -234,23 +220,20 @@ fn where_a_crash_has_cut_a_show_is_known_to_five_seconds() {
 fn a_configuration_is_read_anew_once_nobody_speaks_with_the_controllers_any_more() {
     let mut rig = Rig::parked();
     let (go_on, held) = channel::<()>();
-    rig.supervisor.send("preflight", None, move || {
-        let _ = held.recv();
-        JobResult::Listed(Err(Problem::new(Code::Check, "no list", "none")))
-    });
+    rig.does(vec![Act::Start(Job::Held(held))]);
     assert_eq!(rig.ask(Command::Reload).unwrap_err().code, Code::Busy);
     rig.supervisor.ports.signals.reload.store(true, Ordering::Release);
-    rig.supervisor.look_after();
-    assert!(!rig.supervisor.runtime.leave.load(Ordering::Acquire), "the port is in use");
+    rig.supervisor.turn();
+    assert!(!rig.supervisor.hall.leave.load(Ordering::Acquire), "the port is in use");
     drop(go_on);
-    rig.wait_until(|supervisor| supervisor.runtime.leave.load(Ordering::Acquire));
+    rig.wait_until(|supervisor| supervisor.hall.leave.load(Ordering::Acquire));
     assert!(rig.supervisor.reload.is_some());
 }
 
 #[test]
 fn nothing_long_begins_in_a_hall_that_closes() {
     let mut rig = Rig::parked();
-    rig.supervisor.runtime.leave.store(true, Ordering::Release);
+    rig.supervisor.hall.leave.store(true, Ordering::Release);
     for ask in [Command::Preflight, Command::Home, Command::Load { cue: "two".to_owned() }] {
         assert_eq!(rig.ask(ask).unwrap_err().code, Code::Busy);
     }
@@ -261,7 +244,7 @@ fn a_clear_that_was_asked_before_a_stop_clears_it_not() {
     let mut rig = Rig::parked();
     rig.tell(Event::Trouble(Trouble::Limiter));
     let clear = rig.post(Command::Clear);
-    rig.supervisor.runtime.desk.stop();
+    rig.supervisor.hall.desk.stop();
     rig.hear_of(State::Stopped);
     rig.hear();
     assert_eq!(clear.join().unwrap().unwrap_err().code, Code::Late);
@@ -284,34 +267,30 @@ fn arming_homes_no_seat_unless_somebody_says_that_they_are_empty() {
 fn what_cannot_be_set_is_not_set_on_the_desk_either() {
     let mut rig = Rig::playing();
     // As where the supervisor has not heard yet that the seats move.
-    rig.supervisor.mirror.state = State::Parked;
-    let problem = rig.supervisor.set(|settings| {
-        settings.enable("B1", Some(Out::now(&anna(), None)));
-        Ok(())
-    });
-    assert_eq!(problem.unwrap_err().code, Code::State);
-    assert!(rig.supervisor.settings.is_on(1) && rig.supervisor.runtime.desk.mix(1).on);
+    rig.supervisor.hall.mirror.state = State::Parked;
+    assert_eq!(rig.ask(out("B1")).unwrap_err().code, Code::State);
+    assert!(rig.supervisor.hall.settings.is_on(1) && rig.supervisor.hall.desk.mix(1).on);
 }
 
 #[test]
 fn a_seat_whose_preflight_has_not_passed_does_not_join_a_show() {
     let mut rig = Rig::parked();
     rig.ask(out("B1")).unwrap();
-    rig.supervisor.preflighted = Some(ready::Preflighted::failing_at(1, 2));
+    rig.supervisor.features.readiness.preflighted = Some(preflighted::Preflighted::failing_at(1, 2));
     rig.ask(ARM).unwrap();
     rig.ask(Command::Go).unwrap();
     assert_eq!(rig.ask(Command::Enable("B1".to_owned())).unwrap_err().code, Code::State);
-    assert!(!rig.supervisor.runtime.desk.mix(1).on);
+    assert!(!rig.supervisor.hall.desk.mix(1).on);
     rig.ask(out("A1")).unwrap();
     rig.ask(Command::Enable("A1".to_owned())).unwrap();
-    assert!(rig.supervisor.runtime.desk.mix(0).on);
+    assert!(rig.supervisor.hall.desk.mix(0).on);
 }
 
 #[test]
 fn an_armed_hall_is_not_asked_for_registers() {
     let mut rig = Rig::armed();
     assert_eq!(rig.ask(Command::Preflight).unwrap_err().code, Code::State);
-    assert_eq!((rig.state(), rig.supervisor.mirror.next), (State::Armed, Next::Go));
+    assert_eq!((rig.state(), rig.supervisor.hall.mirror.next), (State::Armed, Next::Go));
 }
 
 #[test]
@@ -324,7 +303,7 @@ fn a_park_between_shows_leaves_the_next_show_where_it_is_to_begin() {
     assert_eq!(rig.state(), State::Parking);
     rig.tell(Event::Parked);
     assert_eq!(
-        (rig.state(), rig.supervisor.cued.as_ref().map(|cued| cued.start)),
+        (rig.state(), rig.supervisor.hall.cued.as_ref().map(|cued| cued.start)),
         (State::Parked, Some(start))
     );
 }
@@ -351,9 +330,13 @@ fn a_test_that_is_made_while_the_hall_is_disarmed_is_forgotten() {
         rig.wait_until(|_| test.is_finished() && other.is_finished());
         let problem = test.join().unwrap().unwrap_err();
         assert_eq!(problem.code, Code::State, "{problem:?}");
-        let cued = rig.supervisor.cued.as_ref().map(|cued| cued.id.clone());
-        assert_eq!((cued.as_deref(), rig.supervisor.seat_test.is_none()), (Some("one"), true), "{held_by:?}");
-        assert!(rig.supervisor.runtime.desk.mix(1).on, "the other row is as it was");
+        let cued = rig.supervisor.hall.cued.as_ref().map(|cued| cued.id.clone());
+        assert_eq!(
+            (cued.as_deref(), rig.supervisor.features.seats.test.is_none()),
+            (Some("one"), true),
+            "{held_by:?}"
+        );
+        assert!(rig.supervisor.hall.desk.mix(1).on, "the other row is as it was");
     }
 }
 
@@ -362,12 +345,47 @@ fn a_homing_that_is_stopped_tells_no_further_seat_to_home() {
     let mut rig = Rig::parked();
     rig.post(Command::Home);
     rig.hear();
-    rig.supervisor.take_news();
-    let Some(homing::Homing::UnderWay(called_off)) = &rig.supervisor.homing else { panic!("it homes") };
+    rig.hear_of(State::Homing);
+    let Homing::UnderWay(called_off) = &rig.supervisor.features.homing else { panic!("it homes") };
     let called_off = Arc::clone(called_off);
     assert!(!called_off.load(Ordering::Acquire));
     rig.ask(Command::Stop).unwrap();
     assert!(called_off.load(Ordering::Acquire));
     assert_eq!(rig.state(), State::Stopped);
-    assert!(rig.supervisor.homing.is_none());
+    assert!(matches!(rig.supervisor.features.homing, Homing::Idle));
+}
+
+#[test]
+fn what_is_asked_waits_for_what_was_asked_before_it_and_neither_holds_up_the_status() {
+    let mut rig = Rig::parked();
+    let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
+    let asked = [Command::Trim(40), Command::Levels(half)].map(|ask| rig.post(ask));
+    rig.while_it_waits(|rig| {
+        let given = rig.supervisor.given;
+        rig.supervisor.told = MonoTime::default();
+        for _ in 0..3 {
+            rig.supervisor.turn();
+        }
+        assert_eq!(rig.supervisor.given, given + 1, "the second was given before the first was answered");
+        assert_ne!(rig.supervisor.told, MonoTime::default(), "no status while something is waited for");
+        assert!(!asked[0].is_finished());
+    });
+    rig.wait_until(|_| asked.iter().all(JoinHandle::is_finished));
+    for answer in asked {
+        answer.join().unwrap().unwrap();
+    }
+    let settings = &rig.supervisor.hall.settings;
+    assert_eq!((settings.trim_ms, settings.levels.motion), (40, 0.5), "the second has undone the first");
+}
+
+#[test]
+fn an_entry_that_is_about_to_start_by_itself_does_not_in_a_hall_that_begins_to_close() {
+    let mut rig = Rig::armed();
+    let go = || vec![Act::Go { who: "the playlist".to_owned(), surface: Surface::Schedule }];
+    rig.supervisor.hall.close();
+    rig.does(go());
+    assert_eq!(rig.state(), State::Armed);
+    rig.supervisor.hall.leave.store(false, Ordering::Release);
+    rig.does(go());
+    assert_eq!(rig.state(), State::Playing(PlayMode::Joining));
 }

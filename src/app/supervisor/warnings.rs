@@ -1,14 +1,14 @@
 //! What a person should know, with what to do.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::Supervisor;
+use super::belts;
+use super::status::StatusParts;
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
 use crate::state::{Next, State};
-use crate::sys::clock::Monotonic;
-use crate::time::Clock as _;
 
 /// In a new state all controllers have this long to be looked at before one that was not is worth a word.
 const FIRST_LOOK: Duration = Duration::from_secs(1);
@@ -30,26 +30,32 @@ impl From<HealthState> for Health {
     }
 }
 
-impl Supervisor {
-    /// All of them, gravest first.
-    pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
+impl StatusParts<'_> {
+    /// All of them, gravest first, with what is noted, and what is wrong with the keeping of what is set.
+    pub(super) fn warnings(
+        &self,
+        table: &[Row],
+        notes: &VecDeque<String>,
+        settings_file: Option<String>,
+    ) -> Vec<Warning> {
+        let Self { hall, features, .. } = *self;
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
-        let takes_part = |(lane, row): (usize, &Row)| self.settings.is_on(lane) && row.standing.may_move();
-        warnings.extend(nobody(table, self.mirror.state, takes_part));
+        let takes_part = |(lane, row): (usize, &Row)| hall.settings.is_on(lane) && row.standing.may_move();
+        warnings.extend(nobody(table, hall.mirror.state, takes_part));
         warnings.extend(self.of_strangers());
-        warnings.extend(self.of_belts(table));
+        warnings.extend(belts::warnings(hall, table));
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
-        warnings.extend(self.of_what_lasts());
-        warnings.extend(self.of_the_settings_file());
-        warnings.extend(self.record.trouble().map(|trouble| Warning {
+        warnings.extend(features.lasting.warnings(hall));
+        warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
+        warnings.extend(features.records.trouble().map(|trouble| Warning {
             id: "journal".to_owned(),
             severity: Severity::Warning,
             controller: None,
             text: trouble,
             remedy: String::new(),
         }));
-        warnings.extend(self.notes.iter().rev().map(|note| Warning {
+        warnings.extend(notes.iter().rev().map(|note| Warning {
             id: NOTE.to_owned(),
             severity: Severity::Warning,
             controller: None,
@@ -61,17 +67,18 @@ impl Supervisor {
     }
 
     fn of_controllers(&self, table: &[Row]) -> impl Iterator<Item = Warning> {
-        let controllers = self.runtime.config.controllers.iter().zip(table).enumerate();
-        let has_begun = Monotonic.now().since(self.mirror.since) < FIRST_LOOK;
+        let hall = self.hall;
+        let controllers = hall.config.controllers.iter().zip(table).enumerate();
+        let has_begun = hall.now.since(hall.mirror.since) < FIRST_LOOK;
         let of = |(lane, (controller, row)): (usize, (&crate::config::Controller, &Row))| {
             let severity = match row.standing {
                 HealthState::Rejoining if matches!(row.why, Why::Moved(_)) => Severity::Error,
-                HealthState::Rejoining if self.mirror.next == Next::ParkOrStart => Severity::Warning,
+                HealthState::Rejoining if hall.mirror.next == Next::ParkOrStart => Severity::Warning,
                 // While a show runs it joins by itself.
                 HealthState::Ok | HealthState::Rejoining => return None,
                 HealthState::Lost if has_begun && row.why == Why::NotSeenYet => return None,
                 HealthState::Degraded | HealthState::Unwatched => Severity::Warning,
-                _ if !self.settings.is_on(lane) => Severity::Info,
+                _ if !hall.settings.is_on(lane) => Severity::Info,
                 _ => Severity::Error,
             };
             Some(Warning {
@@ -86,9 +93,9 @@ impl Supervisor {
     }
 
     fn of_strangers(&self) -> impl Iterator<Item = Warning> {
-        let controllers = self.runtime.config.controllers.iter().enumerate();
+        let controllers = self.hall.config.controllers.iter().enumerate();
         controllers.filter_map(|(lane, controller)| {
-            let answers = self.strangers.of(lane)?;
+            let answers = self.features.figures.strangers.of(lane)?;
             Some(Warning {
                 id: "another-master".to_owned(),
                 severity: Severity::Error,
@@ -101,34 +108,13 @@ impl Supervisor {
     }
 
     fn of_the_machine(&self) -> impl Iterator<Item = Warning> {
-        self.runtime.granted.refusals.iter().map(|refusal| {
-            let (text, remedy) = refusal.split_once("; ").unwrap_or((refusal, ""));
-            Warning {
-                id: "not-real-time".to_owned(),
-                severity: Severity::Warning,
-                controller: None,
-                text: text.to_owned(),
-                remedy: remedy.to_owned(),
-            }
-        })
-    }
-
-    fn of_the_settings_file(&self) -> Option<Warning> {
-        let trouble = self.ports.settings_file.trouble()?;
-        let (text, remedy) = trouble.split_once("; ").unwrap_or((&trouble, ""));
-        Some(Warning {
-            id: "settings".to_owned(),
-            severity: Severity::Warning,
-            controller: None,
-            text: text.to_owned(),
-            remedy: remedy.to_owned(),
-        })
+        self.hall.granted.refusals.iter().map(|refusal| in_two("not-real-time", refusal))
     }
 
     fn of_preflight(&self) -> Option<Warning> {
-        let (text, severity) = match &self.preflighted {
+        let (text, severity) = match &self.features.readiness.preflighted {
             None => ("preflight was not run since the program started", Severity::Info),
-            Some(it) if !it.has_passed(|lane| self.settings.is_on(lane)) => {
+            Some(it) if !it.has_passed(|lane| self.hall.settings.is_on(lane)) => {
                 ("preflight failed", Severity::Error)
             }
             Some(_) => return None,
@@ -140,6 +126,18 @@ impl Supervisor {
             text: text.to_owned(),
             remedy: "run preflight".to_owned(),
         })
+    }
+}
+
+/// A warning of a text that ends with what to do.
+fn in_two(id: &str, trouble: &str) -> Warning {
+    let (text, remedy) = trouble.split_once("; ").unwrap_or((trouble, ""));
+    Warning {
+        id: id.to_owned(),
+        severity: Severity::Warning,
+        controller: None,
+        text: text.to_owned(),
+        remedy: remedy.to_owned(),
     }
 }
 

@@ -9,7 +9,7 @@ use std::thread::{self, Builder, JoinHandle};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use rtrb::{Consumer, Producer};
+use rtrb::Producer;
 
 use super::health::HealthMessages;
 use super::keyboard::{self, Leader};
@@ -17,7 +17,7 @@ use super::keys;
 use super::messages::Messages;
 use crate::app::PlayHandle;
 use crate::cli::print;
-use crate::rt::{Command, News, Phase};
+use crate::rt::{Command, News, NewsIn, Phase};
 use crate::state::{Next, State};
 use crate::sys::terminal::Keyboard;
 use crate::time::ShowTime;
@@ -34,7 +34,7 @@ pub(super) struct Progress {
     over: Arc<AtomicBool>,
     teller: Option<JoinHandle<()>>,
     keys: Option<JoinHandle<()>>,
-    news: Sender<Consumer<News>>,
+    news: Sender<NewsIn>,
     commands: Sender<Producer<Command>>,
 }
 
@@ -87,11 +87,11 @@ impl Progress {
 /// Collects what there is to say, and says it.
 struct Teller {
     said: Messages,
-    news_end: Receiver<Consumer<News>>,
+    news_end: Receiver<NewsIn>,
     /// What the keys have to say.
     notes: Receiver<&'static str>,
     /// None until the tick loop runs.
-    news: Option<Consumer<News>>,
+    news: Option<NewsIn>,
     /// For how many looks Ctrl-C has been pressed.
     pressed: u32,
     /// How far the preparation was when it was looked at last.

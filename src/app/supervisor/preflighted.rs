@@ -1,15 +1,10 @@
-//! Preflight of the hall, and whether a show can be armed.
+//! What preflight came to.
 
-use super::Supervisor;
-use super::job::JobResult;
-use crate::app::runtime::{DeviceJob, Finding, run_on_devices};
 use crate::config::Config;
-use crate::control::{Asked, PreflightStatus, Severity, Warning};
+use crate::control::{PreflightStatus, Severity, Warning};
 use crate::device::survey::Survey;
 use crate::net::{Route, route};
 use crate::preflight::{self, Check, Subject, Terms, judge};
-use crate::rt::Command as TickCommand;
-use crate::state::{Event, Readiness};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -25,7 +20,7 @@ pub(super) struct Preflighted {
 
 impl Preflighted {
     /// Judges what controllers told, for whatever cue is played.
-    fn of(config: &Config, surveys: &[Survey]) -> Self {
+    pub(super) fn of(config: &Config, surveys: &[Survey]) -> Self {
         let bind = *config.show.bind.ip();
         let way =
             |address| -> Result<Route, String> { route(bind, address).map_err(|error| error.to_string()) };
@@ -99,47 +94,4 @@ fn told(controller: &str, finding: preflight::Finding) -> Option<Warning> {
 
 fn id(check: Check) -> String {
     check.to_string()
-}
-
-impl Supervisor {
-    /// Has all controllers asked; whoever asked for it is answered once they were judged.
-    pub(super) fn preflight(&mut self, asked: Asked) {
-        // An armed hall may go at any moment, and then frames come between.
-        if let Err(problem) = self.may("preflight").and_then(|()| self.is_free()) {
-            return self.answer(asked, Err(problem));
-        }
-        let (config, line) = (self.runtime.config.clone(), self.line.clone());
-        self.send("preflight", Some(asked), move || {
-            let finding =
-                run_on_devices(&mut line.hold(), &config.controllers, DeviceJob::Survey, &mut |_| {});
-            let surveys = match finding {
-                Finding::Surveyed(surveys) => surveys,
-                Finding::Homed(_) => Vec::new(),
-            };
-            JobResult::Preflighted(Box::new(Preflighted::of(&config, &surveys)))
-        });
-    }
-
-    /// True if nothing fails at the controllers of a group.
-    pub(super) fn is_preflighted(&self, group: &str) -> bool {
-        let controllers = &self.runtime.config.controllers;
-        let of_group = |lane: usize| controllers[lane].group == group;
-        self.preflighted.as_ref().is_some_and(|it| it.has_passed(of_group))
-    }
-
-    /// Tells the tick thread whether a show can be armed, where that has changed.
-    pub(super) fn tell_readiness(&mut self) {
-        let readiness = match (&self.cued, &self.preflighted) {
-            (None, _) => Readiness::NoCue,
-            (Some(_), Some(preflighted)) if preflighted.has_passed(|lane| self.settings.is_on(lane)) => {
-                Readiness::Ready
-            }
-            (Some(_), _) => Readiness::NotPreflighted,
-        };
-        if self.readiness != Some(readiness)
-            && self.command(TickCommand::Event(Event::Readiness(readiness))).is_ok()
-        {
-            self.readiness = Some(readiness);
-        }
-    }
 }

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use super::*;
-use crate::app::supervisor::testing::Rig;
+use crate::app::supervisor::testing::{Rig, hall, told};
 use crate::control::LevelsChange;
+use crate::playlist::{Playlist, Schedule};
 use crate::state::{Event, PlayMode};
 
 const JOINING: State = State::Playing(PlayMode::Joining);
@@ -20,34 +21,36 @@ fn list() -> List {
 /// A hall whose first entry plays.
 fn playing() -> Rig {
     let mut rig = Rig::playing();
-    rig.supervisor.list = Some(list());
+    rig.supervisor.features.onward.list = Some(list());
     rig
 }
 
 /// A hall that is armed, and loads the second entry, whose time has come.
 fn due() -> Rig {
     let mut rig = Rig::armed();
-    rig.supervisor.list = Some(list());
-    rig.supervisor.fetch_entry(1, Some(Start::Time), None);
+    rig.supervisor.features.onward.list = Some(list());
+    let acts = rig.supervisor.features.onward.fetch(1, Some(Start::Time));
+    rig.does(acts);
     rig
 }
 
 fn cue(rig: &Rig) -> Option<&str> {
-    rig.supervisor.cued.as_ref().map(|cued| cued.id.as_str())
+    rig.supervisor.hall.cued.as_ref().map(|cued| cued.id.as_str())
 }
 
 /// The seats have parked, and the next cue is on its way.
 fn end_show(rig: &mut Rig) {
     rig.happens(|machine, now| machine.event(Event::Parked, now));
     rig.hear_of(State::Parked);
-    rig.supervisor.end_show();
-    assert!(rig.supervisor.job.is_some());
+    rig.do_begun();
+    assert!(rig.supervisor.hall.job.is_some());
 }
 
 /// Has something asked, with nothing looked after in between.
 fn ask_in_between(rig: &mut Rig, ask: Command) {
     drop(rig.post(ask));
     rig.hear();
+    rig.do_begun();
 }
 
 #[test]
@@ -62,11 +65,11 @@ fn an_entry_goes_on_to_the_next_once_its_cue_came_to_its_end() {
 #[test]
 fn a_cue_that_a_person_loads_beside_the_playlist_goes_on_to_nothing() {
     let mut rig = Rig::parked();
-    rig.supervisor.list = Some(list());
+    rig.supervisor.features.onward.list = Some(list());
     rig.ask(Command::Load { cue: "three".to_owned() }).unwrap();
     rig.ask(Command::Arm { seats_empty: false }).unwrap();
     rig.ask(Command::Go).unwrap();
-    assert_eq!(rig.supervisor.place(), None);
+    assert_eq!(rig.supervisor.features.onward.place(&rig.supervisor.hall), None);
     rig.tell(Event::CueEnded);
     rig.tell(Event::Parked);
     rig.settle();
@@ -102,12 +105,25 @@ fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() 
 }
 
 #[test]
+fn the_next_cue_that_comes_while_all_seats_are_read_once_more_is_loaded_after_that() {
+    let mut rig = playing();
+    rig.tell(Event::CueEnded);
+    end_show(&mut rig);
+    ask_in_between(&mut rig, Command::Park);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parking, Some("one")));
+    rig.tell(Event::Parked);
+    rig.settle();
+    assert_eq!((rig.state(), cue(&rig)), (State::Parked, Some("two")));
+}
+
+#[test]
 fn nothing_goes_on_after_a_stop_that_was_cleared_before_the_next_cue_was_loaded() {
     let mut rig = playing();
     rig.tell(Event::CueEnded);
     end_show(&mut rig);
     // By the stop socket, of which no word may come.
-    rig.supervisor.runtime.desk.stop();
+    rig.supervisor.hall.desk.stop();
     rig.hear_of(State::Stopped);
     rig.happens(|machine, now| {
         machine.request(Transition::Clear, now).unwrap();
@@ -178,7 +194,7 @@ fn a_show_that_a_person_lets_go_stays_the_one_that_is_loaded() {
     ask_in_between(&mut rig, Command::Go);
     rig.settle();
     assert_eq!((rig.state(), cue(&rig)), (JOINING, Some("one")));
-    assert_eq!(rig.supervisor.list.as_ref().unwrap().current, 0);
+    assert_eq!(rig.supervisor.features.onward.list.as_ref().unwrap().current, 0);
     let half = LevelsChange { motion: Some(0.5), ..LevelsChange::default() };
     rig.ask(Command::Levels(half)).unwrap();
 }
@@ -190,4 +206,37 @@ fn a_playlist_that_was_loaded_before_is_at_the_entry_where_it_was_or_at_that_of_
     assert_eq!(list.nearest(0, "three"), 2, "somebody has changed it meanwhile");
     assert_eq!(list.nearest(0, "beside"), 0, "a cue that was loaded beside it");
     assert_eq!(list.nearest(7, "beside"), 2);
+}
+
+/// What is done for a wall clock that passes the time of the second entry in that state.
+fn at_its_time(state: State) -> Vec<Act> {
+    let text = "title = \"Day\"\ntimezone = \"UTC\"\n[[entry]]\ncue = \"one\"\n[[entry]]\ncue = \"two\"\nat = \"19:00\"\n";
+    let playlist = Playlist::parse(Path::new("day.toml"), text).unwrap();
+    let list = List { playlist, cues: vec![(None, 4.0); 2], current: 1, ..list() };
+    let mut onward = Onward { list: Some(list), ..Onward::default() };
+    let hall = hall(state, "two");
+    let wall = |text: &str| text.parse::<Zoned>().unwrap();
+    let before = wall("2026-11-22T18:59:59+00:00[UTC]");
+    assert!(told(&mut onward, &SupervisorEvent::Clock(&before), &hall).is_empty());
+    let starts_in = onward.list.as_ref().unwrap().starts_in(&before);
+    assert_eq!(starts_in, Some(std::time::Duration::from_secs(1)));
+    let at = wall("2026-11-22T19:00:00.01+00:00[UTC]");
+    let acts = told(&mut onward, &SupervisorEvent::Clock(&at), &hall);
+    assert!(told(&mut onward, &SupervisorEvent::Clock(&at), &hall).is_empty(), "once");
+    acts
+}
+
+#[test]
+fn the_time_of_an_entry_starts_it_in_an_armed_hall_and_is_noted_in_any_other() {
+    let acts = at_its_time(State::Armed);
+    let [Act::Name(_), Act::TellReadiness, Act::CheckBelts, Act::Go { surface: Surface::Schedule, .. }] =
+        &acts[..]
+    else {
+        panic!("{acts:?}")
+    };
+    for state in [State::Parked, State::Recovering, State::Stopped, State::Playing(PlayMode::Following)] {
+        let acts = at_its_time(state);
+        let [Act::Note(note)] = &acts[..] else { panic!("{acts:?}") };
+        assert!(note.contains("nobody had armed the hall"), "{note}");
+    }
 }

@@ -1,0 +1,120 @@
+//! The features of the supervisor: each is told what happens, and all together know what is to be done with the result of a
+//! job and at the end of a show.
+
+use super::act::{Act, Feature, SupervisorEvent};
+use super::figures::Figures;
+use super::gear::GearLimits;
+use super::hall::{HallContext, ShowChange};
+use super::homing::Homing;
+use super::job::{Again, JobResult};
+use super::lasting::Lasting;
+use super::playlist::Onward;
+use super::readiness::ReadinessCheck;
+use super::record::ShowRecords;
+use super::seat_testing::SeatTesting;
+use crate::control::Problem;
+use crate::state::Cause;
+use crate::time::ShowTime;
+
+/// All of them.
+#[derive(Debug)]
+pub(super) struct Features {
+    pub(super) onward: Onward,
+    pub(super) homing: Homing,
+    pub(super) seats: SeatTesting,
+    pub(super) readiness: ReadinessCheck,
+    pub(super) lasting: Lasting,
+    pub(super) gear: GearLimits,
+    pub(super) records: ShowRecords,
+    pub(super) figures: Figures,
+}
+
+impl Features {
+    /// Those of a hall that has just opened.
+    pub(super) fn new(records: ShowRecords, lasting: Lasting) -> Self {
+        Self {
+            onward: Onward::default(),
+            homing: Homing::default(),
+            seats: SeatTesting::default(),
+            readiness: ReadinessCheck::default(),
+            lasting,
+            gear: GearLimits::default(),
+            records,
+            figures: Figures::default(),
+        }
+    }
+
+    /// Tells all of them what happens; gives what is to be done for it.
+    pub(super) fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext) -> Vec<Act> {
+        let Self { onward, homing, seats, lasting, gear, records, figures, readiness: _ } = self;
+        let all: [&mut dyn Feature; 7] = [onward, homing, seats, lasting, gear, records, figures];
+        let mut out = Vec::new();
+        all.into_iter().for_each(|feature| feature.on(event, hall, &mut out));
+        out
+    }
+
+    /// Takes what a job has come to.
+    ///
+    /// # Errors
+    /// Where it has come to nothing, or may not be taken up any more.
+    pub(super) fn take(&mut self, result: JobResult, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+        match result {
+            JobResult::Loaded(cued) => {
+                let cued = cued?;
+                hall.may("load").map(|()| vec![Act::Stage(ShowChange::Cue(cued, None))])
+            }
+            JobResult::Listed(listed) => self.onward.take_list(listed?, hall),
+            JobResult::Entry(entry, cued) => self.onward.take_entry(entry, cued, hall),
+            JobResult::Again(again) => Ok(self.take_again(again, hall)),
+            JobResult::Tested(made, only) => self.seats.take(made?, only, hall),
+            JobResult::Preflighted(preflighted) => {
+                self.readiness.preflighted = Some(*preflighted);
+                Ok(Vec::new())
+            }
+            JobResult::Homed(finding) => Ok(self.homing.take(finding, hall)),
+        }
+    }
+
+    /// Takes up what was loaded before. A playlist that has gone leaves the cue.
+    fn take_again(&mut self, again: Again, hall: &HallContext) -> Vec<Act> {
+        let Some(((list, cued), before)) = self.lasting.take(again, hall) else { return Vec::new() };
+        if hall.cued.is_some() {
+            return Vec::new(); // a person has loaded another meanwhile
+        }
+        let mut acts = Vec::new();
+        match list {
+            Some(Ok(list)) => self.onward.list = Some(*list),
+            Some(Err(problem)) => acts.push(Act::Note(problem.to_string())),
+            None => {}
+        }
+        acts.push(match cued {
+            Ok(mut cued) => {
+                let same = before.filter(|before| before.sha256 == cued.sha256);
+                cued.left_at = same.and_then(|before| before.film_ms).map(ShowTime::from_millis);
+                Act::Stage(ShowChange::Cue(cued, None))
+            }
+            Err(problem) => Act::Fail(problem),
+        });
+        acts
+    }
+
+    /// The engine is done, or rests for good: the next show needs another.
+    pub(super) fn end_show(&mut self, hall: &mut HallContext) -> Vec<Act> {
+        let played = self.records.is_under_way();
+        self.records.end(hall);
+        if hall.is_closing() {
+            // There is no next show in this hall, and soon no tick thread to take it.
+            return Vec::new();
+        }
+        if !played {
+            // Seats were brought to park between shows: what is next stays as it is.
+            return vec![Act::Stage(ShowChange::Again)];
+        }
+        if hall.aside.is_some() {
+            let how = if hall.ended == Cause::CueEnded { "completed" } else { "stopped" };
+            return vec![Act::EndTest(how), Act::Stage(ShowChange::Rewind)];
+        }
+        hall.keep_place();
+        self.onward.on_show_over(hall)
+    }
+}

@@ -1,0 +1,314 @@
+//! The hall as all features of the supervisor see it. Acts change it, one after the other, so that whatever they read is what the
+//! tick thread has taken up.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::hall_settings::HallSettings;
+use super::show::ProvedShow;
+use super::state_mirror::StateMirror;
+use crate::app::runtime::RuntimeHandle;
+use crate::config::Config;
+use crate::control::{Code, Problem};
+use crate::engine::Unplanned;
+use crate::health::Groups;
+use crate::rt::{Desk, Live, Loaded, Row, Times};
+use crate::state::{Cause, State, Whose};
+use crate::sys::realtime::RealTime;
+use crate::time::{MonoTime, ShowTime};
+
+/// A show that was left sooner after its beginning is begun anew, not gone on with.
+const WORTH_IT: ShowTime = ShowTime::from_millis(1_000);
+
+/// The hall of now.
+#[derive(Debug)]
+pub(super) struct HallContext {
+    pub(super) config: Arc<Config>,
+    pub(super) desk: Arc<Desk>,
+    pub(super) live: Arc<Live>,
+    /// Set to have the seats parked and the hall closed.
+    pub(super) leave: Arc<AtomicBool>,
+    /// What the system granted the tick thread.
+    pub(super) granted: RealTime,
+    pub(super) mirror: StateMirror,
+    pub(super) settings: HallSettings,
+    /// What is loaded.
+    pub(super) cued: Option<ProvedShow>,
+    /// What was loaded before the test of the seats that is under way.
+    pub(super) aside: Option<SetAside>,
+    /// Where the film was when the seats left the cue.
+    pub(super) left_at: Option<ShowTime>,
+    /// Why the last show ended.
+    pub(super) ended: Cause,
+    /// The slow work that is under way.
+    pub(super) job: Option<&'static str>,
+    pub(super) now: MonoTime,
+}
+
+/// What was loaded before a test of the seats, if anything was.
+#[derive(Debug)]
+pub(super) struct SetAside(pub(super) Option<ProvedShow>);
+
+/// What was counted before a show.
+#[derive(Debug, Clone)]
+pub(super) struct Counted {
+    pub(super) ticks: u64,
+    pub(super) missed: u64,
+    pub(super) table: Vec<Row>,
+    pub(super) times: Times,
+}
+
+/// What becomes another in the show that is next.
+#[derive(Debug)]
+pub(super) enum ShowChange {
+    /// What is set. While the seats move the desk is enough for it.
+    Settings(Box<HallSettings>),
+    /// The cue, and what is set with it.
+    Cue(Box<ProvedShow>, Option<Box<HallSettings>>),
+    /// Where it begins.
+    Start(ShowTime),
+    /// It begins at its beginning.
+    Rewind,
+    /// Nothing: the one before it is over.
+    Again,
+    /// It tests the seats of these rows, or of all.
+    Test(Box<ProvedShow>, Option<BTreeSet<String>>),
+}
+
+/// What becomes of a change that is not taken up.
+#[derive(Debug)]
+pub(super) enum Undo {
+    /// It stays; what is to be done fails.
+    Nothing,
+    /// It is changed back; what is to be done fails.
+    Change(ShowChange),
+    /// The cue is dropped; what is to be done fails.
+    Unload,
+    /// The cue is dropped, which is noted; what is to be done goes on.
+    Drop,
+    /// The tick thread is told again of readiness; what is to be done goes on.
+    Readiness,
+}
+
+impl HallContext {
+    /// A hall that opens, where that is set.
+    pub(super) fn new(runtime: &RuntimeHandle, settings: HallSettings, now: MonoTime) -> Self {
+        Self {
+            config: Arc::clone(&runtime.config),
+            desk: Arc::clone(&runtime.desk),
+            live: Arc::clone(&runtime.live),
+            leave: Arc::clone(&runtime.leave),
+            granted: runtime.granted.clone(),
+            mirror: StateMirror::new(now),
+            settings,
+            cued: None,
+            aside: None,
+            left_at: None,
+            ended: Cause::Started,
+            job: None,
+            now,
+        }
+    }
+
+    /// True if the hall is at rest, and nobody has made it ready to go, so that another cue may be loaded, or controllers asked.
+    ///
+    /// # Errors
+    /// Why it may not.
+    pub(super) fn may(&self, what: &str) -> Result<(), Problem> {
+        let remedy = match self.mirror.state {
+            State::Armed => "disarm first",
+            state if state.may_send_motion() => "park first",
+            _ => return Ok(()),
+        };
+        Err(Problem::new(Code::State, format!("cannot {what} while {}", self.mirror.state), remedy))
+    }
+
+    /// True if something long may begin. In a hall that closes nothing may: it would hold the port that the next one opens.
+    ///
+    /// # Errors
+    /// Why it may not.
+    pub(super) fn is_free(&self) -> Result<(), Problem> {
+        if self.is_closing() {
+            return Err(Problem::new(Code::Busy, "the hall is being closed", "ask again in a second"));
+        }
+        match self.job {
+            None => Ok(()),
+            Some(word) => {
+                Err(Problem::new(Code::Busy, format!("{word} is under way"), "ask again when it is done"))
+            }
+        }
+    }
+
+    /// True if the hall closes, for good or for another configuration.
+    pub(super) fn is_closing(&self) -> bool {
+        self.leave.load(Ordering::Acquire)
+    }
+
+    /// Has the seats parked and the hall closed.
+    pub(super) fn close(&self) {
+        self.leave.store(true, Ordering::Release);
+    }
+
+    /// Why the hall is in its state, with the name of whom that is about.
+    pub(super) fn cause(&self) -> String {
+        let cause = self.mirror.cause;
+        match cause.whose() {
+            Some(Whose::Controller(index)) => match self.config.controllers.get(index) {
+                Some(controller) => format!("{}: {cause}", controller.name),
+                None => cause.to_string(),
+            },
+            Some(Whose::Group(index)) => {
+                format!("{}: {cause}", Groups::of(&self.config.controllers).name(index))
+            }
+            None => cause.to_string(),
+        }
+    }
+
+    /// What could not be planned, with the name of whose move that is.
+    pub(super) fn name_unplanned(&self, what: Unplanned) -> String {
+        match what {
+            Unplanned::Seek => what.to_string(),
+            Unplanned::Lane(lane) => format!("{}: {what}", self.config.controllers[lane].name),
+        }
+    }
+
+    /// The lanes that take part.
+    pub(super) fn lanes_on(&self) -> impl Iterator<Item = usize> {
+        (0..self.config.controllers.len()).filter(|lane| self.settings.is_on(*lane))
+    }
+
+    /// The controllers of a group.
+    pub(super) fn names_of(&self, group: &str) -> impl Iterator<Item = &str> {
+        let all = self.config.controllers.iter().filter(move |one| one.group == group);
+        all.map(|one| one.name.as_str())
+    }
+
+    /// What is counted so far; to be taken before a show is let go.
+    pub(super) fn count(&self) -> Counted {
+        let live = &self.live;
+        Counted { ticks: live.ticks(), missed: live.missed(), table: live.table(), times: live.times() }
+    }
+
+    /// True if the seats follow the cue, or may go on with it.
+    pub(super) const fn is_on_cue(&self) -> bool {
+        rides(self.mirror.state)
+    }
+
+    /// Sets the tick thread's desk as it is set here.
+    pub(super) fn set_desk(&self) {
+        let effects = self.cued.as_ref().map_or(&[][..], |cued| cued.timeline.effect_names());
+        self.settings.set(&self.desk, effects);
+    }
+
+    /// Changes what is loaded or set; says what becomes of that where it is not taken up.
+    pub(super) fn apply(&mut self, change: ShowChange) -> Undo {
+        match change {
+            ShowChange::Settings(settings) => {
+                let before = std::mem::replace(&mut self.settings, *settings);
+                return Undo::Change(ShowChange::Settings(Box::new(before)));
+            }
+            ShowChange::Cue(cued, settings) => {
+                self.cued = Some(*cued);
+                self.settings = settings.map_or_else(|| self.settings.clone(), |settings| *settings);
+                return Undo::Unload;
+            }
+            ShowChange::Start(film) => {
+                let start = self.cued.as_mut().map(|cued| std::mem::replace(&mut cued.start, film));
+                return start.map_or(Undo::Nothing, |before| Undo::Change(ShowChange::Start(before)));
+            }
+            ShowChange::Test(cued, only) => {
+                self.aside = Some(SetAside(self.cued.replace(*cued)));
+                self.settings.only = only;
+                return Undo::Nothing;
+            }
+            ShowChange::Rewind => {
+                if let Some(cued) = &mut self.cued {
+                    cued.start = ShowTime::ZERO;
+                }
+            }
+            ShowChange::Again => {}
+        }
+        Undo::Drop
+    }
+
+    /// The test of the seats is over: what was loaded before is back.
+    pub(super) fn end_test(&mut self) {
+        if let Some(SetAside(before)) = self.aside.take() {
+            self.settings.only = None;
+            self.cued = before;
+        }
+    }
+
+    /// The show that the tick thread plays next, of what is loaded and as everything is set now; `None` if nothing is loaded.
+    ///
+    /// # Errors
+    /// Where none can be made of it.
+    pub(super) fn show(&mut self) -> Result<Option<Box<Loaded>>, Problem> {
+        self.cued.as_mut().map(|cued| cued.staged(&self.config, &self.settings)).transpose()
+    }
+
+    /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
+    pub(super) fn note_place(&mut self, from: State, to: State) {
+        if rides(from) && !rides(to) && self.mirror.cause != Cause::CueEnded {
+            self.left_at = Some(self.live.show());
+        }
+    }
+
+    /// A show is over: where it was left is kept with its cue.
+    pub(super) fn keep_place(&mut self) {
+        let left_at = self.left_at.take();
+        if let Some(cued) = &mut self.cued {
+            let end = cued.timeline.duration();
+            cued.left_at = left_at.filter(|film| (WORTH_IT..end).contains(film));
+        }
+    }
+
+    /// A show begins: where the one before was left is forgotten.
+    pub(super) fn forget_place(&mut self) {
+        self.left_at = None;
+        if let Some(cued) = &mut self.cued {
+            cued.left_at = None;
+        }
+    }
+}
+
+const fn rides(state: State) -> bool {
+    matches!(state, State::Playing(_) | State::Paused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::supervisor::testing::{hall, proved};
+
+    #[test]
+    fn what_is_not_taken_up_is_changed_back() {
+        let mut hall = hall(State::Parked, "one");
+        let mut settings = hall.settings.clone();
+        settings.trim_ms = 40;
+        let start = ShowTime::from_millis(2_000);
+        for change in [ShowChange::Settings(Box::new(settings)), ShowChange::Start(start)] {
+            let Undo::Change(back) = hall.apply(change) else { panic!("it can be changed back") };
+            let is = |hall: &HallContext| (hall.settings.trim_ms, hall.cued.as_ref().unwrap().start);
+            assert_ne!(is(&hall), (0, ShowTime::ZERO));
+            hall.apply(back);
+            assert_eq!(is(&hall), (0, ShowTime::ZERO));
+        }
+        let other = Box::new(proved("two", &hall.config));
+        assert!(matches!(hall.apply(ShowChange::Cue(other, None)), Undo::Unload));
+        assert_eq!(hall.cued.unwrap().id, "two");
+    }
+
+    #[test]
+    fn the_place_where_a_show_was_left_is_kept_where_it_is_neither_at_its_beginning_nor_past_its_end() {
+        for (film_ms, kept) in [(999, false), (1_000, true), (3_999, true), (4_000, false)] {
+            let mut hall = hall(State::Stopping, "one");
+            let film = ShowTime::from_millis(film_ms);
+            hall.live.on_show(film);
+            hall.note_place(State::Paused, State::Stopping);
+            hall.keep_place();
+            assert_eq!(hall.cued.unwrap().left_at, kept.then_some(film));
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! The playlist: which cue is next, how it is played, and what follows its end. It starts nothing that no person has armed
+//! the hall for: at the time of an entry only a hall that is armed goes, and an entry goes on to the next only where the one
+//! before was let go by a person, or by its time, and came to its end.
+
+use jiff::Zoned;
+
+use super::act::{Act, Feature, SupervisorEvent};
+use super::hall::{HallContext, ShowChange};
+use super::hall_settings::HallSettings;
+use super::job::{Job, JobResult};
+use super::list::List;
+use super::show::ProvedShow;
+use crate::control::{Code, Command, Problem, Surface};
+use crate::journal::PlaylistPlace;
+use crate::playlist::{PlaylistId, Then};
+use crate::rt::Command as TickCommand;
+use crate::state::{Cause, State, Transition};
+
+/// What lets an entry start by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Start {
+    /// The entry before goes on to it: the hall is armed for it once more.
+    GoOn,
+    /// Its time has come, and a person has armed the hall.
+    Time,
+}
+
+/// The playlist that is loaded, and what starts by itself of it, which is what every person can hold back.
+#[derive(Debug, Default)]
+pub(super) struct Onward {
+    pub(super) list: Option<List>,
+    /// The entry that is being loaded starts then. Taken back where the hall leaves the state that it was in, or somebody wants
+    /// it to stay there.
+    start: Option<Start>,
+    /// Somebody wanted the hall to stay at rest since the show began.
+    held: bool,
+    /// The entry that is being loaded follows one that is over.
+    follows: bool,
+    /// It came while the seats moved once more: it is taken up when they rest.
+    waits: Option<(usize, Box<ProvedShow>)>,
+}
+
+impl Onward {
+    /// Loads a playlist, with the cue of its first entry, or drops the one that is loaded.
+    ///
+    /// # Errors
+    /// Where it may not be loaded.
+    pub(super) fn load(&mut self, id: Option<&str>, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+        hall.may("load")?;
+        hall.is_free()?;
+        let Some(id) = id else {
+            self.list = None;
+            return Ok(Vec::new());
+        };
+        let id = id.parse::<PlaylistId>().map_err(|error| {
+            Problem::new(Code::Value, error.to_string(), "GET /api/v1/playlists lists them")
+        })?;
+        Ok(vec![Act::Start(Job::List(id))])
+    }
+
+    /// Makes an entry the next to be played.
+    ///
+    /// # Errors
+    /// Where there is none, or it may not be.
+    pub(super) fn select(&mut self, entry: usize, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+        let count = self.list.as_ref().map_or(0, |list| list.playlist.entries.len());
+        if entry >= count {
+            return Err(Problem::new(
+                Code::Unknown,
+                format!("there is no entry {} in a playlist of {count}", entry.saturating_add(1)),
+                "choose one that there is; the API counts them from 0",
+            ));
+        }
+        hall.may("load")?;
+        hall.is_free()?;
+        Ok(self.fetch(entry, None))
+    }
+
+    /// Has the cue of an entry read, which starts then where that is due.
+    pub(super) fn fetch(&mut self, entry: usize, start: Option<Start>) -> Vec<Act> {
+        (self.start, self.follows, self.waits) = (start, false, None);
+        let cue = self.list.as_ref().map(|list| list.playlist.entries[entry].cue.clone());
+        cue.map(|cue| Act::Start(Job::Entry(entry, cue))).into_iter().collect()
+    }
+
+    /// Takes up a playlist that was checked.
+    ///
+    /// # Errors
+    /// Where it may not be, or its first entry asks for levels that are none.
+    pub(super) fn take_list(
+        &mut self,
+        (list, cued): (Box<List>, Box<ProvedShow>),
+        hall: &HallContext,
+    ) -> Result<Vec<Act>, Problem> {
+        hall.may("load")?;
+        let settings = entry_settings(self.list.insert(*list), hall)?;
+        Ok(vec![Act::Stage(ShowChange::Cue(cued, Some(settings)))])
+    }
+
+    /// Takes up the cue of an entry, and starts it where that is still due. That homes no seat: people sit there.
+    ///
+    /// # Errors
+    /// As [`Self::take_list`].
+    pub(super) fn take_entry(
+        &mut self,
+        entry: usize,
+        cued: Result<Box<ProvedShow>, Problem>,
+        hall: &HallContext,
+    ) -> Result<Vec<Act>, Problem> {
+        let start = self.start.take();
+        let cued = cued?;
+        if start.is_none()
+            && let Err(problem) = hall.may("load")
+        {
+            if !self.follows {
+                return Err(problem);
+            }
+            self.waits = Some((entry, cued));
+            return Ok(Vec::new());
+        }
+        let Some(list) = &mut self.list else { return Ok(Vec::new()) };
+        list.current = entry;
+        let mut acts = vec![Act::Stage(ShowChange::Cue(cued, Some(entry_settings(list, hall)?)))];
+        acts.extend(start.into_iter().flat_map(starting));
+        Ok(acts)
+    }
+
+    /// True if what is loaded is that entry of the playlist.
+    fn is_entry(&self, entry: usize, hall: &HallContext) -> bool {
+        let cue = hall.cued.as_ref().map(|cued| cued.id.as_str());
+        self.list
+            .as_ref()
+            .is_some_and(|list| list.current == entry && cue == Some(&*list.entry().cue.to_string()))
+    }
+
+    /// Where the playlist is, where what is loaded is of it.
+    pub(super) fn place(&self, hall: &HallContext) -> Option<PlaylistPlace> {
+        let list = self.list.as_ref().filter(|list| self.is_entry(list.current, hall));
+        list.map(List::place)
+    }
+
+    /// A show is over: the next entry is loaded, and starts where the one before says so and came to its end.
+    pub(super) fn on_show_over(&mut self, hall: &HallContext) -> Vec<Act> {
+        // The engine that is done makes way for one that waits, whatever becomes of the next cue.
+        let mut acts = vec![Act::Stage(ShowChange::Rewind)];
+        let Some(list) = &self.list else { return acts };
+        let (played, next) = (list.current, list.current + 1);
+        let completed = hall.ended == Cause::CueEnded;
+        // A cue that a person loaded beside the playlist leads nowhere.
+        if !completed || !self.is_entry(played, hall) || next >= list.playlist.entries.len() {
+            return acts;
+        }
+        let goes = list.entry().then == Then::Go && hall.mirror.state == State::Parked && !self.held;
+        if hall.is_free().is_ok() {
+            acts.extend(self.fetch(next, goes.then_some(Start::GoOn)));
+            self.follows = true;
+        }
+        acts
+    }
+
+    /// Starts an entry whose time has come, where a person has armed the hall.
+    fn heed_schedule(&mut self, wall: &Zoned, hall: &HallContext) -> Vec<Act> {
+        let Some(list) = &mut self.list else { return Vec::new() };
+        let Some(entry) = list.schedule.due(&list.playlist, wall) else { return Vec::new() };
+        let cue = list.playlist.entries[entry].cue.to_string();
+        if hall.mirror.state != State::Armed {
+            let state = hall.mirror.state;
+            let note = format!("{cue} was to start now, but nobody had armed the hall: it was {state}");
+            return vec![Act::Note(note)];
+        }
+        let mut acts = vec![Act::Name(format!("{cue} was to start now"))];
+        match hall.is_free() {
+            Err(problem) => acts.push(Act::Fail(problem)),
+            Ok(()) if self.is_entry(entry, hall) => acts.extend(starting(Start::Time)),
+            Ok(()) => acts.extend(self.fetch(entry, Some(Start::Time))),
+        }
+        acts
+    }
+}
+
+impl Feature for Onward {
+    fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext, out: &mut Vec<Act>) {
+        let rests = !hall.is_on_cue();
+        match event {
+            // Whoever wants the hall to be at rest wants nothing to start by itself either, also where it is at rest already.
+            SupervisorEvent::Asked(desired) => match desired.ask {
+                Command::Stop | Command::Park | Command::Disarm => (self.start, self.held) = (None, true),
+                Command::Pause if rests => (self.start, self.held) = (None, true),
+                _ => {}
+            },
+            SupervisorEvent::Leaving => (self.start, self.held) = (None, true),
+            // What was to start by itself was for the state before.
+            SupervisorEvent::Entered(_) => {
+                self.start = None;
+                let ready = self.waits.take_if(|_| hall.may("load").is_ok());
+                out.extend(ready.map(|(entry, cued)| Act::Take(JobResult::Entry(entry, Ok(cued)))));
+            }
+            SupervisorEvent::Begun(_) => (self.start, self.held, self.waits) = (None, false, None),
+            SupervisorEvent::Clock(wall) => out.extend(self.heed_schedule(wall, hall)),
+            SupervisorEvent::Done(_) | SupervisorEvent::Round(_) => {}
+        }
+    }
+}
+
+/// What is set, with what the current entry of a playlist says of it.
+fn entry_settings(list: &List, hall: &HallContext) -> Result<Box<HallSettings>, Problem> {
+    let entry = list.entry();
+    let mut settings = hall.settings.clone();
+    settings.change(&entry.levels(&hall.config))?;
+    settings.trim_ms = entry.trim_ms.unwrap_or(settings.trim_ms);
+    Ok(Box::new(settings))
+}
+
+/// Lets the current entry go, arming the hall first where the entry before went on to it.
+fn starting(start: Start) -> Vec<Act> {
+    let mut acts = vec![Act::TellReadiness, Act::CheckBelts];
+    if start == Start::GoOn {
+        acts.push(Act::Tick(TickCommand::Request(Transition::Arm)));
+    }
+    acts.push(Act::Go { who: "the playlist".to_owned(), surface: Surface::Schedule });
+    acts
+}
+
+#[cfg(test)]
+mod tests;
