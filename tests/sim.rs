@@ -12,7 +12,8 @@ use kinocue::sim::{
 };
 use kinocue::time::MonoTime;
 use kinocue::wire::{
-    Code, FrameNo, MAX_LEN, Motion, MotionReply, ReadRequest, RegisterReply, ReplyCode, Status, Timing,
+    Analogue, Code, FrameNo, MAX_LEN, Motion, MotionReply, ReadRequest, RegisterReply, ReplyCode, Status,
+    Timing,
 };
 
 use proptest::prelude::*;
@@ -40,6 +41,7 @@ fn send(host: &UdpSocket, to: SocketAddrV4, frame: u32) {
         time_ms: 1,
         positions: &[Pulses(10), Pulses(20), Pulses(30)],
         outputs: 0,
+        analogue: Analogue::OFF,
         vibration: None,
     };
     let mut buf = [0; MAX_LEN];

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use toml::de::DeTable;
 
+use crate::channel::{self, SWITCHES};
 use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 
 use super::accept::acceptances;
@@ -336,6 +337,10 @@ fn controller<'t>(
     let vibration_port = vibration_port(&mut section, dialect);
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
+    let mut at_most = [0.0; SWITCHES];
+    for ((_, _, name), most) in channel::switches().zip(&mut at_most) {
+        *most = section.number_in(name, 0.0..=1.0).unwrap_or(0.0);
+    }
     let estop_inputs = inputs_of(&mut section, "estop_inputs");
     let belt_inputs = inputs_of(&mut section, "belt_inputs");
     if let Some(entry) = section.get("belt_inputs").filter(|_| estop_inputs & belt_inputs != 0) {
@@ -360,6 +365,7 @@ fn controller<'t>(
         vibration_port: vibration_port.unwrap_or_default(),
         accept,
         effects,
+        at_most,
         estop_inputs,
         belt_inputs,
         accept_findings,

@@ -5,19 +5,22 @@ mod lanes;
 
 pub use lanes::{Manner, lanes};
 
+use crate::channel::{ChannelId, Sample};
 use crate::cue;
 use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
 use crate::timeline::EffectSet;
-use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
 
-/// Which outputs a cue's effects switch on one controller.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// Which outputs a cue's effects switch on one controller, and how far its analogue ones go.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Wiring {
     /// Output word of each effect of the cue, by its place among the cue's names.
     pub named: Vec<u16>,
     /// The bits of a raw output word that reach the controller.
     pub raw: u16,
+    /// The highest levels of its analogue outputs, 0 where it has none.
+    pub analogue: [f64; 2],
 }
 
 impl Wiring {
@@ -31,6 +34,13 @@ impl Wiring {
                 lit.fold(0, |word, (_, outputs)| word | outputs)
             }
         }
+    }
+
+    /// What its analogue outputs are set to for what the cue asks of them.
+    #[must_use]
+    pub fn analogue(&self, Sample([dac1, dac2]): Sample) -> Analogue {
+        let [most1, most2] = self.analogue;
+        Analogue::from_levels([dac1.min(most1), dac2.min(most2)])
     }
 }
 
@@ -83,12 +93,14 @@ impl Lane {
         for (index, slot) in slots.iter().enumerate() {
             positions[index] = slot.pulses(pose[index]);
             if let Some(axis) = slot.axis.filter(|_| self.vibrates) {
-                let cue::Vibration { hz, amplitude } = mix.vibration(beat.vibration[axis]);
+                let shake = beat.samples.of(ChannelId::Vibration.on(axis));
+                let cue::Vibration { hz, amplitude } = mix.sample(ChannelId::Vibration, shake).into();
                 let strokes = amplitude * slot.to_stroke;
                 vibration[index] = Vibration::from_hz(hz, strokes * slot.stroke_pulses);
                 stamped.shakes = stamped.shakes.max(strokes);
             }
         }
+        let levels = beat.samples.of(ChannelId::Analogue.of_hall());
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,
@@ -98,12 +110,13 @@ impl Lane {
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],
             outputs: self.wiring.outputs(mix.effects(beat.effects)),
+            analogue: self.wiring.analogue(mix.sample(ChannelId::Analogue, levels)),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };
         (stamped, motion.emit_as(self.vibration_port, buf))
     }
 
-    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects off.
+    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects and outputs off.
     pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
         let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
         let beat = Beat::still(Timing::Relative, time_ms);
@@ -112,7 +125,7 @@ impl Lane {
         written
     }
 
-    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration and effects off.
+    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
     pub fn hold(&mut self) {
         self.window.hold();
         self.vibrates = false;

@@ -76,7 +76,7 @@ fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
     let config = hall(&["127.0.0.1:1"], 1);
     let mut lane = lanes(&config, &cue, FULL).remove(0);
     let mut beat = Beat::still(Timing::Absolute, 10);
-    beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
+    beat.samples.set(ChannelId::Vibration.on(0), Sample([20.0, 0.01]));
     let mut buf = [0xa5; MAX_LEN];
     let (stamped, bytes) = lane.encode(&beat, &lane.window.park(), Mix::FULL, &mut buf);
     let frame = MotionRequest::parse(bytes).unwrap();
@@ -93,7 +93,7 @@ fn vibration_stands_two_bytes_further_back_where_port_out_takes_four() {
     let mut lane = lanes(&config, &cue, FULL).remove(0);
     let mut beat = Beat::still(Timing::Relative, 10);
     beat.effects = EffectSet::Word(0x0003);
-    beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
+    beat.samples.set(ChannelId::Vibration.on(0), Sample([20.0, 0.01]));
     let mut buf = [0xa5; MAX_LEN];
     let park = lane.window.park();
     let (_, bytes) = lane.encode(&beat, &park, Mix::FULL, &mut buf);

@@ -82,7 +82,7 @@ fn csv_to_mcap_to_csv_keeps_every_value() {
     assert_eq!((second.title(), second.unit()), (Some("Störm"), Unit::Millimetre));
     assert_eq!(second.interpolation(), Interpolation::Monotone);
     assert_eq!((second.times(), second.positions()), (first.times(), first.positions()));
-    assert_eq!((second.vibration(), second.effects()), (first.vibration(), first.effects()));
+    assert_eq!((second.tracks(), second.effects()), (first.tracks(), first.effects()));
     assert_eq!(csv_of(&second), csv_of(&first));
     assert_eq!(csv_of(&csv(&csv_of(&first))), csv_of(&first));
     let words = csv("time_ms,a1,io\n0,0,0x5\n1,1,4095\n");
