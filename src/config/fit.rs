@@ -345,6 +345,33 @@ mod tests {
     }
 
     #[test]
+    fn a_level_is_held_to_what_a_controller_has_and_what_its_frames_can_carry() {
+        let timeline = cue("a1,a2,v2_hz,v2_amp,dac1", "0,0,20,0.01,0.75");
+        let targets = ["127.0.0.1:1,axes=1", "127.0.0.1:2,axes=1,offset=1"].map(str::to_owned);
+        let hall = |at_most: [[f64; 2]; 2]| {
+            let mut config = from_to_args(&targets, &[], 2).unwrap();
+            config.controllers.iter_mut().zip(at_most).for_each(|(one, most)| one.at_most = most);
+            config
+        };
+        assert!(hall([[0.75, 0.0], [0.0, 1.0]]).misfits(&timeline).is_empty());
+        for (at_most, text) in [
+            (
+                [[0.5, 0.0], [0.0; 2]],
+                "dac1: the level of 0.75 at 00:00.000 is over 0.5, the highest that c1 may have",
+            ),
+            (
+                [[1.0; 2], [1.0; 2]],
+                "dac1: this output cannot be set at c2, as its frames carry the vibration of axis 2",
+            ),
+            ([[0.0, 1.0]; 2], "dac1: no controller has this output"),
+        ] {
+            let found = hall(at_most).misfits(&timeline);
+            let [misfit] = &found[..] else { panic!("told once: {found:?}") };
+            assert!(misfit.to_string().starts_with(text) && misfit.column() == "dac1", "{misfit}");
+        }
+    }
+
+    #[test]
     fn a_swing_that_no_frame_can_say_is_refused_with_its_time_and_the_limit() {
         let shake = |amplitude: &str| {
             let text =

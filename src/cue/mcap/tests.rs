@@ -186,7 +186,7 @@ fn foreign_files_are_refused() {
     assert_eq!(faults(&file(FRACTION, &[])), "0 of the two rows that a cue needs at least");
     assert_eq!(
         faults_behind_rows(&[("/cue/smell", 0, "{}")]),
-        "unknown topic \"/cue/smell\"; a cue has /cue/axes, /cue/vibration, /cue/io and /cue/marker"
+        "unknown topic \"/cue/smell\"; a cue has /cue/axes, /cue/vibration, /cue/analogue, /cue/io and /cue/marker"
     );
     assert_eq!(
         faults(&file(&[("version", "2"), ("interpolation", "sine")], &ROWS)),
