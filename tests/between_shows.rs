@@ -336,7 +336,10 @@ fn a_park_of_seats_that_are_all_at_park_sends_nothing() {
     for before in [&[(3, Load), (4, READY)][..], &[]] {
         let found = [(1, Found(PARKED)), (2, found(true, true)), (100, Ask(Transition::Park))];
         let (frames, states) = live_through(&[&found[..], before].concat(), 200);
-        assert_eq!((frames, states), (vec![], vec![State::Boot, State::Parked]));
+        assert_eq!(
+            (frames, states),
+            (vec![], vec![State::Boot, State::Parked, State::Parking, State::Parked])
+        );
     }
 }
 

@@ -287,6 +287,23 @@ fn a_seat_that_is_off_gets_nothing_once_it_is_parked_through_pauses_seeks_loops_
 }
 
 #[test]
+fn a_pause_in_whichever_tick_a_seat_is_told_that_it_is_out_keeps_it_out() {
+    let off = Mix { on: false, ..Mix::FULL };
+    let told = two_seats().with(400, Event::Mix(1, off)).play().lane(1).count();
+    for back in 0..6 {
+        let pause = u64::try_from(told).unwrap() - back;
+        let played = two_seats()
+            .with(400, Event::Mix(1, off))
+            .with(pause, Event::Ask(Transition::Pause))
+            .with(pause + 100, Event::Ask(Transition::Resume))
+            .play();
+        assert_eq!(played.ended.ending, Ending::Completed, "{back}");
+        assert!(played.lane(1).count() < told + 20, "{back}: {} frames", played.lane(1).count());
+        assert_eq!(played.lane(1).rev_pulses(3), [0; 3], "{back}: at park");
+    }
+}
+
+#[test]
 fn a_lost_controller_is_brought_to_rest_told_so_three_times_and_gets_nothing_until_it_is_back() {
     let smooth = two_seats().play();
     let played = two_seats().with(500, Event::Alarm(Alarm::Leave(1))).play();

@@ -1,11 +1,15 @@
 //! What is shipped beside the program: the package names only what exists, examples that drive nothing by themselves, a unit
 //! that gives nothing away, manual pages for every command.
 
+#[path = "common/programs.rs"]
+mod programs;
+
 use std::fs;
-use std::io::Write as _;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use programs::is_installed;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -24,13 +28,10 @@ fn kinocue(args: &[&str]) -> Output {
     command.current_dir(root()).args(args).output().expect("kinocue runs")
 }
 
-/// What a tool says that not every machine has; none, said so, where it is not there.
+/// What a tool says; none where its tests are to be skipped.
 fn tool(program: &str, args: &[&str]) -> Option<Output> {
-    let output = Command::new(program).current_dir(root()).args(args).output();
-    if output.is_err() {
-        let _ = writeln!(std::io::stderr(), "skipped: no {program} is installed");
-    }
-    output.ok()
+    is_installed(program)
+        .then(|| Command::new(program).current_dir(root()).args(args).output().expect("it is installed"))
 }
 
 fn said(output: &Output) -> String {

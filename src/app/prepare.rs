@@ -155,12 +155,13 @@ impl<C: Clock> Preparation<'_, C> {
             let (sent, arrivals): (Vec<usize>, Vec<MonoTime>) = under_way.unzip();
             let Some(arrival) = arrivals.into_iter().max() else { break };
             self.live.enter(Phase::Homing);
-            // One that is silent altogether is no more silent after the whole way.
+            // One that has not acked by then has the whole way to do so.
             let acked = |this: &Self| sent.iter().all(|&lane| this.is_acked(lane));
             self.wait_until((self.clock.now() + ACK_WAIT).min(arrival), acked);
             self.wait_until(arrival, |_| false);
-            let was_heard = |lane: &usize| self.live.evidence(*lane).is_some_and(|seen| seen.version() > 0);
-            open = sent.into_iter().filter(|&lane| !self.is_acked(lane)).filter(was_heard).collect();
+            // One that says nothing at all is left out.
+            let is_open = |lane: &usize| !self.is_acked(*lane) && self.acks.has_heard(*lane);
+            open = sent.into_iter().filter(is_open).collect();
             if open.is_empty() || self.stopped() {
                 return unsure;
             }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::motion::{MAX_AXES, Pose};
+use crate::motion::Pose;
 use crate::time::MonoTime;
 
 /// Frames so far apart are kept together; one that takes longer is alone.
@@ -46,9 +46,9 @@ impl History {
         }
         let bucket = &mut self.buckets[self.newest];
         (bucket.until, bucket.shakes) = (bucket.until.max(until), bucket.shakes.max(shakes));
-        for slot in 0..MAX_AXES {
-            bucket.low[slot] = bucket.low[slot].min(pose[slot]);
-            bucket.high[slot] = bucket.high[slot].max(pose[slot]);
+        for (slot, place) in pose.iter().enumerate() {
+            bucket.low[slot] = bucket.low[slot].min(*place);
+            bucket.high[slot] = bucket.high[slot].max(*place);
         }
     }
 

@@ -9,12 +9,13 @@ use crate::time::{ShowTime, TRIM_MS};
 impl Engine {
     /// Parks, three hold frames, and the end. Asking again changes nothing.
     ///
-    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end
-    /// at once: nothing has been set in motion, and the lanes may still be on a slow way to park, or where nobody knows.
+    /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end, and no
+    /// frame goes out; between shows once that was read. One that was let go ends at once: nothing has been set in motion, and the
+    /// lanes may still be on a slow way to park, or where nobody knows.
     pub fn park(&mut self) {
         let is_over = self.phase == Phase::Done;
         let is_fresh = self.frames == 0 && self.rest().is_none();
-        if (is_over || is_fresh) && self.is_astray() {
+        if is_over || self.phase == Phase::Waiting || (is_fresh && self.is_astray()) {
             self.rest_untold();
         } else if is_over || self.is_homeward() {
             return;
@@ -120,11 +121,12 @@ impl Engine {
 
     /// Brings one lane to rest; after three hold frames nothing goes to it.
     pub fn leave(&mut self, lane: usize) {
-        if self.sends_nothing() {
-            return self.cut(lane);
+        if !self.sends_nothing() {
+            self.brake(lane);
+            self.riders[lane].leave();
+        } else if self.takes_part(lane) {
+            self.riders[lane].step_out();
         }
-        self.brake(lane);
-        self.riders[lane].leave();
     }
 
     /// Nobody knows which frames reach a lane: it is brought to rest by frames that are slow enough from wherever it may be

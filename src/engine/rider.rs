@@ -15,6 +15,9 @@ use crate::time::{Rate, ShowTime};
 /// Hold frames that end a lane's motion.
 pub(super) const HOLD_FRAMES: u8 = 3;
 
+/// One that falls out is read at rest after a second or two, if it answers at all.
+const AWAITED_FOR: Duration = Duration::from_secs(3);
+
 /// How quickly the level of vibration changes, per second.
 const VIBRATION_RATE: f64 = 4.0;
 
@@ -50,6 +53,10 @@ pub(super) struct Rider {
     pub(super) leaving: Option<u8>,
     /// Whether it has just come to be away, and is to be looked at before it can come back.
     fallen: Option<Fall>,
+    /// Ticks for which whoever parks still waits for it to come back.
+    awaited: u32,
+    /// Ticks for which that is so once it has stepped out.
+    patience: u32,
     /// Ticks for which its last frame leads it, this one included.
     ahead: u32,
     /// Whether it was away, and is not where the others are yet.
@@ -81,6 +88,8 @@ impl Rider {
             out: false,
             leaving: None,
             fallen: None,
+            awaited: 0,
+            patience: ticks(AWAITED_FOR, rate),
             ahead: 0,
             returning: false,
             refused: false,
@@ -103,7 +112,9 @@ impl Rider {
 
     /// Another tick begins, after so many that were missed.
     pub(super) fn pass(&mut self, missed: u64) {
-        self.ahead = self.ahead.saturating_sub(u32::try_from(missed + 1).unwrap_or(u32::MAX));
+        let ticks = u32::try_from(missed + 1).unwrap_or(u32::MAX);
+        self.ahead = self.ahead.saturating_sub(ticks);
+        self.awaited = self.awaited.saturating_sub(ticks);
     }
 
     /// Whether a frame goes to it in this tick.
@@ -133,7 +144,8 @@ impl Rider {
             state.position = *position;
         }
         self.brake = Brake::new(&self.window, &states);
-        self.part = Part::Braking(Duration::ZERO);
+        // One that was on its way out is told so by whatever course leads on.
+        (self.part, self.leaving) = (Part::Braking(Duration::ZERO), None);
     }
 
     /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
@@ -165,12 +177,18 @@ impl Rider {
 
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
-        (self.part, self.leaving, self.ahead) = (Part::Away, None, 0);
+        (self.part, self.leaving, self.ahead, self.awaited) = (Part::Away, None, 0, 0);
+    }
+
+    /// The same, and it is looked at: it may be back soon.
+    pub(super) const fn step_out(&mut self) {
+        self.cut();
+        self.awaited = self.patience;
     }
 
     /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
     pub(super) const fn fall_out(&mut self, why: Fall) {
-        self.cut();
+        self.step_out();
         self.fallen = Some(why);
     }
 
@@ -183,7 +201,7 @@ impl Rider {
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
         self.limiter.restart(known);
-        (self.part, self.leaving, self.ahead) = (Part::Still, None, 0);
+        (self.part, self.leaving, self.ahead, self.awaited) = (Part::Still, None, 0, 0);
         (self.refused, self.returning) = (false, true);
     }
 
@@ -206,9 +224,13 @@ impl Rider {
         }
     }
 
-    /// Goes on counting what the limiter has to do where another left off.
-    pub(super) const fn count_on(&mut self, before: &Self) {
+    /// Goes on where another left off: with what the limiter had to do, and away where that was.
+    pub(super) fn go_on_from(&mut self, before: &Self) {
         self.limiter.count_on(before.limiter.counts());
+        if before.part == Part::Away {
+            self.cut();
+            self.awaited = before.awaited;
+        }
     }
 
     /// What the limiter had to do.
@@ -347,6 +369,21 @@ impl Rider {
         apart && !self.refused
     }
 
+    /// Whether it may still come to park: it has just stepped out and is looked at, or is about to.
+    pub(super) const fn is_awaited(&self) -> bool {
+        self.wanted.on && (self.awaited > 0 || self.is_blind())
+    }
+
+    /// Whether it is there again, and the others left for park without it.
+    pub(super) fn is_left_behind(&self) -> bool {
+        self.part == Part::Still && self.needs_a_course()
+    }
+
+    /// Whether a park is not over without it.
+    pub(super) fn is_missing(&self) -> bool {
+        self.is_awaited() || self.is_left_behind()
+    }
+
     /// Hears that no such course could be planned.
     pub(super) fn refuse(&mut self) {
         self.refused = self.needs_a_course();
@@ -403,4 +440,9 @@ impl Rider {
         self.fader = Fader::at(level);
         self.window.set_level(level);
     }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand ticks")]
+fn ticks(span: Duration, rate: Rate) -> u32 {
+    (span.as_secs_f64() * rate.hz()) as u32
 }

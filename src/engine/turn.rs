@@ -77,9 +77,7 @@ impl Engine {
         let asked = self.switch.as_ref().map(|switch| switch.goal);
         let soonest = self.playhead + self.lead();
         match self.phase {
-            Phase::Parking if self.reached >= self.course.settled() => {
-                self.phase = Phase::Closing(HOLD_FRAMES);
-            }
+            Phase::Parking if self.reached >= self.course.settled() => self.arrive(),
             Phase::Resting(rest) if asked.is_none() => self.look_ahead_at_rest(rest, soonest),
             Phase::Riding if self.homeward && asked == Some(Goal::Park) => {}
             // The old course ends before another can begin on it: what is to come begins on the one that follows.
@@ -93,6 +91,16 @@ impl Engine {
         }
     }
 
+    /// The lanes on the course are at park. One that fell out on the way is waited for there, and led after them.
+    fn arrive(&mut self) {
+        if self.riders.iter().any(Rider::is_left_behind) {
+            self.homeward = true;
+            self.come_down(Rest::Ended);
+        } else if !self.riders.iter().any(Rider::is_awaited) {
+            self.phase = Phase::Closing(HOLD_FRAMES);
+        }
+    }
+
     /// Whether somebody waits for lanes to leave their course.
     pub(super) fn is_wanted_elsewhere(&self) -> bool {
         self.homeward || self.seeking.is_some() || self.lanes_need_a_course()
@@ -101,6 +109,7 @@ impl Engine {
     fn look_ahead_at_rest(&mut self, rest: Rest, soonest: ShowTime) {
         let now = self.playhead;
         match rest {
+            Rest::Stopped if self.is_parked_untold() => self.phase = Phase::Done,
             _ if self.homeward => self.ask(Goal::Park, None, now),
             Rest::Late => self.ask(Goal::Cue, Some(soonest), soonest),
             Rest::Ended if self.plays_left == Some(0) => self.ask(Goal::Home, None, now),
@@ -250,7 +259,11 @@ impl Engine {
             Goal::Home | Goal::Park => self.slew.skip(0.0),
         }
         self.phase = match switch.goal {
-            Goal::Home | Goal::Park if course.settled() <= course.start => Phase::Closing(HOLD_FRAMES),
+            Goal::Home | Goal::Park
+                if course.settled() <= course.start && !self.riders.iter().any(Rider::is_missing) =>
+            {
+                Phase::Closing(HOLD_FRAMES)
+            }
             Goal::Home | Goal::Park => Phase::Parking,
             Goal::Again | Goal::Cue | Goal::Lanes => Phase::Riding,
         };

@@ -1,13 +1,16 @@
 //! Between shows: an engine that is loaded waits until somebody lets it go, and the next takes over what the last one knows
 //! of the lanes. Nothing is sent meanwhile.
 
-use super::{Engine, Part, Phase, Rest, Rider, first_phase};
+use super::{Engine, Phase, Rest, Rider, first_phase};
 use crate::engine::Mix;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::time::TRIM_MS;
 
 /// A seat this near its park pose is there, strokes: 0.1 mm of 150.
 const AT_PARK: Pose = [0.000_7; MAX_AXES];
+
+/// About a pulse of a bench seat: nearer no frame leads.
+const A_PULSE: Pose = [0.000_004; MAX_AXES];
 
 impl Engine {
     /// The same, waiting for [`Engine::go`].
@@ -62,10 +65,7 @@ impl Engine {
     /// is not ready to play (`ready` false), it rests.
     pub fn take_over(&mut self, before: &Self, ready: bool) {
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
-            rider.count_on(old);
-            if old.part == Part::Away {
-                rider.cut();
-            }
+            rider.go_on_from(old);
         }
         if !ready {
             self.rest_untold();
@@ -75,8 +75,19 @@ impl Engine {
     /// Whether a lane that frames may go to is elsewhere than at park.
     #[must_use]
     pub fn is_astray(&self) -> bool {
-        let is_up = |rider: &Rider| !is_at(&rider.window, rider.pose(), &rider.window.park(), &AT_PARK);
-        self.riders.iter().any(|rider| rider.is_there() && is_up(rider))
+        self.is_any_off_park(&AT_PARK)
+    }
+
+    /// Whether a lane that frames may go to is farther than that from park.
+    fn is_any_off_park(&self, near: &Pose) -> bool {
+        let is_off = |rider: &Rider| !is_at(&rider.window, rider.pose(), &rider.window.park(), near);
+        self.riders.iter().any(|rider| rider.is_there() && is_off(rider))
+    }
+
+    /// Whether lanes that are to park rest there already, and nobody is waited for.
+    pub(super) fn is_parked_untold(&self) -> bool {
+        let is_awaited = self.riders.iter().any(Rider::is_awaited);
+        self.homeward && self.sends_nothing() && !is_awaited && !self.is_any_off_park(&A_PULSE)
     }
 
     /// At rest, and no frame says so: the seats have not moved.

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use super::late::Overdue;
 use super::proof::Traffic;
 use crate::time::MonoTime;
 
@@ -27,6 +28,8 @@ pub(super) struct Counter {
     /// What was told, and not judged yet.
     told: Option<u16>,
     first: Option<Count>,
+    /// The next count says no more than what may still arrive.
+    anew: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +37,8 @@ struct Count {
     packets: u16,
     traffic: Traffic,
     at: MonoTime,
+    /// What it has not counted of all that was sent before.
+    late: Overdue,
 }
 
 /// What a count says.
@@ -46,6 +51,11 @@ pub(super) enum Said {
 }
 
 impl Counter {
+    /// The same that compares nothing with what was counted so far.
+    pub(super) const fn anew(&self) -> Self {
+        Self { next: None, told: None, first: self.first, anew: true }
+    }
+
     pub(super) const fn hear(&mut self, packets: u16) {
         self.told = Some(packets);
     }
@@ -64,7 +74,8 @@ impl Counter {
     /// Judges what was told by all that was sent until now, which is a little more than it can have counted.
     pub(super) fn judge(&mut self, traffic: Traffic, now: MonoTime) -> Option<Said> {
         let packets = self.told.take()?;
-        let count = Count { packets, traffic, at: now };
+        let anew = std::mem::take(&mut self.anew);
+        let count = Count { packets, traffic, at: now, late: Overdue::default() };
         let Some(first) = self.first.filter(|first| now.since(first.at) < STALE) else {
             self.first = Some(count);
             return None;
@@ -73,9 +84,13 @@ impl Counter {
         let acked = traffic.acked - first.traffic.acked;
         let grown = u64::from(packets.wrapping_sub(first.packets));
         let tolerated = TOLERATED + sent / DOUBLED;
-        let fits = grown <= sent + tolerated && grown + tolerated >= acked;
-        if now.since(first.at) >= SPAN || !fits {
-            self.first = Some(count);
+        let fits = grown <= sent + first.late.most(now) + tolerated && grown + tolerated >= acked;
+        if now.since(first.at) >= SPAN || !fits || anew {
+            let late = if fits { first.late.after(sent, grown, now) } else { Overdue::default() };
+            self.first = Some(Count { late, ..count });
+        }
+        if anew {
+            return None;
         }
         if fits {
             return None;
@@ -114,6 +129,25 @@ mod tests {
     fn another_master_is_known_by_the_second_count_after_it_began() {
         assert_eq!(judge(&[500, 600, 750])[2], Some(Said::Crowded));
         assert_eq!(judge(&[500, 620, 740])[2], Some(Said::Crowded), "twenty a second");
+    }
+
+    #[test]
+    fn what_was_held_back_is_not_taken_for_another_masters_when_it_comes_and_more_than_that_is() {
+        for (more, said) in [(0, None), (60, Some(Said::Crowded))] {
+            let mut counter = Counter::default();
+            let mut after = |packets: u16, sent, at| {
+                counter.hear(packets);
+                counter.judge(Traffic { sent, acked: 0 }, s(at))
+            };
+            assert_eq!((after(500, 0, 1), after(600, 400, 2)), (None, None), "300 of them are held back");
+            counter = counter.anew();
+            let mut after = |packets: u16, sent, at| {
+                counter.hear(packets);
+                counter.judge(Traffic { sent, acked: 0 }, s(at))
+            };
+            assert_eq!((after(650, 450, 3), after(700, 500, 5)), (None, None));
+            assert_eq!(after(1_050 + more, 550, 6), said);
+        }
     }
 
     #[test]

@@ -217,11 +217,12 @@ impl Member {
         self.on_alarm(DPFE, sighting.alarm);
         let is_well = sighting.error == 0 && sighting.alarm == 0;
         self.refusing &= !is_well;
-        if let Some(why) = self.against(sighting) {
+        if let Some(why) = self.against(sighting, at) {
             self.crowd_untold |= self.must_rehome.is_none() && matches!(why, Why::OtherMaster(_));
             self.must_rehome.get_or_insert(why);
         } else {
-            self.baseline = Some(Baseline::of(sighting, self.traffic));
+            let renewed = |before: Baseline| before.renewed(sighting, self.traffic, at);
+            self.baseline = Some(self.baseline.map_or_else(|| Baseline::of(sighting, self.traffic), renewed));
             (self.trusted, self.gap) = (false, false);
             self.seen = is_well.then_some(at);
         }
@@ -232,10 +233,10 @@ impl Member {
         self.must_be_home = true;
     }
 
-    fn against(&self, sighting: &Sighting) -> Option<Why> {
+    fn against(&self, sighting: &Sighting, now: MonoTime) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.baseline {
-            Some(baseline) => baseline.judge(sighting, self.traffic, self.gap),
+            Some(baseline) => baseline.judge(sighting, self.traffic, self.gap, now),
             None if self.trusted => Verdict::Same,
             None => Verdict::Unproved,
         };
@@ -433,7 +434,7 @@ impl Member {
         self.reading = false;
         self.next_read = None;
         // Who it is when it is back, and whether it rebooted, is for a sighting to prove.
-        self.counter = Counter::default();
+        self.counter = self.counter.anew();
         self.rest();
     }
 

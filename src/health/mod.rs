@@ -10,6 +10,7 @@ mod counter;
 mod groups;
 mod health_state;
 mod judge;
+mod late;
 mod member;
 mod proof;
 #[cfg(test)]

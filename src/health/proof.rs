@@ -1,12 +1,16 @@
 //! Decides if a controller that is back is the one it was, and has not rebooted: its identity, and its count of datagrams.
 //!
 //! DP34 counts the datagrams that a controller received, round after 65,535. Since it was last read, it must have grown
-//! by at least the frames that were acked and at most by all that was sent; whether reads count is left open. A
+//! by at least the frames that were acked and at most by all that was sent, and by what was held back before ([`Overdue`]); whether
+//! reads count is left open. A
 //! controller that rebooted began at 0 and hardly ever meets that; where it counts more than it could since, somebody else
 //! sent to it.
 //!
 //! An MBOX controller has no DP34. That one did not reboot is proved by its answers: it needs a second to start, and then
 //! homes, so whoever has answered all the while has not.
+
+use super::late::Overdue;
+use crate::time::MonoTime;
 
 /// What was read of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +63,8 @@ pub(super) struct Baseline {
     packets: Option<u16>,
     homed: bool,
     traffic: Traffic,
+    /// What it had not counted then of all that was sent before.
+    late: Overdue,
 }
 
 /// What a sighting says beside the baseline.
@@ -78,12 +84,26 @@ impl Baseline {
         self.homed
     }
 
-    pub(super) const fn of(sighting: &Sighting, traffic: Traffic) -> Self {
-        Self { identity: sighting.identity, packets: sighting.packets, homed: sighting.homed, traffic }
+    pub(super) fn of(sighting: &Sighting, traffic: Traffic) -> Self {
+        let Sighting { identity, packets, homed, .. } = *sighting;
+        Self { identity, packets, homed, traffic, late: Overdue::default() }
+    }
+
+    /// The one that follows it, of a sighting that it believes.
+    pub(super) fn renewed(&self, sighting: &Sighting, traffic: Traffic, now: MonoTime) -> Self {
+        let grown = |(then, now): (u16, u16)| {
+            let acked = traffic.acked - self.traffic.acked;
+            let beyond = u64::from(now).wrapping_sub(u64::from(then)).wrapping_sub(acked);
+            (acked + beyond.wrapping_add(UNDER_WAY) % (1 << 16)).saturating_sub(UNDER_WAY)
+        };
+        let sent = traffic.sent - self.traffic.sent;
+        let late =
+            self.packets.zip(sighting.packets).map(grown).map(|grown| self.late.after(sent, grown, now));
+        Self { late: late.unwrap_or_default(), ..Self::of(sighting, traffic) }
     }
 
     /// `gap` says whether it has left unanswered, since it was believed last, what it would not have.
-    pub(super) fn judge(&self, sighting: &Sighting, traffic: Traffic, gap: bool) -> Verdict {
+    pub(super) fn judge(&self, sighting: &Sighting, traffic: Traffic, gap: bool, now: MonoTime) -> Verdict {
         if sighting.identity != self.identity {
             return Verdict::Other;
         }
@@ -91,13 +111,14 @@ impl Baseline {
         if self.homed && !sighting.homed {
             return Verdict::NotHome;
         }
+        let late = self.late.most(now);
         let (then, now) = match (self.packets, sighting.packets) {
             (Some(then), Some(now)) => (then, now),
             (None, None) if gap => return Verdict::Gap,
             (None, None) => return Verdict::Same,
             _ => return Verdict::Unproved,
         };
-        let doubt = self.doubt(traffic) + 2 * UNDER_WAY;
+        let doubt = self.doubt(traffic) + late + 2 * UNDER_WAY;
         if doubt > PROVES {
             return Verdict::Unproved;
         }
@@ -106,7 +127,7 @@ impl Baseline {
         if grown.wrapping_add(UNDER_WAY) % (1 << 16) <= doubt {
             return Verdict::Same;
         }
-        let counted_since = traffic.sent - self.traffic.sent + UNDER_WAY;
+        let counted_since = traffic.sent - self.traffic.sent + late + UNDER_WAY;
         if u64::from(now) <= counted_since { Verdict::Rebooted } else { Verdict::Crowded }
     }
 
@@ -134,6 +155,8 @@ mod tests {
 
     use super::*;
 
+    const NOW: MonoTime = MonoTime::from_nanos(100_000_000_000);
+
     const fn sighting(packets: u16) -> Sighting {
         let identity = Identity { version: 3, minor_version: 1, work_mode: 2, axes: 3 };
         Sighting { identity, error: 0, alarm: 0, packets: Some(packets), homed: true }
@@ -142,7 +165,7 @@ mod tests {
     fn after(packets: u16, sent: u64, acked: u64, now: u16) -> Verdict {
         let before = Traffic { sent: 1_000, acked: 900 };
         let baseline = Baseline::of(&sighting(packets), before);
-        baseline.judge(&sighting(now), Traffic { sent: 1_000 + sent, acked: 900 + acked }, true)
+        baseline.judge(&sighting(now), Traffic { sent: 1_000 + sent, acked: 900 + acked }, true, NOW)
     }
 
     #[test]
@@ -178,16 +201,16 @@ mod tests {
     fn a_controller_that_counts_nothing_is_believed_as_long_as_it_has_answered_all_the_while() {
         let blind = Sighting { packets: None, ..sighting(0) };
         let none = Traffic::default();
-        let after = |gap| Baseline::of(&blind, none).judge(&blind, none, gap);
+        let after = |gap| Baseline::of(&blind, none).judge(&blind, none, gap, NOW);
         assert_eq!((after(false), after(true)), (Verdict::Same, Verdict::Gap));
-        assert_eq!(Baseline::of(&sighting(0), none).judge(&blind, none, false), Verdict::Unproved);
+        assert_eq!(Baseline::of(&sighting(0), none).judge(&blind, none, false, NOW), Verdict::Unproved);
     }
 
     #[test]
     fn a_controller_that_was_never_home_is_no_less_so_now() {
         let away = Sighting { homed: false, ..sighting(7) };
         let judge =
-            |before, now| Baseline::of(before, Traffic::default()).judge(now, Traffic::default(), false);
+            |before, now| Baseline::of(before, Traffic::default()).judge(now, Traffic::default(), false, NOW);
         assert_eq!(judge(&away, &away), Verdict::Same);
         assert_eq!(judge(&sighting(7), &away), Verdict::NotHome);
     }
@@ -197,7 +220,7 @@ mod tests {
         let mut other = sighting(7);
         other.identity.work_mode = 1;
         assert_eq!(
-            Baseline::of(&sighting(7), Traffic::default()).judge(&other, Traffic::default(), false),
+            Baseline::of(&sighting(7), Traffic::default()).judge(&other, Traffic::default(), false, NOW),
             Verdict::Other
         );
     }

@@ -69,7 +69,35 @@ impl Why {
 impl fmt::Display for Why {
     /// The reason, without the name of the controller.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+        match self {
+            Self::Outside { axis, pulses, .. } => write!(
+                f,
+                "its axis {} says that it is at {} pulses, outside of its stroke (one that its seat type does not have is led to 0): \
+                 wrong word order (dialect), other axes (PA02), or not home",
+                axis + 1,
+                pulses.0
+            ),
+            Self::Error { error, .. } => write!(f, "{}", crate::wire::DeviceError(*error)),
+            Self::Drive { axis, error, .. } => write!(f, "drive of axis {axis}: error {error}"),
+            Self::Alarm { register: DPFE, value, .. } => {
+                write!(f, "alarm of the servo drives, kind {value} (DPFE)")
+            }
+            Self::Alarm { register, value, .. } => {
+                write!(f, "it reports that something is wrong (0x1001): DP{register:02x} is {value}")
+            }
+            Self::MoreAxes { drives, .. } => write!(
+                f,
+                "PA02 = {drives}: it drives axes that its seat type does not have, nobody can read them, and frames would lead them to 0"
+            ),
+            _ => f.write_str(self.plainly()),
+        }
+    }
+}
+
+impl Why {
+    /// The reason where no figure belongs to it.
+    const fn plainly(self) -> &'static str {
+        match self {
             Self::Acked => "it answers",
             Self::AcksOff => "acks are off",
             Self::AcksMissing(_) => "acks are missing or late",
@@ -77,7 +105,9 @@ impl fmt::Display for Why {
             Self::NotSeenYet => "no answer yet",
             Self::SeenAgain => "back as it was",
             Self::Moved(_) => "it was moved while no frame was sent to it from here",
-            Self::Unsure(_) => "frames to it, or its acks, were missing for over 50 ms: where it is has to be read",
+            Self::Unsure(_) => {
+                "frames to it, or its acks, were missing for over 50 ms: where it is has to be read"
+            }
             Self::Astray(_) => {
                 "it acks frames and is elsewhere than they have led it: it homes by itself or is jogged (PA96 to PA98), or its \
                  filters delay it too much"
@@ -92,29 +122,9 @@ impl fmt::Display for Why {
             Self::Unread(_) => {
                 "not all of its axes tell where they are: those past the sixth have no register"
             }
-            Self::Outside { axis, pulses, .. } => {
-                return write!(
-                    f,
-                    "its axis {} says that it is at {} pulses, outside of its stroke (one that its seat type does not have is led to 0): \
-                     wrong word order (dialect), other axes (PA02), or not home",
-                    axis + 1,
-                    pulses.0
-                );
-            }
             Self::EmergencyStop(_) => "emergency stop",
             Self::HeldUntilReset(_) => "its emergency stop was released, and holds until a reset (PA91 = 2)",
-            Self::Error { error, .. } => return write!(f, "{}", crate::wire::DeviceError(*error)),
-            Self::Drive { axis, error, .. } => return write!(f, "drive of axis {axis}: error {error}"),
-            Self::Alarm { register: DPFE, value, .. } => {
-                return write!(f, "alarm of the servo drives, kind {value} (DPFE)");
-            }
-            Self::Alarm { register, value, .. } => {
-                return write!(f, "it reports that something is wrong (0x1001): DP{register:02x} is {value}");
-            }
             Self::Refuses(_) => "it refuses frames",
-            Self::MoreAxes { drives, .. } => {
-                return write!(f, "PA02 = {drives}: it drives axes that its seat type does not have, nobody can read them, and frames would lead them to 0");
-            }
             Self::Wide(_) => "it answers with registers of 32 bits, and only those of 16 can be read",
             Self::Rebooted(_) => "it has rebooted: its packet counter (DP34) does not go on",
             Self::OtherMaster(_) => {
@@ -126,7 +136,12 @@ impl fmt::Display for Why {
                 "it was silent for so long that it may have rebooted, and it counts no packets (DP34) that would tell"
             }
             Self::Unproved(_) => "whether it has rebooted cannot be told",
-        })
+            Self::Outside { .. }
+            | Self::Error { .. }
+            | Self::Drive { .. }
+            | Self::Alarm { .. }
+            | Self::MoreAxes { .. } => "it says so itself",
+        }
     }
 }
 

@@ -74,6 +74,8 @@ pub struct AckLoop {
     ticks: Consumer<TickReport>,
     /// The newest instant at which a frame was sent.
     last_sent: MonoTime,
+    /// Which controllers have said anything at all.
+    heard: Vec<bool>,
     /// Who judges how the controllers stand.
     watch: Option<Watch>,
     /// Whom to tell which frames were acked, and the times so far.
@@ -91,9 +93,17 @@ impl AckLoop {
         sent: Consumer<Sent>,
         ticks: Consumer<TickReport>,
     ) -> Self {
-        let accounts = Accounts::new(watched, ack_every);
-        let last_sent = MonoTime::default();
-        Self { receiver, accounts, sent, ticks, watch: None, last_sent, live: None, hangs_after: HANGS_AFTER }
+        Self {
+            heard: vec![false; watched.len()],
+            receiver,
+            accounts: Accounts::new(watched, ack_every),
+            sent,
+            ticks,
+            watch: None,
+            last_sent: MonoTime::default(),
+            live: None,
+            hangs_after: HANGS_AFTER,
+        }
     }
 
     /// The same where frames were sent before: `firsts` are the numbers of the next.
@@ -189,7 +199,7 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, .. } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, heard, watch, live, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
@@ -199,6 +209,7 @@ impl AckLoop {
                     return;
                 }
             };
+            heard[controller] = true;
             match observer.read_reply(controller, octets) {
                 Ok(reply) => {
                     observer.on_reply(controller, &reply, at);
@@ -238,6 +249,12 @@ impl AckLoop {
     pub fn into_accounts(self) -> Accounts {
         let (changes, gone) = self.watch.map(Watch::into_outcome).unwrap_or_default();
         Accounts { changes, gone, ..self.accounts }
+    }
+
+    /// Whether a controller has said anything at all.
+    #[must_use]
+    pub fn has_heard(&self, controller: usize) -> bool {
+        self.heard[controller]
     }
 
     /// Notes positions that were read from registers before the tick loop runs.

@@ -2,6 +2,7 @@
 //! hear of that, and whose registers are read.
 
 mod asking;
+mod hearing;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,19 +15,17 @@ use super::live::{Live, Phase};
 use super::mail::{Alarm, Sent};
 use super::positions::Positions;
 use super::sight::{Looker, axes_to_read};
-use super::standby::{Seen, Standby};
+use super::standby::Standby;
 use super::table::{Row, Turns};
-use crate::belief::Reading;
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::health::{Change, HealthState, HealthTable, Notice};
-use crate::motion::Pulses;
 use crate::net::Sender;
 use crate::observe::{Look, Observer};
 use crate::state::Event;
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
-use crate::wire::{Dialect, ImaxRegisters, PerAxis, ReplyCode};
+use crate::wire::{Dialect, ReplyCode};
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
@@ -192,75 +191,6 @@ impl Watch {
         }
     }
 
-    /// Hears a datagram that is no reply to a frame; says whether it was an answer to a look.
-    pub(super) fn hear(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-        let awaited = self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at));
-        let looker = &mut self.lookers[controller];
-        let is_answer = looker.hear(octets);
-        if let Some(packets) = looker.take_count() {
-            self.health.on_count(controller, packets);
-        }
-        if is_answer || awaited {
-            self.health.on_answer(controller, at);
-        }
-        if ImaxRegisters::parse(octets).is_ok_and(|reply| reply.is_wide()) {
-            self.health.on_wide_registers(controller);
-        }
-        self.take_sighting(controller, at);
-        is_answer || awaited
-    }
-
-    /// A seat answers where some of its axes are. What nobody asked for here may be the answer to what the control plane asked;
-    /// else it was repeated on its way.
-    fn on_answer(&mut self, controller: usize, first: usize, told: &[Pulses], at: MonoTime) {
-        if let Some(passing) = self.positions[controller].answer(first, told, at) {
-            self.on_positions(controller, at);
-            self.on_passing(controller, &passing, at);
-        } else if !self.is_asked_otherwise() {
-            self.positions[controller].on_repeated(at);
-        }
-    }
-
-    /// A seat that frames lead is hardly ever read as a whole between two of them: what a part of it tells is for the tick thread as
-    /// well.
-    fn on_passing(&self, controller: usize, passing: &Reading, at: MonoTime) {
-        let positions = &self.positions[controller];
-        if !self.live.is_moving() || positions.reading(at).is_some() {
-            return;
-        }
-        if let Some(evidence) = self.live.evidence(controller) {
-            evidence.on_reading(passing);
-        }
-    }
-
-    /// What is known by now of where a seat is, is for the tick thread, too.
-    fn on_positions(&mut self, controller: usize, at: MonoTime) {
-        let positions = &self.positions[controller];
-        self.health.on_outside(controller, positions.outside());
-        self.health.on_ambiguous(controller, positions.is_ambiguous());
-        if let (Some(reading), Some(evidence)) = (positions.reading(at), self.live.evidence(controller)) {
-            evidence.on_reading(&reading);
-        }
-    }
-
-    /// Whoever joins from where it is found has to be at rest there.
-    fn take_sighting(&mut self, controller: usize, at: MonoTime) {
-        let standing = self.stands(controller);
-        let Some(reading) = self.positions[controller].reading(at) else { return };
-        let looker = &mut self.lookers[controller];
-        let Some(sighting) = looker.take() else { return };
-        if looker.leads_more_axes(sighting.identity.axes) {
-            self.health.on_more_axes(controller, sighting.identity.axes);
-        }
-        if reading.rests || !standing.is_looked_at() {
-            self.health.on_sighting(controller, &sighting, at);
-            if let Some(standby) = &mut self.standby {
-                let at_park = looker.is_parked(&reading.pose);
-                standby.on_seen(controller, Seen { homed: sighting.homed, at_park });
-            }
-        }
-    }
-
     /// Minds a sign of an emergency stop: what was asked before it says nothing of its end.
     pub(super) fn mind_stop(&mut self, controller: usize, code: ReplyCode) {
         if let Some(looker) = self.lookers.get_mut(controller) {
@@ -283,38 +213,6 @@ impl Watch {
         if let Some(standby) = &self.standby {
             standby.on_closed(controller, times);
         }
-    }
-
-    /// Hears an answer to a beat: a sign of life, and where the axes of the seat are, as far as that is known by now; none where
-    /// it is none.
-    pub(super) fn hear_beat(
-        &mut self,
-        controller: usize,
-        octets: &[u8],
-        at: MonoTime,
-    ) -> Option<PerAxis<Pulses>> {
-        let (first, told) = self.beats.hear(controller, octets)?;
-        self.on_answer(controller, first, &told, at);
-        self.health.on_status(controller, at);
-        self.mind_rest(controller, at);
-        self.positions[controller].told()
-    }
-
-    /// Hears an answer to a beat that asked whether a controller that is led knows its zero; says whether it is one.
-    pub(super) fn hear_zero(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-        let zero = Beats::hear_zero(octets).filter(|_| self.live.is_moving());
-        if let Some(homed) = zero {
-            self.health.on_zero(controller, homed);
-            self.health.on_status(controller, at);
-        }
-        zero.is_some()
-    }
-
-    /// Hears an answer to a beat that asked for inputs: a sign of life, and which are active; none where it is none.
-    pub(super) fn hear_inputs(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> Option<u16> {
-        let inputs = self.beats.hear_inputs(controller, octets)?;
-        self.health.on_status(controller, at);
-        Some(inputs)
     }
 
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.

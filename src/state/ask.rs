@@ -138,7 +138,8 @@ impl Machine {
         match self.state {
             State::Playing(_) | State::Paused => self.enter(State::Parking, cause, now),
             State::Armed => self.enter(State::Parked, cause, now),
-            State::Parked if self.facts.astray => self.enter(State::Parking, cause, now),
+            // Whether all are there is read once more, and what is not is led there.
+            State::Parked if self.facts.astray || self.facts.homed => self.enter(State::Parking, cause, now),
             State::Parked | State::Parking => {}
             State::Recovering => {
                 self.known_position()?;

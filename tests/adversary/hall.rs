@@ -132,6 +132,7 @@ pub(crate) fn seats(kind: &Kind) -> Vec<Settings> {
         mm_s: 240.0,
         mbox: kind.dialect == Dialect::Mbox,
         lies: false,
+        shy: false,
         // As its manual has it.
         high_first: kind.dialect == Dialect::Mbox,
         hurry: true,

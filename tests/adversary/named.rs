@@ -216,6 +216,47 @@ fn a_seat_that_is_still_being_jogged_when_park_is_asked_for_is_not_yanked() {
 }
 
 #[test]
+fn a_seat_that_was_jogged_just_before_park_is_there_before_the_hall_says_that_it_is_parked() {
+    for (by_mm, ms) in [(-20.0, 50), (-20.0, 300), (-60.0, 10), (-60.0, 700)] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(1_500);
+            hall.stops();
+            hall.is_cleared();
+            hall.pass(2_000);
+            let now = hall.ether.ns();
+            assert!(hall.ether.world().lines[0].seat.jog(0, by_mm, now), "it rests");
+            hall.pass(ms);
+            assert!(hall.parks(), "{:?}", hall.state);
+        });
+        assert_no_breach(&ether);
+        assert_at_park(&ether, 3);
+    }
+}
+
+#[test]
+fn nor_does_it_go_on_to_say_so_of_one_that_was_jogged_up_while_it_was_parked() {
+    for ms in [10, 50, 150, 300, 600] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.load(0);
+            assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
+            hall.pass(300);
+            let now = hall.ether.ns();
+            assert!(hall.ether.world().lines[0].seat.jog(0, 15.0, now), "it rests");
+            hall.pass(ms);
+            hall.ask(Transition::Park);
+            for state in [State::Parking, State::Parked] {
+                assert!(hall.comes_to(|now| now == state, 30_000), "{:?}", hall.state);
+            }
+        });
+        assert_no_breach(&ether);
+        assert_at_park(&ether, 3);
+    }
+}
+
+#[test]
 fn a_seat_that_was_jogged_just_before_go_is_not_yanked() {
     for passes in [100, 300, 500, 700] {
         let ether = ether(SIX, |_| {});
@@ -386,6 +427,24 @@ fn a_seat_that_hears_nothing_of_a_stop_and_then_of_the_way_to_park_does_not_leap
         hall.pass(4_000);
     });
     assert_no_breach(&ether);
+}
+
+#[test]
+fn a_seat_that_is_cut_off_on_its_way_to_park_is_there_before_the_hall_says_that_it_is_parked() {
+    for (at, length) in [(0, 150), (300, 90), (300, 600), (900, 150)] {
+        let ether = ether(THREE, |_| {});
+        lead(THREE, &ether, false, |hall| {
+            hall.ride(0);
+            hall.pass(600);
+            hall.ask(Transition::Park);
+            hall.pass(at);
+            hall.ether.turns(0, Weather::Cut, length);
+            assert!(hall.comes_to(|state| state == State::Parked, 30_000), "{:?}", hall.state);
+            hall.pass(50);
+            assert_at_park(&hall.ether, 3);
+        });
+        assert_no_breach(&ether);
+    }
 }
 
 #[test]

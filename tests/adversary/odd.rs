@@ -21,7 +21,8 @@ fn assert_no_more(bent: Bent, open: usize, share: f64) {
     assert_at_most(most, first, count, Some(bent));
 }
 
-// Open: where a seat stands at which another master's long frame keeps it, nothing tells that what is sent then waits.
+// Open: nothing tells of another master that moves a seat after its last answer, while the answers are on their way. What waits behind
+// that master's long frame is not judged: no reading tells of a queue.
 #[test]
 fn no_more_histories_than_are_open_move_a_seat_too_fast_while_another_master_sends_to_it() {
     assert_no_more(Bent::Master, 0, 0.005);

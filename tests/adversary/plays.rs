@@ -57,6 +57,14 @@ fn nor_does_one_to_two_seats_of_which_one_was_cut_off_while_it_was_to_park() {
     assert_no_breach(&town, code);
 }
 
+#[test]
+fn nor_does_one_whose_seat_answers_everything_but_where_it_is() {
+    let lost = |town: &Town| town.ether.turns(0, Weather::Slow(200), 60_000);
+    let (town, code) = play(&[100.0], |seat| seat.shy = true, lost);
+    assert_no_breach(&town, code);
+    assert_eq!(code, Some(75), "at {} mm", height(&town, 0));
+}
+
 // D14: a controller that cuts what takes long.
 
 #[test]

@@ -46,6 +46,8 @@ pub(crate) struct Settings {
     pub(crate) mbox: bool,
     /// Whether it says that it knows its zero though it does not (DPF0).
     pub(crate) lies: bool,
+    /// Whether it leaves reads of its positions unanswered.
+    pub(crate) shy: bool,
     /// Whether the upper word of a position comes first.
     pub(crate) high_first: bool,
     /// PA06.
@@ -392,6 +394,9 @@ impl Seat {
                 } else {
                     words::motion_reply(octets, x, 0, inputs)
                 }
+            }
+            Heard::Read { channel: 0, start, .. } if self.settings.shy && POSITIONS.contains(&start) => {
+                return None;
             }
             Heard::Read { channel, start, num } => {
                 let words: Vec<u16> = (start..start.saturating_add(num))

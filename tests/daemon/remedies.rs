@@ -89,6 +89,20 @@ fn a_dead_controller_holds_up_neither_clear_nor_park_of_the_others_be_it_out_or_
 }
 
 #[test]
+fn a_hall_whose_seats_are_all_out_says_that_none_takes_part() {
+    let hall = Hall::open();
+    let says_so = |status: &Value| {
+        status["warnings"].as_array().expect("a list").iter().any(|one| one["id"] == "no-seat")
+    };
+    hall.done(&["disable", "A1"]);
+    assert!(!says_so(&hall.lives_on(30)), "there is another");
+    hall.done(&["disable", "A2"]);
+    hall.wait(says_so);
+    hall.done(&["enable", "A1"]);
+    hall.wait(|status| !says_so(status));
+}
+
+#[test]
 fn an_emergency_stop_at_a_seat_that_is_out_holds_up_nobody_and_the_seat_stays_out() {
     let hall = pressed_at_rest();
     hall.done(&["disable", "A1"]);

@@ -95,3 +95,42 @@ fn a_configuration_whose_port_is_taken_is_given_up_and_the_hall_goes_on_with_the
     hall.arm("ride");
     assert_eq!(hall.end().motion(), 0);
 }
+
+/// A hall whose seats stand up, stopped in mid-show, and which has read its configuration anew, changed like that.
+fn reloaded_up(change: fn(String) -> String) -> Hall {
+    let hall = Hall::open();
+    hall.play("night");
+    (0..2).for_each(|seat| hall.rises(seat));
+    hall.done(&["stop"]);
+    hall.comes_to("stopped");
+    hall.rewrite(|config| change(config).replace("Hall 1", "Hall 2"));
+    for seat in 0..2 {
+        hall.relay(seat).count();
+    }
+    hall.done(&["reload"]);
+    // What was latched stays so.
+    hall.wait(|status| status["hall"] == "Hall 2" && status["next"] == "clear, then park or home");
+    hall.done(&["clear"]);
+    hall.comes_to("recovering");
+    hall
+}
+
+#[test]
+fn seats_that_stand_up_while_the_configuration_is_read_anew_are_parked_from_where_they_are() {
+    let changes: [fn(String) -> String; 3] = [
+        |config| config,
+        |config| config.replace("stroke_mm = 150.0", "stroke_mm = 100.0"),
+        |config| config.replace("park = [0.0, 0.0, 0.0]", "park = [0.1, 0.1, 0.1]"),
+    ];
+    for (index, change) in changes.into_iter().enumerate() {
+        let hall = reloaded_up(change);
+        hall.lives_on(30);
+        assert_eq!(hall.relay(0).count() + hall.relay(1).count(), 0, "nothing moves by itself");
+        hall.wait(|status| status["next"] == "park, or home");
+        hall.done(&["park"]);
+        let parked = hall.comes_to("parked");
+        assert!((0..2).all(|seat| parked["controllers"][seat]["health"] == "ok"), "{parked}");
+        let seen = hall.end();
+        assert_eq!(seen.rest_in_park(), index < 2, "{:?}", seen.controllers);
+    }
+}

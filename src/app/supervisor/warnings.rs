@@ -6,7 +6,7 @@ use super::Supervisor;
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
-use crate::state::Next;
+use crate::state::{Next, State};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -34,6 +34,8 @@ impl Supervisor {
     /// All of them, gravest first.
     pub(super) fn warnings(&self, table: &[Row]) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self.of_controllers(table).collect();
+        let takes_part = |(lane, row): (usize, &Row)| self.settings.is_on(lane) && row.standing.may_move();
+        warnings.extend(nobody(table, self.mirror.state, takes_part));
         warnings.extend(self.of_strangers());
         warnings.extend(self.of_belts(table));
         warnings.extend(self.of_the_machine());
@@ -139,4 +141,19 @@ impl Supervisor {
             remedy: "run preflight".to_owned(),
         })
     }
+}
+
+/// A hall may play and park with all its seats out; what its state says is true of none of them then.
+fn nobody(table: &[Row], state: State, takes_part: impl FnMut((usize, &Row)) -> bool) -> Option<Warning> {
+    let is_looked_for = |row: &Row| row.why == Why::NotSeenYet;
+    if table.iter().all(is_looked_for) || table.iter().enumerate().any(takes_part) {
+        return None;
+    }
+    Some(Warning {
+        id: "no-seat".to_owned(),
+        severity: Severity::Error,
+        controller: None,
+        text: format!("no seat takes part: \"{state}\" is said of none"),
+        remedy: "take seats in (`kinocue enable`), or see at each what keeps it out".to_owned(),
+    })
 }

@@ -139,6 +139,27 @@ fn repeated_and_reordered_acks_do_not_shake_the_proof_by_the_counter() {
 }
 
 #[test]
+fn datagrams_that_the_network_holds_back_are_not_another_masters_when_they_come_after_the_seat_is_back() {
+    for (rival, is_alone) in [(0, true), (200, false)] {
+        let mut hall = Hall::new(LossPolicy::Continue);
+        hall.run(150);
+        hall.silence(&[2]);
+        hall.run(40);
+        hall.health.on_other_sent(2, 300); // all of them are held back
+        hall.back();
+        hall.run(30);
+        hall.health.on_joined(1);
+        hall.run(150);
+        assert_eq!(hall.health.standing(1), HealthState::Ok);
+        hall.notices.clear();
+        hall.packets[2] += 300 + rival;
+        hall.run(200);
+        let told = hall.told_hall().contains(&Event::Trouble(Trouble::OtherMaster(2)));
+        assert_eq!(told, !is_alone, "{:?}", hall.changes());
+    }
+}
+
+#[test]
 fn old_acks_that_come_late_keep_nobody_alive() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.run(100);

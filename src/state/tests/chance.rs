@@ -134,7 +134,8 @@ impl Model {
         assert!(!stays || to.is_latched(), "{request} led from {from} to {to}");
         if !from.may_send_motion() && to.may_send_motion() {
             let way = (from, request);
-            let parks = from == State::Recovering || (from == State::Parked && self.astray);
+            let parks =
+                from == State::Recovering || (from == State::Parked && (self.astray || before.is_homed()));
             assert!(
                 way == (State::Armed, Transition::Go) || (parks && request == Transition::Park),
                 "{way:?}"

@@ -92,6 +92,9 @@ fn nothing_goes_on_that_a_person_wanted_to_rest_while_the_next_cue_was_loaded() 
         rig.tell(Event::CueEnded);
         end_show(&mut rig);
         ask_in_between(&mut rig, ask.clone());
+        if ask == Command::Park {
+            rig.tell(Event::Parked); // all were read once more
+        }
         rig.settle();
         let rests = if ask == Command::Stop { State::Stopped } else { State::Parked };
         assert_eq!((rig.state(), cue(&rig)), (rests, Some("two")), "{ask}");
