@@ -8,7 +8,7 @@ use crate::motion::MAX_AXES;
 use crate::wire::Analogue;
 
 /// The most parts of one channel.
-pub const MAX_PARTS: usize = 2;
+pub(crate) const MAX_PARTS: usize = 2;
 
 /// What a channel says at an instant, a number for each of its parts in the order of the table; all 0 at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -25,7 +25,7 @@ pub enum ChannelId {
 
 /// Whose a value is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
+pub(crate) enum Scope {
     /// One of each axis.
     Axis,
     /// One for all seats.
@@ -34,7 +34,7 @@ pub enum Scope {
 
 /// What a part counts, and so what it may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub(crate) enum PartKind {
     /// Hz.
     Hertz,
     /// A distance in the cue's unit.
@@ -45,7 +45,7 @@ pub enum Quantity {
 
 /// What operators set of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LevelRule {
+pub(crate) enum LevelRule {
     /// The level of vibration scales its amplitude.
     Scale,
     /// Each part is allowed or not, as an effect is; a controller has it where its configuration says up to which level.
@@ -54,36 +54,38 @@ pub enum LevelRule {
 
 /// One number of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Part {
+pub(crate) struct ChannelPart {
     /// Its name in files.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// What it counts.
-    pub quantity: Quantity,
+    pub(crate) kind: PartKind,
 }
 
 /// A row of the table.
 #[derive(Debug, Clone, Copy)]
-pub struct Channel {
+pub(crate) struct Channel {
     /// Its place.
-    pub id: ChannelId,
+    pub(crate) id: ChannelId,
     /// Its MCAP topic.
-    pub topic: &'static str,
+    pub(crate) topic: &'static str,
     /// What a person calls it.
-    pub title: &'static str,
+    pub(crate) title: &'static str,
     /// What its CSV columns begin with before the number of the axis; nothing in those of the hall.
-    pub prefix: &'static str,
+    pub(crate) prefix: &'static str,
     /// Whose it is.
-    pub scope: Scope,
+    pub(crate) scope: Scope,
     /// Its numbers.
-    pub parts: &'static [Part],
+    pub(crate) parts: &'static [ChannelPart],
     /// What operators set of it.
-    pub level: LevelRule,
+    pub(crate) level: LevelRule,
+    /// False if frames with vibration have no place for it.
+    pub(crate) beside_vibration: bool,
     /// What no frame may say though each part alone could, with the remedy.
-    pub check: fn(Sample) -> Result<(), &'static str>,
+    pub(crate) check: fn(Sample) -> Result<(), &'static str>,
 }
 
-/// All channels.
-pub const CHANNELS: &[Channel] = &[
+/// All channels. The first is what every cue had from the first release on; see `proof::digest` and MCAP for the others.
+pub(crate) const CHANNELS: &[Channel] = &[
     Channel {
         id: ChannelId::Vibration,
         topic: "/cue/vibration",
@@ -91,10 +93,11 @@ pub const CHANNELS: &[Channel] = &[
         prefix: "v",
         scope: Scope::Axis,
         parts: &[
-            Part { name: "hz", quantity: Quantity::Hertz },
-            Part { name: "amp", quantity: Quantity::Amplitude },
+            ChannelPart { name: "hz", kind: PartKind::Hertz },
+            ChannelPart { name: "amp", kind: PartKind::Amplitude },
         ],
         level: LevelRule::Scale,
+        beside_vibration: true,
         check: |_| Ok(()),
     },
     Channel {
@@ -104,18 +107,19 @@ pub const CHANNELS: &[Channel] = &[
         prefix: "",
         scope: Scope::Hall,
         parts: &[
-            Part { name: "dac1", quantity: Quantity::Level },
-            Part { name: "dac2", quantity: Quantity::Level },
+            ChannelPart { name: "dac1", kind: PartKind::Level },
+            ChannelPart { name: "dac2", kind: PartKind::Level },
         ],
         level: LevelRule::Switch,
+        beside_vibration: false,
         check: |sample| Analogue::check(sample.0),
     },
 ];
 
 /// How many values there are at an instant: one for each axis of a channel of axes, one of each other.
-pub const TRACKS: usize = tracks_before(CHANNELS.len());
+pub(crate) const TRACKS: usize = tracks_before(CHANNELS.len());
 /// How many parts operators can switch.
-pub const SWITCHES: usize = switches_before(CHANNELS.len());
+pub(crate) const SWITCHES: usize = switches_before(CHANNELS.len());
 
 const fn tracks_before(channel: usize) -> usize {
     let (mut index, mut tracks) = (0, 0);
@@ -141,27 +145,27 @@ const fn switches_before(channel: usize) -> usize {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TrackId {
     /// The channel.
-    pub channel: ChannelId,
+    pub(crate) channel: ChannelId,
     /// The axis, counted from 0; 0 for a channel of the hall.
-    pub axis: usize,
+    pub(crate) axis: usize,
 }
 
 impl ChannelId {
     /// Its row of the table.
     #[must_use]
-    pub const fn row(self) -> &'static Channel {
+    pub(crate) const fn row(self) -> &'static Channel {
         &CHANNELS[self as usize]
     }
 
     /// Its track on an axis, counted from 0.
     #[must_use]
-    pub const fn on(self, axis: usize) -> TrackId {
+    pub(crate) const fn on(self, axis: usize) -> TrackId {
         TrackId { channel: self, axis }
     }
 
     /// Its only track, of a channel of the hall.
     #[must_use]
-    pub const fn of_hall(self) -> TrackId {
+    pub(crate) const fn of_hall(self) -> TrackId {
         self.on(0)
     }
 }
@@ -175,14 +179,14 @@ impl Channel {
     }
 
     /// Its tracks in a cue of so many axes.
-    pub fn tracks(&self, axes: usize) -> impl Iterator<Item = TrackId> + use<> {
+    pub(crate) fn tracks(&self, axes: usize) -> impl Iterator<Item = TrackId> + use<> {
         let id = self.id;
         (0..self.width().min(if self.scope == Scope::Axis { axes } else { 1 })).map(move |axis| id.on(axis))
     }
 
     /// What operators set, where each of its parts has a switch: the place of the first among all switches.
     #[must_use]
-    pub const fn first_switch(&self) -> usize {
+    pub(crate) const fn first_switch(&self) -> usize {
         switches_before(self.id as usize)
     }
 }
@@ -193,14 +197,14 @@ impl TrackId {
     /// # Panics
     /// If there is no such axis.
     #[must_use]
-    pub const fn index(self) -> usize {
+    pub(crate) const fn index(self) -> usize {
         assert!(self.axis < self.channel.row().width(), "a track of an axis that there is");
         tracks_before(self.channel as usize) + self.axis
     }
 
     /// The CSV column of one of its parts.
     #[must_use]
-    pub fn column(self, part: usize) -> String {
+    pub(crate) fn column(self, part: usize) -> String {
         let Channel { prefix, scope, parts, .. } = self.channel.row();
         let name = parts[part].name;
         match scope {
@@ -222,7 +226,7 @@ impl fmt::Display for TrackId {
 
 /// The track and part that a CSV column carries; `axis_of` reads the number of an axis.
 #[must_use]
-pub fn of_column(name: &str, axis_of: impl Fn(&str) -> Option<usize>) -> Option<(TrackId, usize)> {
+pub(crate) fn of_column(name: &str, axis_of: impl Fn(&str) -> Option<usize>) -> Option<(TrackId, usize)> {
     CHANNELS.iter().find_map(|channel| {
         let (axis, part) = match channel.scope {
             Scope::Hall => (0, name),
@@ -237,7 +241,7 @@ pub fn of_column(name: &str, axis_of: impl Fn(&str) -> Option<usize>) -> Option<
 }
 
 /// The parts that operators can switch: the track, the part, and the name of the switch, which is that of the column.
-pub fn switches() -> impl Iterator<Item = (TrackId, usize, &'static str)> {
+pub(crate) fn switches() -> impl Iterator<Item = (TrackId, usize, &'static str)> {
     let switched = CHANNELS.iter().filter(|channel| channel.level == LevelRule::Switch);
     switched.flat_map(|channel| {
         (0..).zip(channel.parts).map(|(part, known)| (channel.id.of_hall(), part, known.name))
@@ -246,7 +250,7 @@ pub fn switches() -> impl Iterator<Item = (TrackId, usize, &'static str)> {
 
 /// True if a switch has that name, which no effect may have then.
 #[must_use]
-pub fn is_switch(name: &str) -> bool {
+pub(crate) fn is_switch(name: &str) -> bool {
     switches().any(|(_, _, known)| known == name)
 }
 
@@ -256,16 +260,16 @@ pub struct Samples([Sample; TRACKS]);
 
 impl Samples {
     /// All off.
-    pub const REST: Self = Self([Sample([0.0; MAX_PARTS]); TRACKS]);
+    pub(crate) const REST: Self = Self([Sample([0.0; MAX_PARTS]); TRACKS]);
 
     /// That of a track.
     #[must_use]
-    pub const fn of(&self, track: TrackId) -> Sample {
+    pub(crate) const fn of(&self, track: TrackId) -> Sample {
         self.0[track.index()]
     }
 
     /// Sets that of a track.
-    pub const fn set(&mut self, track: TrackId, sample: Sample) {
+    pub(crate) const fn set(&mut self, track: TrackId, sample: Sample) {
         self.0[track.index()] = sample;
     }
 }

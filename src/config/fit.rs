@@ -104,8 +104,8 @@ pub enum Misfit {
     },
     /// An analogue output of a controller whose frames have no place for it.
     #[error(
-        "{column}: this output cannot be set at {controller}, as its frames carry the vibration of axis {axis} and so no \
-         Extend (SMC manual 2.2.2.9); take the vibration out of the cue, or set {column} = 0 for that [[controller]]"
+        "{column}: this output cannot be set at {controller}, as its frames carry the vibration of axis {axis} and have no \
+         place for it (SMC manual 2.2.2.9); take the vibration out of the cue, or set {column} = 0 for that [[controller]]"
     )]
     OutputWithVibration {
         /// Its column.
@@ -213,7 +213,7 @@ impl Config {
                 let most = Some(one.at_most[place]).filter(|most| *most > 0.0)?;
                 let controller = one.name.clone();
                 let vibrating = one.sees(timeline.axes()).find(|axis| timeline.vibrates(*axis));
-                if let Some(axis) = vibrating {
+                if let Some(axis) = vibrating.filter(|_| !track.channel.row().beside_vibration) {
                     return Some(Misfit::OutputWithVibration { column, controller, axis: axis + 1 });
                 }
                 (level > most).then_some(Misfit::LevelTooHigh { column, level, at, controller, most })

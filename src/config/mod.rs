@@ -187,7 +187,7 @@ pub struct Controller {
     /// The effects it switches; `None` for all of them and every bit of a raw output word.
     pub effects: Option<Vec<String>>,
     /// The highest level of each output of the table that cues set ([`crate::channel::switches`]), 0 to 1; 0 where it has none.
-    pub at_most: [f64; SWITCHES],
+    pub(crate) at_most: [f64; SWITCHES],
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 if only its replies tell.
     pub estop_inputs: u16,
     /// The inputs of its belts, each active while its belt is open, bit 0 = X01; 0 for none.
@@ -269,7 +269,7 @@ impl Config {
     }
 
     /// What operators may switch here: the effects, and the outputs of the table that a controller has.
-    pub fn switch_names(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn switch_names(&self) -> impl Iterator<Item = &str> {
         let there = |place: usize| self.named().any(|controller| controller.at_most[place] > 0.0);
         let outputs = channel::switches().enumerate().filter(move |(place, _)| there(*place));
         self.effects.iter().map(|effect| effect.name.as_str()).chain(outputs.map(|(_, (_, _, name))| name))
@@ -390,7 +390,7 @@ fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
 fn check_effect_name(name: &str) -> Result<(), &'static str> {
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if channel::is_switch(name) {
-        return Err("is the name of an analogue output's switch; call the effect otherwise");
+        return Err("is the name of an output in cues; call the effect otherwise");
     }
     if !name.is_empty() && name.chars().all(fits) {
         Ok(())

@@ -38,13 +38,13 @@ impl Default for Tracks {
 impl Tracks {
     /// That of a track.
     #[must_use]
-    pub fn of(&self, track: TrackId) -> &Steps<Sample> {
+    pub(crate) fn of(&self, track: TrackId) -> &Steps<Sample> {
         &self.0[track.index()]
     }
 
     /// That of the vibration of an axis, counted from 0.
     #[must_use]
-    pub fn vibration(&self, axis: usize) -> &Steps<Sample> {
+    pub(crate) fn vibration(&self, axis: usize) -> &Steps<Sample> {
         self.of(ChannelId::Vibration.on(axis))
     }
 

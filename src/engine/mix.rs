@@ -1,6 +1,6 @@
 //! What an operator sets for a seat, beside where it goes.
 
-use crate::channel::{ChannelId, LevelRule, Quantity, Sample};
+use crate::channel::{ChannelId, LevelRule, PartKind, Sample};
 use crate::timeline::EffectSet;
 
 /// What one lane makes of the cue.
@@ -32,7 +32,7 @@ impl Mix {
         let row = channel.row();
         for ((index, part), value) in (0..).zip(row.parts).zip(&mut left.0) {
             match row.level {
-                LevelRule::Scale if part.quantity == Quantity::Amplitude => *value *= self.vibration,
+                LevelRule::Scale if part.kind == PartKind::Amplitude => *value *= self.vibration,
                 LevelRule::Switch if self.switches >> (row.first_switch() + index) & 1 == 0 => *value = 0.0,
                 LevelRule::Scale | LevelRule::Switch => {}
             }

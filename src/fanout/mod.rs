@@ -5,7 +5,7 @@ mod lanes;
 
 pub use lanes::{Manner, lanes};
 
-use crate::channel::{ChannelId, Sample};
+use crate::channel::{ChannelId, SWITCHES, Sample};
 use crate::cue;
 use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
@@ -19,8 +19,8 @@ pub struct Wiring {
     pub named: Vec<u16>,
     /// The bits of a raw output word that reach the controller.
     pub raw: u16,
-    /// The highest levels of its analogue outputs, 0 where it has none.
-    pub analogue: [f64; 2],
+    /// The highest level of each output of the table ([`crate::channel::switches`]), 0 where it has none.
+    pub(crate) at_most: [f64; SWITCHES],
 }
 
 impl Wiring {
@@ -36,11 +36,10 @@ impl Wiring {
         }
     }
 
-    /// What its analogue outputs are set to for what the cue asks of them.
-    #[must_use]
-    pub fn analogue(&self, Sample([dac1, dac2]): Sample) -> Analogue {
-        let [most1, most2] = self.analogue;
-        Analogue::from_levels([dac1.min(most1), dac2.min(most2)])
+    /// What of a channel of outputs the controller may have.
+    fn within(&self, channel: ChannelId, Sample(levels): Sample) -> Sample {
+        let most = &self.at_most[channel.row().first_switch()..];
+        Sample(std::array::from_fn(|part| levels[part].min(most.get(part).copied().unwrap_or(0.0))))
     }
 }
 
@@ -100,7 +99,7 @@ impl Lane {
                 stamped.shakes = stamped.shakes.max(strokes);
             }
         }
-        let levels = beat.samples.of(ChannelId::Analogue.of_hall());
+        let levels = mix.sample(ChannelId::Analogue, beat.samples.of(ChannelId::Analogue.of_hall()));
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,
@@ -110,7 +109,7 @@ impl Lane {
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],
             outputs: self.wiring.outputs(mix.effects(beat.effects)),
-            analogue: self.wiring.analogue(mix.sample(ChannelId::Analogue, levels)),
+            analogue: Analogue::from_levels(self.wiring.within(ChannelId::Analogue, levels).0),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };
         (stamped, motion.emit_as(self.vibration_port, buf))

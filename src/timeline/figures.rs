@@ -33,17 +33,17 @@ pub struct EffectUse {
 
 /// How much an output of the table is used.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LevelUse {
+pub(crate) struct LevelUse {
     /// How often, and how long, under the name of its column.
-    pub usage: EffectUse,
+    pub(crate) usage: EffectUse,
     /// Its highest level.
-    pub most: f64,
+    pub(crate) most: f64,
 }
 
 impl Timeline {
     /// How much each output of the table is used; nothing of one that is always off.
     #[must_use]
-    pub fn level_uses(&self) -> Vec<LevelUse> {
+    pub(crate) fn level_uses(&self) -> Vec<LevelUse> {
         let used = channel::switches().filter_map(|(track, part, name)| {
             let (_, most) = self.greatest_level(track, part)?;
             let is_on = |sample: Sample| u32::from(sample.0[part] > 0.0);

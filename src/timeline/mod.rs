@@ -10,7 +10,8 @@ mod spline;
 
 pub(crate) use cubic::Cubic;
 pub use extremes::{AxisExtremes, Extreme};
-pub use figures::{EffectUse, Figure, LevelUse};
+pub(crate) use figures::LevelUse;
+pub use figures::{EffectUse, Figure};
 pub use fit::{HELD_BACK, Held, StrokeFit};
 
 use crate::channel::{self, Sample, Samples, TRACKS, TrackId};
@@ -129,7 +130,7 @@ impl Timeline {
 
     /// What each track of the table holds at a show time; off where the cue has none.
     #[must_use]
-    pub fn samples(&self, at: ShowTime, hint: &mut Hint) -> Samples {
+    pub(crate) fn samples(&self, at: ShowTime, hint: &mut Hint) -> Samples {
         let mut all = Samples::REST;
         for track in &self.tracks {
             all.set(*track, self.cue.tracks().of(*track).at(at, &mut hint.tracks[track.index()]));
@@ -151,7 +152,7 @@ impl Timeline {
 
     /// The highest level of a part of a channel, and the first show time at which it is asked for; `None` if it is always off.
     #[must_use]
-    pub fn greatest_level(&self, track: TrackId, part: usize) -> Option<(ShowTime, f64)> {
+    pub(crate) fn greatest_level(&self, track: TrackId, part: usize) -> Option<(ShowTime, f64)> {
         let on = self.cue.tracks().of(track).as_slice().iter().map(|step| (step.at, step.value.0[part]));
         on.filter(|(_, level)| *level > 0.0).reduce(|most, step| if step.1 > most.1 { step } else { most })
     }
@@ -185,7 +186,7 @@ impl Timeline {
 
     /// What an operator may switch of it: its effects, and outputs of the table that it uses.
     #[must_use]
-    pub fn switch_names(&self) -> Vec<String> {
+    pub(crate) fn switch_names(&self) -> Vec<String> {
         let levels =
             channel::switches().filter(|(track, part, _)| self.greatest_level(*track, *part).is_some());
         let levels = levels.map(|(_, _, name)| name.to_owned());

@@ -6,9 +6,9 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Analogue {
     /// The first output, the high word.
-    pub dac1: u16,
+    dac1: u16,
     /// The second output, the low word.
-    pub dac2: u16,
+    dac2: u16,
 }
 
 /// What the vendor's sample sends for Extend, and public programs copied: a value that nobody meant.
@@ -47,7 +47,7 @@ impl Analogue {
 
     /// The same, but off where it is the vendor's sample value, which no frame of ours may say.
     #[must_use]
-    pub const fn meant(self) -> Self {
+    pub(super) const fn meant(self) -> Self {
         if self.extend() == VENDOR_SAMPLE { Self::OFF } else { self }
     }
 
@@ -55,7 +55,7 @@ impl Analogue {
     ///
     /// # Errors
     /// Why not, and what to do, where they make the vendor's sample value.
-    pub fn check(levels: [f64; 2]) -> Result<(), &'static str> {
+    pub(crate) fn check(levels: [f64; 2]) -> Result<(), &'static str> {
         if Self::from_levels(levels).extend() == VENDOR_SAMPLE {
             return Err(
                 "dac1 and dac2 make 0x5678abcd, the constant of the vendor's sample program, which is never sent; \

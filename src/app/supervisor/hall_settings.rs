@@ -172,3 +172,24 @@ fn carry(levels: &mut Levels, before: &Levels) {
         *level = before.rows.get(row).copied().unwrap_or(*level);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::from_to_args;
+
+    #[test]
+    fn an_output_is_switched_as_an_effect_is_and_keeps_no_raw_output_word_back() {
+        let config = from_to_args(&["127.0.0.1:1".to_owned()], &[], 1).unwrap();
+        let mut settings = HallSettings::new(&config);
+        let change =
+            |name: &str, on| LevelsChange { effects: [(name.to_owned(), on)].into(), ..<_>::default() };
+        settings.change(&change("dac2", false)).unwrap();
+        let mix = settings.mixes(&[])[0];
+        assert_eq!((mix.switches, mix.effects), (0b01, u32::MAX));
+        settings.change(&change("water", false)).unwrap();
+        let mix = settings.mixes(&["air".to_owned(), "water".to_owned()])[0];
+        assert_eq!((mix.switches, mix.effects), (0b01, u32::MAX & !0b10 & !(1 << 31)));
+        assert!(settings.change(&change("dac3", false)).is_err());
+    }
+}

@@ -16,31 +16,31 @@ pub(super) struct Axes {
 
 /// A channel of the table: a number for each of its parts.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Parts {
+pub(super) struct TrackMessage {
     /// The axis, counted from 1; 1 for a channel of the hall.
     pub(super) axis: usize,
     pub(super) sample: Sample,
 }
 
 /// Reads those of a channel.
-pub(super) struct PartsOf(pub(super) &'static Channel);
+pub(super) struct MessageOf(pub(super) &'static Channel);
 
-impl<'de> DeserializeSeed<'de> for PartsOf {
-    type Value = Parts;
+impl<'de> DeserializeSeed<'de> for MessageOf {
+    type Value = TrackMessage;
 
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Parts, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<TrackMessage, D::Error> {
         deserializer.deserialize_map(self)
     }
 }
 
-impl<'de> Visitor<'de> for PartsOf {
-    type Value = Parts;
+impl<'de> Visitor<'de> for MessageOf {
+    type Value = TrackMessage;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a number for each part of {}", self.0.topic)
     }
 
-    fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Parts, M::Error> {
+    fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<TrackMessage, M::Error> {
         let Self(channel) = self;
         let mut axis = (channel.scope == Scope::Hall).then_some(1);
         let mut values = [None; MAX_PARTS];
@@ -61,7 +61,7 @@ impl<'de> Visitor<'de> for PartsOf {
         for ((part, value), there) in channel.parts.iter().zip(values).zip(&mut sample.0) {
             *there = value.ok_or_else(|| M::Error::missing_field(part.name))?;
         }
-        Ok(Parts { axis: axis.ok_or_else(|| M::Error::missing_field("axis"))?, sample })
+        Ok(TrackMessage { axis: axis.ok_or_else(|| M::Error::missing_field("axis"))?, sample })
     }
 }
 

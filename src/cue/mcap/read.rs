@@ -14,7 +14,7 @@ use super::super::header::is_effect_name;
 use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME};
 use super::super::problem::Problem;
 use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, title_of, value};
-use super::record::{self, Channel};
+use super::record::{self, ChannelRecord};
 use super::{METADATA, Topic, VERSION, message};
 use crate::channel::{ChannelId, Sample};
 use crate::motion::MAX_AXES;
@@ -81,7 +81,7 @@ struct Reading {
     seen: HashMap<Topic, (u64, u64)>,
     unit: Option<DeclaredUnit>,
     cue: Cue,
-    samples: Vec<(At, ChannelId, message::Parts)>,
+    samples: Vec<(At, ChannelId, message::TrackMessage)>,
     switched: u32,
 }
 
@@ -107,7 +107,7 @@ impl Reading {
                 self.schemas.insert(record::schema(body).ok_or_else(|| broken("schema"))?);
             }
             op::CHANNEL => {
-                self.channel(&Channel::parse(body).ok_or_else(|| broken("channel"))?)?;
+                self.channel(&ChannelRecord::parse(body).ok_or_else(|| broken("channel"))?)?;
             }
             op::METADATA => {
                 let (name, entries) = record::metadata(body).ok_or_else(|| broken("metadata"))?;
@@ -132,8 +132,8 @@ impl Reading {
     }
 
     /// Topics that are not below `/cue/` belong to someone else and are passed over.
-    fn channel(&mut self, channel: &Channel<'_>) -> Result<(), Problem> {
-        let Channel { id, schema, topic: name, encoding } = *channel;
+    fn channel(&mut self, channel: &ChannelRecord<'_>) -> Result<(), Problem> {
+        let ChannelRecord { id, schema, topic: name, encoding } = *channel;
         if self.channels.contains_key(&id) {
             return Ok(()); // repeated in the summary
         }
@@ -196,7 +196,7 @@ impl Reading {
             match at.topic {
                 Topic::Axes => self.axes(at, before, data),
                 _ if at.log_time < before => Err(Problem::TimeGoesBack { early_ns: before - at.log_time }),
-                Topic::Channel(id) => parsed_by(message::PartsOf(id.row()), data)
+                Topic::Channel(id) => parsed_by(message::MessageOf(id.row()), data)
                     .map(|parts| self.samples.push((at, id, parts))),
                 Topic::Io => parsed(data).and_then(|io| self.io(at, io)),
                 Topic::Marker => parsed(data).and_then(|marker| self.marker(at, marker)),
@@ -320,7 +320,7 @@ impl Reading {
         &mut self,
         at: At,
         id: ChannelId,
-        message::Parts { axis, sample }: message::Parts,
+        message::TrackMessage { axis, sample }: message::TrackMessage,
         unit: DeclaredUnit,
     ) -> Result<(), (Option<&'static str>, Problem)> {
         let (channel, axes) = (id.row(), self.cue.axes);
