@@ -41,7 +41,9 @@ impl HealthTable {
         if let (HealthState::Excluded, Some(controller)) = (standing, why.controller()) {
             on(Notice::Hall(state::Event::Rebooted(controller)));
         }
-        let falls_out = (before.standing.may_move() || is_explained) && !standing.may_move();
+        // A seat that is out already may come down only now.
+        let lets_go = before.standing == HealthState::Lost && why.is_of_drives();
+        let falls_out = (before.standing.may_move() || is_explained || lets_go) && !standing.may_move();
         if let Some(demand) = self.demand(standing, why).filter(|_| falls_out) {
             on(Notice::Hall(state::Event::Policy(demand, group)));
         }
@@ -84,9 +86,8 @@ impl HealthTable {
     const fn demand(&self, standing: HealthState, why: Why) -> Option<Demand> {
         match (standing, why, self.policy) {
             (HealthState::Stopped, ..) => None,
-            (_, Why::Drive { .. } | Why::Alarm { register: DPFE, .. }, _) | (.., LossPolicy::Park) => {
-                Some(Demand::Park)
-            }
+            (.., LossPolicy::Park) => Some(Demand::Park),
+            _ if why.is_of_drives() => Some(Demand::Park),
             (.., LossPolicy::Pause) => Some(Demand::Pause),
             (.., LossPolicy::Continue) => None,
         }
@@ -154,6 +155,11 @@ impl HealthTable {
 }
 
 impl Why {
+    /// True if drives may hold their seat no more.
+    const fn is_of_drives(self) -> bool {
+        matches!(self, Self::Drive { .. } | Self::Alarm { register: DPFE, .. })
+    }
+
     /// Why a group that was out for this joins again. That somebody moved it goes on to be worth a word.
     const fn once_seen(self) -> Self {
         match self {

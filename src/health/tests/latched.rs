@@ -89,6 +89,19 @@ fn a_drive_with_an_alarm_parks_whatever_the_configuration_says() {
 }
 
 #[test]
+fn one_of_a_seat_that_is_lost_already_parks_as_well() {
+    let mut hall = Hall::new(LossPolicy::Continue);
+    hall.silence(&[3]);
+    hall.answers_reads = false;
+    hall.health.on_fell_out(3, crate::belief::Fall::Gap);
+    hall.run(2);
+    assert_eq!(hall.health.standing(2), HealthState::Lost);
+    hall.observed(3, What::ServoError { axis: 2, error: 7 });
+    hall.run(2);
+    assert!(hall.told_hall().contains(&Event::Policy(Demand::Park, 2)), "{:?}", hall.told_hall());
+}
+
+#[test]
 fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
     let mut hall = Hall::new(LossPolicy::Continue);
     hall.run(10);

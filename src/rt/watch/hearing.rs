@@ -95,8 +95,9 @@ impl Watch {
 
     /// Hears an answer to a beat that asked whether a controller that is led knows its zero; says whether it is one.
     pub(in super::super) fn hear_zero(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-        let zero = Beats::hear_zero(octets).filter(|_| self.live.is_moving());
-        if let Some(homed) = zero {
+        let zero = Beats::hear_zero(octets);
+        // One that homes because it was asked to does not know it meanwhile.
+        if let Some(homed) = zero.filter(|_| self.live.is_moving()) {
             self.health.on_zero(controller, homed);
             self.health.on_status(controller, at);
         }
