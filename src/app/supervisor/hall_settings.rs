@@ -189,7 +189,7 @@ mod tests {
         assert_eq!((mix.switches, mix.effects), (0b01, u32::MAX));
         settings.change(&change("water", false)).unwrap();
         let mix = settings.mixes(&["air".to_owned(), "water".to_owned()])[0];
-        assert_eq!((mix.switches, mix.effects), (0b01, u32::MAX & !0b10 & !(1 << 31)));
+        assert_eq!((mix.switches, mix.effects), (0b01, !(1 << 1 | 1 << 31)));
         assert!(settings.change(&change("dac3", false)).is_err());
     }
 }
