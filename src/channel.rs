@@ -141,6 +141,17 @@ const fn switches_before(channel: usize) -> usize {
     switches
 }
 
+/// The place of each channel's first track, and of its first switch: looked up on the tick thread, so counted beforehand.
+const FIRST: [(usize, usize); CHANNELS.len()] = {
+    let mut first = [(0, 0); CHANNELS.len()];
+    let mut index = 0;
+    while index < first.len() {
+        first[index] = (tracks_before(index), switches_before(index));
+        index += 1;
+    }
+    first
+};
+
 /// One track of a cue: a channel, of an axis where it is one of axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TrackId {
@@ -187,7 +198,7 @@ impl Channel {
     /// What operators set, where each of its parts has a switch: the place of the first among all switches.
     #[must_use]
     pub(crate) const fn first_switch(&self) -> usize {
-        switches_before(self.id as usize)
+        FIRST[self.id as usize].1
     }
 }
 
@@ -199,7 +210,7 @@ impl TrackId {
     #[must_use]
     pub(crate) const fn index(self) -> usize {
         assert!(self.axis < self.channel.row().width(), "a track of an axis that there is");
-        tracks_before(self.channel as usize) + self.axis
+        FIRST[self.channel as usize].0 + self.axis
     }
 
     /// The CSV column of one of its parts.

@@ -389,6 +389,9 @@ mod tests {
         let seat = crate::motion::SeatType::bench3(2);
         let faults = timeline.fits_stroke(0..2, Some(&seat)).faults.unwrap();
         assert_eq!(faults.told()[0].to_string(), "5:9: a2: 160 is outside the stroke, 0 to 150 mm");
+        let air = |at| timeline.cue().column_place("fx_air", at);
+        assert_eq!(air(None), Place::Text { line: 2, column: 9 });
+        assert_eq!(air(Some(ShowTime::from_millis(10))), Place::Text { line: 5, column: 4 });
         std::fs::remove_file(&path).unwrap();
         assert_eq!(timeline.cue().place(1, 1), Place::Text { line: 5, column: 1 });
     }
