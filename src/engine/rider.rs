@@ -220,6 +220,8 @@ impl Rider {
         if self.is_blind() {
             self.fall_out(Fall::Gap);
         } else if self.is_there() {
+            // One that was being told that it is out is told so anew by whatever course leads on.
+            self.leaving = self.leaving.filter(|_| self.part != Part::With);
             self.part = Part::Still;
         }
     }

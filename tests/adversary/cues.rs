@@ -26,6 +26,7 @@ pub(crate) struct Kind {
     park: f64,
     /// How far the cues go, of what they do otherwise.
     far: f64,
+    ack_every: u32,
 }
 
 const PLAIN: Kind = Kind {
@@ -37,6 +38,7 @@ const PLAIN: Kind = Kind {
     drives: 12,
     park: 0.0,
     far: 1.0,
+    ack_every: 1,
 };
 const MBOX: Kind = Kind { dialect: Dialect::Mbox, ..PLAIN };
 
@@ -62,6 +64,19 @@ pub(crate) const MBOXES: [Kind; 5] = [
 ];
 
 const HIGH: Kind = Kind { park: 0.3, far: 0.5, ..PLAIN };
+
+/// Halls of other rates and sizes.
+pub(crate) const OTHERS: [Kind; 9] = [
+    Kind { hz: 20.0, ..PLAIN },
+    Kind { axes: &[6], hz: 20.0, ..PLAIN },
+    Kind { axes: &[8], hz: 1_000.0, ..PLAIN },
+    Kind { axes: &[6], hz: 1_000.0, timing: Timing::Absolute, ..PLAIN },
+    Kind { axes: &[3], hz: 100.0, ack_every: 10, ..PLAIN },
+    Kind { axes: &[3], hz: 100.0, ack_every: 4, ..PLAIN },
+    Kind { axes: &[3], hz: 5.0, ..PLAIN },
+    Kind { axes: &[3], hz: 1_000.0, ..PLAIN },
+    Kind { axes: &[3, 6, 3, 6, 3, 6], hz: 100.0, ..PLAIN },
+];
 
 /// What configurations the same seats may have, one after the other; what a hall does not drive has no place in its frames.
 pub(crate) const RELOADED: [[Kind; 4]; 4] = [
@@ -123,6 +138,7 @@ impl Kind {
         let tos: Vec<String> = self.axes.iter().enumerate().map(to).collect();
         let mut config = from_to_args(&tos, &[], self.most()).expect("the addresses are sound");
         config.show.rate_hz = self.hz;
+        config.show.ack_every = self.ack_every;
         config.show.timing = self.timing;
         config.show.loss_policy = self.policy;
         for controller in &mut config.controllers {
@@ -142,10 +158,14 @@ impl Kind {
 
     /// What there is for halls of this kind; made once.
     pub(crate) fn book(&self) -> &'static Book {
-        const ALL: usize = KINDS.len() + MBOXES.len() + 24;
+        const ALL: usize = KINDS.len() + MBOXES.len() + 24 + OTHERS.len();
         static BOOKS: [OnceLock<Book>; ALL] = [const { OnceLock::new() }; ALL];
-        let mut all =
-            KINDS.iter().chain(&MBOXES).chain(RELOADED.iter().flatten()).chain(FEWER.iter().flatten());
+        let mut all = KINDS
+            .iter()
+            .chain(&OTHERS)
+            .chain(&MBOXES)
+            .chain(RELOADED.iter().flatten())
+            .chain(FEWER.iter().flatten());
         let index = all.position(|kind| kind == self).expect("it is one of them");
         BOOKS[index].get_or_init(|| {
             let config = self.config();
@@ -154,6 +174,11 @@ impl Kind {
                 swing(axes, 0.8, 40.0 * far, 75.0),
                 swing(axes.min(3), 0.5, 50.0 * far, 70.0),
                 swing(axes, 0.3, 20.0 * far, 120.0),
+                wet(axes, 40.0 * far, "5,0.003"),
+                wet(axes, 0.0, "5,0.003"),
+                wet(axes, 0.0, "4,0.02"),
+                wet(axes, 0.0, "2,0.06"),
+                wet(axes, 0.0, "9.0909,0.003"),
             ];
             let ready = |text: &String| {
                 let cue = cue::read(Path::new("ride.csv"), text.as_bytes(), &Source::Native);
@@ -169,14 +194,30 @@ impl Kind {
 
 /// Six seconds in which all axes swing, each a little after the one before.
 pub(crate) fn swing(axes: usize, hz: f64, mm: f64, about_mm: f64) -> String {
+    swing_on(300, axes, hz, mm, about_mm)
+}
+
+fn swing_on(rows: u32, axes: usize, hz: f64, mm: f64, about_mm: f64) -> String {
     let names: String = (1..=axes).map(|axis| format!(",a{axis}")).collect();
     let mut text = format!("time_ms{names}\n");
-    for row in 0..=300 {
+    for row in 0..=rows {
         text += &(row * 20).to_string();
         for axis in 0..axes {
             let turn = hz * f64::from(row) * 0.02 + axis as f64 * 0.13;
             text += &format!(",{:.9}", (about_mm + mm * (turn * std::f64::consts::TAU).sin()) / 150.0);
         }
+        text.push('\n');
+    }
+    text
+}
+
+/// The same with vibration of the first axis and air all along.
+pub(crate) fn wet(axes: usize, mm: f64, shake: &str) -> String {
+    let swing = swing_on(1_200, axes, 0.3, mm, 75.0);
+    let mut text = String::new();
+    for (row, line) in swing.lines().enumerate() {
+        text += line;
+        text += &if row == 0 { ",v1_hz,v1_amp,fx_air".to_owned() } else { format!(",{shake},1") };
         text.push('\n');
     }
     text

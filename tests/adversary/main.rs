@@ -30,6 +30,7 @@ mod chance;
 mod cues;
 mod dice;
 mod ether;
+mod fresh;
 mod hall;
 mod judge;
 mod master;

@@ -81,6 +81,15 @@ impl Master {
         }
         self.number += 1;
         let time_ms = (self.period / MS) as u32;
-        Frame { absolute: false, number: self.number, time_ms, axes, positions }
+        Frame {
+            absolute: false,
+            number: self.number,
+            time_ms,
+            axes,
+            positions,
+            outputs: 0,
+            shakes: false,
+            shake: [(0, 0); 6],
+        }
     }
 }

@@ -153,6 +153,10 @@ pub(crate) struct Seat {
     pub(crate) hurried: u32,
     pub(crate) waited_ns: u64,
     pub(crate) fastest: f64,
+    /// Its outputs, and whether it vibrates: as the last frame or register that it heard had them.
+    pub(crate) outputs: u16,
+    pub(crate) shakes: bool,
+    shake: [(u16, u16); 6],
     pub(crate) breaches: Vec<Breach>,
 }
 
@@ -188,6 +192,9 @@ impl Seat {
             hurried: 0,
             waited_ns: 0,
             fastest: 0.0,
+            outputs: 0,
+            shakes: false,
+            shake: [(0, 0); 6],
             breaches: Vec::new(),
         }
     }
@@ -388,6 +395,7 @@ impl Seat {
         let inputs = u16::from(self.button.0);
         let reply = match words::hear(octets) {
             Heard::Motion(frame) => {
+                (self.outputs, self.shakes, self.shake) = (frame.outputs, frame.shakes, frame.shake);
                 self.on_motion(&frame, arrival);
                 if mbox && self.stopped {
                     words::motion_reply(octets, 3, words::u16_at(octets, 6), inputs)
@@ -405,6 +413,9 @@ impl Seat {
                 words::register_reply(octets, x, 0, &words)
             }
             Heard::Write { channel, start, value } => {
+                if (channel, start) == (2, 1) {
+                    self.outputs = value;
+                }
                 if (channel, start, value) == (2, 0, 0) {
                     let zero = [0.0; 12];
                     self.homings += 1;
@@ -521,7 +532,10 @@ impl Seat {
     fn told(&self, axis: usize, now: u64) -> i32 {
         let place =
             self.stale.filter(|(until, _)| now < *until).map_or_else(|| self.place(now), |(_, was)| was);
-        (place[axis] - self.zero[axis]).round() as i32
+        let (period, amplitude) = self.shake.get(axis).copied().unwrap_or_default();
+        let turn = now as f64 / 125_000.0 / f64::from(period.max(1));
+        let shaken = f64::from(amplitude) * (turn * std::f64::consts::TAU).sin();
+        (place[axis] - self.zero[axis] + shaken).round() as i32
     }
 
     /// The same of all axes, pulses.

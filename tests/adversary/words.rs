@@ -8,6 +8,11 @@ pub(crate) struct Frame {
     pub(crate) time_ms: u32,
     pub(crate) axes: usize,
     pub(crate) positions: [i32; 12],
+    /// Port Out, and whether it asks any axis to vibrate.
+    pub(crate) outputs: u16,
+    pub(crate) shakes: bool,
+    /// Period, eighths of a millisecond, and amplitude, pulses, of the vibration of its axes.
+    pub(crate) shake: [(u16, u16); 6],
 }
 
 /// What a controller receives.
@@ -68,7 +73,12 @@ fn motion(octets: &[u8], function: u16, channel: u16) -> Heard {
     }
     let absolute = matches!(function, 0x1301 | 0x1801);
     let (number, time_ms) = (u32_at(octets, 12), u32_at(octets, 16));
-    Heard::Motion(Frame { absolute, number, time_ms, axes, positions })
+    let outputs = u16_at(octets, 20 + 4 * axes);
+    let shakes = vibrating && octets[22 + 4 * axes..].iter().any(|octet| *octet != 0);
+    let shark = 22 + 4 * axes;
+    let of = |axis: usize| (u16_at(octets, shark + 4 * axis), u16_at(octets, shark + 4 * axis + 2));
+    let shake = std::array::from_fn(|axis| if vibrating && axis < axes { of(axis) } else { (0, 0) });
+    Heard::Motion(Frame { absolute, number, time_ms, axes, positions, outputs, shakes, shake })
 }
 
 /// The answer to a frame: the frame again, with the inputs in place of the outputs.
