@@ -33,7 +33,7 @@ const ROWS: &[Row] = &[
     ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
     ("pairs of runs, but for names", repeats::but_for_names, Less, 251.0, 170.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 16.0, 2.0),
-    ("lines of code", counts::lines_of_code, Less, 49_120.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 49_094.0, 39_800.0),
     ("public items and fields", counts::public_items, Less, 2_877.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 55.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 538.0, 390.0),
