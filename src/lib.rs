@@ -26,6 +26,7 @@ pub mod plain;
 pub mod time;
 pub mod wire;
 
+pub mod channel;
 pub mod cue;
 pub mod timeline;
 

@@ -14,8 +14,8 @@ use kinocue::motion::Pulses;
 use kinocue::sys::clock::Monotonic;
 use kinocue::time::Clock as _;
 use kinocue::wire::{
-    Access, Code, Dialect, FrameNo, MAX_LEN, Motion, MotionRequest, ReadRequest, RegisterReply, ReplyCode,
-    Timing, Words, position, position_words,
+    Access, Analogue, Code, Dialect, FrameNo, MAX_LEN, Motion, MotionRequest, ReadRequest, RegisterReply,
+    ReplyCode, Timing, Words, position, position_words,
 };
 use process::{Run, Sim, kinocue};
 use serde_json::Value;
@@ -84,6 +84,7 @@ fn send_to(address: &str, places: [i32; 3]) {
         time_ms: 500,
         positions: &positions,
         outputs: 0,
+        analogue: Analogue::OFF,
         vibration: None,
     };
     controller.send(motion.emit(&mut [0; MAX_LEN])).expect("loopback takes it");

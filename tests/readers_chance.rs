@@ -6,16 +6,18 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use kinocue::channel::Sample;
 use kinocue::config;
-use kinocue::cue::{self, Cue, CueFaults, Source};
+use kinocue::cue::{self, Cue, CueFaults, Source, Step};
 use kinocue::device::settings;
 use kinocue::motion::MAX_AXES;
 use kinocue::playlist::Playlist;
 use kinocue::time::ShowTime;
+use kinocue::wire::Analogue;
 use proptest::prelude::*;
 
-const CUE: &str = "# title: Störm\n# units: mm\ntime_ms,a1,a2,v1_hz,v1_amp,fx_air,fx_water\n\
-    0,0.1,150,0,0,1,0\n16.6,0.3,5e-3,20,1.5,1,1\n33.3,1,2,20,1.5,0,0\n50,,2,,,,\n";
+const CUE: &str = "# title: Störm\n# units: mm\ntime_ms,a1,a2,v1_hz,v1_amp,dac1,dac2,fx_air,fx_water\n\
+    0,0.1,150,0,0,0,1,1,0\n16.6,0.3,5e-3,20,1.5,0.25,1,1,1\n33.3,1,2,20,1.5,5e-3,0,0,0\n50,,2,,,,,,\n";
 const HALL: &str = include_str!("data/config/hall.toml");
 const DAY: &str = "title = \"Saturday\"\ntimezone = \"UTC\"\n\n[[entry]]\ncue = \"seat-demo\"\npreset = \"kids\"\nthen = \"go\"\n\n\
     [[entry]]\ncue = \"storm\"\nlevel = \"60%\"\ntrim_ms = -40\neffects = { water = false }\nat = \"19:00\"\n\
@@ -113,8 +115,13 @@ fn assert_sound(cue: &Cue) {
     assert_eq!((cue.times().len() * cue.axes(), cue.times()[0]), (cue.positions().len(), ShowTime::ZERO));
     assert!(cue.times().is_sorted_by(|a, b| a < b));
     assert!(cue.positions().iter().all(|position| position.is_finite() && *position >= 0.0));
-    let shakes = cue.vibration().iter().flat_map(|steps| steps.as_slice());
-    assert!(shakes.into_iter().all(|step| step.value.hz >= 0.0 && step.value.amplitude >= 0.0));
+    for (track, steps) in cue.tracks().used() {
+        let values = || steps.as_slice().iter().map(|Step { value: Sample(values), .. }| *values);
+        assert!(values().flatten().all(|value| value >= 0.0), "{track}");
+        let mut extends = values().map(|levels| Analogue::from_levels(levels).extend());
+        let is_analogue = track.to_string().contains("analogue");
+        assert!(!is_analogue || extends.all(|extend| extend != 0x5678_abcd), "never sent");
+    }
     assert!(cue.title().is_none_or(is_plain), "{:?}", cue.title());
     assert!(cue.markers().iter().all(|marker| marker.name.is_empty() || is_plain(&marker.name)));
 }
@@ -137,11 +144,12 @@ fn assert_read(read: Result<Cue, CueFaults>) {
             cue::write_mcap(&cue, &mut file).unwrap();
             let again = cue::read(Path::new("t.mcap"), file.get_ref().as_slice(), &Source::Native).unwrap();
             assert_eq!((again.times(), again.positions()), (cue.times(), cue.positions()));
-            assert_eq!((again.title(), again.vibration()), (cue.title(), cue.vibration()));
+            assert_eq!((again.title(), again.tracks()), (cue.title(), cue.tracks()));
             let mut text = Vec::new();
             if cue::write_csv(&cue, &mut text).is_ok() {
                 let again = cue::read(Path::new("t.csv"), text.as_slice(), &Source::Native).unwrap();
                 assert_eq!((again.title(), again.positions()), (cue.title(), cue.positions()));
+                assert_eq!(again.tracks(), cue.tracks());
             }
         }
         Err(faults) => assert!(is_plain(&faults.to_string()), "{:?}", faults.to_string()),

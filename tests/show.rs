@@ -58,7 +58,7 @@ fn a_cue_that_starts_and_ends_at_rest_in_the_park_pose_is_played_row_by_row() {
     let played = Virtual::new(cue).play();
     assert_eq!(played.join, ShowTime::ZERO);
     assert_eq!(played.frames[99].request.positions[0].0, 30_000, "at 1 s the cue stands at a tenth");
-    assert_eq!(played.frames.len(), 300 + 3);
+    assert_eq!(played.frames.len(), 300 + 7);
     assert_gentle(&played);
 }
 

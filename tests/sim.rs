@@ -12,7 +12,8 @@ use kinocue::sim::{
 };
 use kinocue::time::MonoTime;
 use kinocue::wire::{
-    Code, FrameNo, MAX_LEN, Motion, MotionReply, ReadRequest, RegisterReply, ReplyCode, Status, Timing,
+    Analogue, Code, FrameNo, MAX_LEN, Motion, MotionReply, ReadRequest, RegisterReply, ReplyCode, Status,
+    Timing,
 };
 
 use proptest::prelude::*;
@@ -40,6 +41,7 @@ fn send(host: &UdpSocket, to: SocketAddrV4, frame: u32) {
         time_ms: 1,
         positions: &[Pulses(10), Pulses(20), Pulses(30)],
         outputs: 0,
+        analogue: Analogue::from_levels([0.5, 0.0]),
         vibration: None,
     };
     let mut buf = [0; MAX_LEN];
@@ -253,8 +255,8 @@ fn the_program_says_when_it_is_ready_logs_frames_and_moves_counts_and_ends_with_
     }
     let rows = rows(&log);
     assert_eq!(rows.len(), 5, "a header, two frames, two ends");
-    assert!(rows.iter().all(|row| row.len() == 7 + 24));
-    assert_eq!(rows[1][2..10], ["1", "0x1401", "1", "2", "0x0000", "10", "20", "30"]);
+    assert!(rows.iter().all(|row| row.len() == 8 + 24));
+    assert_eq!(rows[1][2..11], ["1", "0x1401", "1", "2", "0x0000", "0x80000000", "10", "20", "30"]);
     let moves = self::rows(&moves);
     assert_eq!(moves.len(), 3, "a header, two moves");
     assert!(moves.iter().all(|row| row.len() == 3 + 24));

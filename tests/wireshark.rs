@@ -27,7 +27,7 @@ use serde::Deserialize;
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/wireshark/kinocue.lua");
 
 /// The fields that are compared, those a message lacks included.
-const FIELDS: [&str; 27] = [
+const FIELDS: [&str; 29] = [
     "kinocue.function",
     "kinocue.answer",
     "kinocue.channel",
@@ -41,6 +41,8 @@ const FIELDS: [&str; 27] = [
     "kinocue.output",
     "kinocue.input",
     "kinocue.extend",
+    "kinocue.extend.dac1",
+    "kinocue.extend.dac2",
     "kinocue.vibration.period",
     "kinocue.vibration.amplitude",
     "kinocue.vibration.hz",
@@ -237,6 +239,8 @@ fn body(fields: &mut Fields, frame: u32, time_ms: u32, positions: &[Pulses]) {
 fn tail(fields: &mut Fields, extend: u32, vibration: Option<&[Vibration]>) {
     let Some(vibration) = vibration else {
         fields.insert("kinocue.extend", format!("0x{extend:08x}"));
+        fields.insert("kinocue.extend.dac1", (extend >> 16).to_string());
+        fields.insert("kinocue.extend.dac2", (extend & 0xffff).to_string());
         return;
     };
     list(fields, "kinocue.vibration.period", vibration.iter().map(|shake| shake.period));

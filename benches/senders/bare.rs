@@ -16,7 +16,7 @@ use kinocue::sys::clock::{Monotonic, thread_cpu_time, wall_now_ns};
 use kinocue::sys::realtime::{normal_priority, request};
 use kinocue::time::{Clock as _, MonoTime, nanos};
 use kinocue::tracker::{ACK_TIMEOUT, Histogram, histogram};
-use kinocue::wire::{Code, FrameNo, MAX_LEN, Motion, MotionReply, Timing};
+use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, MotionReply, Timing};
 
 use super::outcome::{Outcome, Quantiles, each};
 
@@ -97,6 +97,7 @@ fn frame() -> Vec<u8> {
         time_ms: 1,
         positions: &[Pulses(0); 6],
         outputs: 0,
+        analogue: Analogue::OFF,
         vibration: None,
     };
     motion.emit(&mut [0; MAX_LEN]).to_vec()

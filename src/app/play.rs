@@ -338,7 +338,7 @@ fn watch(
 }
 
 fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
-    let place = |misfit: Misfit| (timeline.cue().column_place(&misfit.column()), misfit);
+    let place = |misfit: Misfit| (timeline.cue().column_place(&misfit.column(), misfit.at()), misfit);
     let misfits: Vec<_> = config.misfits(timeline).into_iter().map(place).collect();
     let strokes = config.fits_stroke(timeline).faults;
     if !misfits.is_empty() {

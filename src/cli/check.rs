@@ -208,7 +208,7 @@ impl Report {
         };
         judge.stroke(&timeline).faults.iter().for_each(|faults| self.cue_faults(faults));
         for misfit in judge.hall.iter().flat_map(|hall| hall.misfits(&timeline)) {
-            let place = timeline.cue().column_place(&misfit.column());
+            let place = timeline.cue().column_place(&misfit.column(), misfit.at());
             self.fault(Exit::BadCue, FaultReport::new(path, &place, misfit.to_string()));
         }
         self.proof(path, &prove(&timeline, judge.terms(&timeline, self.level)));
@@ -270,7 +270,7 @@ impl Report {
 
 /// That nobody knows whether a hall has the effects of a cue, where it has some.
 fn unwired(path: &Path, timeline: &Timeline) -> Option<String> {
-    let names = timeline.effect_names();
+    let names = timeline.switch_names();
     (!names.is_empty()).then(|| {
         let (path, names) = (path.display(), names.join(", "));
         format!("{path}: whether a hall has its effects ({names}) was not looked at; --config FILE does")

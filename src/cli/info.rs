@@ -1,6 +1,6 @@
 //! `kinocue info`.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -8,10 +8,11 @@ use serde::Serialize;
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
+use crate::cue::Vibration;
 use crate::plain;
 use crate::proof::{self, AxisFigures};
 use crate::time::{Rate, ShowTime};
-use crate::timeline::{EffectUse, Held, Hint, Timeline};
+use crate::timeline::{EffectUse, Held, Hint, LevelUse, Timeline};
 
 /// How many marks a curve is drawn with.
 const DRAWN: u32 = 64;
@@ -69,6 +70,7 @@ struct Info {
     rate_hz: f64,
     vibration: Vec<VibrationReport>,
     effects: Vec<EffectReport>,
+    outputs: Vec<OutputReport>,
     markers: Vec<MarkerReport>,
     notes: Vec<String>,
     axes: Vec<AxisReport>,
@@ -84,11 +86,33 @@ struct EffectReport {
     first_s: Option<f64>,
 }
 
+impl fmt::Display for EffectReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, times, on_s, first_s } = self;
+        write!(f, "{name}: {times}×, {on_s:.1} s in all")?;
+        first_s.map_or(Ok(()), |first| write!(f, ", first at {}", ShowTime::from_secs_f64(first)))
+    }
+}
+
+impl From<LevelUse> for OutputReport {
+    fn from(LevelUse { usage, most }: LevelUse) -> Self {
+        Self { usage: usage.into(), max_level: most }
+    }
+}
+
 impl From<EffectUse> for EffectReport {
     fn from(usage: EffectUse) -> Self {
         let EffectUse { name, times, on, first } = usage;
         Self { name, times, on_s: on.as_secs_f64(), first_s: first.map(ShowTime::as_secs_f64) }
     }
+}
+
+/// An analogue output, while its level is above 0.
+#[derive(Debug, Serialize)]
+struct OutputReport {
+    #[serde(flatten)]
+    usage: EffectReport,
+    max_level: f64,
 }
 
 /// The vibration of an axis: frequencies while its amplitude is above 0, and the greatest amplitude.
@@ -135,6 +159,7 @@ impl Info {
             rate_hz: judge.rate_hz,
             vibration: vibration(timeline, &figures),
             effects: timeline.effect_uses().into_iter().map(Into::into).collect(),
+            outputs: timeline.level_uses().into_iter().map(Into::into).collect(),
             markers: cue
                 .markers()
                 .iter()
@@ -181,11 +206,9 @@ impl Info {
             let hz = if min_hz == max_hz { min_hz.to_string() } else { format!("{min_hz} to {max_hz}") };
             ("vibration", format!("{axes}: {hz} Hz, up to {max_amplitude_mm:.2} mm"))
         }));
-        facts.extend(self.effects.iter().map(|effect| {
-            let first = effect.first_s.map(|s| format!(", first at {}", ShowTime::from_secs_f64(s)));
-            let (name, times, on) = (&effect.name, effect.times, effect.on_s);
-            ("effect", format!("{name}: {times}×, {on:.1} s in all{}", first.unwrap_or_default()))
-        }));
+        facts.extend(self.effects.iter().map(|effect| ("effect", effect.to_string())));
+        let output = |OutputReport { usage, max_level }: &OutputReport| format!("{usage}, up to {max_level}");
+        facts.extend(self.outputs.iter().map(|used| ("output", output(used))));
         let at = |marker: &MarkerReport| ShowTime::from_secs_f64(marker.at_s);
         facts.extend(self.markers.iter().map(|marker| ("marker", format!("{} {}", at(marker), marker.name))));
         facts
@@ -193,10 +216,10 @@ impl Info {
 }
 
 fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationReport> {
-    let axes = timeline.cue().vibration().iter().zip(figures).enumerate();
-    let report = axes.filter_map(|(axis, (steps, figures))| {
+    let report = figures.iter().enumerate().filter_map(|(axis, figures)| {
+        let steps = timeline.cue().tracks().vibration(axis).as_slice().iter();
         let shaking =
-            steps.as_slice().iter().map(|step| step.value).filter(|v| v.hz > 0.0 && v.amplitude > 0.0);
+            steps.map(|step| Vibration::from(step.value)).filter(|v| v.hz > 0.0 && v.amplitude > 0.0);
         let (hz, amplitudes): (Vec<_>, Vec<_>) = shaking.map(|v| (v.hz, v.amplitude)).unzip();
         let mm = timeline.unit().to_stroke(&figures.seat) * figures.seat.stroke_mm;
         Some(VibrationReport {

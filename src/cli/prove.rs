@@ -106,9 +106,9 @@ fn of_cue(cue: Cue, config: Config, verdict: &mut Verdict) {
     verdict.title = timeline.cue().title().map(str::to_owned);
     verdict.length_s = Some(timeline.duration().as_secs_f64());
     verdict.axes = Some(timeline.axes());
-    verdict.effects = timeline.effect_names().to_vec();
+    verdict.effects = timeline.switch_names();
     for misfit in config.misfits(&timeline) {
-        let place = timeline.cue().column_place(&misfit.column());
+        let place = timeline.cue().column_place(&misfit.column(), misfit.at());
         verdict.faults.push(format!("{place}{misfit}").trim_start().to_owned());
     }
     config.fits_stroke(&timeline).faults.iter().for_each(|faults| note(faults, verdict));

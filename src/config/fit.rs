@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::channel::{self, TrackId};
 use crate::cue::CueFaults;
 use crate::motion::SeatType;
 use crate::time::ShowTime;
@@ -11,7 +12,7 @@ use crate::timeline::{Held, Timeline};
 use crate::wire::{Vibration, motion_channel_and_slots};
 
 use super::section::did_you_mean;
-use super::{Config, Controller, Dialect, FanOut};
+use super::{Config, Controller, Dialect};
 
 /// The most axes of a frame with vibration (SMC manual 2.2.2.9).
 const MAX_VIBRATING_AXES: usize = 6;
@@ -75,6 +76,45 @@ pub enum Misfit {
         /// Half the seat's stroke.
         limit: Swing,
     },
+    /// An analogue output that no controller has.
+    #[error(
+        "{column}: no controller has this output; say in the [[controller]] that has it how far it may go, as \
+         {column} = 1.0"
+    )]
+    NoOutput {
+        /// Its column.
+        column: &'static str,
+    },
+    /// A level over what a controller's output may have.
+    #[error(
+        "{column}: the level of {level} at {at} is over {most}, the highest that {controller} may have; lower it, or raise \
+         {column} of that [[controller]]"
+    )]
+    LevelTooHigh {
+        /// Its column.
+        column: &'static str,
+        /// What the cue asks for.
+        level: f64,
+        /// The first show time at which it is asked for.
+        at: ShowTime,
+        /// The controller's name.
+        controller: String,
+        /// What it may have.
+        most: f64,
+    },
+    /// An analogue output of a controller whose frames have no place for it.
+    #[error(
+        "{column}: this output cannot be set at {controller}, as its frames carry the vibration of axis {axis} and have no \
+         place for it (SMC manual 2.2.2.9); take the vibration out of the cue, or set {column} = 0 for that [[controller]]"
+    )]
+    OutputWithVibration {
+        /// Its column.
+        column: &'static str,
+        /// The controller's name.
+        controller: String,
+        /// The axis that vibrates, from 1.
+        axis: usize,
+    },
 }
 
 /// How far a vibration swings to either side.
@@ -121,6 +161,18 @@ impl Misfit {
             Self::UnsaidAmplitude { axis, .. } | Self::AmplitudePastStroke { axis, .. } => {
                 format!("v{axis}_amp")
             }
+            Self::NoOutput { column, .. }
+            | Self::LevelTooHigh { column, .. }
+            | Self::OutputWithVibration { column, .. } => (*column).to_owned(),
+        }
+    }
+
+    /// The show time that it is about; `None` if the column as such is wrong.
+    #[must_use]
+    pub const fn at(&self) -> Option<ShowTime> {
+        match self {
+            Self::LevelTooHigh { at, .. } => Some(*at),
+            _ => None,
         }
     }
 }
@@ -145,7 +197,29 @@ impl Config {
             Misfit::UnknownEffect { name: name.clone(), hint }
         });
         let shaken = self.controllers.iter().filter_map(|controller| unshakeable(controller, timeline));
-        untaken.chain(unknown).chain(shaken).chain(self.overshaken(timeline)).collect()
+        let shaken = shaken.chain(self.overshaken(timeline));
+        untaken.chain(unknown).chain(shaken).chain(self.unset_levels(timeline)).collect()
+    }
+
+    /// The levels that outputs cannot have, once for each column: of no controller, or the first that cannot.
+    fn unset_levels(&self, timeline: &Timeline) -> Vec<Misfit> {
+        let switches = channel::switches().enumerate();
+        let misfit = |(place, (track, part, column)): (usize, (TrackId, usize, &'static str))| {
+            let (at, level) = timeline.greatest_level(track, part)?;
+            if !self.named().any(|controller| controller.at_most[place] > 0.0) {
+                return Some(Misfit::NoOutput { column });
+            }
+            self.controllers.iter().find_map(|one| {
+                let most = Some(one.at_most[place]).filter(|most| *most > 0.0)?;
+                let controller = one.name.clone();
+                let vibrating = one.sees(timeline.axes()).find(|axis| timeline.vibrates(*axis));
+                if let Some(axis) = vibrating.filter(|_| !track.channel.row().beside_vibration) {
+                    return Some(Misfit::OutputWithVibration { column, controller, axis: axis + 1 });
+                }
+                (level > most).then_some(Misfit::LevelTooHigh { column, level, at, controller, most })
+            })
+        };
+        switches.filter_map(misfit).collect()
     }
 
     /// The axes that swing too far, once for each seat type.
@@ -189,12 +263,8 @@ impl Config {
 
 /// Why the controller cannot shake as the cue asks, named by the first axis that does.
 fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
-    let seen = match controller.fan_out {
-        FanOut::Slice => controller.window(),
-        FanOut::Shared => 0..timeline.axes(),
-    };
     let (_, axes) = motion_channel_and_slots(controller.frame_axes(timeline.axes()));
-    let axis = 1 + seen.into_iter().find(|&axis| timeline.vibrates(axis))?;
+    let axis = 1 + controller.sees(timeline.axes()).find(|&axis| timeline.vibrates(axis))?;
     let controller_name = controller.name.clone();
     match controller.dialect {
         Dialect::Mbox => Some(Misfit::NoVibration { axis, controller: controller_name }),
@@ -272,6 +342,33 @@ mod tests {
         assert!(misfits(&["1,axes=6"], header, row).is_empty());
         assert_eq!(misfits(&["1,axes=7"], header, row).len(), 1);
         assert!(misfits(&["1,axes=10"], header, "0,0,0,0").is_empty());
+    }
+
+    #[test]
+    fn a_level_is_held_to_what_a_controller_has_and_what_its_frames_can_carry() {
+        let timeline = cue("a1,a2,v2_hz,v2_amp,dac1", "0,0,20,0.01,0.75");
+        let targets = ["127.0.0.1:1,axes=1", "127.0.0.1:2,axes=1,offset=1"].map(str::to_owned);
+        let hall = |at_most: [[f64; 2]; 2]| {
+            let mut config = from_to_args(&targets, &[], 2).unwrap();
+            config.controllers.iter_mut().zip(at_most).for_each(|(one, most)| one.at_most = most);
+            config
+        };
+        assert!(hall([[0.75, 0.0], [0.0, 1.0]]).misfits(&timeline).is_empty());
+        for (at_most, text) in [
+            (
+                [[0.5, 0.0], [0.0; 2]],
+                "dac1: the level of 0.75 at 00:00.000 is over 0.5, the highest that c1 may have",
+            ),
+            (
+                [[1.0; 2], [1.0; 2]],
+                "dac1: this output cannot be set at c2, as its frames carry the vibration of axis 2",
+            ),
+            ([[0.0, 1.0]; 2], "dac1: no controller has this output"),
+        ] {
+            let found = hall(at_most).misfits(&timeline);
+            let [misfit] = &found[..] else { panic!("told once: {found:?}") };
+            assert!(misfit.to_string().starts_with(text) && misfit.column() == "dac1", "{misfit}");
+        }
     }
 
     #[test]

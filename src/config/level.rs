@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::Effect;
 use super::fault::Faults;
 use super::section::{Entry, Section, did_you_mean};
+use crate::channel;
 use crate::time::TRIM_MS;
 
 /// An intensity, 0 to 1: `60%`, or `-6dB` for 10^(-6/20).
@@ -50,7 +51,8 @@ pub(crate) fn switches(
     for (name, value) in table {
         let name = name.get_ref();
         let entry = Entry::new(name, value);
-        if effects.is_some_and(|effects| !effects.iter().any(|effect| effect.name == **name)) {
+        let is_here = |effects: &[Effect]| effects.iter().any(|effect| effect.name == **name);
+        if effects.is_some_and(|effects| !is_here(effects)) && !channel::is_switch(name) {
             let known = effects.unwrap_or_default().iter().map(|effect| effect.name.as_str());
             entry.fault(faults, &format!("is not in [effects]{}", did_you_mean(name, known)));
         }

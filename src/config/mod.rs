@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::channel::{self, SWITCHES};
 use crate::checks::Check;
 use crate::motion::{MAX_AXES, SeatType};
 
@@ -185,6 +186,8 @@ pub struct Controller {
     pub accept: Accept,
     /// The effects it switches; `None` for all of them and every bit of a raw output word.
     pub effects: Option<Vec<String>>,
+    /// The highest level of each output of the table that cues set ([`crate::channel::switches`]), 0 to 1; 0 where it has none.
+    pub(crate) at_most: [f64; SWITCHES],
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 if only its replies tell.
     pub estop_inputs: u16,
     /// The inputs of its belts, each active while its belt is open, bit 0 = X01; 0 for none.
@@ -265,6 +268,13 @@ impl Config {
         }
     }
 
+    /// What operators may switch here: the effects, and the outputs of the table that a controller has.
+    pub(crate) fn switch_names(&self) -> impl Iterator<Item = &str> {
+        let there = |place: usize| self.named().any(|controller| controller.at_most[place] > 0.0);
+        let outputs = channel::switches().enumerate().filter(move |(place, _)| there(*place));
+        self.effects.iter().map(|effect| effect.name.as_str()).chain(outputs.map(|(_, (_, _, name))| name))
+    }
+
     /// Every controller that the file names: those that take part, and those that are out for good.
     pub fn named(&self) -> impl Iterator<Item = &Controller> {
         self.controllers.iter().chain(self.absent.iter().map(|one| &one.controller))
@@ -327,6 +337,14 @@ impl Controller {
         self.axis_offset..self.axis_offset + self.seat.axes
     }
 
+    /// The axes of a cue of `cue_axes` axes that its frames carry, also those of others, from 0.
+    fn sees(&self, cue_axes: usize) -> Range<usize> {
+        match self.fan_out {
+            FanOut::Slice => self.window(),
+            FanOut::Shared => 0..cue_axes,
+        }
+    }
+
     fn switches(&self, effect: &str) -> bool {
         self.effects.as_ref().is_none_or(|names| names.iter().any(|name| name == effect))
     }
@@ -371,6 +389,9 @@ fn check_peer(address: SocketAddrV4) -> Result<(), &'static str> {
 /// True if cues can use `name` for an effect; the reason if not.
 fn check_effect_name(name: &str) -> Result<(), &'static str> {
     let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    if channel::is_switch(name) {
+        return Err("is the name of an output in cues; call the effect otherwise");
+    }
     if !name.is_empty() && name.chars().all(fits) {
         Ok(())
     } else {

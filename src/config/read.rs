@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use toml::de::DeTable;
 
+use crate::channel::{self, SWITCHES};
 use crate::motion::{FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
 
 use super::accept::acceptances;
@@ -336,11 +337,8 @@ fn controller<'t>(
     let vibration_port = vibration_port(&mut section, dialect);
     let accept = accept(&mut section).unwrap_or(Accept::All);
     let effects = effects_of(&mut section, site);
-    let estop_inputs = inputs_of(&mut section, "estop_inputs");
-    let belt_inputs = inputs_of(&mut section, "belt_inputs");
-    if let Some(entry) = section.get("belt_inputs").filter(|_| estop_inputs & belt_inputs != 0) {
-        entry.fault(section.faults, "an input of estop_inputs is none of a belt");
-    }
+    let at_most = levels_of(&mut section);
+    let (estop_inputs, belt_inputs) = named_inputs(&mut section);
     let accept_findings = acceptances(&mut section);
     let enabled = section.get("enabled").and_then(|entry| entry.switch(section.faults)).unwrap_or(true);
     section.finish();
@@ -360,11 +358,30 @@ fn controller<'t>(
         vibration_port: vibration_port.unwrap_or_default(),
         accept,
         effects,
+        at_most,
         estop_inputs,
         belt_inputs,
         accept_findings,
     };
     Some((controller, enabled))
+}
+
+/// The highest level of each output, as its name says it.
+fn levels_of(section: &mut Section<'_, '_, '_>) -> [f64; SWITCHES] {
+    let mut at_most = [0.0; SWITCHES];
+    for ((_, _, name), most) in channel::switches().zip(&mut at_most) {
+        *most = section.number_in(name, 0.0..=1.0).unwrap_or(0.0);
+    }
+    at_most
+}
+
+/// The inputs of an emergency stop, and those of belts.
+fn named_inputs(section: &mut Section<'_, '_, '_>) -> (u16, u16) {
+    let [estop, belts] = ["estop_inputs", "belt_inputs"].map(|key| inputs_of(section, key));
+    if let Some(entry) = section.get("belt_inputs").filter(|_| estop & belts != 0) {
+        entry.fault(section.faults, "an input of estop_inputs is none of a belt");
+    }
+    (estop, belts)
 }
 
 /// A list of inputs, X01 to X12, as a word.

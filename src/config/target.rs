@@ -3,6 +3,7 @@
 use std::net::{SocketAddr, SocketAddrV4, ToSocketAddrs as _};
 use std::sync::Arc;
 
+use crate::channel::SWITCHES;
 use crate::motion::{MAX_AXES, SeatType};
 
 use super::section::did_you_mean;
@@ -76,7 +77,10 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
     for (index, to) in tos.iter().enumerate() {
         let mut controller = parse_target(to, index, cue_axes)?;
         refuse_twin(to, &controller, &controllers)?;
-        controller.effects = (!controller.address.ip().is_loopback()).then(|| names.clone());
+        // Nobody knows the wiring of one that is not of this machine.
+        let bench = controller.address.ip().is_loopback();
+        controller.effects = (!bench).then(|| names.clone());
+        controller.at_most = [if bench { 1.0 } else { 0.0 }; SWITCHES];
         controllers.push(controller);
     }
     let seats = distinct_seats(&controllers);
@@ -189,6 +193,7 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
         vibration_port: options.vibration_port,
         accept: Accept::All,
         effects: None,
+        at_most: [0.0; SWITCHES],
         estop_inputs: 0,
         belt_inputs: 0,
         accept_findings: Vec::new(),

@@ -166,6 +166,19 @@ fn a_key_given_twice_is_refused_once() {
 }
 
 #[test]
+fn an_output_has_what_its_controller_says_and_no_effect_has_its_name() {
+    let hall = with("dac2 = 0.8\n").unwrap();
+    assert_eq!(hall.controllers[0].at_most, [0.0, 0.8]);
+    assert!(hall.switch_names().eq(["dac2"]), "nobody switches what no controller has");
+    assert_eq!(with("dac1 = 1.5\n").unwrap_err(), ["hall.toml:13:8: dac1: 1.5 is outside 0..=1"]);
+    let faults = parse(&format!("[effects]\ndac1 = 1\n{SEAT}{CONTROLLER}")).unwrap_err();
+    assert!(
+        faults[0].ends_with("dac1: is the name of an output in cues; call the effect otherwise"),
+        "{faults:?}"
+    );
+}
+
+#[test]
 fn columns_are_counted_in_characters() {
     let faults = with("row = \"é\" # é\neffects = [\"é\", 1]\n").unwrap_err();
     assert_eq!(

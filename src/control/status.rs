@@ -140,7 +140,7 @@ pub struct ShowStatus {
     pub resume_s: Option<f64>,
     /// How many axes it has.
     pub axes: usize,
-    /// The effects that it uses.
+    /// The effects and outputs that it uses, by the names of their switches.
     pub effects: Vec<String>,
 }
 

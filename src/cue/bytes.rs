@@ -6,7 +6,7 @@ use std::path::Path;
 use super::fault::CueFaults;
 use super::limits::{MAX_ROWS, MAX_TIME};
 use super::problem::Problem;
-use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps};
+use super::{Cue, DeclaredUnit, Interpolation, Origin};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -18,13 +18,8 @@ pub(super) fn read(path: &Path, input: impl Read, axes: usize, rate_hz: f64) -> 
     if !(rate_hz > 0.0 && rate_hz <= 1e6) {
         return Err(CueFaults::one(path, Problem::Rate(rate_hz)));
     }
-    let mut cue = Cue {
-        interpolation: Interpolation::Monotone,
-        axes,
-        origin: Origin::Bytes(axes),
-        vibration: vec![Steps::default(); axes],
-        ..Cue::blank(path)
-    };
+    let mut cue =
+        Cue { interpolation: Interpolation::Monotone, axes, origin: Origin::Bytes(axes), ..Cue::blank(path) };
     match fill(&mut cue, input, rate_hz) {
         Ok(()) => Ok(cue),
         Err(problem) => Err(CueFaults::one(path, problem)),

@@ -10,7 +10,8 @@ use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
 use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
-use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, Vibration, title_of, value};
+use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, title_of, value};
+use crate::channel::{Samples, TrackId};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -103,6 +104,8 @@ fn parsed<T: FromStr<Err: ToString>>(text: &str) -> Result<T, String> {
 /// The rows while they are read, and the cue so far.
 struct Rows {
     header: Header,
+    /// The tracks of the table that the file has, and the first column of each.
+    tracks: Vec<(TrackId, usize)>,
     splitter: Splitter,
     row: Row,
     cue: Cue,
@@ -111,9 +114,14 @@ struct Rows {
 impl Rows {
     fn new(path: &Path, declared: &Declared, header: Header) -> Self {
         let mut axis_cells = [0; MAX_AXES];
+        let mut tracks: Vec<(TrackId, usize)> = Vec::new();
         for (cell, column) in header.columns.iter().enumerate() {
-            if let Column::Position(axis) = column {
-                axis_cells[*axis] = cell;
+            match *column {
+                Column::Position(axis) => axis_cells[axis] = cell,
+                Column::Part(track, _) if !tracks.iter().any(|(known, _)| *known == track) => {
+                    tracks.push((track, cell));
+                }
+                _ => {}
             }
         }
         let effects = if header.columns.contains(&Column::Word) {
@@ -127,12 +135,11 @@ impl Rows {
             interpolation: declared.interpolation,
             axes: header.axes,
             origin: Origin::Text { jumps: Vec::new(), cells: axis_cells },
-            vibration: vec![Steps::default(); header.axes],
             effects,
             ..Cue::blank(path)
         };
-        let row = Row { unit: declared.unit, time_unit_ns: header.time_unit_ns, ..Row::default() };
-        Self { header, splitter: Splitter::new(), row, cue }
+        let row = Row::before_all(declared.unit, header.time_unit_ns);
+        Self { header, tracks, splitter: Splitter::new(), row, cue }
     }
 
     /// Takes one line as a row; what is wrong with it goes to `faults`, and the next may follow.
@@ -154,9 +161,23 @@ impl Rows {
             }
         }
         self.row.begun = true;
-        if whole {
+        if whole && self.may_stand(number, line, faults) {
             self.keep(number);
         }
+    }
+
+    /// True if the values of each track may stand together, which no cell alone shows.
+    fn may_stand(&self, number: u64, line: &str, faults: &mut Collector) -> bool {
+        self.tracks.iter().all(|(track, index)| {
+            let checked = (track.channel.row().check)(self.row.samples.of(*track));
+            checked
+                .map_err(|problem| {
+                    let place = Place::Text { line: number, column: column_of(line, *index) };
+                    let name = self.header.names.get(*index).map(String::as_str);
+                    faults.add(place, name, Problem::Refused(problem));
+                })
+                .is_ok()
+        })
     }
 
     fn keep(&mut self, line: u64) {
@@ -164,10 +185,8 @@ impl Rows {
         cue.origin.push_line(cue.times.len(), line);
         cue.times.push(row.time);
         cue.positions.extend_from_slice(&row.positions[..cue.axes]);
-        for column in &self.header.columns {
-            if let Column::Hertz(axis) = *column {
-                cue.vibration[axis].push(row.time, row.vibration[axis]);
-            }
+        for (track, _) in &self.tracks {
+            cue.tracks.of_mut(*track).push(row.time, row.samples.of(*track));
         }
         match &mut cue.effects {
             Effects::Named { steps, names } if !names.is_empty() => steps.push(row.time, row.effects),
@@ -178,7 +197,7 @@ impl Rows {
 }
 
 /// The row being read; before that the one before it, which an empty cell holds.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Row {
     unit: DeclaredUnit,
     time_unit_ns: f64,
@@ -187,12 +206,26 @@ struct Row {
     latest: Option<ShowTime>,
     time: ShowTime,
     positions: [f64; MAX_AXES],
-    vibration: [Vibration; MAX_AXES],
+    samples: Samples,
     effects: u32,
     word: u16,
 }
 
 impl Row {
+    const fn before_all(unit: DeclaredUnit, time_unit_ns: f64) -> Self {
+        Self {
+            unit,
+            time_unit_ns,
+            begun: false,
+            latest: None,
+            time: ShowTime::ZERO,
+            positions: [0.0; MAX_AXES],
+            samples: Samples::REST,
+            effects: 0,
+            word: 0,
+        }
+    }
+
     /// Takes the cell of a column.
     fn take(&mut self, column: Column, text: &str) -> Result<(), Problem> {
         if text.is_empty() {
@@ -207,9 +240,10 @@ impl Row {
             Column::Position(axis) => {
                 self.positions[axis] = value::position(value::number(text)?, self.unit)?;
             }
-            Column::Hertz(axis) => self.vibration[axis].hz = value::hertz(value::number(text)?)?,
-            Column::Amplitude(axis) => {
-                self.vibration[axis].amplitude = value::amplitude(value::number(text)?, self.unit)?;
+            Column::Part(track, part) => {
+                let mut sample = self.samples.of(track);
+                sample.0[part] = value::part(value::number(text)?, track, part, self.unit)?;
+                self.samples.set(track, sample);
             }
             Column::Effect(effect) => {
                 self.effects = self.effects & !(1 << effect) | u32::from(value::switch(text)?) << effect;

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use super::number::{push_millis, push_number};
 use super::{Cue, Effects, Steps};
+use crate::channel::Sample;
 use crate::time::ShowTime;
 
 /// Why a cue cannot be written as CSV.
@@ -28,12 +29,12 @@ pub enum CsvError {
 /// Writes a cue as CSV, every value exactly; markers have no place there.
 ///
 /// # Errors
-/// Where writing fails, or vibration or effects change between rows.
+/// Where writing fails, or what holds until it changes does so between rows.
 pub fn write(cue: &Cue, mut out: impl Write) -> Result<(), CsvError> {
     check_changes(cue)?;
     out.write_all(head(cue).as_bytes())?;
-    let shaking: Vec<_> = shaking(cue).collect();
-    let mut found = vec![0; shaking.len()];
+    let tracks: Vec<_> = cue.tracks().used().collect();
+    let mut found = vec![0; tracks.len()];
     let mut switched = 0;
     let mut line = String::new();
     for (row, time) in cue.times().iter().enumerate() {
@@ -43,11 +44,11 @@ pub fn write(cue: &Cue, mut out: impl Write) -> Result<(), CsvError> {
             line.push(',');
             push_number(&mut line, *value);
         }
-        for ((_, steps), found) in shaking.iter().zip(&mut found) {
-            let vibration = steps.at(*time, found);
-            for value in [vibration.hz, vibration.amplitude] {
+        for ((track, steps), found) in tracks.iter().zip(&mut found) {
+            let Sample(values) = steps.at(*time, found);
+            for value in &values[..track.channel.row().parts.len()] {
                 line.push(',');
-                push_number(&mut line, value);
+                push_number(&mut line, *value);
             }
         }
         match cue.effects() {
@@ -73,7 +74,10 @@ fn head(cue: &Cue) -> String {
     head.push_str(&format!("# units: {}\n", cue.unit().name()));
     head.push_str(&format!("# interpolation: {}\ntime_ms", cue.interpolation().name()));
     (1..=cue.axes()).for_each(|axis| head.push_str(&format!(",a{axis}")));
-    shaking(cue).for_each(|(axis, _)| head.push_str(&format!(",v{axis}_hz,v{axis}_amp")));
+    for (track, _) in cue.tracks().used() {
+        (0..track.channel.row().parts.len())
+            .for_each(|part| head.push_str(&format!(",{}", track.column(part))));
+    }
     match cue.effects() {
         Effects::Named { names, .. } => names.iter().for_each(|name| head.push_str(&format!(",fx_{name}"))),
         Effects::Words(_) => head.push_str(",io"),
@@ -82,15 +86,9 @@ fn head(cue: &Cue) -> String {
     head
 }
 
-/// The axes with vibration, counted from 1, and what they do.
-fn shaking(cue: &Cue) -> impl Iterator<Item = (usize, &Steps<super::Vibration>)> {
-    let axes = cue.vibration().iter().enumerate();
-    axes.filter(|(_, steps)| !steps.as_slice().is_empty()).map(|(axis, steps)| (axis + 1, steps))
-}
-
 fn check_changes(cue: &Cue) -> Result<(), CsvError> {
-    for (axis, steps) in shaking(cue) {
-        check_steps(cue, steps, || format!("the vibration of axis {axis}"))?;
+    for (track, steps) in cue.tracks().used() {
+        check_steps(cue, steps, || track.to_string())?;
     }
     match cue.effects() {
         Effects::Named { steps, .. } => check_steps(cue, steps, || "an effect".to_owned()),

@@ -1,9 +1,12 @@
 //! The header row of a cue: which column carries what.
 
+use std::sync::LazyLock;
+
 use super::fault::{Collector, Place};
 use super::limits::MAX_EFFECTS;
 use super::problem::Problem;
 use super::table::{Cells, column_of};
+use crate::channel::{self, CHANNELS, Scope, TrackId};
 use crate::motion::MAX_AXES;
 
 /// What a column carries; axes are counted from 0 here.
@@ -13,10 +16,8 @@ pub(super) enum Column {
     Time,
     /// Position of an axis.
     Position(usize),
-    /// Vibration frequency of an axis, Hz.
-    Hertz(usize),
-    /// Vibration amplitude of an axis.
-    Amplitude(usize),
+    /// A part of a channel.
+    Part(TrackId, usize),
     /// Switch of an effect.
     Effect(usize),
     /// Raw output word.
@@ -35,8 +36,21 @@ pub(super) struct Header {
     pub(super) effects: Vec<String>,
 }
 
-const KNOWN: &str = "a cue has time_ms or time_s, then a1 to a12, v1_hz and v1_amp to v12_hz and v12_amp, \
-                     fx_NAME, or io";
+static KNOWN: LazyLock<String> = LazyLock::new(|| {
+    let columns = CHANNELS.iter().map(|channel| {
+        let named = |axis: usize| {
+            let track = channel.id.on(axis);
+            let columns: Vec<_> = (0..channel.parts.len()).map(|part| track.column(part)).collect();
+            columns.join(" and ")
+        };
+        match channel.scope {
+            Scope::Axis => format!("{} to {}", named(0), named(MAX_AXES - 1)),
+            Scope::Hall => named(0),
+        }
+    });
+    let columns: Vec<_> = columns.collect();
+    format!("a cue has time_ms or time_s, then a1 to a12, {}, fx_NAME, or io", columns.join(", "))
+});
 
 impl Header {
     /// Reads the header from its cells; what is wrong goes to `faults`.
@@ -65,7 +79,7 @@ impl Header {
             (0, "time_s") => self.time_unit_ns = 1e9,
             (0, _) => return Err(Problem::UnknownColumn("the first column is time_ms or time_s")),
             (_, "io") => return Ok(Column::Word),
-            _ => return self.track(name).unwrap_or(Err(Problem::UnknownColumn(KNOWN))),
+            _ => return self.track(name).unwrap_or(Err(Problem::UnknownColumn(KNOWN.as_str()))),
         }
         Ok(Column::Time)
     }
@@ -77,13 +91,7 @@ impl Header {
         if let Some(axis) = name.strip_prefix('a') {
             return axis_number(axis).map(|axis| Ok(Column::Position(axis)));
         }
-        let (axis, part) = name.strip_prefix('v')?.split_once('_')?;
-        let axis = axis_number(axis)?;
-        match part {
-            "hz" => Some(Ok(Column::Hertz(axis))),
-            "amp" => Some(Ok(Column::Amplitude(axis))),
-            _ => None,
-        }
+        channel::of_column(name, axis_number).map(|(track, part)| Ok(Column::Part(track, part)))
     }
 
     fn effect(&mut self, name: &str) -> Result<Column, Problem> {
@@ -110,16 +118,20 @@ impl Header {
         }
         let last = (0..MAX_AXES).rev().find(|axis| has(Column::Position(*axis)));
         for axis in 0..MAX_AXES {
-            let vibrates = (has(Column::Hertz(axis)), has(Column::Amplitude(axis)));
-            let needed = last.is_some_and(|last| axis < last) || vibrates != (false, false);
-            if needed && !has(Column::Position(axis)) && !(axis == 0 && self.axes == 0) {
+            // What belongs to an axis needs that axis, and all of its channel; of outputs of the hall one may stand alone.
+            let (mut begun, mut absent) = (last.is_some_and(|last| axis < last), Vec::new());
+            for channel in CHANNELS.iter().filter(|channel| channel.scope == Scope::Axis) {
+                let track = channel.id.on(axis);
+                let (there, others): (Vec<_>, Vec<_>) =
+                    (0..channel.parts.len()).partition(|part| has(Column::Part(track, *part)));
+                begun |= !there.is_empty();
+                absent
+                    .extend(others.into_iter().filter(|_| !there.is_empty()).map(|part| track.column(part)));
+            }
+            if begun && !has(Column::Position(axis)) && !(axis == 0 && self.axes == 0) {
                 missing(format!("a{}", axis + 1));
             }
-            match vibrates {
-                (true, false) => missing(format!("v{}_amp", axis + 1)),
-                (false, true) => missing(format!("v{}_hz", axis + 1)),
-                _ => {}
-            }
+            absent.into_iter().for_each(&mut missing);
         }
         if has(Column::Word) && !self.effects.is_empty() {
             faults.add(place(), Some("io"), Problem::WordAndEffects);
@@ -156,6 +168,7 @@ mod tests {
     fn a_whole_header_is_understood() {
         assert!(faults("time_s,a1,v1_hz,v1_amp,a2,fx_air,fx_water").is_empty());
         assert!(faults("time_ms,a1,io").is_empty());
+        assert!(faults("time_ms,dac2,a1,dac1,fx_air").is_empty() && faults("time_ms,a1,dac2").is_empty());
     }
 
     #[test]

@@ -18,6 +18,7 @@ mod problem;
 mod rows;
 mod steps;
 mod table;
+mod tracks;
 mod unit;
 mod value;
 
@@ -28,8 +29,10 @@ pub use mcap::{recover, write as write_mcap};
 use place::Origin;
 pub use problem::Problem;
 pub use steps::{Step, Steps};
+pub use tracks::{Tracks, Vibration};
 pub use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation, UnknownUnit};
 
+use crate::channel::{ChannelId, Sample};
 use crate::plain;
 use crate::sys;
 use crate::time::ShowTime;
@@ -52,15 +55,6 @@ pub enum Source {
         /// Rows a second, above 0.
         rate_hz: f64,
     },
-}
-
-/// A vibration of one axis; `None` if either part is 0.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Vibration {
-    /// Frequency, Hz: 0, or [`limits::MIN_VIBRATION_HZ`] to [`limits::MAX_VIBRATION_HZ`].
-    pub hz: f64,
-    /// Amplitude in the cue's unit, 0 or more.
-    pub amplitude: f64,
 }
 
 /// What a cue switches over time.
@@ -103,7 +97,7 @@ pub struct Cue {
     times: Vec<ShowTime>,
     positions: Vec<f64>,
     origin: Origin,
-    vibration: Vec<Steps<Vibration>>,
+    tracks: Tracks,
     effects: Effects,
     markers: Vec<Marker>,
 }
@@ -120,7 +114,7 @@ impl Cue {
             times: Vec::new(),
             positions: Vec::new(),
             origin: Origin::default(),
-            vibration: Vec::new(),
+            tracks: Tracks::default(),
             effects: Effects::default(),
             markers: Vec::new(),
         }
@@ -194,10 +188,10 @@ impl Cue {
         self.times.last().copied().unwrap_or_default()
     }
 
-    /// Vibration per axis; an axis that never had any has no steps.
+    /// What the channels of the table carry; one that the file does not have has no steps.
     #[must_use]
-    pub fn vibration(&self) -> &[Steps<Vibration>] {
-        &self.vibration
+    pub const fn tracks(&self) -> &Tracks {
+        &self.tracks
     }
 
     /// What the cue switches.
@@ -226,11 +220,12 @@ impl Cue {
         self.origin.place(&self.path, row, axis, time)
     }
 
-    /// Where the header of its file names a column, or the file as a whole where it has no such header. Reads the
-    /// file again.
+    /// Where the header of its file names a column, or where that column has what holds from `at` on; the file as a whole where
+    /// it has no such header. Reads the file again.
     #[must_use]
-    pub fn column_place(&self, column: &str) -> Place {
-        self.origin.column_place(&self.path, column)
+    pub fn column_place(&self, column: &str, at: Option<ShowTime>) -> Place {
+        let row = at.map(|at| self.times.partition_point(|time| *time <= at).saturating_sub(1));
+        self.origin.column_place(&self.path, column, row)
     }
 
     /// The same cue with other rows. What has a place in it is then placed by the number of its row.
@@ -249,7 +244,7 @@ impl Cue {
             path: self.path.clone(),
             title: self.title.clone(),
             origin: Origin::Messages,
-            vibration: self.vibration.clone(),
+            tracks: self.tracks.clone(),
             effects: self.effects.clone(),
             markers: self.markers.clone(),
             times,
@@ -262,14 +257,19 @@ impl Cue {
     /// The same cue with other vibrations, one for each change of each axis.
     #[must_use]
     pub(crate) fn with_vibration(self, tracks: &[Vec<Vibration>]) -> Self {
-        let vibration = self.vibration.iter().zip(tracks).map(|(steps, track)| steps.with_values(track));
-        Self { vibration: vibration.collect(), ..self }
+        let mut changed = self.tracks.clone();
+        for (axis, values) in tracks.iter().enumerate() {
+            let values: Vec<Sample> = values.iter().copied().map(Sample::from).collect();
+            let steps = changed.of_mut(ChannelId::Vibration.on(axis));
+            *steps = steps.with_values(&values);
+        }
+        Self { tracks: changed, ..self }
     }
 
     fn shrink(&mut self) {
         self.times.shrink_to_fit();
         self.positions.shrink_to_fit();
-        self.vibration.iter_mut().for_each(Steps::shrink);
+        self.tracks.shrink();
         match &mut self.effects {
             Effects::Named { steps, .. } => steps.shrink(),
             Effects::Words(steps) => steps.shrink(),
@@ -389,6 +389,9 @@ mod tests {
         let seat = crate::motion::SeatType::bench3(2);
         let faults = timeline.fits_stroke(0..2, Some(&seat)).faults.unwrap();
         assert_eq!(faults.told()[0].to_string(), "5:9: a2: 160 is outside the stroke, 0 to 150 mm");
+        let air = |at| timeline.cue().column_place("fx_air", at);
+        assert_eq!(air(None), Place::Text { line: 2, column: 9 });
+        assert_eq!(air(Some(ShowTime::from_millis(10))), Place::Text { line: 5, column: 4 });
         std::fs::remove_file(&path).unwrap();
         assert_eq!(timeline.cue().place(1, 1), Place::Text { line: 5, column: 1 });
     }

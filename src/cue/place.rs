@@ -69,14 +69,17 @@ impl Origin {
         }
     }
 
-    /// Where the header names a column; the file as a whole where there is no such header.
-    pub(super) fn column_place(&self, path: &Path, column: &str) -> Place {
-        let place = if let Self::Text { .. } = self { column_in_header(path, column) } else { None };
-        place.unwrap_or(Place::File)
+    /// Where the header names a column, or its cell in a row; the file as a whole where there is no such header.
+    pub(super) fn column_place(&self, path: &Path, column: &str, row: Option<usize>) -> Place {
+        let Self::Text { .. } = self else { return Place::File };
+        let Some((header, cell)) = column_in_header(path, column) else { return Place::File };
+        let line = row.map_or(header, |row| self.line(row));
+        column_in_file(path, line, cell).map_or(Place::File, |column| Place::Text { line, column })
     }
 }
 
-fn column_in_header(path: &Path, column: &str) -> Option<Place> {
+/// The line of the header, and which of its cells names a column.
+fn column_in_header(path: &Path, column: &str) -> Option<(u64, usize)> {
     let mut lines = Lines::new(sys::file::open(path).ok()?);
     loop {
         let (number, text) = lines.next().ok()??;
@@ -85,8 +88,7 @@ fn column_in_header(path: &Path, column: &str) -> Option<Place> {
         }
         let mut splitter = Splitter::new();
         let cells = splitter.split(text).ok()?;
-        let index = (0..cells.count()).find(|&index| cells.get(index) == column)?;
-        return Some(Place::Text { line: number, column: column_of(text, index) });
+        return Some((number, (0..cells.count()).find(|&index| cells.get(index) == column)?));
     }
 }
 

@@ -178,6 +178,12 @@ pub enum Problem {
         /// The unit's name with a space before it; nothing for fractions.
         unit: &'static str,
     },
+    /// A level of an output that is none.
+    #[error("a level of {0} is outside 0 to 1; 1 is all that the output can do")]
+    Level(f64),
+    /// Values that must not stand together.
+    #[error("{0}")]
+    Refused(&'static str),
     /// An effect that is neither on nor off.
     #[error("{0:?} is neither 0 nor 1")]
     Switch(String),
@@ -208,8 +214,13 @@ pub enum Problem {
     #[error("damaged: {0}; `kinocue convert --recover` saves the complete messages before the damage")]
     Damaged(String),
     /// A topic below `/cue/` that we do not know.
-    #[error("unknown topic {0:?}; a cue has /cue/axes, /cue/vibration, /cue/io and /cue/marker")]
-    UnknownTopic(String),
+    #[error("unknown topic {name:?}; a cue has {known}")]
+    UnknownTopic {
+        /// What the file calls it.
+        name: String,
+        /// Those that there are.
+        known: String,
+    },
     /// A message that is not what its topic carries.
     #[error("not the JSON of its topic: {0}")]
     Message(String),

@@ -9,7 +9,7 @@ use super::fault::{Collector, CueFaults, Place};
 use super::limits::{MAX_ROWS, MAX_TIME};
 use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
-use super::{Cue, DeclaredUnit, Interpolation, Origin, Steps, value};
+use super::{Cue, DeclaredUnit, Interpolation, Origin, value};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -79,7 +79,6 @@ impl Reading {
             interpolation: Interpolation::Linear,
             axes,
             origin: Origin::Text { jumps: Vec::new(), cells: origin_cells },
-            vibration: vec![Steps::default(); axes],
             ..Cue::blank(path)
         };
         faults.is_empty().then_some(Self { splitter, unit, cue, positions: [0.0; MAX_AXES], begun: false })

@@ -3,6 +3,7 @@
 use super::limits::{ALL_OUTPUTS, MAX_TIME, MAX_VIBRATION_HZ, MIN_VIBRATION_HZ};
 use super::problem::Problem;
 use super::unit::{DeclaredUnit, Unit};
+use crate::channel::{PartKind, TrackId};
 use crate::time::ShowTime;
 
 /// A finite number.
@@ -50,6 +51,16 @@ pub(super) fn hertz(value: f64) -> Result<f64, Problem> {
         Ok(value)
     } else {
         Err(Problem::Frequency(value))
+    }
+}
+
+/// A part of a channel in the unit of memory, from one in the unit of the file.
+pub(super) fn part(value: f64, track: TrackId, part: usize, unit: DeclaredUnit) -> Result<f64, Problem> {
+    match track.channel.row().parts[part].kind {
+        PartKind::Hertz => hertz(value),
+        PartKind::Amplitude => amplitude(value, unit),
+        PartKind::Level if (0.0..=1.0).contains(&value) => Ok(value),
+        PartKind::Level => Err(Problem::Level(value)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! What an operator sets for a seat, beside where it goes.
 
-use crate::cue::Vibration;
+use crate::channel::{ChannelId, LevelRule, PartKind, Sample};
 use crate::timeline::EffectSet;
 
 /// What one lane makes of the cue.
@@ -12,20 +12,32 @@ pub struct Mix {
     pub vibration: f64,
     /// Which of its effects may be on, bit by bit in the order of the cue's names; a raw output word needs all of them.
     pub effects: u32,
+    /// Which parts of channels may be on, bit by bit in the order of [`crate::channel::switches`].
+    pub switches: u32,
     /// Whether the seat takes part at all.
     pub on: bool,
 }
 
 impl Mix {
     /// All of the cue.
-    pub const FULL: Self = Self { motion: 1.0, vibration: 1.0, effects: u32::MAX, on: true };
-    /// No vibration and no effects.
-    pub const STILL: Self = Self { motion: 1.0, vibration: 0.0, effects: 0, on: true };
+    pub const FULL: Self =
+        Self { motion: 1.0, vibration: 1.0, effects: u32::MAX, switches: u32::MAX, on: true };
+    /// No vibration, no effects, all outputs off.
+    pub const STILL: Self = Self { motion: 1.0, vibration: 0.0, effects: 0, switches: 0, on: true };
 
-    /// The vibration that is left of the cue's.
+    /// What is left of what the cue says on a channel.
     #[must_use]
-    pub fn vibration(&self, cue: Vibration) -> Vibration {
-        Vibration { amplitude: cue.amplitude * self.vibration, ..cue }
+    pub fn sample(&self, channel: ChannelId, cue: Sample) -> Sample {
+        let mut left = cue;
+        let row = channel.row();
+        for ((index, part), value) in (0..).zip(row.parts).zip(&mut left.0) {
+            match row.level {
+                LevelRule::Scale if part.kind == PartKind::Amplitude => *value *= self.vibration,
+                LevelRule::Switch if self.switches >> (row.first_switch() + index) & 1 == 0 => *value = 0.0,
+                LevelRule::Scale | LevelRule::Switch => {}
+            }
+        }
+        left
     }
 
     /// The effects that are left of the cue's.

@@ -25,8 +25,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::belief::Fall;
-use crate::cue::Vibration;
-use crate::motion::{MAX_AXES, Pose, Window};
+use crate::channel::Samples;
+use crate::motion::{Pose, Window};
 use crate::plan::{Course, Scene};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::{EffectSet, Hint, Timeline};
@@ -73,18 +73,18 @@ pub struct Beat {
     pub time_ms: u32,
     /// How long the frame takes, ms: what a relative one says, and the difference to the one before of an absolute one.
     pub lasts_ms: u32,
-    /// The vibration of each of the cue's axes, in its unit.
-    pub vibration: [Vibration; MAX_AXES],
+    /// What the cue's channels say, in its unit.
+    pub samples: Samples,
     /// The effects that are on.
     pub effects: EffectSet,
 }
 
 impl Beat {
-    /// Frames without vibration and effects.
+    /// Frames with all channels and effects off.
     #[must_use]
     pub fn still(timing: Timing, time_ms: u32) -> Self {
-        let vibration = [Vibration::default(); MAX_AXES];
-        Self { timing, time_ms, lasts_ms: time_ms, vibration, effects: EffectSet::Named(0) }
+        let (samples, effects) = (Samples::REST, EffectSet::Named(0));
+        Self { timing, time_ms, lasts_ms: time_ms, samples, effects }
     }
 
     /// The same for a frame that takes so many milliseconds, whatever its Time says.
@@ -384,7 +384,7 @@ impl Engine {
         let mut beat = Beat::still(timing, stamp_ms).lasting(time_ms);
         if self.phase == Phase::Riding {
             // They act when the frame comes, not when its pose is reached.
-            beat.vibration = self.timeline.vibration(show, &mut self.hint);
+            beat.samples = self.timeline.samples(show, &mut self.hint);
             beat.effects = self.timeline.effects(show, &mut self.hint);
         }
         self.look_ahead();

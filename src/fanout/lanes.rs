@@ -82,5 +82,6 @@ fn wiring(config: &Config, controller: &Controller, timeline: &Timeline) -> Wiri
     Wiring {
         named: timeline.effect_names().iter().map(outputs).collect(),
         raw: config.allowed_outputs(controller),
+        at_most: controller.at_most,
     }
 }

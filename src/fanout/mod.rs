@@ -5,19 +5,22 @@ mod lanes;
 
 pub use lanes::{Manner, lanes};
 
+use crate::channel::{ChannelId, SWITCHES, Sample};
 use crate::cue;
 use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
 use crate::timeline::EffectSet;
-use crate::wire::{Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
+use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
 
-/// Which outputs a cue's effects switch on one controller.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// Which outputs a cue's effects switch on one controller, and how far its analogue ones go.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Wiring {
     /// Output word of each effect of the cue, by its place among the cue's names.
     pub named: Vec<u16>,
     /// The bits of a raw output word that reach the controller.
     pub raw: u16,
+    /// The highest level of each output of the table ([`crate::channel::switches`]), 0 where it has none.
+    pub(crate) at_most: [f64; SWITCHES],
 }
 
 impl Wiring {
@@ -31,6 +34,12 @@ impl Wiring {
                 lit.fold(0, |word, (_, outputs)| word | outputs)
             }
         }
+    }
+
+    /// What of a channel of outputs the controller may have.
+    fn within(&self, channel: ChannelId, Sample(levels): Sample) -> Sample {
+        let most = &self.at_most[channel.row().first_switch()..];
+        Sample(std::array::from_fn(|part| levels[part].min(most.get(part).copied().unwrap_or(0.0))))
     }
 }
 
@@ -83,12 +92,14 @@ impl Lane {
         for (index, slot) in slots.iter().enumerate() {
             positions[index] = slot.pulses(pose[index]);
             if let Some(axis) = slot.axis.filter(|_| self.vibrates) {
-                let cue::Vibration { hz, amplitude } = mix.vibration(beat.vibration[axis]);
+                let shake = beat.samples.of(ChannelId::Vibration.on(axis));
+                let cue::Vibration { hz, amplitude } = mix.sample(ChannelId::Vibration, shake).into();
                 let strokes = amplitude * slot.to_stroke;
                 vibration[index] = Vibration::from_hz(hz, strokes * slot.stroke_pulses);
                 stamped.shakes = stamped.shakes.max(strokes);
             }
         }
+        let levels = mix.sample(ChannelId::Analogue, beat.samples.of(ChannelId::Analogue.of_hall()));
         let motion = Motion {
             timing: beat.timing,
             channel: self.channel,
@@ -98,12 +109,13 @@ impl Lane {
             time_ms: beat.time_ms,
             positions: &positions[..slots.len()],
             outputs: self.wiring.outputs(mix.effects(beat.effects)),
+            analogue: Analogue::from_levels(self.wiring.within(ChannelId::Analogue, levels).0),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };
         (stamped, motion.emit_as(self.vibration_port, buf))
     }
 
-    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects off.
+    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects and outputs off.
     pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
         let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
         let beat = Beat::still(Timing::Relative, time_ms);
@@ -112,7 +124,7 @@ impl Lane {
         written
     }
 
-    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration and effects off.
+    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
     pub fn hold(&mut self) {
         self.window.hold();
         self.vibrates = false;

@@ -76,13 +76,35 @@ fn a_cue_with_vibration_is_sent_in_frames_that_carry_it() {
     let config = hall(&["127.0.0.1:1"], 1);
     let mut lane = lanes(&config, &cue, FULL).remove(0);
     let mut beat = Beat::still(Timing::Absolute, 10);
-    beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
+    beat.samples.set(ChannelId::Vibration.on(0), Sample([20.0, 0.01]));
     let mut buf = [0xa5; MAX_LEN];
     let (stamped, bytes) = lane.encode(&beat, &lane.window.park(), Mix::FULL, &mut buf);
     let frame = MotionRequest::parse(bytes).unwrap();
     assert_eq!(stamped, Stamped { frame: FrameNo::FIRST, asked: true, shakes: 0.01 });
     assert_eq!(frame.vibration.unwrap()[0], Vibration { period: 400, amplitude: 3_000 });
     assert_eq!(bytes[4..6], [0x18, 0x01]);
+}
+
+#[test]
+fn analogue_outputs_go_as_far_as_the_controller_says_and_are_off_on_the_way_to_park_and_in_a_hold() {
+    let cue = cue("time_ms,a1,dac1,dac2\n0,0,0.5,1\n1000,0,0.5,1\n");
+    let mut config = hall(&["127.0.0.1:1", "127.0.0.1:2,dialect=mbox"], 1);
+    config.controllers[1].at_most = [0.25, 0.0];
+    let mut beat = Beat::still(Timing::Relative, 10);
+    beat.samples.set(ChannelId::Analogue.of_hall(), Sample([0.5, 1.0]));
+    let mut buf = [0xa5; MAX_LEN];
+    let mut sent = |lane: &mut Lane, beat: &Beat, mix| {
+        let park = lane.window.park();
+        MotionRequest::parse(lane.encode(beat, &park, mix, &mut buf).1).unwrap().extend
+    };
+    let mut lanes = lanes(&config, &cue, FULL);
+    assert_eq!([0, 1].map(|lane| sent(&mut lanes[lane], &beat, Mix::FULL)), [0x8000_ffff, 0x4000_0000]);
+    assert_eq!(sent(&mut lanes[0], &Beat::still(Timing::Relative, 10), Mix::FULL), 0);
+    assert_eq!(sent(&mut lanes[0], &beat, Mix::STILL), 0);
+    lanes[1].hold();
+    assert_eq!(sent(&mut lanes[1], &beat, Mix::FULL), 0);
+    let (_, bytes) = lanes[0].encode_slow_park(3_000, &mut buf);
+    assert_eq!(MotionRequest::parse(bytes).unwrap().extend, 0);
 }
 
 #[test]
@@ -93,7 +115,7 @@ fn vibration_stands_two_bytes_further_back_where_port_out_takes_four() {
     let mut lane = lanes(&config, &cue, FULL).remove(0);
     let mut beat = Beat::still(Timing::Relative, 10);
     beat.effects = EffectSet::Word(0x0003);
-    beat.vibration[0] = crate::cue::Vibration { hz: 20.0, amplitude: 0.01 };
+    beat.samples.set(ChannelId::Vibration.on(0), Sample([20.0, 0.01]));
     let mut buf = [0xa5; MAX_LEN];
     let park = lane.window.park();
     let (_, bytes) = lane.encode(&beat, &park, Mix::FULL, &mut buf);

@@ -4,13 +4,14 @@ use std::fmt;
 
 use sha2::{Digest as _, Sha256};
 
+use crate::channel::{ChannelId, Sample, TrackId};
 use crate::cue::{Cue, Effects, Steps};
 use crate::time::ShowTime;
 
 /// Bytes that are hashed at once.
 const CHUNK: usize = 1 << 16;
 
-/// The SHA-256 of what a cue does: rows, unit, interpolation, vibration and effects, as they are in memory. Title, markers
+/// The SHA-256 of what a cue does: rows, unit, interpolation, channels and effects, as they are in memory. Title, markers
 /// and the format of the file do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Digest(pub [u8; 32]);
@@ -26,12 +27,7 @@ impl Digest {
         sink.count(cue.rows());
         cue.times().iter().for_each(|time| sink.time(*time));
         cue.positions().iter().for_each(|position| sink.bytes(position.to_le_bytes()));
-        for steps in cue.vibration() {
-            sink.steps(steps, |sink, vibration| {
-                sink.bytes(vibration.hz.to_le_bytes());
-                sink.bytes(vibration.amplitude.to_le_bytes());
-            });
-        }
+        (0..cue.axes()).for_each(|axis| sink.track(cue, ChannelId::Vibration.on(axis)));
         match cue.effects() {
             Effects::Named { names, steps } => {
                 sink.count(names.len());
@@ -42,6 +38,12 @@ impl Digest {
                 sink.count(usize::MAX); // unlike any count of names
                 sink.steps(steps, |sink, word| sink.bytes(u64::from(word).to_le_bytes()));
             }
+        }
+        // What came after the first release counts where a cue has it: the others keep the digest that they had.
+        for (track, _) in cue.tracks().used().filter(|(track, _)| track.channel != ChannelId::Vibration) {
+            sink.text(track.channel.row().topic);
+            sink.count(track.axis);
+            sink.track(cue, track);
         }
         sink.hash.update(&sink.buffer);
         Self(sink.hash.finalize().into())
@@ -81,6 +83,13 @@ impl Sink {
     fn text(&mut self, text: &str) {
         self.count(text.len());
         self.buffer.extend_from_slice(text.as_bytes());
+    }
+
+    fn track(&mut self, cue: &Cue, track: TrackId) {
+        let parts = track.channel.row().parts.len();
+        self.steps(cue.tracks().of(track), |sink, Sample(values)| {
+            values[..parts].iter().for_each(|value| sink.bytes(value.to_le_bytes()));
+        });
     }
 
     fn steps<T: Copy + PartialEq + Default>(&mut self, steps: &Steps<T>, value: impl Fn(&mut Self, T)) {

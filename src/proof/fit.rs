@@ -312,18 +312,15 @@ fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
 
 /// Lowers the vibration that is more than the seat stands to what there is room for; says how many stretches that were.
 fn lower_vibration(cue: Cue, terms: &Terms) -> (Cue, usize) {
-    if cue.vibration().iter().all(|steps| steps.as_slice().is_empty()) {
+    if (0..cue.axes()).all(|axis| cue.tracks().vibration(axis).as_slice().is_empty()) {
         return (cue, 0);
     }
     let timeline = Timeline::new(cue);
     let stencils = Stencils::at(terms.rate);
     let mut lowered = 0;
-    let mut tracks: Vec<Vec<Vibration>> = timeline
-        .cue()
-        .vibration()
-        .iter()
-        .map(|steps| steps.as_slice().iter().map(|step| step.value).collect())
-        .collect();
+    let steps = |axis| timeline.cue().tracks().vibration(axis).as_slice().iter();
+    let mut tracks: Vec<Vec<Vibration>> =
+        (0..timeline.axes()).map(|axis| steps(axis).map(|step| step.value.into()).collect()).collect();
     for subject in subjects(&timeline, terms) {
         let Some(track) = tracks.get_mut(subject.axis) else { continue };
         let pieces = Pieces::new(&timeline, subject.axis, &subject.slot);

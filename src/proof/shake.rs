@@ -13,7 +13,7 @@ use super::pieces::{At, Pieces};
 use super::stencil::Stencils;
 use super::violation::{Breach, Quantity};
 use super::{Found, SLACK, Terms};
-use crate::cue::{Step, Vibration};
+use crate::cue::Vibration;
 use crate::time::ShowTime;
 use crate::wire;
 
@@ -78,7 +78,7 @@ impl Subject<'_> {
         found: &mut Vec<Found>,
     ) -> Option<(At, At)> {
         let under = self.under(pieces, terms, stencils)?;
-        let steps = self.timeline.cue().vibration().get(self.axis)?.as_slice();
+        let steps = self.timeline.cue().tracks().vibration(self.axis).as_slice();
         let mut ends: Option<(At, At)> = None;
         // Of steps in a row that break a limit the first is told.
         let mut broken_before = [false; 2];
@@ -103,10 +103,11 @@ impl Subject<'_> {
 
     /// One of the axis's vibrations; `None` if it stands for none.
     fn swing(&self, under: &Under<'_>, terms: &Terms, index: usize) -> Option<Swing> {
-        let steps = self.timeline.cue().vibration().get(self.axis)?.as_slice();
-        let (step, next): (&Step<Vibration>, _) = (steps.get(index)?, steps.get(index + 1));
-        let amplitude = step.value.amplitude * self.slot.scale().0;
-        if step.value.hz <= 0.0 || amplitude <= 0.0 {
+        let steps = self.timeline.cue().tracks().vibration(self.axis).as_slice();
+        let (step, next) = (steps.get(index)?, steps.get(index + 1));
+        let Vibration { hz, amplitude } = step.value.into();
+        let amplitude = amplitude * self.slot.scale().0;
+        if hz <= 0.0 || amplitude <= 0.0 {
             return None;
         }
         // What a frame switches acts while the axis moves to the frame's pose, a period later.
@@ -115,7 +116,7 @@ impl Subject<'_> {
         let (low, high) = under.pieces.range(from, until);
         let low = At { value: low.value - amplitude, ..low };
         let high = At { value: high.value + amplitude, ..high };
-        let hz = executed_hz(step.value.hz);
+        let hz = executed_hz(hz);
         Some(Swing { low, high, amplitude, hz, moved: self.moved(under, from, until) })
     }
 

@@ -22,6 +22,7 @@ struct Strip {
     motion: AtomicU32,
     vibration: AtomicU32,
     effects: AtomicU32,
+    switches: AtomicU32,
     on: AtomicBool,
 }
 
@@ -33,6 +34,7 @@ impl Desk {
             motion: AtomicU32::new(0),
             vibration: AtomicU32::new(0),
             effects: AtomicU32::new(0),
+            switches: AtomicU32::new(0),
             on: AtomicBool::new(true),
         };
         let mixes: Vec<Mix> = mixes.collect();
@@ -76,6 +78,7 @@ impl Desk {
             motion: level(&strip.motion),
             vibration: level(&strip.vibration),
             effects: strip.effects.load(Ordering::Relaxed),
+            switches: strip.switches.load(Ordering::Relaxed),
             on: strip.on.load(Ordering::Relaxed),
         }
     }
@@ -92,6 +95,7 @@ impl Desk {
         strip.motion.store(bits(mix.motion), Ordering::Relaxed);
         strip.vibration.store(bits(mix.vibration), Ordering::Relaxed);
         strip.effects.store(mix.effects, Ordering::Relaxed);
+        strip.switches.store(mix.switches, Ordering::Relaxed);
         strip.on.store(mix.on, Ordering::Relaxed);
     }
 
@@ -128,8 +132,11 @@ mod tests {
         let desk = Desk::new([Mix::FULL; 2].into_iter());
         assert_eq!((desk.lanes(), desk.mix(1)), (2, Mix::FULL));
         for (set, read) in [(0.5, 0.5), (7.0, 1.0), (-1.0, 0.0), (f64::NAN, 0.0)] {
-            desk.set(1, Mix { motion: set, vibration: set, effects: 5, on: false });
-            assert_eq!(desk.mix(1), Mix { motion: read, vibration: read, effects: 5, on: false });
+            desk.set(1, Mix { motion: set, vibration: set, effects: 5, switches: 2, on: false });
+            assert_eq!(
+                desk.mix(1),
+                Mix { motion: read, vibration: read, effects: 5, switches: 2, on: false }
+            );
         }
         assert_eq!(desk.mix(0), Mix::FULL, "the other seat is as it was");
     }

@@ -40,6 +40,7 @@ pub struct Controller {
     servos: BTreeMap<(u16, u16), u16>,
     player: Player,
     outputs: u16,
+    extend: u32,
     inputs: Inputs,
     /// Time of the last motion in absolute time; `None` if the next one is a first one.
     last_absolute: Option<u32>,
@@ -90,6 +91,7 @@ impl Controller {
             dialect: setup.dialect,
             mute: setup.mute,
             outputs: registers.get(pa::START_OUTPUTS) & OUTPUTS,
+            extend: 0,
             inputs: Inputs::new(registers.get(pa::INPUT_POLARITY) == 1),
             registers,
             servos: BTreeMap::new(),
@@ -321,6 +323,12 @@ impl Controller {
     #[must_use]
     pub const fn outputs(&self) -> u16 {
         self.outputs
+    }
+
+    /// Its analogue outputs, as Extend has them.
+    #[must_use]
+    pub const fn extend(&self) -> u32 {
+        self.extend
     }
 
     /// What became of the datagrams and moves so far.

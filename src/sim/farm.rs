@@ -64,6 +64,8 @@ pub struct Outcome {
     pub positions: Vec<i32>,
     /// Its outputs at the end, bit 0 = Y01.
     pub outputs: u16,
+    /// Its analogue outputs at the end, as the last frame without vibration had them in Extend.
+    pub extend: u32,
 }
 
 /// Virtual controllers at work on a thread of their own, until they are stopped or dropped.

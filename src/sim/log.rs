@@ -7,6 +7,7 @@ use std::io;
 use std::net::SocketAddrV4;
 
 use super::MotionSeen;
+use super::farm::Outcome;
 use super::player::Executed;
 use super::sheet::Sheet;
 use crate::motion::Pulses;
@@ -24,7 +25,7 @@ pub(super) struct Logs {
 impl Logs {
     /// Logs that begin with their header rows; what was in the files is gone.
     pub(super) fn new(start: MonoTime, frames: Option<File>, moves: Option<File>) -> Self {
-        let frame_columns = "time_s,controller,frame,function,time_ms,reply,outputs";
+        let frame_columns = "time_s,controller,frame,function,time_ms,reply,outputs,extend";
         let move_columns = "time_s,controller,duration_ms";
         Self {
             start,
@@ -55,7 +56,7 @@ impl Logs {
         if answered {
             let _ = write!(sheet.row, "{}", seen.code as u8);
         }
-        let _ = write!(sheet.row, ",0x{:04x}", request.outputs);
+        let _ = write!(sheet.row, ",0x{:04x},0x{:08x}", request.outputs, request.extend);
         sheet.positions(&request.positions);
         sheet.positions(executed);
         sheet.end_row();
@@ -72,13 +73,15 @@ impl Logs {
         sheet.end_row();
     }
 
-    /// Where the motors of a controller are at the end, and its outputs.
-    pub(super) fn rest(&mut self, at: MonoTime, controller: SocketAddrV4, outputs: u16, executed: &[Pulses]) {
+    /// Where the motors of a controller are at the end, and its outputs of both kinds.
+    pub(super) fn rest(&mut self, at: MonoTime, end: &Outcome) {
         let Some(sheet) = &mut self.frames else { return };
-        sheet.start_row(at.since(self.start), controller);
-        let _ = write!(sheet.row, ",,,,,0x{outputs:04x}");
+        let Outcome { address, positions, outputs, extend, .. } = end;
+        sheet.start_row(at.since(self.start), *address);
+        let _ = write!(sheet.row, ",,,,,0x{outputs:04x},0x{extend:08x}");
         sheet.positions(&[]);
-        sheet.positions(executed);
+        let executed: Vec<Pulses> = positions.iter().copied().map(Pulses).collect();
+        sheet.positions(&executed);
         sheet.end_row();
     }
 

@@ -173,12 +173,13 @@ impl Station {
     /// What became of it, `since` the start.
     pub(super) fn end(&mut self, at: MonoTime, logs: &mut Logs) -> Outcome {
         let positions = self.controller.positions(at);
-        let outputs = self.controller.outputs();
         self.controller.close_record(at);
         self.log_moves(logs);
-        logs.rest(at, self.address, outputs, &positions);
         let positions = positions.iter().map(|position| position.0).collect();
-        Outcome { address: self.address, counts: self.counts(), positions, outputs }
+        let (outputs, extend) = (self.controller.outputs(), self.controller.extend());
+        let end = Outcome { address: self.address, counts: self.counts(), positions, outputs, extend };
+        logs.rest(at, &end);
+        end
     }
 
     fn log_moves(&mut self, logs: &mut Logs) {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::Timeline;
+use crate::channel::{self, Sample};
 use crate::cue::{Effects, Step, Steps};
 use crate::time::ShowTime;
 
@@ -30,7 +31,28 @@ pub struct EffectUse {
     pub first: Option<ShowTime>,
 }
 
+/// How much an output of the table is used.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LevelUse {
+    /// How often, and how long, under the name of its column.
+    pub(crate) usage: EffectUse,
+    /// Its highest level.
+    pub(crate) most: f64,
+}
+
 impl Timeline {
+    /// How much each output of the table is used; nothing of one that is always off.
+    #[must_use]
+    pub(crate) fn level_uses(&self) -> Vec<LevelUse> {
+        let used = channel::switches().filter_map(|(track, part, name)| {
+            let (_, most) = self.greatest_level(track, part)?;
+            let is_on = |sample: Sample| u32::from(sample.0[part] > 0.0);
+            let usage = usage(name.to_owned(), self.cue().tracks().of(track), self.duration(), is_on);
+            Some(LevelUse { usage, most })
+        });
+        used.collect()
+    }
+
     /// How much each effect that the cue names, or each bit of its raw output words, is used.
     #[must_use]
     pub fn effect_uses(&self) -> Vec<EffectUse> {
@@ -106,6 +128,13 @@ mod tests {
         assert_eq!((uses[0].times, uses[0].on), (2, Duration::from_secs(4)));
         assert_eq!((uses[0].first, uses[1].first), (Some(ShowTime::ZERO), None));
         assert_eq!((uses[1].times, uses[1].on), (0, Duration::ZERO));
+    }
+
+    #[test]
+    fn an_output_is_counted_while_its_level_is_above_0() {
+        let uses = timeline("time_s,a1,dac1,dac2\n0,0,0,0\n1,0,0.5,0\n2,0,0.75,0\n4,0,0,0\n").level_uses();
+        let [LevelUse { usage, most }] = &uses[..] else { panic!("dac2 is always off: {uses:?}") };
+        assert_eq!((usage.name.as_str(), usage.times, usage.on.as_secs(), *most), ("dac1", 1, 3, 0.75));
     }
 
     #[test]

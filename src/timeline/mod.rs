@@ -10,9 +10,11 @@ mod spline;
 
 pub(crate) use cubic::Cubic;
 pub use extremes::{AxisExtremes, Extreme};
+pub(crate) use figures::LevelUse;
 pub use figures::{EffectUse, Figure};
 pub use fit::{HELD_BACK, Held, StrokeFit};
 
+use crate::channel::{self, Sample, Samples, TRACKS, TrackId};
 use crate::cue::{Cue, Effects, Unit, Vibration};
 use crate::motion::{MAX_AXES, Pose};
 use crate::time::ShowTime;
@@ -21,7 +23,7 @@ use crate::time::ShowTime;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Hint {
     row: usize,
-    vibration: [usize; MAX_AXES],
+    tracks: [usize; TRACKS],
     effects: usize,
 }
 
@@ -42,7 +44,8 @@ pub struct Timeline {
     /// is some 1e-7 of the curve's own bend, and halves the memory.
     bends: Vec<f32>,
     extremes: Vec<AxisExtremes>,
-    vibrates: bool,
+    /// The tracks that the cue has.
+    tracks: Vec<TrackId>,
 }
 
 impl Timeline {
@@ -50,9 +53,8 @@ impl Timeline {
     #[must_use]
     pub fn new(cue: Cue) -> Self {
         let bends = spline::solve(&cue);
-        let vibrates =
-            cue.vibration().iter().flat_map(|steps| steps.as_slice()).any(|step| moves(step.value));
-        let mut timeline = Self { cue, bends, extremes: Vec::new(), vibrates };
+        let tracks = cue.tracks().used().map(|(track, _)| track).collect();
+        let mut timeline = Self { cue, bends, extremes: Vec::new(), tracks };
         timeline.extremes = extremes::find(&timeline);
         timeline
     }
@@ -126,40 +128,42 @@ impl Timeline {
         self.cue.times().partition_point(|time| *time <= at).saturating_sub(1)
     }
 
-    /// The vibration of each axis that holds at a show time; none past the cue's axes.
+    /// What each track of the table holds at a show time; off where the cue has none.
     #[must_use]
-    pub fn vibration(&self, at: ShowTime, hint: &mut Hint) -> [Vibration; MAX_AXES] {
-        let mut all = [Vibration::default(); MAX_AXES];
-        for ((steps, found), vibration) in self.cue.vibration().iter().zip(&mut hint.vibration).zip(&mut all)
-        {
-            *vibration = steps.at(at, found);
+    pub(crate) fn samples(&self, at: ShowTime, hint: &mut Hint) -> Samples {
+        let mut all = Samples::REST;
+        for track in &self.tracks {
+            all.set(*track, self.cue.tracks().of(*track).at(at, &mut hint.tracks[track.index()]));
         }
         all
     }
 
     /// True if anything ever vibrates.
     #[must_use]
-    pub const fn has_vibration(&self) -> bool {
-        self.vibrates
+    pub fn has_vibration(&self) -> bool {
+        (0..self.axes()).any(|axis| self.vibrates(axis))
     }
 
     /// True if an axis, counted from 0, ever vibrates.
     #[must_use]
     pub fn vibrates(&self, axis: usize) -> bool {
-        self.cue
-            .vibration()
-            .get(axis)
-            .is_some_and(|steps| steps.as_slice().iter().any(|step| moves(step.value)))
+        self.cue.tracks().vibration(axis).as_slice().iter().any(|step| moves(step.value))
+    }
+
+    /// The highest level of a part of a channel, and the first show time at which it is asked for; `None` if it is always off.
+    #[must_use]
+    pub(crate) fn greatest_level(&self, track: TrackId, part: usize) -> Option<(ShowTime, f64)> {
+        let on = self.cue.tracks().of(track).as_slice().iter().map(|step| (step.at, step.value.0[part]));
+        on.filter(|(_, level)| *level > 0.0).reduce(|most, step| if step.1 > most.1 { step } else { most })
     }
 
     /// The farthest swing of an axis, counted from 0, and the first show time from which it holds; `None` if the axis
     /// never vibrates.
     #[must_use]
     pub fn strongest_vibration(&self, axis: usize) -> Option<(ShowTime, Vibration)> {
-        let steps = self.cue.vibration().get(axis)?.as_slice().iter().filter(|step| moves(step.value));
-        let strongest = steps
-            .reduce(|most, step| if step.value.amplitude > most.value.amplitude { step } else { most })?;
-        Some((strongest.at, strongest.value))
+        let steps = self.cue.tracks().vibration(axis).as_slice().iter().filter(|step| moves(step.value));
+        let vibrations = steps.map(|step| (step.at, Vibration::from(step.value)));
+        vibrations.reduce(|most, step| if step.1.amplitude > most.1.amplitude { step } else { most })
     }
 
     /// The effects that are on at a show time.
@@ -180,6 +184,15 @@ impl Timeline {
         }
     }
 
+    /// What an operator may switch of it: its effects, and outputs of the table that it uses.
+    #[must_use]
+    pub(crate) fn switch_names(&self) -> Vec<String> {
+        let levels =
+            channel::switches().filter(|(track, part, _)| self.greatest_level(*track, *part).is_some());
+        let levels = levels.map(|(_, _, name)| name.to_owned());
+        self.effect_names().iter().cloned().chain(levels).collect()
+    }
+
     /// The least and greatest value of each axis's curve, exact also between rows, and before anything is held at
     /// the stroke's ends.
     #[must_use]
@@ -188,7 +201,8 @@ impl Timeline {
     }
 }
 
-fn moves(vibration: Vibration) -> bool {
+fn moves(sample: Sample) -> bool {
+    let vibration = Vibration::from(sample);
     vibration.hz > 0.0 && vibration.amplitude > 0.0
 }
 

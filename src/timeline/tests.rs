@@ -3,6 +3,7 @@ use std::path::Path;
 use proptest::prelude::*;
 
 use super::*;
+use crate::channel::ChannelId;
 use crate::cue::{Source, read};
 use crate::motion::SeatType;
 
@@ -70,9 +71,11 @@ fn vibration_and_effects_hold_from_their_row_on() {
     let mut hint = Hint::default();
     let ms = ShowTime::from_millis;
     assert!(cue.has_vibration());
-    assert_eq!(cue.vibration(ms(9), &mut hint)[0], Vibration::default());
-    assert_eq!(cue.vibration(ms(10), &mut hint)[0], Vibration { hz: 20.0, amplitude: 0.01 });
-    assert_eq!(cue.vibration(ms(99), &mut hint)[0].hz, 20.0);
+    let mut vibration =
+        |time| Vibration::from(cue.samples(ms(time), &mut hint).of(ChannelId::Vibration.on(0)));
+    assert_eq!(vibration(9), Vibration::default());
+    assert_eq!(vibration(10), Vibration { hz: 20.0, amplitude: 0.01 });
+    assert_eq!(vibration(99).hz, 20.0);
     assert_eq!(cue.effect_names(), ["air", "water"]);
     let set = |time, hint: &mut Hint| cue.effects(ms(time), hint);
     assert_eq!(set(-1, &mut hint), EffectSet::Named(0));

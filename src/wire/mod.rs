@@ -4,6 +4,7 @@
 //! Numbers are big-endian throughout; one message is one datagram. Sources are the SMC manual (2.2 and 2.3) and the
 //! IMAX manual (2.2 and 2.3); where they are silent or disagree, what public programs send.
 
+mod analogue;
 mod bytes;
 mod error;
 mod frame_no;
@@ -20,6 +21,7 @@ mod vibration;
 mod word_order;
 mod words;
 
+pub use analogue::Analogue;
 pub use error::{DeviceError, WireError};
 pub use frame_no::FrameNo;
 pub use header::{Code, Dialect, Header, ReplyCode};

@@ -3,7 +3,9 @@
 
 use super::bytes::{i32_at, put_i32, put_u16, put_u32, u16_at, u32_at};
 use super::header::{self, Header, reply_function, request_function};
-use super::{Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, VibrationPort, WireError, vibration};
+use super::{
+    Analogue, Code, FrameNo, MAX_LEN, PerAxis, ReplyCode, Vibration, VibrationPort, WireError, vibration,
+};
 use crate::motion::{MAX_AXES, Pulses};
 
 mod field {
@@ -41,7 +43,7 @@ pub const fn motion_channel_and_slots(axes: usize) -> (u16, usize) {
 }
 
 /// A motion frame to send, host to controller: 38 bytes for three axes, 50 for six, 66 for ten, 74 for twelve, with
-/// vibration 46 for three and 70 for six, or two more. Extend, which switches analogue outputs, is always 0.
+/// vibration 46 for three and 70 for six, or two more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Motion<'a> {
     /// What `time_ms` counts from.
@@ -60,6 +62,8 @@ pub struct Motion<'a> {
     pub positions: &'a [Pulses],
     /// Switched outputs, bit 0 = Y01 to bit 11 = Y12.
     pub outputs: u16,
+    /// Analogue outputs, for which frames with vibration have no place.
+    pub analogue: Analogue,
     /// Vibration of each axis, which makes it 0x1801 or 0x1901; axes past the end of the slice get none.
     pub vibration: Option<&'a [Vibration]>,
 }
@@ -79,7 +83,7 @@ impl Motion<'_> {
             time_ms: self.time_ms,
             positions: self.positions,
             port: self.outputs,
-            extend: 0,
+            extend: self.analogue.meant().extend(),
             vibration: self.vibration,
         };
         body.emit(header, port, buf)

@@ -226,11 +226,11 @@ impl Seen {
         self.rows.len()
     }
 
-    /// Whether all of them rest in pulse 0 of every axis with all outputs off.
+    /// Whether all of them rest in pulse 0 of every axis with all outputs off, the analogue ones too.
     pub(crate) fn rest_in_park(&self) -> bool {
         self.controllers.iter().all(|one| {
             let positions = one["positions"].as_array().expect("a list");
-            one["outputs"] == 0 && positions.iter().all(|position| position == 0)
+            one["outputs"] == 0 && one["extend"] == 0 && positions.iter().all(|position| position == 0)
         })
     }
 
@@ -249,6 +249,7 @@ pub(crate) struct Row {
     pub(crate) function: String,
     pub(crate) time_ms: u32,
     pub(crate) outputs: u16,
+    pub(crate) extend: u32,
     pub(crate) commanded: Vec<i32>,
     /// Where the motors were when it came.
     pub(crate) executed: Vec<i32>,
@@ -266,8 +267,9 @@ impl Row {
             function: cells[3].to_owned(),
             time_ms: cells[4].parse().expect("a Time"),
             outputs: u16::from_str_radix(&cells[6][2..], 16).expect("a word"),
-            commanded: pulses(&cells[7..19]),
-            executed: pulses(&cells[19..31]),
+            extend: u32::from_str_radix(&cells[7][2..], 16).expect("two words"),
+            commanded: pulses(&cells[8..20]),
+            executed: pulses(&cells[20..32]),
         })
     }
 }

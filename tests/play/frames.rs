@@ -158,6 +158,26 @@ fn effects_are_outputs_while_the_cue_lasts_and_off_at_the_end() {
     assert!(seen.rest_in_park());
 }
 
+#[test]
+fn analogue_outputs_are_set_while_the_cue_lasts_and_off_at_the_end_with_either_dialect() {
+    let folder = Folder::new();
+    let cells = |at_ms| format!(",{},1", if (300..500).contains(&at_ms) { 0.5 } else { 0.0 });
+    let cue = folder.nod_with(&[0.1], ",dac1,dac2", cells);
+    for dialect in ["smc", "mbox"] {
+        let sim = Sim::one(&["--dialect", dialect]);
+        let to = sim.to().iter().map(|to| format!("{to},dialect={dialect}")).collect::<Vec<_>>();
+        play(&cue, &to, &["--json"]).report_of(0);
+        let seen = sim.end();
+        for (frames, extend) in [(3..=28, 0xffff), (33..=48, 0x8000_ffff), (53..=NOD_MS / 10 - 2, 0xffff)] {
+            for row in seen.rows.iter().filter(|row| frames.contains(&row.frame)) {
+                assert_eq!(row.extend, extend, "frame {} of {dialect}", row.frame);
+            }
+        }
+        assert!(seen.rows[seen.rows.len() - 3..].iter().all(|row| row.extend == 0));
+        assert!(seen.rest_in_park());
+    }
+}
+
 /// Plays a nod at this rate: every frame's number, its Time and what the first axis is told.
 fn at_rate(rate: &str) -> Vec<Row> {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));

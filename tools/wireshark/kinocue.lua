@@ -104,6 +104,8 @@ local f = {
   output = ProtoField.uint16("kinocue.output", "Outputs", base.HEX),
   input = ProtoField.uint16("kinocue.input", "Inputs", base.HEX),
   extend = ProtoField.uint32("kinocue.extend", "Extend", base.HEX),
+  dac1 = ProtoField.uint16("kinocue.extend.dac1", "Analogue output 1", base.DEC),
+  dac2 = ProtoField.uint16("kinocue.extend.dac2", "Analogue output 2", base.DEC),
   period = ProtoField.uint16("kinocue.vibration.period", "Period (0.125 ms)", base.DEC),
   amplitude = ProtoField.uint16("kinocue.vibration.amplitude", "Amplitude (pulses)", base.DEC),
   hz = ProtoField.double("kinocue.vibration.hz", "Frequency (Hz)"),
@@ -427,7 +429,9 @@ local function add_motion(tree, tvb, message, note)
   local tail = BODY + 4 * axes + port_len(message.is.vibrating)
   add_bits(tree, message.low == 1 and "output" or "input", tvb(tail - 2, 2), note)
   if not message.is.vibrating then
-    tree:add(f.extend, tvb(tail, 4))
+    local extend = tree:add(f.extend, tvb(tail, 4))
+    extend:add(f.dac1, tvb(tail, 2))
+    extend:add(f.dac2, tvb(tail + 2, 2))
     return
   end
   for axis = 1, axes do

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::channel;
 use crate::config::Config;
 use crate::control::{Code, Levels, LevelsChange, Problem};
 use crate::engine::Mix;
@@ -37,7 +38,7 @@ impl HallSettings {
         let lanes: Vec<LanePlace> = config.controllers.iter().map(strip).collect();
         let rows: BTreeMap<String, f64> =
             config.named().filter_map(|one| Some((one.row.clone()?, 1.0))).collect();
-        let effects = config.effects.iter().map(|effect| (effect.name.clone(), true)).collect();
+        let effects = config.switch_names().map(|name| (name.to_owned(), true)).collect();
         let levels = Levels { motion: 1.0, vibration: 1.0, effects, rows };
         Self { ceiling: levels.clone(), levels, trim_ms: 0, out: BTreeMap::new(), only: None, lanes }
     }
@@ -123,18 +124,21 @@ impl HallSettings {
 
     /// What each lane makes of a cue that has these effects.
     pub(super) fn mixes(&self, effects: &[String]) -> Vec<Mix> {
-        let on = |name: &String| self.levels.effects.get(name).copied().unwrap_or(true);
-        let off = effects.iter().enumerate().filter(|(_, name)| !on(name));
+        let allowed = |name: &str| self.levels.effects.get(name).copied().unwrap_or(true);
+        let off = effects.iter().enumerate().filter(|(_, name)| !allowed(name));
         let named = off.fold(u32::MAX, |mask, (bit, _)| mask & !(1 << bit));
         // A raw output word passes where every bit is set: where no effect at all is off.
-        let all = self.levels.effects.values().all(|on| *on);
+        let all = self.levels.effects.iter().all(|(name, on)| *on || channel::is_switch(name));
         let mask = if all { named } else { named & !(1 << 31) };
+        let switches = channel::switches().enumerate().filter(|(_, (_, _, name))| allowed(name));
+        let switches = switches.fold(0, |mask, (bit, _)| mask | 1 << bit);
         let mix = |(lane, strip): (usize, &LanePlace)| {
             let row = strip.row.as_ref().and_then(|row| self.levels.rows.get(row)).copied().unwrap_or(1.0);
             Mix {
                 motion: self.levels.motion * row,
                 vibration: self.levels.vibration * row,
                 effects: mask,
+                switches,
                 on: self.is_on(lane),
             }
         };
@@ -166,5 +170,26 @@ fn carry(levels: &mut Levels, before: &Levels) {
     }
     for (row, level) in &mut levels.rows {
         *level = before.rows.get(row).copied().unwrap_or(*level);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::from_to_args;
+
+    #[test]
+    fn an_output_is_switched_as_an_effect_is_and_keeps_no_raw_output_word_back() {
+        let config = from_to_args(&["127.0.0.1:1".to_owned()], &[], 1).unwrap();
+        let mut settings = HallSettings::new(&config);
+        let change =
+            |name: &str, on| LevelsChange { effects: [(name.to_owned(), on)].into(), ..<_>::default() };
+        settings.change(&change("dac2", false)).unwrap();
+        let mix = settings.mixes(&[])[0];
+        assert_eq!((mix.switches, mix.effects), (0b01, u32::MAX));
+        settings.change(&change("water", false)).unwrap();
+        let mix = settings.mixes(&["air".to_owned(), "water".to_owned()])[0];
+        assert_eq!((mix.switches, mix.effects), (0b01, !(1 << 1 | 1 << 31)));
+        assert!(settings.change(&change("dac3", false)).is_err());
     }
 }

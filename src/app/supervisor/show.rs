@@ -50,7 +50,7 @@ impl ProvedShow {
         let misfits = config.misfits(&timeline);
         if !misfits.is_empty() {
             let place = |misfit: &crate::config::Misfit| {
-                format!("{}{misfit}", timeline.cue().column_place(&misfit.column()))
+                format!("{}{misfit}", timeline.cue().column_place(&misfit.column(), misfit.at()))
             };
             return Err(refused(misfits.iter().map(place).collect()));
         }
@@ -90,7 +90,7 @@ impl ProvedShow {
             join_s: self.join_s,
             resume_s: self.left_at.map(ShowTime::as_secs_f64),
             axes: self.timeline.axes(),
-            effects: self.timeline.effect_names().to_vec(),
+            effects: self.timeline.switch_names(),
         }
     }
 

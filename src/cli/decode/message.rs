@@ -1,7 +1,7 @@
 //! The messages of the protocol to their sheets.
 
 use super::names::{motion_name, space_name};
-use super::sheet::Sheet;
+use super::sheet::{self, Sheet};
 use crate::wire::{
     Access, Dialect, ImaxMotion, ImaxRegisters, MAX_SERVO_READ, Message, MotionReply, MotionRequest,
     ReplyCode, Space, Status, VibrationPort, WireError,
@@ -202,7 +202,7 @@ impl Sheet {
             Some(_) => self.bits("inputs", 'X', motion.port),
             None => self.bits("outputs", 'Y', motion.port),
         }
-        self.field("analogue outputs", format!("0x{:08x}", motion.dac), motion.dac);
+        self.field("analogue outputs", sheet::analogue(motion.dac), motion.dac);
     }
 
     fn imax_registers(&mut self, bytes: &[u8], reply: &ImaxRegisters<'_>) {

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::names::{answer_name, register_name, station};
 use crate::motion::Pulses;
 use crate::wire::{
-    Code, DP_POSITIONS, DeviceError, Dialect, ReplyCode, Space, Timing, Vibration, Words, positions,
+    Analogue, Code, DP_POSITIONS, DeviceError, Dialect, ReplyCode, Space, Timing, Vibration, Words, positions,
 };
 
 /// The most registers that the one-line form shows.
@@ -179,7 +179,7 @@ impl Sheet {
     /// What stands after the outputs or inputs of a motion frame.
     pub(super) fn tail(&mut self, extend: u32, vibration: Option<&[Vibration]>) {
         let Some(vibration) = vibration else {
-            return self.field("extend", format!("0x{extend:08x}"), extend);
+            return self.field("extend", analogue(extend), extend);
         };
         let mut values = Vec::new();
         for (axis, shake) in (1..).zip(vibration) {
@@ -268,4 +268,11 @@ impl Sheet {
 
 fn listed<T: Display>(values: &[T]) -> String {
     values.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Analogue outputs, as the word that they are and, where one is on, as levels.
+pub(super) fn analogue(extend: u32) -> String {
+    let [dac1, dac2] = Analogue::of_extend(extend).levels();
+    let levels = if extend == 0 { String::new() } else { format!(" (dac1 {dac1:.3}, dac2 {dac2:.3})") };
+    format!("0x{extend:08x}{levels}")
 }

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::cue::{FaultClass, Unit};
+use crate::cue::{FaultClass, Unit, Vibration};
 
 fn cue(text: &str) -> Cue {
     read(Path::new("t.csv"), text.as_bytes()).unwrap_or_else(|faults| panic!("{faults}"))
@@ -26,9 +26,9 @@ fn a_whole_cue_is_understood() {
     );
     assert_eq!((cue.axes(), cue.rows(), cue.duration()), (2, 2, ShowTime::from_millis(500)));
     assert_eq!(cue.positions(), [0.0, 0.5, 1.0, 0.5]);
-    let last = cue.vibration()[0].as_slice().last().map(|step| step.value);
+    let last = cue.tracks().vibration(0).as_slice().last().map(|step| step.value.into());
     assert_eq!(last, Some(Vibration { hz: 20.0, amplitude: 0.025 }));
-    assert!(cue.vibration()[1].as_slice().is_empty());
+    assert!(cue.tracks().vibration(1).as_slice().is_empty());
     let Effects::Named { names, steps } = cue.effects() else { panic!("named effects") };
     assert_eq!((names.join(" "), steps.at(cue.duration(), &mut 0)), ("air water".to_owned(), 0b01));
     assert_eq!((cue.line(0), cue.line(1)), (7, 8));

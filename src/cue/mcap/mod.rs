@@ -7,6 +7,8 @@ mod walk;
 mod write;
 mod zstd;
 
+use crate::channel::{CHANNELS, Channel, ChannelId, Scope};
+
 pub(super) use read::read;
 pub use read::recover;
 pub use write::write;
@@ -22,40 +24,64 @@ const VERSION: &str = "1";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Topic {
     Axes,
-    Vibration,
+    /// A channel of the table.
+    Channel(ChannelId),
     Io,
     Marker,
 }
 
 impl Topic {
-    const ALL: [Self; 4] = [Self::Axes, Self::Vibration, Self::Io, Self::Marker];
+    fn all() -> impl Iterator<Item = Self> {
+        let channels = CHANNELS.iter().map(|channel| Self::Channel(channel.id));
+        [Self::Axes].into_iter().chain(channels).chain([Self::Io, Self::Marker])
+    }
+
+    /// Their names, as a person reads them.
+    fn known() -> String {
+        let names: Vec<_> = Self::all().map(Self::name).collect();
+        let (last, others) = names.split_last().expect("there are topics");
+        format!("{} and {last}", others.join(", "))
+    }
 
     const fn name(self) -> &'static str {
         match self {
             Self::Axes => "/cue/axes",
-            Self::Vibration => "/cue/vibration",
+            Self::Channel(channel) => channel.row().topic,
             Self::Io => "/cue/io",
             Self::Marker => "/cue/marker",
         }
     }
 
     /// The JSON schema of its messages.
-    const fn schema(self) -> &'static str {
-        match self {
+    fn schema(self) -> String {
+        let schema = match self {
             Self::Axes => {
                 r#"{"title":"cue.axes","type":"object","required":["a"],"properties":{"a":{"type":"array","items":{"type":"number"}}}}"#
             }
-            Self::Vibration => {
-                r#"{"title":"cue.vibration","type":"object","required":["axis","hz","amp"],"properties":{"axis":{"type":"integer"},"hz":{"type":"number"},"amp":{"type":"number"}}}"#
-            }
+            Self::Channel(channel) => return schema_of(channel.row()),
             Self::Io => {
                 r#"{"title":"cue.io","type":"object","properties":{"effects":{"type":"object","additionalProperties":{"type":"integer"}},"word":{"type":"integer"}}}"#
             }
             Self::Marker => {
                 r#"{"title":"cue.marker","type":"object","required":["name"],"properties":{"name":{"type":"string"}}}"#
             }
-        }
+        };
+        schema.to_owned()
     }
+}
+
+/// A number for each part of a channel, and the axis where it is one of axes.
+fn schema_of(channel: &Channel) -> String {
+    let axis = (channel.scope == Scope::Axis).then_some(("axis", "integer"));
+    let members = axis.into_iter().chain(channel.parts.iter().map(|part| (part.name, "number")));
+    let (names, types): (Vec<_>, Vec<_>) =
+        members.map(|(name, kind)| (format!("{name:?}"), format!("{name:?}:{{\"type\":{kind:?}}}"))).unzip();
+    format!(
+        r#"{{"title":"cue.{}","type":"object","required":[{}],"properties":{{{}}}}}"#,
+        channel.topic.trim_start_matches("/cue/"),
+        names.join(","),
+        types.join(",")
+    )
 }
 
 #[cfg(test)]

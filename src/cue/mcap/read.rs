@@ -2,18 +2,21 @@
 
 use std::collections::{HashMap, HashSet};
 use std::io::Read;
+use std::marker::PhantomData;
 use std::path::Path;
 
 use mcap::records::op;
 use serde::Deserialize;
+use serde::de::DeserializeSeed;
 
 use super::super::fault::{Collector, CueFaults, Place};
 use super::super::header::is_effect_name;
 use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME};
 use super::super::problem::Problem;
-use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, Vibration, title_of, value};
-use super::record::{self, Channel};
+use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, title_of, value};
+use super::record::{self, ChannelRecord};
 use super::{METADATA, Topic, VERSION, message};
+use crate::channel::{ChannelId, Sample};
 use crate::motion::MAX_AXES;
 use crate::plain::escaped;
 use crate::time::ShowTime;
@@ -78,7 +81,7 @@ struct Reading {
     seen: HashMap<Topic, (u64, u64)>,
     unit: Option<DeclaredUnit>,
     cue: Cue,
-    vibration: Vec<(At, message::Vibration)>,
+    samples: Vec<(At, ChannelId, message::TrackMessage)>,
     switched: u32,
 }
 
@@ -91,7 +94,7 @@ impl Reading {
             seen: HashMap::new(),
             unit: None,
             cue: Cue { origin: Origin::Messages, ..Cue::blank(path) },
-            vibration: Vec::new(),
+            samples: Vec::new(),
             switched: 0,
         }
     }
@@ -104,7 +107,7 @@ impl Reading {
                 self.schemas.insert(record::schema(body).ok_or_else(|| broken("schema"))?);
             }
             op::CHANNEL => {
-                self.channel(&Channel::parse(body).ok_or_else(|| broken("channel"))?)?;
+                self.channel(&ChannelRecord::parse(body).ok_or_else(|| broken("channel"))?)?;
             }
             op::METADATA => {
                 let (name, entries) = record::metadata(body).ok_or_else(|| broken("metadata"))?;
@@ -129,14 +132,15 @@ impl Reading {
     }
 
     /// Topics that are not below `/cue/` belong to someone else and are passed over.
-    fn channel(&mut self, channel: &Channel<'_>) -> Result<(), Problem> {
-        let Channel { id, schema, topic: name, encoding } = *channel;
+    fn channel(&mut self, channel: &ChannelRecord<'_>) -> Result<(), Problem> {
+        let ChannelRecord { id, schema, topic: name, encoding } = *channel;
         if self.channels.contains_key(&id) {
             return Ok(()); // repeated in the summary
         }
-        let topic = Topic::ALL.into_iter().find(|topic| topic.name() == name);
+        let topic = Topic::all().find(|topic| topic.name() == name);
         if topic.is_none() && name.starts_with("/cue/") {
-            self.faults.add(Place::File, None, Problem::UnknownTopic(value::shortened(name)));
+            let problem = Problem::UnknownTopic { name: value::shortened(name), known: Topic::known() };
+            self.faults.add(Place::File, None, problem);
         }
         if topic.is_some() && encoding != "json" {
             let problem = Problem::Foreign(format!(
@@ -192,7 +196,8 @@ impl Reading {
             match at.topic {
                 Topic::Axes => self.axes(at, before, data),
                 _ if at.log_time < before => Err(Problem::TimeGoesBack { early_ns: before - at.log_time }),
-                Topic::Vibration => parsed(data).map(|vibration| self.vibration.push((at, vibration))),
+                Topic::Channel(id) => parsed_by(message::MessageOf(id.row()), data)
+                    .map(|parts| self.samples.push((at, id, parts))),
                 Topic::Io => parsed(data).and_then(|io| self.io(at, io)),
                 Topic::Marker => parsed(data).and_then(|marker| self.marker(at, marker)),
             }
@@ -203,7 +208,7 @@ impl Reading {
                 self.faults.add(at.place(), None, problem);
                 Ok(())
             }
-            Ok(()) if self.vibration.len() > MAX_ROWS => Err(Problem::TooManyRows),
+            Ok(()) if self.samples.len() > MAX_ROWS => Err(Problem::TooManyRows),
             Ok(()) => Ok(()),
         }
     }
@@ -278,7 +283,7 @@ impl Reading {
                 self.faults.add(Place::File, None, Problem::TooFewRows(self.cue.rows()));
             } else {
                 self.check_positions(unit);
-                self.build_vibration(unit);
+                self.build_tracks(unit);
             }
         }
         let Self { faults, cue, .. } = self;
@@ -303,25 +308,40 @@ impl Reading {
         }
     }
 
-    fn build_vibration(&mut self, unit: DeclaredUnit) {
-        let axes = self.cue.axes;
-        self.cue.vibration = vec![Steps::default(); axes];
-        for (at, message::Vibration { axis, hz, amp }) in std::mem::take(&mut self.vibration) {
-            let Some(steps) = axis.checked_sub(1).and_then(|axis| self.cue.vibration.get_mut(axis)) else {
-                self.faults.add(at.place(), Some("axis"), Problem::NoSuchAxis { axis, axes });
-                continue;
-            };
-            match (value::hertz(hz), value::amplitude(amp, unit)) {
-                (Ok(hz), Ok(amplitude)) => steps.push(at.time(), Vibration { hz, amplitude }),
-                (hz, amplitude) => {
-                    for (name, problem) in [("hz", hz.err()), ("amp", amplitude.err())] {
-                        if let Some(problem) = problem {
-                            self.faults.add(at.place(), Some(name), problem);
-                        }
+    fn build_tracks(&mut self, unit: DeclaredUnit) {
+        for (at, id, parts) in std::mem::take(&mut self.samples) {
+            if let Err((name, problem)) = self.keep(at, id, parts, unit) {
+                self.faults.add(at.place(), name, problem);
+            }
+        }
+    }
+
+    fn keep(
+        &mut self,
+        at: At,
+        id: ChannelId,
+        message::TrackMessage { axis, sample }: message::TrackMessage,
+        unit: DeclaredUnit,
+    ) -> Result<(), (Option<&'static str>, Problem)> {
+        let (channel, axes) = (id.row(), self.cue.axes);
+        let track = axis.checked_sub(1).and_then(|axis| channel.tracks(axes).nth(axis));
+        let track = track.ok_or((Some("axis"), Problem::NoSuchAxis { axis, axes }))?;
+        let mut kept = Sample::default();
+        let mut wrong = None;
+        for (part, known) in channel.parts.iter().enumerate() {
+            match value::part(sample.0[part], track, part, unit) {
+                Ok(value) => kept.0[part] = value,
+                Err(problem) => {
+                    if let Some((name, before)) = wrong.replace((Some(known.name), problem)) {
+                        self.faults.add(at.place(), name, before);
                     }
                 }
             }
         }
+        wrong.map_or(Ok(()), Err)?;
+        (channel.check)(kept).map_err(|problem| (None, Problem::Refused(problem)))?;
+        self.cue.tracks.of_mut(track).push(at.time(), kept);
+        Ok(())
     }
 }
 
@@ -341,7 +361,12 @@ fn effect(names: &mut Vec<String>, name: String) -> Result<usize, Problem> {
 }
 
 fn parsed<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, Problem> {
+    parsed_by(PhantomData, data)
+}
+
+fn parsed_by<'a, S: DeserializeSeed<'a>>(seed: S, data: &'a [u8]) -> Result<S::Value, Problem> {
+    let mut json = serde_json::Deserializer::from_slice(data);
+    let parsed = seed.deserialize(&mut json).and_then(|value| json.end().map(|()| value));
     // It names what it met in the file as it stands there.
-    serde_json::from_slice(data)
-        .map_err(|error| Problem::Message(escaped(&error.to_string(), REASON_TOLD).into_owned()))
+    parsed.map_err(|error| Problem::Message(escaped(&error.to_string(), REASON_TOLD).into_owned()))
 }

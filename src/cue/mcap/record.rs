@@ -87,8 +87,8 @@ pub(super) fn schema(body: &[u8]) -> Option<u16> {
     Body(body).u16()
 }
 
-/// Channel record.
-pub(super) struct Channel<'a> {
+/// ChannelRecord record.
+pub(super) struct ChannelRecord<'a> {
     pub(super) id: u16,
     /// The schema of its messages; 0 is none.
     pub(super) schema: u16,
@@ -96,7 +96,7 @@ pub(super) struct Channel<'a> {
     pub(super) encoding: &'a str,
 }
 
-impl<'a> Channel<'a> {
+impl<'a> ChannelRecord<'a> {
     pub(super) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut body = Body(body);
         Some(Self { id: body.u16()?, schema: body.u16()?, topic: body.text()?, encoding: body.text()? })

@@ -82,7 +82,7 @@ fn csv_to_mcap_to_csv_keeps_every_value() {
     assert_eq!((second.title(), second.unit()), (Some("Störm"), Unit::Millimetre));
     assert_eq!(second.interpolation(), Interpolation::Monotone);
     assert_eq!((second.times(), second.positions()), (first.times(), first.positions()));
-    assert_eq!((second.vibration(), second.effects()), (first.vibration(), first.effects()));
+    assert_eq!((second.tracks(), second.effects()), (first.tracks(), first.effects()));
     assert_eq!(csv_of(&second), csv_of(&first));
     assert_eq!(csv_of(&csv(&csv_of(&first))), csv_of(&first));
     let words = csv("time_ms,a1,io\n0,0,0x5\n1,1,4095\n");
@@ -139,6 +139,19 @@ fn faults_are_placed_by_topic_message_and_log_time() {
 
 #[test]
 fn messages_that_are_not_what_they_should_be_are_refused() {
+    for (json, expected) in [
+        (
+            r#"{"dac1":0.5,"dac2":1.5}"#,
+            "dac2: a level of 1.5 is outside 0 to 1; 1 is all that the output can do",
+        ),
+        (r#"{"dac1":0.33777,"dac2":0.67111}"#, "dac1 and dac2 make 0x5678abcd"),
+        (r#"{"dac1":0}"#, "not the JSON of its topic: missing field `dac2`"),
+        (r#"{"axis":1,"dac1":0,"dac2":0}"#, "not the JSON of its topic: unknown field `axis`"),
+        (r#"{"dac1":0,"dac1":0,"dac2":0}"#, "not the JSON of its topic: duplicate field `dac1`"),
+    ] {
+        let told = faults_behind_rows(&[("/cue/analogue", 3, json)]);
+        assert!(told.starts_with(&format!("/cue/analogue message 1, log_time 3 ns: {expected}")), "{told}");
+    }
     for (topic, json, expected) in [
         ("/cue/axes", r#"{"a":["x",1]}"#, "not the JSON of its topic: invalid type: string"),
         ("/cue/axes", r#"{"a":[1e999,1]}"#, "not the JSON of its topic: number out of range"),
@@ -186,7 +199,7 @@ fn foreign_files_are_refused() {
     assert_eq!(faults(&file(FRACTION, &[])), "0 of the two rows that a cue needs at least");
     assert_eq!(
         faults_behind_rows(&[("/cue/smell", 0, "{}")]),
-        "unknown topic \"/cue/smell\"; a cue has /cue/axes, /cue/vibration, /cue/io and /cue/marker"
+        "unknown topic \"/cue/smell\"; a cue has /cue/axes, /cue/vibration, /cue/analogue, /cue/io and /cue/marker"
     );
     assert_eq!(
         faults(&file(&[("version", "2"), ("interpolation", "sine")], &ROWS)),

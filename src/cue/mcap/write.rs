@@ -9,6 +9,7 @@ use mcap::{Compression, McapError, WriteOptions, Writer};
 use super::super::number::push_number;
 use super::super::{Cue, Effects};
 use super::{METADATA, Topic, VERSION};
+use crate::channel::{Channel, ChannelId, Sample, Scope, TrackId};
 use crate::time::ShowTime;
 
 /// Small, so that little is lost where a file is cut short.
@@ -65,7 +66,14 @@ impl<W: Write + Seek> Messages<W> {
         let metadata = entries.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
         writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
         let mut channels = BTreeMap::new();
-        for topic in Topic::ALL {
+        let used = |topic: &Topic| match topic {
+            // Programs of before this channel read the file of a cue that has none.
+            Topic::Channel(id) if *id != ChannelId::Vibration => {
+                cue.tracks().used().any(|(track, _)| track.channel == *id)
+            }
+            _ => true,
+        };
+        for topic in Topic::all().filter(used) {
             let name = format!("cue.{}", topic.name().trim_start_matches("/cue/"));
             let schema = writer.add_schema(&name, "jsonschema", topic.schema().as_bytes())?;
             let channel = writer.add_channel(schema, topic.name(), "json", &BTreeMap::new())?;
@@ -89,8 +97,8 @@ impl<W: Write + Seek> Messages<W> {
 /// A change of something that holds until its next change.
 #[derive(Debug, Clone, Copy)]
 enum Change {
-    /// The nth step of an axis's vibration.
-    Vibration(usize, usize),
+    /// The nth step of a track.
+    Track(TrackId, usize),
     /// The nth step of the effects.
     Effects(usize),
     /// The nth marker.
@@ -106,9 +114,8 @@ struct Changes<'a> {
 impl<'a> Changes<'a> {
     fn new(cue: &'a Cue) -> Self {
         let mut order = Vec::new();
-        for (axis, steps) in cue.vibration().iter().enumerate() {
-            order
-                .extend(steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, Change::Vibration(axis, n))));
+        for (track, steps) in cue.tracks().used() {
+            order.extend(steps.as_slice().iter().enumerate().map(|(n, s)| (s.at, Change::Track(track, n))));
         }
         match cue.effects() {
             Effects::Named { steps, .. } => {
@@ -131,15 +138,9 @@ impl<'a> Changes<'a> {
     ) -> Result<(), McapError> {
         while let Some((at, change)) = self.order.next_if(|(at, _)| *at <= time) {
             match change {
-                Change::Vibration(axis, n) => {
-                    let vibration = self.cue.vibration()[axis].as_slice()[n].value;
-                    file.write(Topic::Vibration, at, |json| {
-                        json.push_str(&format!("{{\"axis\":{},\"hz\":", axis + 1));
-                        push_number(json, vibration.hz);
-                        json.push_str(",\"amp\":");
-                        push_number(json, vibration.amplitude);
-                        json.push('}');
-                    })?;
+                Change::Track(track, n) => {
+                    let sample = self.cue.tracks().of(track).as_slice()[n].value;
+                    file.write(Topic::Channel(track.channel), at, |json| push_sample(json, track, sample))?;
                 }
                 Change::Effects(n) => {
                     file.write(Topic::Io, at, |json| push_io(json, self.cue.effects(), n))?
@@ -152,6 +153,20 @@ impl<'a> Changes<'a> {
         }
         Ok(())
     }
+}
+
+/// The axis where it is a channel of axes, and every part.
+fn push_sample(json: &mut String, track: TrackId, Sample(values): Sample) {
+    let Channel { scope, parts, .. } = track.channel.row();
+    json.push('{');
+    if *scope == Scope::Axis {
+        json.push_str(&format!("\"axis\":{},", track.axis + 1));
+    }
+    push_list(json, parts.iter().zip(values), |json, (part, value)| {
+        json.push_str(&format!("\"{}\":", part.name));
+        push_number(json, value);
+    });
+    json.push('}');
 }
 
 /// Every effect each time: a message then needs none before it to be understood.

@@ -65,6 +65,10 @@ impl Controller {
         if self.registers.get(pa::KEEP_OUTPUTS) != 1 {
             self.outputs = motion.outputs & OUTPUTS;
         }
+        // A frame with vibration has no Extend: the outputs stay as they are.
+        if motion.vibration.is_none() {
+            self.extend = motion.extend;
+        }
         self.seen.command(motion, duration);
         self.counts.accepted += 1;
         self.counts.motion += 1;

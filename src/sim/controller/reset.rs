@@ -55,6 +55,7 @@ impl Controller {
         self.seen = Seen::default();
         self.player.restart();
         self.outputs = self.registers.get(pa::START_OUTPUTS) & OUTPUTS;
+        self.extend = 0;
         let start = at + self.registers.millis(pa::START_DELAY);
         self.go_home(self.invented.homing, start, at);
         self.silent_until =

@@ -3,8 +3,8 @@ use std::time::Duration;
 use super::*;
 use crate::sim::Refused;
 use crate::wire::{
-    FrameNo, Motion, MotionReply, ReadRequest, RegisterReply, Timing, Vibration, VibrationPort, Words,
-    WriteRequest,
+    Analogue, FrameNo, Motion, MotionReply, ReadRequest, RegisterReply, Timing, Vibration, VibrationPort,
+    Words, WriteRequest,
 };
 
 mod faults;
@@ -33,6 +33,7 @@ const FRAME: Motion<'static> = Motion {
     time_ms: 100,
     positions: &[Pulses(1_000), Pulses(2_000), Pulses(-3_000)],
     outputs: 0,
+    analogue: Analogue::OFF,
     vibration: None,
 };
 
