@@ -173,7 +173,7 @@ fn an_output_has_what_its_controller_says_and_no_effect_has_its_name() {
     assert_eq!(with("dac1 = 1.5\n").unwrap_err(), ["hall.toml:13:8: dac1: 1.5 is outside 0..=1"]);
     let faults = parse(&format!("[effects]\ndac1 = 1\n{SEAT}{CONTROLLER}")).unwrap_err();
     assert!(
-        faults[0].ends_with("dac1: is the name of an output in cues; call the effect otherwise"),
+        faults[0].ends_with("dac1\": is the name of an output in cues; call the effect otherwise"),
         "{faults:?}"
     );
 }

@@ -27,8 +27,9 @@ const SPEED_SHARE: f64 = 0.98;
 const STEP_SHARE: f64 = 0.9;
 /// How long the whole way may take, ms: it is gone without knowing where the seat is, and a stop waits for it.
 pub(super) const LONGEST_WAY_MS: u32 = 1_000;
-/// How long a line takes that leads nowhere, seconds.
+/// How long a line takes that leads nowhere, seconds, and until when they go out: nobody exchanges two cables or jogs far in that time.
 const STILL_S: f64 = 0.1;
+const STILL_FOR_MS: u32 = 300;
 /// From one size of steps to the next that is tried, and how many are: the largest is 800 times the gentlest.
 const HARDER: f64 = 1.12;
 const TRIES: usize = 60;
@@ -128,8 +129,8 @@ impl Grid {
     }
 }
 
-/// The next line of that way to rest, and of the rest of [`LONGEST_WAY_MS`]; none once that is over, or where no frame can bring
-/// the axes there.
+/// The next line of that way to rest, or at rest for [`STILL_FOR_MS`] in all; none once that is over, or where no frame can bring the
+/// axes there.
 pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
     let mut axes = *axes;
     // Each axis as gently as it can alone: one that is short of room is not to brake the others.
@@ -140,7 +141,9 @@ pub(super) fn next_leg(axes: &[Axis; MAX_AXES], grid: Grid) -> Option<Leg> {
     slow(&mut axes, harder);
     if rest(&axes) {
         // Vibration and effects end with the first of them that arrives.
-        return line(&mut axes, grid, STILL_S).filter(|leg| leg.lasts_ms <= grid.left_ms);
+        let is_told = grid.left_ms <= LONGEST_WAY_MS - STILL_FOR_MS;
+        let still = line(&mut axes, grid, STILL_S).filter(|leg| leg.lasts_ms <= grid.left_ms);
+        return if is_told { None } else { still };
     }
     go(&mut axes, grid)
 }
@@ -266,12 +269,12 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_that_is_slower_than_one_step_rests_at_once_and_is_told_so_for_the_rest_of_a_second() {
+    fn a_lane_that_is_slower_than_one_step_rests_at_once_and_is_told_so_for_a_while() {
         let grid = grid(100.0, 3_000);
         let slow = one(axis(75.0, -50.0, 10.0, grid.rate));
         let leg = next_leg(&slow, grid).expect("it is told");
         assert!((leg.to[0] * 150.0 - 75.0).abs() < 1e-9 && leg.lasts_ms >= 100, "{leg:?}");
-        assert_eq!(next_leg(&slow, Grid { left_ms: 90, ..grid }), None, "it has been told for long enough");
+        assert_eq!(next_leg(&slow, Grid { left_ms: 700, ..grid }), None, "it has been told for long enough");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::motion::Pose;
 use crate::time::{ShowTime, TRIM_MS};
 
 impl Engine {
-    /// Parks, three hold frames, and the end. Asking again changes nothing.
+    /// Parks, hold frames, and the end. Asking again changes nothing.
     ///
     /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end, and no
     /// frame goes out; between shows once that was read. One that was let go ends at once: nothing has been set in motion, and the
@@ -40,7 +40,7 @@ impl Engine {
         self.phase = Phase::Done;
     }
 
-    /// Brings the lanes to rest at once, without the planner; then three hold frames, and no more.
+    /// Brings the lanes to rest at once, without the planner; then hold frames, and no more.
     pub fn stop(&mut self) {
         if self.phase == Phase::Done {
             return;
@@ -119,7 +119,7 @@ impl Engine {
         }
     }
 
-    /// Brings one lane to rest; after three hold frames nothing goes to it.
+    /// Brings one lane to rest; after its hold frames nothing goes to it.
     pub fn leave(&mut self, lane: usize) {
         if !self.sends_nothing() {
             self.brake(lane);

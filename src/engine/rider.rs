@@ -299,7 +299,7 @@ impl Rider {
         }
     }
 
-    /// One that is out, and at park, gets three more frames: whoever works on it is safe from those of the others.
+    /// One that is out, and at park, gets hold frames and then none: whoever works on it is safe from those of the others.
     fn count_stowed(&mut self, is_settled: bool) {
         if !(self.out && self.wants_out() && is_settled) {
             self.leaving = None;

@@ -11,7 +11,7 @@ pub enum HealthState {
     Ok,
     /// Acks are missing; motion goes on.
     Degraded,
-    /// Not heard for too long: three hold frames, then no motion.
+    /// Not heard for too long: hold frames, then no motion.
     Lost,
     /// Found again as it was: it takes part from the next join on.
     Rejoining,

@@ -134,7 +134,7 @@ pub enum Task {
 pub enum Alarm {
     /// Something that concerns the hall.
     Event(Event),
-    /// A controller is lost: its lane comes to rest, and after three hold frames nothing goes to it.
+    /// A controller is lost: its lane comes to rest, and after its hold frames nothing goes to it.
     Leave(u16),
     /// Nothing goes to that lane from now on.
     Cut(u16),

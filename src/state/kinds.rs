@@ -19,7 +19,7 @@ pub enum State {
     Armed,
     /// The seats move with the cue.
     Playing(PlayMode),
-    /// The seats hold; after three hold frames nothing is sent.
+    /// The seats hold; after its hold frames nothing is sent.
     Paused,
     /// The seats decelerate, to [`State::Stopped`] or to [`State::Fault`].
     Stopping,
