@@ -29,7 +29,7 @@ const STEP_SHARE: f64 = 0.9;
 pub(super) const LONGEST_WAY_MS: u32 = 1_000;
 /// How long a line takes that leads nowhere, seconds, and until when they go out: nobody exchanges two cables or jogs far in that time.
 const STILL_S: f64 = 0.1;
-const STILL_FOR_MS: u32 = 300;
+const STILL_FOR_MS: u32 = 200;
 /// From one size of steps to the next that is tried, and how many are: the largest is 800 times the gentlest.
 const HARDER: f64 = 1.12;
 const TRIES: usize = 60;
@@ -274,7 +274,7 @@ mod tests {
         let slow = one(axis(75.0, -50.0, 10.0, grid.rate));
         let leg = next_leg(&slow, grid).expect("it is told");
         assert!((leg.to[0] * 150.0 - 75.0).abs() < 1e-9 && leg.lasts_ms >= 100, "{leg:?}");
-        assert_eq!(next_leg(&slow, Grid { left_ms: 700, ..grid }), None, "it has been told for long enough");
+        assert_eq!(next_leg(&slow, Grid { left_ms: 800, ..grid }), None, "it has been told for long enough");
     }
 
     #[test]
