@@ -14,7 +14,7 @@ pub(crate) const MAX_PARTS: usize = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sample(pub [f64; MAX_PARTS]);
 
-/// A channel, by its place in [`CHANNELS`].
+/// A channel, by its place in `CHANNELS`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ChannelId {
     /// Vibration of an axis (SMC manual 2.2.2.9).

@@ -12,7 +12,7 @@ pub struct Mix {
     pub vibration: f64,
     /// Which of its effects may be on, bit by bit in the order of the cue's names; a raw output word needs all of them.
     pub effects: u32,
-    /// Which parts of channels may be on, bit by bit in the order of [`crate::channel::switches`].
+    /// Which parts of channels may be on, bit by bit in the order of `channel::switches`.
     pub switches: u32,
     /// Whether the seat takes part at all.
     pub on: bool,

@@ -35,7 +35,7 @@ const ROWS: &[Row] = &[
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 16.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show.
-    ("lines of code", counts::lines_of_code, Less, 49_625.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 49_628.0, 39_800.0),
     ("public items and fields", counts::public_items, Less, 2_854.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 543.0, 390.0),
