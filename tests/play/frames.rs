@@ -67,7 +67,7 @@ fn ten_and_twelve_axes_go_in_one_frame_each_to_seats_that_are_homed_first() {
     for (seen, axes) in [(ten.end(), 10), (twelve.end(), 12)] {
         assert!(seen.rest_in_park());
         for (axis, height) in heights.iter().enumerate().take(axes) {
-            assert_eq!(seen.farthest(axis), pulses(*height), "axis {axis} of {axes}");
+            assert_eq!(seen.farthest(axis), pulses(*height), "axis {axis} of {axes}: {report}");
         }
         assert_eq!(seen.rows[0].commanded.len(), axes);
         assert_eq!(seen.rows[0].time_ms, 3000, "axes past the sixth cannot tell where they are");
