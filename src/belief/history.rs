@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::span::Reach;
 use crate::motion::Pose;
 use crate::time::MonoTime;
 
@@ -17,8 +18,7 @@ struct Bucket {
     from: MonoTime,
     /// When the last of them is over.
     until: MonoTime,
-    low: Pose,
-    high: Pose,
+    reach: Reach,
     /// The greatest amplitude of vibration on any slot, strokes.
     shakes: f64,
 }
@@ -34,7 +34,7 @@ impl History {
     /// The seat is there, and no frame led it elsewhere.
     pub(super) const fn at(pose: Pose) -> Self {
         let zero = MonoTime::from_nanos(0);
-        let empty = Bucket { from: zero, until: zero, low: pose, high: pose, shakes: 0.0 };
+        let empty = Bucket { from: zero, until: zero, reach: Reach::at(pose), shakes: 0.0 };
         Self { buckets: [empty; BUCKETS], newest: 0 }
     }
 
@@ -42,20 +42,17 @@ impl History {
     pub(super) fn push(&mut self, last: &Pose, pose: &Pose, shakes: f64, (at, until): (MonoTime, MonoTime)) {
         if at.since(self.buckets[self.newest].from) >= BUCKET {
             self.newest = (self.newest + 1) % BUCKETS;
-            self.buckets[self.newest] = Bucket { from: at, until, low: *last, high: *last, shakes };
+            self.buckets[self.newest] = Bucket { from: at, until, reach: Reach::at(*last), shakes };
         }
         let bucket = &mut self.buckets[self.newest];
         (bucket.until, bucket.shakes) = (bucket.until.max(until), bucket.shakes.max(shakes));
-        for (slot, place) in pose.iter().enumerate() {
-            bucket.low[slot] = bucket.low[slot].min(*place);
-            bucket.high[slot] = bucket.high[slot].max(*place);
-        }
+        bucket.reach.widen(pose);
     }
 
     /// Between which places frames have led a slot since then, and with what vibration; none where none was under way.
     pub(super) fn reach(&self, slot: usize, since: MonoTime) -> Option<(f64, f64, f64)> {
         let open = self.buckets.iter().filter(|bucket| bucket.until >= since);
-        open.map(|bucket| (bucket.low[slot], bucket.high[slot], bucket.shakes))
+        open.map(|bucket| (bucket.reach.low[slot], bucket.reach.high[slot], bucket.shakes))
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1), a.2.max(b.2)))
     }
 }

@@ -275,7 +275,7 @@ impl Belief {
             return Found::Nothing;
         }
         let mut pose = *self.spans.last();
-        (0..MAX_AXES).filter(|slot| told >> slot & 1 == 1).for_each(|slot| pose[slot] = reading.pose[slot]);
+        slots_in(told).for_each(|slot| pose[slot] = reading.pose[slot]);
         self.within = told | if agrees { self.within } else { 0 };
         self.spans = Spans::at(pose);
         self.known = Known::Measured(reading.at, reading.by);
@@ -289,19 +289,15 @@ impl Belief {
         if now.since(reading.at) > STALE {
             return Found::Nothing;
         }
-        let follows = FOLLOWS + 3 * self.period;
-        let since = reading.at.before(follows);
-        let is_astray = |slot: &usize| {
-            let place = reading.pose[*slot];
-            let (low, high) = self.spans.reach(*slot);
-            let (low, high, shakes) = self
-                .history
-                .reach(*slot, since)
-                .map_or((low, high, 0.0), |led| (low.min(led.0), high.max(led.1), led.2));
-            !(low - shakes - ASTRAY..=high + shakes + ASTRAY).contains(&place)
+        let since = reading.at.before(FOLLOWS + 3 * self.period);
+        let is_astray = |slot: usize| {
+            let (low, high) = self.spans.reach(slot);
+            let led = self.history.reach(slot, since);
+            let (low, high, shakes) =
+                led.map_or((low, high, 0.0), |led| (low.min(led.0), high.max(led.1), led.2));
+            !(low - shakes - ASTRAY..=high + shakes + ASTRAY).contains(&reading.pose[slot])
         };
-        let known = reading.slots & self.within;
-        if !(0..MAX_AXES).filter(|slot| known >> slot & 1 == 1).any(|slot| is_astray(&slot)) {
+        if !slots_in(reading.slots & self.within).any(is_astray) {
             return Found::Nothing;
         }
         (self.within, self.known) = (0, Known::Contradicted(now));
@@ -345,7 +341,7 @@ impl Belief {
     }
 
     fn is_elsewhere(&self, slots: u16, pose: &Pose) -> bool {
-        (0..MAX_AXES).filter(|slot| slots >> slot & 1 == 1).any(|slot| {
+        slots_in(slots).any(|slot| {
             let (low, high) = self.spans.reach(slot);
             (high - pose[slot]).abs().max((low - pose[slot]).abs()) > self.near[slot]
         })
@@ -389,7 +385,7 @@ impl Belief {
         let from_all = self.gap || self.is_quiet(now);
         let last = self.spans.last();
         let mut farthest = [0.0; MAX_AXES];
-        for slot in (0..MAX_AXES).filter(|slot| self.own >> slot & 1 == 1) {
+        for slot in slots_in(self.own) {
             let (low, high) = if self.within >> slot & 1 == 0 {
                 (0.0, 1.0)
             } else if from_all {
@@ -434,4 +430,9 @@ impl Belief {
     pub const fn withheld(&mut self) {
         self.tally.withheld += 1;
     }
+}
+
+/// The slots of a set, a bit each.
+fn slots_in(set: u16) -> impl Iterator<Item = usize> {
+    (0..MAX_AXES).filter(move |slot| set >> slot & 1 == 1)
 }

@@ -20,8 +20,27 @@ struct Span {
     at: MonoTime,
     /// When its first frame was sent that asks for an ack, and the number of the last such.
     asked: Option<(MonoTime, FrameNo)>,
-    low: Pose,
-    high: Pose,
+    reach: Reach,
+}
+
+/// Between which places each slot has been led.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    pub(super) low: Pose,
+    pub(super) high: Pose,
+}
+
+impl Reach {
+    pub(super) const fn at(pose: Pose) -> Self {
+        Self { low: pose, high: pose }
+    }
+
+    pub(super) fn widen(&mut self, pose: &Pose) {
+        for (slot, place) in pose.iter().enumerate() {
+            self.low[slot] = self.low[slot].min(*place);
+            self.high[slot] = self.high[slot].max(*place);
+        }
+    }
 }
 
 /// The frames since the one that was acked last, at most so many spans of them.
@@ -43,8 +62,8 @@ impl Default for Spans {
 impl Spans {
     /// No frame since the axes were there.
     pub(super) const fn at(pose: Pose) -> Self {
-        let empty =
-            Span { first: FrameNo::FIRST, at: MonoTime::from_nanos(0), asked: None, low: pose, high: pose };
+        let (at, reach) = (MonoTime::from_nanos(0), Reach::at(pose));
+        let empty = Span { first: FrameNo::FIRST, at, asked: None, reach };
         Self { spans: [empty; SPANS], count: 0, last: pose, newest: FrameNo::FIRST }
     }
 
@@ -63,14 +82,12 @@ impl Spans {
         let is_full = self.count == SPANS;
         if self.count == 0 || (!is_full && at.since(self.spans[self.count - 1].at) >= SPAN) {
             // What is on its way to the first frame's pose is still between that and the one before.
-            self.spans[self.count] = Span { first: frame, at, asked: None, low: self.last, high: self.last };
+            let reach = Reach::at(self.last);
+            self.spans[self.count] = Span { first: frame, at, asked: None, reach };
             self.count += 1;
         }
         let span = &mut self.spans[self.count - 1];
-        for (slot, place) in pose.iter().enumerate() {
-            span.low[slot] = span.low[slot].min(*place);
-            span.high[slot] = span.high[slot].max(*place);
-        }
+        span.reach.widen(pose);
         if asked {
             span.asked = Some((span.asked.map_or(at, |(since, _)| since), frame));
         }
@@ -108,11 +125,14 @@ impl Spans {
     pub(super) fn reach(&self, slot: usize) -> (f64, f64) {
         let place = self.last[slot];
         let spans = self.spans[..self.count].iter();
-        spans.fold((place, place), |(low, high), span| (low.min(span.low[slot]), high.max(span.high[slot])))
+        spans
+            .map(|span| &span.reach)
+            .fold((place, place), |(low, high), reach| (low.min(reach.low[slot]), high.max(reach.high[slot])))
     }
 
     /// Whether all frames lead to one place.
     pub(super) fn is_a_point(&self) -> bool {
-        self.spans[..self.count].iter().all(|span| span.low == self.last && span.high == self.last)
+        let mut reaches = self.spans[..self.count].iter().map(|span| &span.reach);
+        reaches.all(|reach| reach.low == self.last && reach.high == self.last)
     }
 }
