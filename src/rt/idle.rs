@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use super::sight::axes_to_read;
+use super::sight::{INPUTS, RESET, RESET_DONE, axes_to_read};
 use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::motion::Pulses;
@@ -20,11 +20,6 @@ const EVERY: Duration = Duration::from_millis(250);
 /// From one to the next of one controller while frames flow: each of at most three reads is made more often than eight times a
 /// second.
 const EVERY_LED: Duration = Duration::from_millis(40);
-/// DP5e: the inputs that are active.
-const INPUTS: u16 = 0x5e;
-/// DPF0: 2 once the controller knows its zero.
-const RESET: u16 = 0xf0;
-const RESET_DONE: u16 = 2;
 
 /// Who beats, and when next.
 #[derive(Debug)]

@@ -136,12 +136,12 @@ impl Positions {
 
     /// Hears an answer: where axes are, from `first` on. One that nobody waits for tells of no place. Gives what it tells by itself.
     pub(super) fn answer(&mut self, first: usize, positions: &[Pulses], at: MonoTime) -> Option<Reading> {
-        let newest = self.open(first, at).back().copied();
-        let made = self.open(first, at).pop_front()?;
+        let asked = self.open(first, at);
+        let newest = *asked.back()?;
+        let made = asked.pop_front()?;
         self.answered = self.answered.max(made);
         self.hear(first, positions, made, at, Source::Registers);
         // Whether a seat follows its frames is a question of now: it is looked at once more than needs be where this is an older answer.
-        let newest = newest.unwrap_or(made);
         let made = if self.may_be_repeated(at) { newest.before(REPEATED) } else { newest };
         Some(self.in_passing(first, positions, made))
     }

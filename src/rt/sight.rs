@@ -23,7 +23,7 @@ const OUTPUTS: u16 = 1;
 /// PA00 to PA02: work mode, and working axes.
 const MODE: (u16, u16) = (0x00, 3);
 /// DP5E: active inputs, bit 0 = X01.
-const INPUTS: u16 = 0x5e;
+pub(super) const INPUTS: u16 = 0x5e;
 /// So many looks in a row without a sign of an emergency stop say that it is over: one answer may be late or repeated.
 const CALM_LOOKS: u8 = 2;
 /// PA92: the inputs that all have to be active for an emergency stop; SMC alone is asked.
@@ -31,8 +31,8 @@ const STOP_MASK: u16 = 0x92;
 /// DP34: datagrams received; SMC alone.
 const PACKETS: u16 = 0x34;
 /// DPF0: 2 once the controller knows its zero.
-const RESET: u16 = 0xf0;
-const RESET_DONE: u16 = 2;
+pub(super) const RESET: u16 = 0xf0;
+pub(super) const RESET_DONE: u16 = 2;
 /// How far from where it rests a seat has to be found to have been moved, in strokes: 0.3 mm of 150.
 const NEAR: f64 = 0.002;
 /// DPFE and DPFF: versions.

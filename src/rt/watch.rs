@@ -272,7 +272,7 @@ impl Watch {
             {
                 self.reported[controller] = at;
                 self.positions[controller].report(&told.value, at);
-                self.on_positions(controller, at);
+                self.on_positions(controller, None, at);
             }
         }
         self.look_anew(now);

@@ -31,31 +31,20 @@ impl Watch {
     /// else it was repeated on its way.
     fn on_answer(&mut self, controller: usize, first: usize, told: &[Pulses], at: MonoTime) {
         if let Some(passing) = self.positions[controller].answer(first, told, at) {
-            self.on_positions(controller, at);
-            self.on_passing(controller, &passing, at);
+            self.on_positions(controller, Some(passing), at);
         } else if !self.is_asked_otherwise() {
             self.positions[controller].on_repeated(at);
         }
     }
 
-    /// A seat that frames lead is hardly ever read as a whole between two of them: what a part of it tells is for the tick thread as
-    /// well.
-    fn on_passing(&self, controller: usize, passing: &Reading, at: MonoTime) {
-        let positions = &self.positions[controller];
-        if !self.live.is_moving() || positions.reading(at).is_some() {
-            return;
-        }
-        if let Some(evidence) = self.live.evidence(controller) {
-            evidence.on_reading(passing);
-        }
-    }
-
-    /// What is known by now of where a seat is, is for the tick thread, too.
-    pub(super) fn on_positions(&mut self, controller: usize, at: MonoTime) {
+    /// What is known by now of where a seat is, is for the tick thread, too. One that frames lead is hardly ever read as a whole between
+    /// two of them: then that is what an answer tells in passing.
+    pub(super) fn on_positions(&mut self, controller: usize, passing: Option<Reading>, at: MonoTime) {
         let positions = &self.positions[controller];
         self.health.on_outside(controller, positions.outside());
         self.health.on_ambiguous(controller, positions.is_ambiguous());
-        if let (Some(reading), Some(evidence)) = (positions.reading(at), self.live.evidence(controller)) {
+        let reading = positions.reading(at).or(passing.filter(|_| self.live.is_moving()));
+        if let (Some(reading), Some(evidence)) = (reading, self.live.evidence(controller)) {
             evidence.on_reading(&reading);
         }
     }
