@@ -10,6 +10,7 @@ use super::cues::{KINDS, Kind, OTHERS};
 use super::dice::Dice;
 use super::ether::{Ether, Weather};
 use super::hall::{Hall, Thread, breaches, open, seats};
+use super::named::ether;
 use super::seat::{MS, Settings};
 
 /// Something that somebody does.
@@ -18,28 +19,8 @@ type Ask = fn(&mut Hall<'_, '_>);
 const WET: usize = 3;
 const WET_AT_REST: usize = 4;
 
-fn ether(kind: Kind, set: impl Fn(&mut Settings)) -> Ether {
-    let mut seats = seats(&kind);
-    seats.iter_mut().for_each(set);
-    Ether::new(&seats, 1)
-}
-
 fn lead<T>(kind: Kind, ether: &Ether, lead: impl FnOnce(&mut Hall<'_, '_>) -> T) -> T {
     open(ether, kind, false, &BTreeMap::new(), lead).0
-}
-
-fn ride(hall: &mut Hall<'_, '_>, cue: usize) {
-    hall.load(cue);
-    assert!(hall.comes_to(|state| state == State::Parked, 5_000), "{:?}", hall.state);
-    hall.pass(300);
-    hall.ask(Transition::Arm);
-    if !hall.comes_to(|state| state == State::Armed, 1_000) {
-        hall.ask(Transition::HomeAndArm);
-    }
-    assert!(hall.comes_to(|state| state == State::Armed, 10_000), "{:?}", hall.state);
-    hall.ask(Transition::Go);
-    let follows = hall.comes_to(|state| state == State::Playing(PlayMode::Following), 8_000);
-    assert!(follows, "{:?}", hall.state);
 }
 
 fn frames(hall: &Hall<'_, '_>, seat: usize) -> u64 {
@@ -64,7 +45,7 @@ fn a_tick_that_comes_late_while_a_seat_is_told_that_it_is_out_does_not_panic() {
             let ether = ether(kind, |_| {});
             let done = catch_unwind(AssertUnwindSafe(|| {
                 lead(kind, &ether, |hall| {
-                    ride(hall, WET);
+                    hall.ride(WET);
                     hall.pass(200);
                     let mix = hall.runtime.desk.mix(0);
                     hall.set(0, Mix { on: false, ..mix });
@@ -100,7 +81,7 @@ fn left_on(
 ) -> (u16, bool) {
     let ether = ether(kind, |_| {});
     lead(kind, &ether, |hall| {
-        ride(hall, cue);
+        hall.ride(cue);
         hall.pass(300);
         assert_eq!(wet(hall, 0), (1, true));
         if lead_ms > 0 {
@@ -164,7 +145,7 @@ fn no_effect_is_left_on_at_a_seat_that_stays_out_since_it_went_astray_or_was_cut
         for deaf in [true, false] {
             let ether = ether(kind, |_| {});
             lead(kind, &ether, |hall| {
-                ride(hall, WET);
+                hall.ride(WET);
                 for _ in 0..4 {
                     if deaf {
                         let now = hall.ether.ns();
@@ -192,7 +173,7 @@ fn no_effect_is_left_on_at_a_seat_that_stays_out_since_it_went_astray_or_was_cut
 fn cut_after(kind: Kind, set: impl Fn(&mut Settings), jogged: Option<(usize, f64)>, at: u64) -> u64 {
     let ether = ether(kind, set);
     lead(kind, &ether, |hall| {
-        ride(hall, 0);
+        hall.ride(0);
         hall.pass(at);
         let begun = hall.ether.ns();
         hall.ether.world().lines[0].seat.seize(jogged, begun, 3_000 * MS);
@@ -234,7 +215,7 @@ fn nor_does_it_take_longer_than_is_said_at_few_frames_a_second() {
 fn cries(kind: Kind, set: impl Fn(&mut Settings), each: impl Fn(&mut Hall<'_, '_>)) -> u32 {
     let ether = ether(kind, set);
     lead(kind, &ether, |hall| {
-        ride(hall, 0);
+        hall.ride(0);
         let mut quiet = 0;
         for _ in 0..14 {
             each(hall);
@@ -273,7 +254,7 @@ fn no_seat_that_vibrates_and_follows_is_cut_off() {
     for kind in [KINDS[1], KINDS[4], KINDS[7], OTHERS[0], OTHERS[7]] {
         let ether = ether(kind, |_| {});
         lead(kind, &ether, |hall| {
-            ride(hall, WET);
+            hall.ride(WET);
             let mut quiet = 0;
             for turn in 0..30_u32 {
                 let before = frames(hall, 0);
@@ -327,7 +308,7 @@ fn no_two_requests_one_after_the_other_move_a_seat_as_none_may() {
                     let ether = ether(kind, |_| {});
                     let done = catch_unwind(AssertUnwindSafe(|| {
                         lead(kind, &ether, |hall| {
-                            ride(hall, WET);
+                            hall.ride(WET);
                             hall.pass(200);
                             first(hall);
                             hall.pass(gap);
@@ -368,7 +349,7 @@ fn a_seat_that_still_vibrates_is_never_joined_from_where_it_is_read_and_few_do()
                 for park in [false, true] {
                     let ether = ether(kind, |_| {});
                     lead(kind, &ether, |hall| {
-                        ride(hall, cue);
+                        hall.ride(cue);
                         hall.pass(300 + offset);
                         hall.ask(Transition::Pause);
                         hall.ether.turns(0, Weather::Lost, 100);

@@ -20,7 +20,7 @@ const FAST: Kind = KINDS[7];
 /// How far apart each axis may stand from where it is meant to be, mm.
 const NEAR_MM: f64 = 0.5;
 
-fn ether(kind: Kind, set: impl Fn(&mut Settings)) -> Ether {
+pub(super) fn ether(kind: Kind, set: impl Fn(&mut Settings)) -> Ether {
     let mut seats = seats(&kind);
     seats.iter_mut().for_each(set);
     Ether::new(&seats, 1)
@@ -57,7 +57,7 @@ fn assert_at_park(ether: &Ether, axes: usize) {
 impl Hall<'_, '_> {
     /// From the start to a ride on the cue.
     #[track_caller]
-    fn ride(&mut self, cue: usize) {
+    pub(super) fn ride(&mut self, cue: usize) {
         self.load(cue);
         assert!(self.comes_to(|state| state == State::Parked, 5_000), "{:?}", self.state);
         self.pass(300);
