@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::process::{Playing, Relay, Row, Seen, Sim, play};
-use super::{Folder, NOD_MS, NOD_TOP, pulses};
+use super::{Folder, NOD_MS, NOD_TOP, STROKE, pulses};
 
 fn functions(seen: &Seen) -> Vec<&str> {
     let mut all: Vec<&str> = seen.rows.iter().map(|row| row.function.as_str()).collect();
@@ -73,6 +73,19 @@ fn ten_and_twelve_axes_go_in_one_frame_each_to_seats_that_are_homed_first() {
         assert_eq!(seen.rows[0].time_ms, 3000, "axes past the sixth cannot tell where they are");
     }
     assert_eq!(report["controllers"][0]["park_frames"], 1);
+}
+
+#[test]
+fn a_seat_that_is_led_to_where_either_order_of_words_is_inside_its_stroke_plays_on() {
+    // One pulse, or 65,536 of 300,000.
+    let (folder, sim) = (Folder::new(), Sim::one(&["--axes", "1"]));
+    let cue = folder.nod(&[1.0 / STROKE]);
+    let report = play(&cue, &sim.to(), &["--json"]).report_of(0);
+    assert_all_acked(&report);
+    assert!(!report["events"].to_string().contains("lost"), "{}", report["events"]);
+    let seen = sim.end();
+    assert_eq!(seen.farthest(0), 1);
+    assert!(seen.rest_in_park());
 }
 
 #[test]

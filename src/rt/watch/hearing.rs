@@ -40,9 +40,11 @@ impl Watch {
     /// What is known by now of where a seat is, is for the tick thread, too. One that frames lead is hardly ever read as a whole between
     /// two of them: then that is what an answer tells in passing.
     pub(super) fn on_positions(&mut self, controller: usize, passing: Option<Reading>, at: MonoTime) {
+        // While frames lead a seat from a place that is known, each answer is held against where they led it.
+        let is_led = self.live.is_moving() && self.stands(controller).may_move();
         let positions = &self.positions[controller];
         self.health.on_outside(controller, positions.outside());
-        self.health.on_ambiguous(controller, positions.is_ambiguous());
+        self.health.on_ambiguous(controller, !is_led && positions.is_ambiguous());
         let reading = positions.reading(at).or(passing.filter(|_| self.live.is_moving()));
         if let (Some(reading), Some(evidence)) = (reading, self.live.evidence(controller)) {
             evidence.on_reading(&reading);
