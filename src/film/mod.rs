@@ -15,4 +15,5 @@
 )]
 
 pub(crate) mod observation;
+pub mod point;
 pub(crate) mod timecode;
