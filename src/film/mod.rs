@@ -16,4 +16,7 @@
 
 pub(crate) mod observation;
 pub mod point;
+#[cfg(test)]
+mod testing;
 pub(crate) mod timecode;
+pub(crate) mod tracker;
