@@ -7,13 +7,15 @@
 //!                                                     playhead, hold, park <- Chase <- Follower <---+
 //! ```
 //!
-//! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: `Chase`
+//! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
 #![cfg_attr(
     not(test),
     expect(dead_code, reason = "the readers of sources and the show that they lead come next")
 )]
 
+pub mod chase;
+pub mod follower;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
