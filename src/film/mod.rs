@@ -15,7 +15,10 @@
 )]
 
 pub mod chase;
+mod estimate;
 pub mod follower;
+mod late;
+pub(crate) mod ltc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
