@@ -17,6 +17,7 @@
 pub mod chase;
 mod estimate;
 pub mod follower;
+mod labels;
 mod late;
 pub(crate) mod ltc;
 pub(crate) mod observation;

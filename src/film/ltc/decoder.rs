@@ -1,10 +1,10 @@
 //! Samples into frames that are sure.
 
-use super::Timecode;
 use super::cells::{Cell, Cells};
 use super::edges::Edges;
 use super::word::{BITS, Word, follows};
-use crate::film::timecode::{FrameRate, Label};
+use super::{Label, Timecode};
+use crate::film::timecode::FrameRate;
 
 /// Frames that have to follow each other before a label is believed. A bit that noise turned is turned in one of them; that the
 /// same one is turned in three does not happen.

@@ -1,9 +1,14 @@
 //! Each kind of damage that a line can do to LTC: every frame that is read was sent, and ended when it is said to have.
 
+use std::time::Duration;
+
 use super::*;
 use crate::film::follower::tests::tries;
-use crate::film::testing::Luck;
+use crate::film::observation::{FilmWord, Observation};
+use crate::film::testing::{Luck, TrueFilm, mono};
 use crate::film::timecode::FrameRate;
+use crate::film::tracker::{SourceKind, SourceTracker};
+use crate::time::MonoTime;
 
 const SAMPLES: u32 = 48_000;
 /// `KINOCUE_FILM_TRIES` makes it that many times as long.
@@ -242,5 +247,113 @@ fn other_sample_rates_are_read() {
         let mut decoder = LtcDecoder::new(samples);
         let read = (0..samples).filter_map(|_| decoder.push(generator.sample())).count();
         assert!(read >= 20, "{read} at {samples}");
+    }
+}
+
+/// A minute of LTC through a pipe that gives its blocks late: the observations, and the film that was sent.
+fn piped(
+    seconds: f64,
+    rate: Option<FrameRate>,
+    sent: FrameRate,
+    stops_at: f64,
+) -> (Vec<Observation>, TrueFilm) {
+    let mut luck = Luck::new(12);
+    let mut generator = LtcGenerator::new(frame("01:00:05:00", sent), SAMPLES, 0.5);
+    let start = "01:00:00:00".parse().expect("it is a label");
+    let mut reader = LtcReader::new(SAMPLES, Duration::from_millis(10), rate, start);
+    let mut told = Vec::new();
+    let (mut block, mut made) = (Vec::new(), 0_u32);
+    while f64::from(made) < seconds * f64::from(SAMPLES) {
+        block.clear();
+        let is_on = f64::from(made) < stops_at * f64::from(SAMPLES);
+        block.extend((0..512).map(|_| if is_on { generator.sample() } else { 0 }));
+        made += 512;
+        // The line takes 10 ms, the pipe up to 6 more. The sound card's crystal is 60 ppm off.
+        let read = f64::from(made) / (f64::from(SAMPLES) * 1.000_06) + 0.010 + luck.between(0.0, 0.006);
+        reader.hear(&block, mono(read), &mut |heard| told.push(heard));
+    }
+    (told, TrueFilm::new(5.0 * f64::from(sent.labels()) / sent.frames_per_second(), 1.000_06))
+}
+
+#[test]
+fn through_a_pipe_that_is_late_the_film_is_known_within_half_a_millisecond() {
+    let (told, film) = piped(20.0, Some(FrameRate::F25), FrameRate::F25, f64::MAX);
+    let mut tracker = SourceTracker::new(SourceKind::Ltc, 0.0015, mono(0.0));
+    let (mut errors, mut locked) = (Vec::new(), None);
+    for observation in &told {
+        tracker.hear(observation);
+        let t = observation.at.since(mono(0.0)).as_secs_f64();
+        if tracker.state().may_lead() {
+            locked.get_or_insert(t - told[0].at.since(mono(0.0)).as_secs_f64());
+            errors.push((tracker.point(observation.at).media.as_secs_f64() - film.media_s(t)) * 1e3);
+        }
+    }
+    let late = &mut errors[100..];
+    let bias = late.iter().sum::<f64>() / late.len() as f64;
+    late.iter_mut().for_each(|error| *error = (*error - bias).abs());
+    late.sort_by(f64::total_cmp);
+    let p99 = late[(late.len() - 1) * 99 / 100];
+    let locked = locked.expect("it locks");
+    println!("pipe: lock {locked:.2} s, p99 {p99:.3} ms, bias {bias:.3} ms");
+    assert!(locked <= 1.0 && p99 <= 0.5 && bias.abs() <= 1.0, "{locked} s, {p99} ms, {bias} ms");
+}
+
+#[test]
+fn a_line_that_falls_silent_says_so_once_and_a_rate_that_nobody_configured_is_found() {
+    for sent in [FrameRate::F24, FrameRate::F23_976, FrameRate::F29_97Drop] {
+        let (told, film) = piped(4.0, None, sent, 3.0);
+        let words: Vec<&Observation> =
+            told.iter().filter(|told| !matches!(told.word, FilmWord::Position(_))).collect();
+        assert!(matches!(words[..], [Observation { word: FilmWord::Silence, .. }]), "{words:?}");
+        let silent = words[0].at.since(mono(3.0)).as_secs_f64();
+        assert!(silent < 0.035, "{sent}: after {silent} s");
+        let last = told[told.len() - 2];
+        let FilmWord::Position(media) = last.word else { panic!("{last:?}") };
+        let error = media.as_secs_f64() - film.media_s(last.at.since(mono(0.0)).as_secs_f64());
+        assert!(error.abs() < 0.003, "{sent}: {error} s");
+    }
+}
+
+#[test]
+fn noise_on_the_line_is_dirt() {
+    let mut reader = LtcReader::new(SAMPLES, Duration::ZERO, None, Label::default());
+    let mut generator = LtcGenerator::new(at_25(), SAMPLES, 0.5);
+    let (mut luck, mut words) = (Luck::new(2), Vec::new());
+    for n in 1..200 {
+        let block: Vec<i16> =
+            (0..480).map(|_| if n < 100 { generator.sample() } else { luck.bits() as i16 }).collect();
+        reader.hear(&block, mono(f64::from(n) * 0.01), &mut |heard| words.push(heard.word));
+    }
+    words.retain(|word| !matches!(word, FilmWord::Position(_)));
+    assert_eq!(words, [FilmWord::Dirt]);
+}
+
+#[test]
+fn no_samples_at_any_time_make_the_reader_panic() {
+    let mut luck = Luck::new(31);
+    let mut reader = LtcReader::new(SAMPLES, Duration::from_millis(3), None, Label::default());
+    for _ in 0..300 {
+        let kind = luck.below(4);
+        let block: Vec<i16> = (0..luck.below(600))
+            .map(|n| match kind {
+                0 => luck.bits() as i16,
+                1 => {
+                    if n / 12 % 2 == 0 {
+                        i16::MAX
+                    } else {
+                        i16::MIN
+                    }
+                }
+                2 => 0,
+                _ => {
+                    if luck.is(0.05) {
+                        i16::MIN
+                    } else {
+                        0
+                    }
+                }
+            })
+            .collect();
+        reader.hear(&block, MonoTime::from_nanos(luck.bits() >> luck.below(64)), &mut |_| ());
     }
 }
