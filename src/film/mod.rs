@@ -14,12 +14,15 @@
     expect(dead_code, reason = "the readers of sources and the show that they lead come next")
 )]
 
+pub(crate) mod artnet;
 pub mod chase;
+pub(crate) mod chooser;
 mod estimate;
 pub mod follower;
 mod labels;
 mod late;
 pub(crate) mod ltc;
+pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
