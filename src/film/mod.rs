@@ -22,6 +22,7 @@ pub mod follower;
 mod labels;
 mod late;
 pub(crate) mod ltc;
+pub(crate) mod mpv;
 pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
