@@ -66,8 +66,15 @@ pub enum ParkCause {
 pub enum ChaseVerdict {
     /// Stay parked.
     Wait,
-    /// Follow the cue there, at that pace. Where `join` differs from the tick before, by a join.
-    Follow { join: u32, playhead: ShowTime, pace: f64 },
+    /// Follow the cue.
+    Follow {
+        /// How often seats have joined; where this differs from the tick before, they are to join.
+        join: u32,
+        /// Where in the cue the frame of this tick leads.
+        playhead: ShowTime,
+        /// How many times as fast as the clock the playhead moves.
+        pace: f64,
+    },
     /// Decelerate, and rest.
     Hold(HoldCause),
     /// Park.

@@ -35,7 +35,7 @@ impl LateBias {
     pub(super) fn push(&mut self, residual_s: f64) {
         self.residuals[self.count % KEPT] = residual_s as f32;
         self.count += 1;
-        if self.count >= KEPT && self.count % EVERY != 0 {
+        if self.count >= KEPT && !self.count.is_multiple_of(EVERY) {
             return;
         }
         let mut sorted = self.residuals;

@@ -5,14 +5,10 @@
 mod cells;
 mod decoder;
 mod edges;
-mod generator;
-mod reader;
+pub(crate) mod generator;
+pub(crate) mod reader;
 #[cfg(test)]
 mod tests;
 mod word;
-
-pub(crate) use decoder::{LtcDecoder, LtcFrame};
-pub(crate) use generator::LtcGenerator;
-pub(crate) use reader::LtcReader;
 
 use super::timecode::{Label, Timecode};

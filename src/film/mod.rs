@@ -9,9 +9,16 @@
 //!
 //! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
+#![expect(dead_code, reason = "the readers of sources come next")]
 #![cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the readers of sources and the show that they lead come next")
+    test,
+    expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        clippy::print_stdout,
+        reason = "tests reckon with small numbers, and print their figures to who asks for them"
+    )
 )]
 
 pub(crate) mod artnet;
