@@ -35,5 +35,7 @@ pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod tests;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
