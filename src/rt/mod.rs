@@ -23,7 +23,7 @@ pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use line::{Line, line};
-pub use live::{Live, Phase, Times};
+pub use live::{Live, Times};
 pub(crate) use mail::Ticket;
 pub use mail::{
     Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, Planning, Sent, Task, TickReport, mailboxes,
