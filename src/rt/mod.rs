@@ -269,7 +269,7 @@ fn load(
 ) -> News {
     let taken = !state.may_send_motion() && mail.has_room_for_a_show();
     if taken {
-        show.engine.take_over(engine, matches!(state, State::Parked | State::Armed));
+        show.engine.take_over(engine);
         for (lane, old) in show.lanes.iter_mut().zip(&*lanes) {
             lane.go_on_from(old);
         }
