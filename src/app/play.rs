@@ -19,6 +19,8 @@ use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::engine::{Ending, Show};
 use crate::fanout::{Lane, Manner};
+use crate::film::chase::ChaseRules;
+use crate::film::point::PublishedPoint;
 use crate::health::{Groups, HealthTable};
 use crate::motion::Window;
 use crate::net::{NetError, Ports, Sender};
@@ -123,6 +125,16 @@ pub struct Play {
     control: Control,
     /// True if nothing may move.
     holds: bool,
+    chased: Option<Chased>,
+}
+
+/// A film that a play chases.
+#[derive(Debug, Clone)]
+pub struct Chased {
+    /// Where its source says where it is.
+    pub source: Arc<PublishedPoint>,
+    /// How it is followed.
+    pub rules: ChaseRules,
 }
 
 /// What a play is led and watched by while it runs.
@@ -189,7 +201,14 @@ impl Play {
         let live = Arc::new(Live::new(staged.lanes.len()));
         let (mail, ends) = mailboxes(staged.lanes.len(), staged.show.rate, Arc::clone(&live));
         let control = Control { desk: Arc::new(staged.desk()), live, leave: Arc::default() };
-        Self { config, manner, staged, mail, ends, control, holds: false }
+        Self { config, manner, staged, mail, ends, control, holds: false, chased: None }
+    }
+
+    /// The same that waits, parked, for a film, and follows that.
+    #[must_use]
+    pub fn chasing(mut self, chased: Chased) -> Self {
+        self.staged.engine = self.staged.engine.waiting();
+        Self { chased: Some(chased), ..self }
     }
 
     /// What it is led and watched by.
@@ -257,6 +276,7 @@ impl Play {
             places,
             sender,
             mail: self.mail,
+            chased: self.chased,
         };
         let attended = lead(PlayHandle { commands, news });
         let parks: Vec<Window> = stage.lanes.iter().map(|lane| lane.window.clone()).collect();

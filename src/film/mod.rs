@@ -22,3 +22,4 @@ pub mod point;
 mod testing;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
+mod words;
