@@ -15,7 +15,11 @@
 )]
 
 pub mod chase;
+mod estimate;
 pub mod follower;
+mod labels;
+mod late;
+pub(crate) mod ltc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
