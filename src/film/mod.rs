@@ -9,10 +9,7 @@
 //!
 //! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
-#![cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the readers of sources and the show that they lead come next")
-)]
+#![cfg_attr(not(test), expect(dead_code, reason = "readers of further sources come next"))]
 
 pub mod chase;
 mod estimate;
