@@ -24,8 +24,8 @@ pub(crate) struct LabelClock {
     start: Label,
     /// Deviation of the time of a label, seconds.
     sigma_s: f64,
-    /// The first label since they count on.
-    first: Option<(MonoTime, Label)>,
+    /// The first label since they count on, and the quarters of a frame that had passed.
+    first: Option<(MonoTime, Label, i64)>,
     newest: Option<(MonoTime, Label)>,
     highest: u8,
     found: Option<FrameRate>,
@@ -71,10 +71,10 @@ impl LabelClock {
         quarters: i64,
         labels: Option<u32>,
     ) -> Option<ShowTime> {
-        self.hold_against_configured(at, label);
+        self.hold_against_configured(at, label, labels);
         self.highest = self.highest.max(label.frames);
         if self.configured.is_none() && !self.is_sure {
-            self.find(at, label, labels);
+            self.find((at, label, quarters), labels);
         }
         self.newest = Some((at, label));
         let placed = self.place(self.rate()?, label, quarters);
@@ -98,8 +98,13 @@ impl LabelClock {
         Ok(rate.quarters(frame.since(start).saturating_mul(4).saturating_add(quarters)))
     }
 
-    fn hold_against_configured(&mut self, at: MonoTime, label: Label) {
+    fn hold_against_configured(&mut self, at: MonoTime, label: Label, labels: Option<u32>) {
         let Some(rate) = self.configured else { return };
+        if let Some(said) = labels {
+            self.contradictions = if said == rate.labels() { 0 } else { CONTRADICTS };
+            self.refused = (said != rate.labels()).then_some(TimecodeError::Says { said, rate });
+            return;
+        }
         if rate.dropping(label.drops).is_none() {
             self.refused = Some(TimecodeError::Drops { label, rate });
             self.newest = None;
@@ -121,15 +126,17 @@ impl LabelClock {
     }
 
     /// Looks which rate makes the labels take as long as they do.
-    fn find(&mut self, at: MonoTime, label: Label, labels: Option<u32>) {
-        let Some((since, first)) = self.first.filter(|(_, first)| first.drops == label.drops) else {
-            self.first = Some((at, label));
+    fn find(&mut self, told: (MonoTime, Label, i64), labels: Option<u32>) {
+        let (at, label, quarters) = told;
+        let Some((since, first, begun)) = self.first.filter(|(_, first, _)| first.drops == label.drops)
+        else {
+            self.first = Some(told);
             return;
         };
         let passed = at.since(since);
         let off = |rate: FrameRate| -> Option<f64> {
             let frames = Timecode::of(label, rate).ok()?.since(Timecode::of(first, rate).ok()?);
-            Some((rate.quarters(4 * frames).as_secs_f64() - passed.as_secs_f64()).abs())
+            Some((rate.quarters(4 * frames + quarters - begun).as_secs_f64() - passed.as_secs_f64()).abs())
         };
         let may_be = |rate: &FrameRate| {
             rate.dropping(label.drops) == Some(*rate)
@@ -157,7 +164,7 @@ impl LabelClock {
                 let whole = if rate == FrameRate::F23_976 { FrameRate::F24 } else { rate };
                 self.found.get_or_insert(if rate == FrameRate::F29_97 { FrameRate::F30 } else { whole });
             }
-            Some((_, off)) if off > 2.0 * by_chance => self.first = Some((at, label)), // it jumped, or is wound
+            Some((_, off)) if off > 2.0 * by_chance => self.first = Some(told), // it jumped, or is wound
             _ => {}
         }
     }

@@ -11,12 +11,16 @@
 //! says what a hall that is armed may do, and no more.
 #![cfg_attr(not(test), expect(dead_code, reason = "readers of further sources come next"))]
 
+pub(crate) mod artnet;
 pub mod chase;
+pub(crate) mod chooser;
 mod estimate;
 pub mod follower;
 mod labels;
 mod late;
 pub(crate) mod ltc;
+pub(crate) mod mpv;
+pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]

@@ -184,6 +184,8 @@ pub(crate) enum TimecodeError {
     Drops { label: Label, rate: FrameRate },
     #[error("a second ends with frame {last}, so there are {} frames a second; {rate} is configured", last + 1)]
     SecondEnds { last: u8, rate: FrameRate },
+    #[error("the source says that it has {said} frames a second; {rate} is configured")]
+    Says { said: u32, rate: FrameRate },
 }
 
 /// A frame of a day, by its rate.

@@ -74,6 +74,8 @@ fn labels_that_contradict_the_configured_rate_are_refused_in_words_until_they_do
     let mut of = clock(Some(FrameRate::F30), 0.0);
     assert_eq!(after(3.5, FrameRate::F24, &mut of, 0.0, None), None);
     assert_eq!(why(&of), "a second ends with frame 23, so there are 24 frames a second; 30 is configured");
+    assert_eq!(after(3.5, FrameRate::F24, &mut of, 0.0, Some(24)), None);
+    assert_eq!(why(&of), "the source says that it has 24 frames a second; 30 is configured");
     let mut of = clock(Some(FrameRate::F24), 0.0);
     assert!(after(3.5, FrameRate::F24, &mut of, 0.0, None).is_some());
 }
