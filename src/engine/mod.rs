@@ -3,6 +3,7 @@
 
 mod blind;
 mod fader;
+mod film;
 mod headroom;
 mod mix;
 mod orders;
@@ -49,6 +50,21 @@ pub enum Ending {
     Stopped,
     /// A move could not be planned; the lanes were stopped where they could be.
     Fault,
+}
+
+/// What the hall wants of the engine: told every tick, so that none can be missed, and told again it changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Directive {
+    /// Nothing is to begin: the hall is not ready, or waits for somebody to let the show go.
+    Wait,
+    /// The lanes are to follow the cue, from a pause as well.
+    Play,
+    /// They are to come to rest, and the film waits.
+    Hold,
+    /// They are to come to rest, and nothing goes on from there.
+    Stop,
+    /// They are to park, and then the show is over.
+    Park,
 }
 
 /// What a play is about; fixed before it starts.
@@ -111,6 +127,8 @@ pub enum Step {
 pub enum Rest {
     /// Frames stopped for too long; the film runs on.
     Late,
+    /// The film that is chased can be followed, and the way onto the cue is not known yet.
+    Film,
     /// The cue is over, and the way on from there not known yet.
     Ended,
     /// Somebody, or the hall's policy, asked for a pause; the film waits.
@@ -156,14 +174,12 @@ pub struct Engine {
     retired: Retired,
     serial: u32,
     plays_left: Option<u32>,
-    /// Whether it has been let go, which one that waits has not.
-    begun: bool,
-    /// Whether the lanes are to park, come what may.
-    homeward: bool,
-    /// Whether a person asked for the film to go on from a pause.
-    resuming: bool,
+    /// What the hall wants.
+    directive: Directive,
     /// Where in the cue the show is to go on.
     seeking: Option<ShowTime>,
+    /// Where in the cue the film that is chased wants the next frame to lead.
+    target: Option<ShowTime>,
     /// Whether a seek could not be planned, and nobody was told yet.
     seek_refused: bool,
     /// Whether a move that the show needs could not be planned.
@@ -206,10 +222,9 @@ impl Engine {
             retired: Retired::default(),
             serial: course.serial,
             plays_left: show.plays.checked_sub(1),
-            begun: true,
-            homeward: false,
-            resuming: false,
+            directive: Directive::Wait,
             seeking: None,
+            target: None,
             seek_refused: false,
             planless: false,
             trim_ms: 0,
@@ -282,13 +297,13 @@ impl Engine {
         rider.part == Part::Unseen && rider.wanted.on
     }
 
-    /// True if lanes rest in a pause, have been told so, and nobody has asked yet for the way on: nothing is sent to them.
+    /// True if nothing is sent until the hall asks for the way on: the show has not begun, or lanes rest in a pause and have been
+    /// told so.
     #[must_use]
-    pub fn waits_in_pause(&self) -> bool {
-        matches!(self.phase, Phase::Resting(Rest::Paused))
-            && self.sends_nothing()
-            && !self.resuming
-            && !self.homeward
+    pub fn waits(&self) -> bool {
+        let goes_on = matches!(self.directive, Directive::Play | Directive::Park);
+        let rests = matches!(self.phase, Phase::Resting(Rest::Paused)) && self.sends_nothing() && !goes_on;
+        rests || self.phase == Phase::Waiting
     }
 
     /// Whether no frame has led any lane since all rested.
@@ -326,10 +341,15 @@ impl Engine {
         }
     }
 
-    /// Whether the lanes are to park, be it that they still follow the cue, or are there.
+    /// Whether the lanes have left the cue for park, at its end, or are there.
     #[must_use]
     pub const fn is_homeward(&self) -> bool {
-        self.homeward || matches!(self.phase, Phase::Parking | Phase::Closing(_) | Phase::Done)
+        matches!(self.phase, Phase::Parking | Phase::Closing(_) | Phase::Done)
+    }
+
+    /// Whether the lanes are to park, come what may.
+    fn is_to_park(&self) -> bool {
+        self.directive == Directive::Park
     }
 
     /// Why the lanes rest, or come to rest; none where they do not.
@@ -374,6 +394,7 @@ impl Engine {
         }
         let time_ms = self.show.rate.time_ms(self.frames);
         self.frames += 1;
+        self.take_target(millis(time_ms));
         let show = self.playhead;
         self.move_on(millis(time_ms));
         if let Phase::Resting(rest) = self.phase {
@@ -400,7 +421,7 @@ impl Engine {
             }
             Phase::Closing(left) => return self.close(left),
             Phase::Waiting | Phase::Done => return,
-            Phase::Resting(Rest::Late) => self.playhead += time,
+            Phase::Resting(Rest::Late | Rest::Film) => self.playhead += time,
             // The film waits from the very request on.
             Phase::Braking(_) | Phase::Resting(_) => {}
             Phase::Riding | Phase::Parking => {

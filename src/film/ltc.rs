@@ -6,9 +6,11 @@ mod cells;
 mod decoder;
 mod edges;
 pub(crate) mod generator;
-pub(crate) mod reader;
+mod reader;
 #[cfg(test)]
 mod tests;
 mod word;
+
+pub(crate) use reader::LtcReader;
 
 use super::timecode::{Label, Timecode};

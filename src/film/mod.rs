@@ -9,7 +9,7 @@
 //!
 //! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
-#![expect(dead_code, reason = "the readers of sources come next")]
+#![expect(dead_code, reason = "readers of further sources come next")]
 #![cfg_attr(
     test,
     expect(
@@ -39,3 +39,4 @@ mod testing;
 mod tests;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
+mod words;

@@ -11,7 +11,7 @@ use std::time::Duration;
 use rtrb::{Producer, PushError};
 
 use super::idle::Beats;
-use super::live::{Live, Phase};
+use super::live::Live;
 use super::mail::{Alarm, Sent};
 use super::positions::Positions;
 use super::sight::{Looker, axes_to_read};
@@ -22,7 +22,7 @@ use crate::fanout::Lane;
 use crate::health::{Change, HealthState, HealthTable, Notice};
 use crate::net::Sender;
 use crate::observe::{Look, Observer};
-use crate::state::Event;
+use crate::state::{Event, State};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
 use crate::wire::{Dialect, ReplyCode};
@@ -65,7 +65,7 @@ pub struct Watch {
     clears: u32,
     /// A controller that takes part does not know its position, and the hall was told so.
     lost_zero: bool,
-    phase: Phase,
+    state: State,
     /// When it last judged.
     looked: MonoTime,
     silent: bool,
@@ -106,7 +106,7 @@ impl Watch {
             clears: 0,
             lost_zero: false,
             waiting: VecDeque::with_capacity(4 * (controllers.len() + groups) + 4),
-            phase: Phase::default(),
+            state: State::Boot,
             looked: MonoTime::default(),
             health,
             sender,
@@ -219,7 +219,7 @@ impl Watch {
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
     fn mind_rest(&mut self, controller: usize, at: MonoTime) {
         let is_set =
-            matches!(self.phase, Phase::Parking | Phase::Joining | Phase::Paused) && !self.live.is_moving();
+            matches!(self.state, State::Parked | State::Armed | State::Paused) && !self.live.is_moving();
         if !is_set || self.standby.is_none() || !self.stands(controller).may_move() {
             return;
         }
