@@ -26,7 +26,7 @@ const CHANGE: f64 = 2.0;
 const TRIM_WAITS_S: f64 = 0.010;
 /// Below these an error and a difference of pace are rounding, seconds and a share.
 const NOTHING_S: f64 = 1e-9;
-const NO_PACE: f64 = 1e-7;
+const NO_PACE: f64 = 4e-9;
 
 /// How the pace of the playhead may differ from the clock's. The proof of a cue is made for the greatest that they allow together.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -45,7 +45,7 @@ fn a_step_is_taken_back_to_the_goal_and_never_passed() {
                 println!("{hz} Hz: {step_ms} ms to {to_ms} ms in {took:.2} s, over by {over:.4} ms");
                 assert!(took <= goal_s, "{hz} Hz: {step_ms} ms to {to_ms} ms in {took} s");
                 assert!(over <= 0.05, "{hz} Hz: over by {over} ms");
-                assert!(errors[errors.len() - 1].abs() < 0.001, "it gets there");
+                assert!(errors[errors.len() - 1].abs() < 0.000_5, "it gets there: {:?}", errors.last());
             }
         }
     }
