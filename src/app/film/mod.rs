@@ -2,6 +2,7 @@
 //! thread. A source that fails leads nobody; the threads end with the program, or with what they read.
 
 mod ltc;
+mod mpv;
 mod riff;
 mod source;
 
@@ -74,6 +75,7 @@ impl FilmReader {
         let child = Arc::default();
         match &args.source {
             FilmSource::Ltc(input) => ltc::start_reading(input, args, told, &child)?,
+            FilmSource::Mpv(socket) => mpv::start_reading(socket, args.begin(), told)?,
         }
         Ok(Self { point, child })
     }
