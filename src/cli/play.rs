@@ -89,8 +89,8 @@ pub(super) struct Args {
     /// configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,
-    /// Follow a film instead of a clock of its own: the seats wait at park, join, and hold while it stands. ltc:pipe:COMMAND,
-    /// ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:- or ltc:FILE.wav.
+    /// Follow a film: the seats wait at park, join, and hold while it stands. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
+    /// ltc:alsa:DEVICE, ltc:- or ltc:FILE.wav.
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["start", "plays"])]
     chase: Option<FilmSource>,
     /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].

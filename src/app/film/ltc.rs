@@ -119,15 +119,17 @@ impl Line {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 Err(error) => return Err(error),
             };
+            let mut at = Monotonic.now();
             block.clear();
             samples.push(&octets[..count], &mut block).map_err(io::Error::other)?;
             let Some(per_s) = samples.samples_per_s() else { continue };
             heard += block.len() as u64;
             if paced {
-                Monotonic.sleep_until(begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s)));
+                at = begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s));
+                Monotonic.sleep_until(at);
             }
             let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, Duration::ZERO, rate, start));
-            reader.hear(&block, Monotonic.now(), &mut |what| {
+            reader.hear(&block, at, &mut |what| {
                 let _ = self.told.send(what); // without a listener the program ends
             });
         }

@@ -2,13 +2,14 @@
 //! thread. A source that fails leads nobody; the threads end with the program, or with what they read.
 
 mod ltc;
+mod mpv;
 mod riff;
 mod source;
 
 use std::io;
 use std::process::Child;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
@@ -74,6 +75,7 @@ impl FilmReader {
         let child = Arc::default();
         match &args.source {
             FilmSource::Ltc(input) => ltc::start_reading(input, args, told, &child)?,
+            FilmSource::Mpv(socket) => mpv::start_reading(socket, args.begin(), told)?,
         }
         Ok(Self { point, child })
     }
@@ -115,3 +117,4 @@ fn track(point: &PublishedPoint, mut tracker: SourceTracker, heard: &Receiver<Ob
 
 /// Where a reader's observations go.
 type Told = SyncSender<Observation>;
+

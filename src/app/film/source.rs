@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::film::timecode::{FrameRate, Label};
+use crate::film::timecode::{FrameRate, Label, Timecode};
 use crate::film::tracker::SourceKind;
+use crate::time::ShowTime;
 
 /// Where LTC comes from: sound, the first channel of it, 16 bits, raw at 48,000 samples a second or behind a RIFF header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,6 +27,8 @@ pub enum LtcInput {
 pub enum FilmSource {
     /// Linear timecode.
     Ltc(LtcInput),
+    /// mpv, by its socket (`--input-ipc-server`).
+    Mpv(PathBuf),
 }
 
 /// How a film is read.
@@ -45,15 +48,23 @@ pub struct FilmArgs {
 pub struct FilmArgError(String);
 
 impl FilmArgs {
+    /// Where a film is whose first frame is labelled 00:00:00:00 when the cue begins.
+    pub(super) fn begin(&self) -> ShowTime {
+        let rate = self.rate.unwrap_or(FrameRate::F24);
+        let of = |label| Timecode::of(label, rate).map(|code| rate.quarters(4 * i64::from(code.index())));
+        of(self.start).unwrap_or(ShowTime::ZERO)
+    }
+
     /// What is written for them: a source, frames a second, and the timecode at which the cue begins.
     ///
     /// # Errors
     /// [`FilmArgError`] where one of them is nothing known.
     pub fn new(source: FilmSource, rate: Option<&str>, start: Option<&str>) -> Result<Self, FilmArgError> {
-        let rate =
-            rate.map(FrameRate::from_str).transpose().map_err(|error| FilmArgError(error.to_string()))?;
-        let start =
-            start.map(Label::from_str).transpose().map_err(|error| FilmArgError(error.to_string()))?;
+        let rate = rate.map(FrameRate::from_str).transpose().map_err(|error| FilmArgError(error.to_string()))?;
+        let start = start.map(Label::from_str).transpose().map_err(|error| FilmArgError(error.to_string()))?;
+        if let (Some(start), Some(rate)) = (start, rate) {
+            Timecode::of(start, rate).map_err(|error| FilmArgError(error.to_string()))?;
+        }
         Ok(Self { source, rate, start: start.unwrap_or_default() })
     }
 }
@@ -62,6 +73,7 @@ impl FilmSource {
     pub(super) const fn kind(&self) -> SourceKind {
         match self {
             Self::Ltc(_) => SourceKind::Ltc,
+            Self::Mpv(_) => SourceKind::MpvSound,
         }
     }
 }
@@ -72,12 +84,13 @@ impl FromStr for FilmSource {
     fn from_str(text: &str) -> Result<Self, FilmArgError> {
         let refuse = || {
             FilmArgError(format!(
-                "{text} is no source; take ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:- or ltc:FILE.wav"
+                "{text} is no source; take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:- or ltc:FILE.wav"
             ))
         };
         let (kind, input) = text.split_once(':').filter(|(_, input)| !input.is_empty()).ok_or_else(refuse)?;
         match kind {
             "ltc" => Ok(Self::Ltc(LtcInput::of(input))),
+            "mpv" => Ok(Self::Mpv(input.into())),
             _ => Err(refuse()),
         }
     }
@@ -107,6 +120,7 @@ mod tests {
         assert_eq!(of("ltc:pipe:sox a.wav -t raw -"), ltc(LtcInput::Pipe("sox a.wav -t raw -".to_owned())));
         assert_eq!(of("ltc:fifo:/run/ltc"), ltc(LtcInput::Fifo("/run/ltc".into())));
         assert_eq!(of("ltc:alsa:hw:2,0"), ltc(LtcInput::Alsa("hw:2,0".to_owned())));
+        assert_eq!(of("mpv:/run/mpv.sock"), Ok(FilmSource::Mpv("/run/mpv.sock".into())));
         assert_eq!(of("ltc:reel:1.wav"), ltc(LtcInput::File("reel:1.wav".into())));
         for text in ["", "ltc", "ltc:", "tape:1"] {
             let error = of(text).expect_err(text).to_string();
