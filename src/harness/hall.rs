@@ -16,10 +16,13 @@ use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::engine::{Mix, Show};
 use crate::fanout::Manner;
+use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
+use crate::film::follower::PaceLimits;
+use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
 use crate::rt::{
-    Alarm, Answer, Command, Conductor, Desk, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
+    Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
     TickLoop, mailboxes,
 };
 use crate::state::Transition;
@@ -59,6 +62,8 @@ pub enum Event {
     Refuse,
     /// From here on nobody reads replies, or somebody does again.
     Deaf(bool),
+    /// From here on the film that is chased is said to be there, at that pace, and in that state.
+    Film(ShowTime, f64, FilmState),
 }
 
 /// A show to be played in virtual time.
@@ -70,6 +75,8 @@ pub struct Virtual {
     pub start: ShowTime,
     pub plays: u32,
     pub level: f64,
+    /// True if it chases a film, of which nobody has heard before the first [`Event::Film`].
+    pub chases: bool,
     /// What happens at the wake-up of that number, counted from 0.
     pub script: Vec<(u64, Event)>,
     /// Wake-ups after which a show that does not end is given up.
@@ -87,6 +94,7 @@ impl Virtual {
             start: ShowTime::ZERO,
             plays: 1,
             level: 1.0,
+            chases: false,
             script: Vec::new(),
             at_most: 1_000_000,
         }
@@ -120,7 +128,10 @@ impl Virtual {
         let staged = StagedShow::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
-        let (engine, lanes, planner, timeline) = staged.split();
+        let (mut engine, lanes, planner, timeline) = staged.split();
+        if self.chases {
+            engine = engine.waiting();
+        }
         let live = Arc::new(Live::new(lanes.len()));
         (0..lanes.len()).for_each(|lane| read_at_rest(&live, lane, [0.0; MAX_AXES], ORIGIN));
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
@@ -137,10 +148,19 @@ impl Virtual {
             live: &live,
             stands: &stands,
             deaf: Cell::new(false),
+            film: Arc::default(),
+            shown: Cell::new(None),
         };
+        let rules = ChaseRules {
+            pace: PaceLimits::default(),
+            join_above: JOIN_ABOVE,
+            rejoin: Rejoin::Auto,
+            cue_end: timeline.duration(),
+        };
+        let film = self.chases.then(|| FilmLead::new(Arc::clone(&hands.film), rules, ORIGIN));
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
-        let conductor = Conductor::of_a_play(clock.now(), true);
+        let conductor = Conductor::of_a_play(clock.now(), true).chasing(film);
         let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
         let places = Places::new(&lanes, rate);
         let mut tick_loop = TickLoop {
@@ -174,9 +194,19 @@ struct Hands<'a> {
     /// Where the last frame of each lane led it.
     stands: &'a RefCell<Vec<Pose>>,
     deaf: Cell<bool>,
+    film: Arc<PublishedPoint>,
+    /// Where the film was said to be last.
+    shown: Cell<Option<FilmPoint>>,
 }
 
 impl Hands<'_> {
+    /// Whoever reads the film publishes where it is.
+    fn show(&self, now: MonoTime) {
+        if let Some(point) = self.shown.get() {
+            self.film.publish(&FilmPoint { at: now, media: point.media_at(now), ..point });
+        }
+    }
+
     fn command(&self, command: Command) {
         self.commands.borrow_mut().push(command).expect("there is room");
     }
@@ -273,6 +303,7 @@ impl Clock for Stage<'_> {
         self.serve_planner();
         self.beat();
         self.hands.hear(self.now.get());
+        self.hands.show(self.now.get());
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
@@ -301,6 +332,12 @@ impl Clock for Stage<'_> {
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+                Event::Film(media, rate, state) => {
+                    let epoch = self.hands.shown.get().map_or(0, |point| point.epoch + 1);
+                    let point = FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
+                    self.hands.shown.set(Some(point));
+                    self.hands.show(self.now.get());
+                }
                 Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
                 Event::Refuse => self.planner_refuses.set(true),
                 Event::SlowPlanner(ticks) => {
