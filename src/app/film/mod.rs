@@ -4,6 +4,7 @@
 mod ltc;
 mod mpv;
 mod riff;
+mod sound;
 mod source;
 
 use std::io;
@@ -13,7 +14,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-pub use source::{FilmArgs, FilmSource, LtcInput};
+pub use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
+pub use source::{FilmArgError, FilmArgs, FilmSource, LtcInput};
 
 use crate::film::follower::PaceLimits;
 use crate::film::observation::Observation;
