@@ -7,11 +7,11 @@ mod tests;
 use std::time::Duration;
 
 use super::follower::{Follower, PaceLimits};
-use super::point::{FilmPoint, FilmState};
+use super::point::{FILM_FRAME, FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime, Tick};
 
-/// An error beyond this, one frame of film at 24 a second, is never slewed away: seats hold, and join.
-pub const JOIN_ABOVE: Duration = Duration::from_nanos(41_666_667);
+/// An error beyond this is never slewed away, unless it is configured otherwise: seats hold, and join.
+pub const JOIN_ABOVE: Duration = FILM_FRAME;
 /// Seats that are parked join once the film has been followable for so long: a reader that flickers must not begin a show.
 const READY_FOR: Duration = Duration::from_millis(500);
 /// So long before the first sample of the cue seats join its first pose.

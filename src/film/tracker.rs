@@ -14,7 +14,7 @@ pub(crate) use kind::SourceKind;
 use super::estimate::{Estimate, RATE_SIGMA};
 use super::late::LateBias;
 use super::observation::{FilmWord, Observation};
-use super::point::{FilmPoint, FilmState};
+use super::point::{FILM_FRAME, FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime};
 use kind::Traits;
 use recent::Recent;
@@ -369,9 +369,14 @@ impl SourceTracker {
         if let Some(ahead) = self.recent.agreed(window, span, estimate.rate(), estimate.noise_s()) {
             estimate.move_to(at, media.as_secs_f64() + ahead);
             self.recent.clear();
-            (self.fitted, self.needed) = (1, SAMPLES_AGAIN);
             self.epoch = self.epoch.wrapping_add(1);
-            self.on_sign(SourceSign::Jump, at);
+            // A cut of a frame is slewed: the noise is known, so nobody has to hold until the new place is.
+            if (missed + ahead).abs() > FILM_FRAME.as_secs_f64() {
+                (self.fitted, self.needed) = (1, SAMPLES_AGAIN);
+                self.on_sign(SourceSign::Jump, at);
+            } else {
+                self.counts.jumps += 1;
+            }
         } else if self.misfits > MISFITS_MOST && !self.was_misfit {
             // Such as come between others that fit; after a jump none fits any more, and the noise is what it was.
             estimate.widen(missed);

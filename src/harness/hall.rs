@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use rtrb::Producer;
 
+use super::film::{Showing, ShownFilm};
 use super::{Frame, Played};
 use crate::app::StagedShow;
 use crate::belief::Reading;
@@ -16,11 +17,13 @@ use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::engine::{Mix, Show};
 use crate::fanout::Manner;
+use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
+use crate::film::follower::PaceLimits;
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
 use crate::rt::{
-    Alarm, Answer, Command, Conductor, Desk, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
-    TickLoop, mailboxes,
+    Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning,
+    Task, TickLoop, mailboxes,
 };
 use crate::state::Transition;
 use crate::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -29,6 +32,9 @@ use crate::wire::{MotionRequest, Timing};
 
 /// When tick 0 is due.
 pub const ORIGIN: MonoTime = MonoTime::from_nanos(1_000_000_000);
+
+/// A film that leads a show tells for so long.
+const FILM_S: f64 = 120.0;
 
 /// Something that happens at a tick.
 #[derive(Debug, Clone, Copy)]
@@ -72,6 +78,8 @@ pub struct Virtual {
     pub level: f64,
     /// What happens at the wake-up of that number, counted from 0.
     pub script: Vec<(u64, Event)>,
+    /// The film that leads it; none where it is led by its ticks.
+    pub film: Option<ShownFilm>,
     /// Wake-ups after which a show that does not end is given up.
     pub at_most: u64,
 }
@@ -88,6 +96,7 @@ impl Virtual {
             plays: 1,
             level: 1.0,
             script: Vec::new(),
+            film: None,
             at_most: 1_000_000,
         }
     }
@@ -110,6 +119,16 @@ impl Virtual {
 
     pub fn config(&self) -> Config {
         from_to_args(&self.to, &[], self.timeline().cue().axes()).expect("the addresses are sound")
+    }
+
+    /// How its seats follow a film.
+    fn rules(&self) -> ChaseRules {
+        ChaseRules {
+            pace: PaceLimits::default(),
+            join_above: JOIN_ABOVE,
+            rejoin: Rejoin::Auto,
+            cue_end: self.timeline().duration(),
+        }
     }
 
     /// Plays it to its end.
@@ -138,9 +157,12 @@ impl Virtual {
             stands: &stands,
             deaf: Cell::new(false),
         };
-        let clock = Stage::new(plans, hands, &self.script, self.at_most);
+        let showing = self.film.as_ref().map(|film| Showing::new(film, FILM_S));
+        let lead = showing.as_ref().map(|film| FilmLead::new(film.point(), self.rules(), ORIGIN));
+        let engine = if lead.is_some() { engine.waiting() } else { engine };
+        let clock = Stage::new(plans, hands, (&self.script, showing), self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
-        let conductor = Conductor::of_a_play(clock.now(), true);
+        let conductor = Conductor::of_a_play(clock.now(), true).chasing(lead);
         let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
         let places = Places::new(&lanes, rate);
         let mut tick_loop = TickLoop {
@@ -201,11 +223,17 @@ struct Stage<'a> {
     hands: Hands<'a>,
     happened: RefCell<Vec<(MonoTime, Event)>>,
     script: &'a [(u64, Event)],
+    film: RefCell<Option<Showing>>,
     at_most: u64,
 }
 
 impl<'a> Stage<'a> {
-    fn new(plans: PlanLoop, hands: Hands<'a>, script: &'a [(u64, Event)], at_most: u64) -> Self {
+    fn new(
+        plans: PlanLoop,
+        hands: Hands<'a>,
+        (script, film): (&'a [(u64, Event)], Option<Showing>),
+        at_most: u64,
+    ) -> Self {
         Self {
             now: Cell::new(ORIGIN),
             beat_at: Cell::default(),
@@ -217,6 +245,7 @@ impl<'a> Stage<'a> {
             hands,
             happened: RefCell::default(),
             script,
+            film: RefCell::new(film),
             at_most,
         }
     }
@@ -273,6 +302,7 @@ impl Clock for Stage<'_> {
         self.serve_planner();
         self.beat();
         self.hands.hear(self.now.get());
+        self.film.borrow_mut().iter_mut().for_each(|film| film.hear(self.now.get()));
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
