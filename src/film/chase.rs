@@ -254,6 +254,7 @@ impl Chase {
             self.ready_since = None;
             return self.sign_of_nobody(state, now);
         };
+        // Before all that could hold: seats that hold outside the cue would hold there for minutes.
         if self.has_left(point.media_at(end), now) {
             return ChaseSign::Over(ParkCause::CueLeft);
         }
@@ -302,6 +303,7 @@ impl Chase {
             return None;
         }
         let oldest = self.joined[self.joins as usize % UNSTABLE_JOINS];
+        // Of the last five the oldest: its place in the ring is the next that is written.
         let many = self.joins as usize >= UNSTABLE_JOINS && now.since(oldest) < UNSTABLE_WITHIN;
         match self.rules.rejoin {
             Rejoin::Ask => Some(HoldCause::Asks),

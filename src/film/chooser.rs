@@ -115,6 +115,7 @@ impl Chooser {
     fn go_up(&mut self, views: &[SourceView], now: MonoTime) -> Option<(usize, ShowTime)> {
         let present = self.present.filter(|_| !self.by_hand)?;
         let is_long = |since: &Option<MonoTime>| since.is_some_and(|since| now.since(since) >= UP_AFTER);
+        // Only those that rank higher: between lower ones nobody has to choose.
         let higher = self.leads_since[..present].iter().position(is_long)?;
         if !views[present].leads() || !views[present].agrees(&views[higher]) {
             return Some((higher, views[present].behind(&views[higher])));

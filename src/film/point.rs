@@ -221,6 +221,7 @@ impl OwnFilm {
 
 impl ChasedFilm {
     fn at(&mut self, tick: &Tick) -> Option<FilmPoint> {
+        // While a point is being written the one before does: it is a few milliseconds old.
         self.last = self.source.read().or(self.last);
         let mut point = self.last?;
         if tick.deadline.since(point.at) > STALE {
