@@ -54,7 +54,7 @@ fn seats_are_where_the_film_is_by_every_source_and_the_limiter_has_nothing_to_do
     for source in SOURCES {
         let film = ShownFilm::told_by(source, TrueFilm::new(-3.0, 1.0002), 7);
         let truth = film.truth.clone();
-        let played = Virtual { film: Some(film), ..Virtual::new(ramp()) }.play();
+        let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
         let name = ShownFilm::name(source);
         let error = p99(&errors_ms(&played, &truth), 8.0..25.0);
         println!("{name:<12} p99 {error:.3} ms");
@@ -68,7 +68,7 @@ fn seats_are_where_the_film_is_by_every_source_and_the_limiter_has_nothing_to_do
 fn a_step_of_40_ms_is_slewed_to_20_ms_in_3_s_and_to_5_ms_in_4_and_a_half() {
     let film = ShownFilm::told_by(0, TrueFilm::new(-1.0, 1.0).step_at(12.0, 0.040), 3);
     let truth = film.truth.clone();
-    let played = Virtual { film: Some(film), ..Virtual::new(ramp()) }.play();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
     let errors = errors_ms(&played, &truth);
     let worst = |from: f64, to: f64| {
         let those = errors.iter().filter(|error| (from..to).contains(&error.0));
@@ -101,7 +101,7 @@ fn moves(played: &Played) -> Vec<(f64, f64)> {
 fn a_told_pause_is_felt_at_once_the_seats_rest_through_it_and_join_after() {
     let film = ShownFilm::told_by(1, TrueFilm::new(-1.0, 1.0), 3).paused(10.0, 14.0);
     let truth = film.truth.clone();
-    let played = Virtual { film: Some(film), ..Virtual::new(ramp()) }.play();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
     let moving = moves(&played).into_iter().filter(|(_, mm)| mm.abs() > 0.001).map(|(at, _)| at);
     let in_pause: Vec<f64> = moving.filter(|at| (10.0..14.0).contains(at)).collect();
     let rest = in_pause.last().copied().unwrap_or(10.0);
@@ -116,7 +116,7 @@ fn a_told_pause_is_felt_at_once_the_seats_rest_through_it_and_join_after() {
 fn a_second_without_a_word_changes_nothing_and_a_seek_is_joined() {
     let truth = TrueFilm::new(-1.0, 1.0).step_at(12.0, 5.0);
     let film = ShownFilm::told_by(1, truth.clone(), 3).unheard(7.0, 8.0);
-    let played = Virtual { film: Some(film), ..Virtual::new(ramp()) }.play();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
     let errors = errors_ms(&played, &truth);
     assert!(p99(&errors, 5.0..11.9) <= 0.6 && p99(&errors, 15.0..19.0) <= 0.6);
     assert_unclamped(&played, "a seek");
@@ -139,7 +139,7 @@ fn whatever_the_film_does_the_seat_keeps_its_limits_and_the_limiter_has_nothing_
             };
         }
         let film = ShownFilm::told_by(dice(9, 5) as usize, truth, seed.into());
-        let show = Virtual { film: Some(film), ..Virtual::new(swell(3, 60, 50.0, 0.25)) };
+        let show = Virtual { chases: true, film: Some(film), ..Virtual::new(swell(3, 60, 50.0, 0.25)) };
         let played = show.with(4_000, Event::Leave).play();
         assert_unclamped(&played, &format!("seed {seed}"));
         assert!(played.lane(0).count() > 500, "seed {seed}: {} frames", played.lane(0).count());

@@ -1,6 +1,5 @@
 //! Films and their sources in virtual time: what is true, and what is told of it.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use crate::film::follower::PaceLimits;
@@ -141,6 +140,9 @@ impl Told {
     }
 }
 
+/// For so long the source of a film tells of it.
+const TOLD_S: f64 = 120.0;
+
 /// A film that is shown beside a hall in virtual time.
 #[derive(Debug, Clone)]
 pub struct ShownFilm {
@@ -189,25 +191,20 @@ impl ShownFilm {
 pub(crate) struct Showing {
     told: std::iter::Peekable<std::vec::IntoIter<Observation>>,
     tracker: SourceTracker,
-    point: Arc<PublishedPoint>,
 }
 
 impl Showing {
-    pub(crate) fn new(film: &ShownFilm, seconds: f64) -> Self {
+    pub(crate) fn new(film: &ShownFilm) -> Self {
         let tracker = SourceTracker::new(film.told.kind, PaceLimits::default().band, mono(0.0));
-        Self { told: film.told(seconds).into_iter().peekable(), tracker, point: Arc::default() }
-    }
-
-    pub(crate) fn point(&self) -> Arc<PublishedPoint> {
-        Arc::clone(&self.point)
+        Self { told: film.told(TOLD_S).into_iter().peekable(), tracker }
     }
 
     /// Hears what there is by now, and publishes where the film is.
-    pub(crate) fn hear(&mut self, now: MonoTime) {
+    pub(crate) fn hear(&mut self, now: MonoTime, point: &PublishedPoint) {
         while let Some(told) = self.told.next_if(|told| told.at <= now) {
             self.tracker.hear(&told);
         }
         self.tracker.poll(now);
-        self.point.publish(&self.tracker.point(now));
+        point.publish(&self.tracker.point(now));
     }
 }

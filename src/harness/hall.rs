@@ -19,6 +19,7 @@ use crate::engine::{Mix, Show};
 use crate::fanout::Manner;
 use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
 use crate::film::follower::PaceLimits;
+use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
 use crate::rt::{
@@ -32,9 +33,6 @@ use crate::wire::{MotionRequest, Timing};
 
 /// When tick 0 is due.
 pub const ORIGIN: MonoTime = MonoTime::from_nanos(1_000_000_000);
-
-/// A film that leads a show tells for so long.
-const FILM_S: f64 = 120.0;
 
 /// Something that happens at a tick.
 #[derive(Debug, Clone, Copy)]
@@ -65,6 +63,8 @@ pub enum Event {
     Refuse,
     /// From here on nobody reads replies, or somebody does again.
     Deaf(bool),
+    /// From here on the film that is chased is said to be there, at that pace, and in that state.
+    Film(ShowTime, f64, FilmState),
 }
 
 /// A show to be played in virtual time.
@@ -76,10 +76,12 @@ pub struct Virtual {
     pub start: ShowTime,
     pub plays: u32,
     pub level: f64,
+    /// True if it chases a film, of which nobody has heard before the first [`Event::Film`].
+    pub chases: bool,
+    /// Whoever tells of it, where it is not the script.
+    pub film: Option<ShownFilm>,
     /// What happens at the wake-up of that number, counted from 0.
     pub script: Vec<(u64, Event)>,
-    /// The film that leads it; none where it is led by its ticks.
-    pub film: Option<ShownFilm>,
     /// Wake-ups after which a show that does not end is given up.
     pub at_most: u64,
 }
@@ -95,8 +97,9 @@ impl Virtual {
             start: ShowTime::ZERO,
             plays: 1,
             level: 1.0,
-            script: Vec::new(),
+            chases: false,
             film: None,
+            script: Vec::new(),
             at_most: 1_000_000,
         }
     }
@@ -121,16 +124,6 @@ impl Virtual {
         from_to_args(&self.to, &[], self.timeline().cue().axes()).expect("the addresses are sound")
     }
 
-    /// How its seats follow a film.
-    fn rules(&self) -> ChaseRules {
-        ChaseRules {
-            pace: PaceLimits::default(),
-            join_above: JOIN_ABOVE,
-            rejoin: Rejoin::Auto,
-            cue_end: self.timeline().duration(),
-        }
-    }
-
     /// Plays it to its end.
     pub fn play(&self) -> Played {
         let rate = Rate::from_hz(self.rate_hz);
@@ -139,7 +132,10 @@ impl Virtual {
         let staged = StagedShow::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
-        let (engine, lanes, planner, timeline) = staged.split();
+        let (mut engine, lanes, planner, timeline) = staged.split();
+        if self.chases {
+            engine = engine.waiting();
+        }
         let live = Arc::new(Live::new(lanes.len()));
         (0..lanes.len()).for_each(|lane| read_at_rest(&live, lane, [0.0; MAX_AXES], ORIGIN));
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
@@ -156,13 +152,20 @@ impl Virtual {
             live: &live,
             stands: &stands,
             deaf: Cell::new(false),
+            film: Arc::default(),
+            shown: Cell::new(None),
+            showing: RefCell::new(self.film.as_ref().map(Showing::new)),
         };
-        let showing = self.film.as_ref().map(|film| Showing::new(film, FILM_S));
-        let lead = showing.as_ref().map(|film| FilmLead::new(film.point(), self.rules(), ORIGIN));
-        let engine = if lead.is_some() { engine.waiting() } else { engine };
-        let clock = Stage::new(plans, hands, (&self.script, showing), self.at_most);
+        let rules = ChaseRules {
+            pace: PaceLimits::default(),
+            join_above: JOIN_ABOVE,
+            rejoin: Rejoin::Auto,
+            cue_end: timeline.duration(),
+        };
+        let film = self.chases.then(|| FilmLead::new(Arc::clone(&hands.film), rules, ORIGIN));
+        let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
-        let conductor = Conductor::of_a_play(clock.now(), true).chasing(lead);
+        let conductor = Conductor::of_a_play(clock.now(), true).chasing(film);
         let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
         let places = Places::new(&lanes, rate);
         let mut tick_loop = TickLoop {
@@ -196,9 +199,24 @@ struct Hands<'a> {
     /// Where the last frame of each lane led it.
     stands: &'a RefCell<Vec<Pose>>,
     deaf: Cell<bool>,
+    film: Arc<PublishedPoint>,
+    /// Where the film was said to be last.
+    shown: Cell<Option<FilmPoint>>,
+    /// Whoever reads the film from a source.
+    showing: RefCell<Option<Showing>>,
 }
 
 impl Hands<'_> {
+    /// Whoever reads the film publishes where it is.
+    fn show(&self, now: MonoTime) {
+        if let Some(showing) = &mut *self.showing.borrow_mut() {
+            showing.hear(now, &self.film);
+        }
+        if let Some(point) = self.shown.get() {
+            self.film.publish(&FilmPoint { at: now, media: point.media_at(now), ..point });
+        }
+    }
+
     fn command(&self, command: Command) {
         self.commands.borrow_mut().push(command).expect("there is room");
     }
@@ -223,17 +241,11 @@ struct Stage<'a> {
     hands: Hands<'a>,
     happened: RefCell<Vec<(MonoTime, Event)>>,
     script: &'a [(u64, Event)],
-    film: RefCell<Option<Showing>>,
     at_most: u64,
 }
 
 impl<'a> Stage<'a> {
-    fn new(
-        plans: PlanLoop,
-        hands: Hands<'a>,
-        (script, film): (&'a [(u64, Event)], Option<Showing>),
-        at_most: u64,
-    ) -> Self {
+    fn new(plans: PlanLoop, hands: Hands<'a>, script: &'a [(u64, Event)], at_most: u64) -> Self {
         Self {
             now: Cell::new(ORIGIN),
             beat_at: Cell::default(),
@@ -245,7 +257,6 @@ impl<'a> Stage<'a> {
             hands,
             happened: RefCell::default(),
             script,
-            film: RefCell::new(film),
             at_most,
         }
     }
@@ -302,7 +313,7 @@ impl Clock for Stage<'_> {
         self.serve_planner();
         self.beat();
         self.hands.hear(self.now.get());
-        self.film.borrow_mut().iter_mut().for_each(|film| film.hear(self.now.get()));
+        self.hands.show(self.now.get());
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
@@ -331,6 +342,13 @@ impl Clock for Stage<'_> {
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+                Event::Film(media, rate, state) => {
+                    let epoch = self.hands.shown.get().map_or(0, |point| point.epoch + 1);
+                    let point =
+                        FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
+                    self.hands.shown.set(Some(point));
+                    self.hands.show(self.now.get());
+                }
                 Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
                 Event::Refuse => self.planner_refuses.set(true),
                 Event::SlowPlanner(ticks) => {
