@@ -137,9 +137,11 @@ impl Follower {
             (self.pace, self.change) = (rate, 0.0);
         } else {
             let most = self.limits.change_per_s();
+            // From a slew c, changing by r, the playhead comes c²/2r further: so c may be √(2r e) at an error e.
             let braked = BRAKES_EARLY * (2.0 * most * error.abs()).sqrt();
             let extra = self.limits.slew.min(error.abs() / CLOSES_IN_S).min(braked) * error.signum();
             let wanted = ((rate + extra - self.pace) / PACE_LAGS_S.max(2.0 * dt)).clamp(-most, most);
+            // The change itself has no steps, or the acceleration of a moving seat would have them.
             let step = most / CHANGE_REACHED_S * dt;
             self.change = wanted.clamp(self.change - step, self.change + step);
             let (least, most) = (2.0 - self.limits.most(), self.limits.most());

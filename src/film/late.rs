@@ -39,10 +39,12 @@ impl LateBias {
         if self.count > FEW && !self.count.is_multiple_of(EVERY) {
             return;
         }
+        // A selection, not a sort: it is most of the work of a tracker.
         let mut sorted = self.residuals;
         let kept = &mut sorted[..self.count.min(KEPT)];
         let index = ((kept.len() - 1) as f64 * ENVELOPE) as usize;
         let (_, envelope, _) = kept.select_nth_unstable_by(index, f32::total_cmp);
+        // Below zero it would say that a sample came before it was sent.
         self.bias_s = f64::from(*envelope).max(0.0);
     }
 }

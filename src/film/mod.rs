@@ -34,8 +34,6 @@ pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
-mod testing;
-#[cfg(test)]
 mod tests;
 pub(crate) mod timecode;
 pub(crate) mod tracker;

@@ -9,8 +9,8 @@ use super::follower::PaceLimits;
 use super::follower::tests::tries;
 use super::observation::{FilmWord, Observation};
 use super::point::{FilmClock, PublishedPoint};
-use super::testing::{Luck, SOURCES, Told, TrueFilm, mono};
 use super::tracker::SourceTracker;
+use crate::harness::film::{Luck, SOURCES, Told, TrueFilm, mono};
 use crate::time::{ShowTime, Tick};
 
 const HZ: f64 = 50.0;

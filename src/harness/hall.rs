@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use rtrb::Producer;
 
+use super::film::{Showing, ShownFilm};
 use super::{Frame, Played};
 use crate::app::StagedShow;
 use crate::belief::Reading;
@@ -22,8 +23,8 @@ use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
 use crate::rt::{
-    Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
-    TickLoop, mailboxes,
+    Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning,
+    Task, TickLoop, mailboxes,
 };
 use crate::state::Transition;
 use crate::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -77,6 +78,8 @@ pub struct Virtual {
     pub level: f64,
     /// True if it chases a film, of which nobody has heard before the first [`Event::Film`].
     pub chases: bool,
+    /// Whoever tells of it, where it is not the script.
+    pub film: Option<ShownFilm>,
     /// What happens at the wake-up of that number, counted from 0.
     pub script: Vec<(u64, Event)>,
     /// Wake-ups after which a show that does not end is given up.
@@ -95,6 +98,7 @@ impl Virtual {
             plays: 1,
             level: 1.0,
             chases: false,
+            film: None,
             script: Vec::new(),
             at_most: 1_000_000,
         }
@@ -150,6 +154,7 @@ impl Virtual {
             deaf: Cell::new(false),
             film: Arc::default(),
             shown: Cell::new(None),
+            showing: RefCell::new(self.film.as_ref().map(Showing::new)),
         };
         let rules = ChaseRules {
             pace: PaceLimits::default(),
@@ -197,11 +202,16 @@ struct Hands<'a> {
     film: Arc<PublishedPoint>,
     /// Where the film was said to be last.
     shown: Cell<Option<FilmPoint>>,
+    /// Whoever reads the film from a source.
+    showing: RefCell<Option<Showing>>,
 }
 
 impl Hands<'_> {
     /// Whoever reads the film publishes where it is.
     fn show(&self, now: MonoTime) {
+        if let Some(showing) = &mut *self.showing.borrow_mut() {
+            showing.hear(now, &self.film);
+        }
         if let Some(point) = self.shown.get() {
             self.film.publish(&FilmPoint { at: now, media: point.media_at(now), ..point });
         }
@@ -334,7 +344,8 @@ impl Clock for Stage<'_> {
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
                 Event::Film(media, rate, state) => {
                     let epoch = self.hands.shown.get().map_or(0, |point| point.epoch + 1);
-                    let point = FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
+                    let point =
+                        FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
                     self.hands.shown.set(Some(point));
                     self.hands.show(self.now.get());
                 }
