@@ -480,7 +480,10 @@ fn a_show_waits_while_its_film_cannot_be_followed_and_says_why_and_parks_when_it
     let absent = HoldCause::Film(FilmState::Absent);
     for from in riding() {
         let mut hall = told(from, Event::FilmAwaited(absent));
-        assert_eq!((hall.state(), hall.cause(), hall.next()), (waiting(absent).0, waiting(absent).1, Next::AwaitFilm));
+        assert_eq!(
+            (hall.state(), hall.cause(), hall.next()),
+            (waiting(absent).0, waiting(absent).1, Next::AwaitFilm)
+        );
         hall.event(Event::FilmAwaited(HoldCause::Unstable), s(2));
         assert_eq!((hall.state(), hall.cause()), waiting(HoldCause::Unstable), "another cause is told");
         hall.event(Event::FilmAwaited(HoldCause::Unstable), s(3));

@@ -43,7 +43,9 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     }
     match stream(&mut sound, blocks) {
         // Whoever listened has heard enough.
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("stdout").or_exit(Exit::Io),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(error).context("stdout").or_exit(Exit::Io)
+        }
         _ => Ok(Exit::Done),
     }
 }
