@@ -5,12 +5,14 @@
 mod cells;
 mod decoder;
 mod edges;
-pub(crate) mod generator;
+mod generator;
 mod reader;
 #[cfg(test)]
 mod tests;
 mod word;
 
+pub(crate) use decoder::{LtcDecoder, LtcFrame};
+pub(crate) use generator::LtcGenerator;
 pub(crate) use reader::LtcReader;
 
 use super::timecode::{Label, Timecode};
