@@ -5,7 +5,7 @@
 mod cells;
 mod decoder;
 mod edges;
-pub(crate) mod generator;
+mod generator;
 mod reader;
 #[cfg(test)]
 mod tests;
