@@ -4,7 +4,10 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use kinocue::sys::clock::Monotonic;
+use kinocue::time::{Clock as _, MonoTime};
 
 use serde_json::{Value, json};
 
@@ -96,12 +99,14 @@ fn serve(stream: UnixStream, media_s: f64, tells: &Receiver<Value>) {
     stream.set_read_timeout(Some(Duration::from_millis(5))).expect("it can be set");
     let (mut lines, mut line) = (BufReader::new(stream), String::new());
     // Where the film is at an instant, while it runs.
-    let (mut at, mut runs) = ((Instant::now(), media_s), true);
-    let media = |at: (Instant, f64), runs: bool| at.1 + if runs { at.0.elapsed().as_secs_f64() } else { 0.0 };
+    let (mut at, mut runs) = ((Monotonic.now(), media_s), true);
+    let media = |at: (MonoTime, f64), runs: bool| {
+        at.1 + if runs { Monotonic.now().since(at.0).as_secs_f64() } else { 0.0 }
+    };
     loop {
         for what in tells.try_iter() {
             if what["name"] == "pause" {
-                at = (Instant::now(), media(at, runs));
+                at = (Monotonic.now(), media(at, runs));
                 runs = what["data"] == false;
             }
             if writeln!(out, "{what}").is_err() {
