@@ -86,6 +86,8 @@ pub(crate) struct SourceTracker {
     newest: Option<Newest>,
     /// The next position begins the estimate anew.
     anew: bool,
+    /// How fast it was said to run.
+    told_rate: f64,
     /// Somebody said that the film was stopped, and nobody that it runs again.
     told_to_stand: bool,
     winding: bool,
@@ -138,6 +140,7 @@ impl SourceTracker {
             recent: Recent::new(),
             newest: None,
             anew: true,
+            told_rate: 1.0,
             told_to_stand: false,
             winding: false,
             misfits: 0.0,
@@ -270,11 +273,12 @@ impl SourceTracker {
         if !rate.is_finite() {
             return;
         }
-        // Up to here it ran at the old speed, from here on at the new: no sample has to show that first.
+        // Up to here it ran at the old speed, from here on at the new: no sample has to show that first. Its clock is off by as much.
         if let Some(estimate) = &mut self.estimate {
             estimate.predict(at);
-            estimate.set_rate(rate, TOLD_RATE_SIGMA);
+            estimate.set_rate(rate * (estimate.rate() / self.told_rate).clamp(0.999, 1.001), TOLD_RATE_SIGMA);
         }
+        self.told_rate = if rate == 0.0 { 1.0 } else { rate };
         if rate < 0.0 {
             self.on_sign(SourceSign::Backward, at);
         } else if (rate - 1.0).abs() > self.band {
