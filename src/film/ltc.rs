@@ -7,6 +7,7 @@ mod decoder;
 mod edges;
 mod generator;
 mod reader;
+mod samples;
 #[cfg(test)]
 mod tests;
 mod word;
