@@ -8,7 +8,7 @@ use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
 use crate::rt::AckLoop;
 use crate::time::{Clock, MonoTime};
-use crate::wire::{Access, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode};
+use crate::wire::{Access, Dialect, FromController, MAX_LEN, ReadRequest, ReplyCode};
 
 /// DP34: datagrams received; SMC alone.
 const PACKETS: u16 = 0x34;
@@ -71,8 +71,8 @@ impl<C: Clock> Company<'_, C> {
             }
             let until = self.clock.now() + WAIT;
             let told = std::cell::RefCell::new(&mut counts);
-            let mut take = |lane: usize, bytes: &[u8]| {
-                let count = count_of(bytes);
+            let mut take = |lane: usize, message: &FromController<'_>| {
+                let count = count_of(message);
                 let mut told = told.borrow_mut();
                 told[lane].told = told[lane].told.or(count);
                 count.is_some()
@@ -95,7 +95,7 @@ impl<C: Clock> Company<'_, C> {
     fn wait_until(
         &mut self,
         until: MonoTime,
-        take: &mut dyn FnMut(usize, &[u8]) -> bool,
+        take: &mut dyn FnMut(usize, &FromController<'_>) -> bool,
         enough: &dyn Fn() -> bool,
     ) {
         while self.clock.now() < until && !self.is_stopped() && !enough() {
@@ -110,8 +110,8 @@ impl<C: Clock> Company<'_, C> {
 }
 
 /// The count that an answer tells; with x over 2 it does not say its channel.
-fn count_of(bytes: &[u8]) -> Option<u16> {
-    let reply = RegisterReply::parse(bytes).ok()?;
+fn count_of(message: &FromController<'_>) -> Option<u16> {
+    let FromController::Registers(reply) = message else { return None };
     let is_ours = reply.access == Access::Read
         && (reply.start, reply.num) == (PACKETS, 1)
         && (reply.channel == 0 || reply.code != ReplyCode::Running);

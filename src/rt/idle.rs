@@ -102,9 +102,12 @@ impl Beats {
     }
 
     /// Which axes an answer to a beat tells of, the first of them counted from 0, and where they are; none where it is none.
-    pub(super) fn hear(&mut self, controller: usize, octets: &[u8]) -> Option<(usize, PerAxis<Pulses>)> {
+    pub(super) fn hear(
+        &mut self,
+        controller: usize,
+        reply: &RegisterReply<'_>,
+    ) -> Option<(usize, PerAxis<Pulses>)> {
         let Heart { axes, code, dialect, .. } = self.hearts[controller];
-        let reply = RegisterReply::parse(octets).ok()?;
         let mut reads = position_reads(axes, code, code);
         let is_ours = reply.access == Access::Read
             && reply.channel == 0
@@ -114,17 +117,15 @@ impl Beats {
     }
 
     /// Whether it knows its zero, where this is the answer to a beat that asked for that.
-    pub(super) fn hear_zero(octets: &[u8]) -> Option<bool> {
-        let reply = RegisterReply::parse(octets).ok()?;
+    pub(super) fn hear_zero(reply: &RegisterReply<'_>) -> Option<bool> {
         let is_ours = (reply.access, reply.channel, reply.start, reply.num) == (Access::Read, 0, RESET, 1);
         reply.data.get(0).filter(|_| is_ours).map(|state| state == RESET_DONE)
     }
 
     /// The inputs that are active, where this is the answer to a beat that asked for them.
-    pub(super) fn hear_inputs(&self, controller: usize, octets: &[u8]) -> Option<u16> {
-        let reply = RegisterReply::parse(octets).ok().filter(|_| self.hearts[controller].inputs)?;
-        let is_ours =
-            reply.access == Access::Read && (reply.channel, reply.start, reply.num) == (0, INPUTS, 1);
+    pub(super) fn hear_inputs(&self, controller: usize, reply: &RegisterReply<'_>) -> Option<u16> {
+        let is_ours = self.hearts[controller].inputs
+            && (reply.access, reply.channel, reply.start, reply.num) == (Access::Read, 0, INPUTS, 1);
         reply.data.get(0).filter(|_| is_ours)
     }
 }
@@ -154,7 +155,7 @@ mod tests {
                 num: 6,
                 data: Words::from(&words[..]),
             };
-            let (first, told) = beats.hear(0, reply.emit(&mut [0; MAX_LEN]))?;
+            let (first, told) = beats.hear(0, &reply)?;
             Some((first, told.iter().map(|pulses| pulses.0).collect::<Vec<_>>()))
         };
         assert_eq!(hear(DP_POSITIONS[3], [4, 5, 6]), Some((3, vec![4, 5, 6])));
@@ -175,10 +176,13 @@ mod tests {
             num: 1,
             data: Words::from(&[3][..]),
         };
-        let octets = reply(INPUTS).emit(&mut [0; MAX_LEN]).to_vec();
-        assert_eq!(beats.hear_inputs(0, &octets), Some(3), "also while it says that no belt is closed");
-        assert_eq!(beats.hear_inputs(0, reply(0x66).emit(&mut [0; MAX_LEN])), None);
+        assert_eq!(
+            beats.hear_inputs(0, &reply(INPUTS)),
+            Some(3),
+            "also while it says that no belt is closed"
+        );
+        assert_eq!(beats.hear_inputs(0, &reply(0x66)), None);
         beats.hearts[0].inputs = false;
-        assert_eq!(beats.hear_inputs(0, &octets), None);
+        assert_eq!(beats.hear_inputs(0, &reply(INPUTS)), None);
     }
 }

@@ -6,25 +6,47 @@ use super::Watch;
 use crate::belief::Reading;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
-use crate::wire::{ImaxRegisters, PerAxis};
+use crate::wire::{FromController, PerAxis, RegisterReply};
 
 impl Watch {
-    /// Hears a datagram that is no reply to a frame; says whether it was an answer to a look.
-    pub(in super::super) fn hear(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-        let awaited = self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at));
+    /// Hands a datagram to whoever else asks; says whether somebody does.
+    pub(in super::super) fn pass_on(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
+        self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at))
+    }
+
+    /// Hears registers; says whether they were an answer to a look.
+    pub(in super::super) fn hear(
+        &mut self,
+        controller: usize,
+        reply: &RegisterReply<'_>,
+        at: MonoTime,
+    ) -> bool {
         let looker = &mut self.lookers[controller];
-        let is_answer = looker.hear(octets);
+        let is_answer = looker.hear(reply);
         if let Some(packets) = looker.take_count() {
             self.health.on_count(controller, packets);
         }
-        if is_answer || awaited {
+        if is_answer {
             self.health.on_answer(controller, at);
         }
-        if ImaxRegisters::parse(octets).is_ok_and(|reply| reply.is_wide()) {
+        is_answer
+    }
+
+    /// Hears whatever it was, `passed` on or not.
+    pub(in super::super) fn hear_any(
+        &mut self,
+        controller: usize,
+        message: &FromController<'_>,
+        passed: bool,
+        at: MonoTime,
+    ) {
+        if passed {
+            self.health.on_answer(controller, at);
+        }
+        if matches!(message, FromController::WideRegisters) {
             self.health.on_wide_registers(controller);
         }
         self.take_sighting(controller, at);
-        is_answer || awaited
     }
 
     /// A seat answers where some of its axes are. What nobody asked for here may be the answer to what the control plane asked;
@@ -74,10 +96,10 @@ impl Watch {
     pub(in super::super) fn hear_beat(
         &mut self,
         controller: usize,
-        octets: &[u8],
+        reply: &RegisterReply<'_>,
         at: MonoTime,
     ) -> Option<PerAxis<Pulses>> {
-        let (first, told) = self.beats.hear(controller, octets)?;
+        let (first, told) = self.beats.hear(controller, reply)?;
         self.on_answer(controller, first, &told, at);
         self.health.on_status(controller, at);
         self.mind_rest(controller, at);
@@ -85,8 +107,13 @@ impl Watch {
     }
 
     /// Hears an answer to a beat that asked whether a controller that is led knows its zero; says whether it is one.
-    pub(in super::super) fn hear_zero(&mut self, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-        let zero = Beats::hear_zero(octets);
+    pub(in super::super) fn hear_zero(
+        &mut self,
+        controller: usize,
+        reply: &RegisterReply<'_>,
+        at: MonoTime,
+    ) -> bool {
+        let zero = Beats::hear_zero(reply);
         // One that homes because it was asked to does not know it meanwhile.
         if let Some(homed) = zero.filter(|_| self.live.is_moving()) {
             self.health.on_zero(controller, homed);
@@ -99,10 +126,10 @@ impl Watch {
     pub(in super::super) fn hear_inputs(
         &mut self,
         controller: usize,
-        octets: &[u8],
+        reply: &RegisterReply<'_>,
         at: MonoTime,
     ) -> Option<u16> {
-        let inputs = self.beats.hear_inputs(controller, octets)?;
+        let inputs = self.beats.hear_inputs(controller, reply)?;
         self.health.on_status(controller, at);
         Some(inputs)
     }
