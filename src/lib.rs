@@ -48,6 +48,7 @@ pub mod observe;
 pub mod tracker;
 
 pub mod device;
+mod drive;
 pub mod preflight;
 
 pub mod control;

@@ -7,6 +7,7 @@ use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
 use super::{Live, Sent, TickReport, Watch};
+use crate::drive::Need;
 use crate::health::Change;
 use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
@@ -124,7 +125,7 @@ impl AckLoop {
     /// Asks a controller where its axes are, at `now`. What the kernel does not take is like what is lost: ask again.
     pub fn ask_positions(&mut self, controller: usize, now: MonoTime) {
         if let Some(watch) = &mut self.watch {
-            watch.ask_positions(controller, now);
+            watch.ask(controller, Need::Position, now);
         }
     }
 
@@ -222,7 +223,7 @@ impl AckLoop {
                 || watch.as_mut().is_some_and(|watch| {
                     // Another thread has a conversation of its own: it is handed what nobody here takes for a report.
                     let passed = watch.pass_on(controller, octets, at);
-                    hear(watch, observer, controller, &message, passed, at)
+                    watch.hear(observer, controller, &message, passed, at)
                 })
                 || other(controller, &message);
             if !is_known {
@@ -270,41 +271,6 @@ impl AckLoop {
     pub fn on_sent(&mut self, sent: Sent) {
         record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
     }
-}
-
-/// Has the watch hear what is no reply to a frame; says whether it was an answer to something asked, which it is where it was
-/// `passed` on to whoever else asks.
-fn hear(
-    watch: &mut Watch,
-    observer: &mut Observer,
-    controller: usize,
-    message: &FromController<'_>,
-    passed: bool,
-    at: MonoTime,
-) -> bool {
-    let mut is_answer = passed;
-    if let FromController::Registers(reply) = message {
-        // One answer may be waited for by several.
-        let beat = watch.hear_beat(controller, reply, at);
-        if let Some(positions) = beat {
-            observer.on_positions(controller, positions, at);
-        }
-        let inputs = watch.hear_inputs(controller, reply, at);
-        if let Some(inputs) = inputs {
-            observer.on_inputs(controller, inputs, at);
-        }
-        let zero = watch.hear_zero(controller, reply, at);
-        is_answer |= watch.hear(controller, reply, at) || beat.is_some() || inputs.is_some() || zero;
-        if is_answer {
-            observer.on_code(controller, reply.code, at);
-            watch.mind_stop(controller, reply.code);
-        }
-    }
-    watch.hear_any(controller, message, passed, at);
-    if let Some(look) = watch.take_look(controller) {
-        observer.on_look(controller, look, at);
-    }
-    is_answer
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.

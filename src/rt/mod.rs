@@ -6,14 +6,11 @@
 mod acks;
 mod conductor;
 mod desk;
-mod idle;
 mod line;
 mod live;
 mod mail;
 mod places;
 mod planning;
-mod positions;
-mod sight;
 mod spin;
 mod standby;
 mod table;

@@ -28,12 +28,12 @@ pub struct Standby {
     /// Whether the program is still to find out where the seats stand, and whether it crashed the last time.
     boot: Option<bool>,
     /// What each controller said of its zero, and whether its seat stands at park.
-    seen: Vec<Option<Seen>>,
+    seen: Vec<Option<Parked>>,
 }
 
 /// What was read of one controller.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct Parked {
     pub(super) homed: bool,
     pub(super) at_park: bool,
 }
@@ -57,7 +57,7 @@ impl Standby {
     }
 
     /// Notes what was read of a controller.
-    pub(super) fn on_seen(&mut self, controller: usize, seen: Seen) {
+    pub(super) fn on_seen(&mut self, controller: usize, seen: Parked) {
         self.seen[controller] = Some(seen);
     }
 
