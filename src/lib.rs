@@ -37,6 +37,7 @@ pub mod proof;
 pub mod belief;
 pub mod engine;
 pub mod fanout;
+pub mod film;
 pub mod limiter;
 pub mod plan;
 pub mod rt;

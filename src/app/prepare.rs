@@ -10,7 +10,8 @@ use crate::config::Controller;
 use crate::fanout::Lane;
 use crate::net::{Delivery, Sender};
 use crate::plan::slow_park_time;
-use crate::rt::{AckLoop, Live, Phase, Places, Sent};
+use crate::rt::{AckLoop, Live, Places, Sent};
+use crate::state::State;
 use crate::time::{Clock, MonoTime};
 use crate::wire::MAX_LEN;
 
@@ -154,7 +155,7 @@ impl<C: Clock> Preparation<'_, C> {
             let under_way = arrivals.into_iter().filter_map(|(lane, arrival)| Some((lane, arrival?)));
             let (sent, arrivals): (Vec<usize>, Vec<MonoTime>) = under_way.unzip();
             let Some(arrival) = arrivals.into_iter().max() else { break };
-            self.live.enter(Phase::Homing);
+            self.live.enter(State::Homing);
             // One that has not acked by then has the whole way to do so.
             let acked = |this: &Self| sent.iter().all(|&lane| this.is_acked(lane));
             self.wait_until((self.clock.now() + ACK_WAIT).min(arrival), acked);

@@ -51,6 +51,21 @@ pub enum Ending {
     Fault,
 }
 
+/// What the hall wants of the engine: told every tick, so that none can be missed, and told again it changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Directive {
+    /// Nothing is to begin: the hall is not ready, or waits for somebody to let the show go.
+    Wait,
+    /// The lanes are to follow the cue, from a pause as well.
+    Play,
+    /// They are to come to rest, and the film waits.
+    Hold,
+    /// They are to come to rest, and nothing goes on from there.
+    Stop,
+    /// They are to park, and then the show is over.
+    Park,
+}
+
 /// What a play is about; fixed before it starts.
 #[derive(Debug, Clone)]
 pub struct Show {
@@ -156,12 +171,8 @@ pub struct Engine {
     retired: Retired,
     serial: u32,
     plays_left: Option<u32>,
-    /// Whether it has been let go, which one that waits has not.
-    begun: bool,
-    /// Whether the lanes are to park, come what may.
-    homeward: bool,
-    /// Whether a person asked for the film to go on from a pause.
-    resuming: bool,
+    /// What the hall wants.
+    directive: Directive,
     /// Where in the cue the show is to go on.
     seeking: Option<ShowTime>,
     /// Whether a seek could not be planned, and nobody was told yet.
@@ -206,9 +217,7 @@ impl Engine {
             retired: Retired::default(),
             serial: course.serial,
             plays_left: show.plays.checked_sub(1),
-            begun: true,
-            homeward: false,
-            resuming: false,
+            directive: Directive::Wait,
             seeking: None,
             seek_refused: false,
             planless: false,
@@ -285,10 +294,8 @@ impl Engine {
     /// True if lanes rest in a pause, have been told so, and nobody has asked yet for the way on: nothing is sent to them.
     #[must_use]
     pub fn waits_in_pause(&self) -> bool {
-        matches!(self.phase, Phase::Resting(Rest::Paused))
-            && self.sends_nothing()
-            && !self.resuming
-            && !self.homeward
+        let goes_on = matches!(self.directive, Directive::Play | Directive::Park);
+        matches!(self.phase, Phase::Resting(Rest::Paused)) && self.sends_nothing() && !goes_on
     }
 
     /// Whether no frame has led any lane since all rested.
@@ -326,10 +333,15 @@ impl Engine {
         }
     }
 
-    /// Whether the lanes are to park, be it that they still follow the cue, or are there.
+    /// Whether the lanes have left the cue for park, at its end, or are there.
     #[must_use]
     pub const fn is_homeward(&self) -> bool {
-        self.homeward || matches!(self.phase, Phase::Parking | Phase::Closing(_) | Phase::Done)
+        matches!(self.phase, Phase::Parking | Phase::Closing(_) | Phase::Done)
+    }
+
+    /// Whether the lanes are to park, come what may.
+    fn is_to_park(&self) -> bool {
+        self.directive == Directive::Park
     }
 
     /// Why the lanes rest, or come to rest; none where they do not.

@@ -1,36 +1,49 @@
 //! What the engine is told to do. None of it waits: each is taken up by the tick it is told before.
 
 use super::wait::is_at;
-use super::{Ending, Engine, Mix, Part, Phase, Rest};
+use super::{Directive, Ending, Engine, Mix, Part, Phase, Rest, first_phase};
 use crate::belief::{Fall, KnownPose};
 use crate::motion::Pose;
 use crate::time::{ShowTime, TRIM_MS};
 
 impl Engine {
-    /// Parks, hold frames, and the end. Asking again changes nothing.
+    /// Takes what the hall wants, as often as it is told. One that waits goes on waiting through a stop.
+    pub fn obey(&mut self, directive: Directive) {
+        let before = std::mem::replace(&mut self.directive, directive);
+        match directive {
+            Directive::Wait => {}
+            Directive::Play => {
+                if self.phase == Phase::Waiting {
+                    self.phase = first_phase(&self.show);
+                }
+            }
+            Directive::Hold => self.pause(),
+            Directive::Stop => self.stop(),
+            Directive::Park if before == Directive::Park => {}
+            Directive::Park => self.park(),
+        }
+    }
+
+    /// Parks, hold frames, and the end.
     ///
     /// Before the first frame, and after the last, only lanes that are astray are brought there. Where none is, it is the end, and no
     /// frame goes out; between shows once that was read. One that was let go ends at once: nothing has been set in motion, and the
     /// lanes may still be on a slow way to park, or where nobody knows.
-    pub fn park(&mut self) {
-        let is_over = self.phase == Phase::Done;
+    fn park(&mut self) {
         let is_fresh = self.frames == 0 && self.rest().is_none();
-        if is_over || self.phase == Phase::Waiting || (is_fresh && self.is_astray()) {
-            self.rest_untold();
-        } else if is_over || self.is_homeward() {
-            return;
-        } else if is_fresh {
-            self.phase = Phase::Done;
+        match self.phase {
+            Phase::Parking | Phase::Closing(_) => return,
+            Phase::Done | Phase::Waiting => self.rest_untold(),
+            _ if is_fresh && self.is_astray() => self.rest_untold(),
+            _ if is_fresh => self.phase = Phase::Done,
+            Phase::Settling | Phase::Riding | Phase::Braking(_) | Phase::Resting(_) => {}
         }
-        // The course that it was to begin on will not be there any more.
-        self.begun = true;
-        self.homeward = true;
         self.ending = Ending::Stopped;
     }
 
     /// Brings lanes that are to park to rest without the planner, where it has not told the way: from there it is asked anew.
     pub fn rest_to_park(&mut self) {
-        if self.homeward && self.phase == Phase::Riding {
+        if self.is_to_park() && self.phase == Phase::Riding {
             self.come_down(Rest::Ended);
         }
     }
@@ -41,14 +54,12 @@ impl Engine {
     }
 
     /// Brings the lanes to rest at once, without the planner; then hold frames, and no more.
-    pub fn stop(&mut self) {
-        if self.phase == Phase::Done {
+    fn stop(&mut self) {
+        if matches!(self.phase, Phase::Waiting | Phase::Done) {
             return;
         }
-        (self.homeward, self.resuming, self.seeking) = (false, false, None);
-        self.ending = Ending::Stopped;
+        (self.seeking, self.ending) = (None, Ending::Stopped);
         match self.phase {
-            Phase::Waiting => self.rest_untold(),
             // Of a course that was asked for to park from there nothing may begin any more.
             _ if self.rest() == Some(Rest::Stopped) => self.drop_switch(),
             _ => self.come_down(Rest::Stopped),
@@ -56,25 +67,15 @@ impl Engine {
     }
 
     /// Brings the lanes to rest at once, without the planner, and holds them there; the film waits.
-    pub fn pause(&mut self) {
+    fn pause(&mut self) {
         match self.phase {
             Phase::Settling
             | Phase::Riding
             | Phase::Braking(Rest::Ended)
-            | Phase::Resting(Rest::Late | Rest::Ended)
-                if !self.homeward =>
-            {
-                self.come_down(Rest::Paused);
-            }
+            | Phase::Resting(Rest::Late | Rest::Ended) => self.come_down(Rest::Paused),
             Phase::Resting(Rest::Paused) => self.drop_switch(),
             _ => {}
         }
-        self.resuming = false;
-    }
-
-    /// Resumes a paused show.
-    pub fn resume(&mut self) {
-        self.resuming |= self.rest() == Some(Rest::Paused);
     }
 
     /// Goes on elsewhere in the film, from a pause once it is resumed. A time after the end is the end.
@@ -85,7 +86,7 @@ impl Engine {
                 self.drop_switch();
                 self.playhead = target;
             }
-            Phase::Settling | Phase::Riding | Phase::Resting(Rest::Late) if !self.homeward => {
+            Phase::Settling | Phase::Riding | Phase::Resting(Rest::Late) if !self.is_to_park() => {
                 self.seeking = Some(target);
             }
             _ => {}

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::switch::{Goal, Switch};
-use super::{Ending, Engine, Phase, Rest, Rider, hold_frames};
+use super::{Directive, Ending, Engine, Phase, Rest, Rider, hold_frames};
 use crate::plan::{Course, From, Request, Scene, To};
 use crate::time::ShowTime;
 
@@ -26,7 +26,6 @@ impl Engine {
             }
             Phase::Braking(rest) if self.is_too_long(gap) => self.halt(rest),
             Phase::Riding | Phase::Parking if self.is_too_long(gap) => {
-                self.homeward |= self.phase == Phase::Parking;
                 self.catch_up();
                 self.playhead += gap;
                 self.halt(Rest::Late);
@@ -79,13 +78,13 @@ impl Engine {
         match self.phase {
             Phase::Parking if self.reached >= self.course.settled() => self.arrive(),
             Phase::Resting(rest) if asked.is_none() => self.look_ahead_at_rest(rest, soonest),
-            Phase::Riding if self.homeward && asked == Some(Goal::Park) => {}
+            Phase::Riding if self.is_to_park() && asked == Some(Goal::Park) => {}
             // The old course ends before another can begin on it: what is to come begins on the one that follows.
             Phase::Riding if self.turns_between(self.playhead, soonest) => {}
             // A course is planned for levels that stand, and for show time that runs as the clock does.
             Phase::Riding if !self.faders_are_still() => {}
             Phase::Riding if self.is_wanted_elsewhere() && !self.slew.is_calm() => {}
-            Phase::Riding if self.homeward => self.ask(Goal::Park, Some(soonest), soonest),
+            Phase::Riding if self.is_to_park() => self.ask(Goal::Park, Some(soonest), soonest),
             Phase::Riding => self.look_ahead_riding(asked, soonest),
             _ => {}
         }
@@ -94,7 +93,6 @@ impl Engine {
     /// The lanes on the course are at park. One that fell out on the way is waited for there, and led after them.
     fn arrive(&mut self) {
         if self.riders.iter().any(Rider::is_left_behind) {
-            self.homeward = true;
             self.come_down(Rest::Ended);
         } else if !self.riders.iter().any(Rider::is_awaited) {
             self.phase = Phase::Closing(hold_frames(self.show.rate));
@@ -103,18 +101,18 @@ impl Engine {
 
     /// Whether somebody waits for lanes to leave their course.
     pub(super) fn is_wanted_elsewhere(&self) -> bool {
-        self.homeward || self.seeking.is_some() || self.lanes_need_a_course()
+        self.is_to_park() || self.seeking.is_some() || self.lanes_need_a_course()
     }
 
     fn look_ahead_at_rest(&mut self, rest: Rest, soonest: ShowTime) {
         let now = self.playhead;
         match rest {
             Rest::Stopped if self.is_parked_untold() => self.phase = Phase::Done,
-            _ if self.homeward => self.ask(Goal::Park, None, now),
+            _ if self.is_to_park() => self.ask(Goal::Park, None, now),
             Rest::Late => self.ask(Goal::Cue, Some(soonest), soonest),
             Rest::Ended if self.plays_left == Some(0) => self.ask(Goal::Home, None, now),
             Rest::Ended => self.ask(Goal::Again, None, self.cue_time(ShowTime::ZERO)),
-            Rest::Paused if self.resuming => self.ask(Goal::Cue, None, now),
+            Rest::Paused if self.directive == Directive::Play => self.ask(Goal::Cue, None, now),
             Rest::Paused | Rest::Stopped => {}
         }
     }
@@ -219,7 +217,7 @@ impl Engine {
             Goal::Lanes => self.riders.iter_mut().for_each(Rider::refuse),
             Goal::Cue if self.seeking.take().is_some() => self.seek_refused = true,
             Goal::Cue | Goal::Again | Goal::Park | Goal::Home => {
-                (self.ending, self.planless, self.resuming) = (Ending::Fault, true, false);
+                (self.ending, self.planless) = (Ending::Fault, true);
             }
         }
     }
@@ -248,10 +246,7 @@ impl Engine {
         match switch.goal {
             Goal::Lanes => {}
             Goal::Cue if self.seeking.take().is_some() => self.slew.reset(),
-            Goal::Cue => {
-                self.slew.skip(switch.skipped_s);
-                self.resuming = false;
-            }
+            Goal::Cue => self.slew.skip(switch.skipped_s),
             Goal::Again => {
                 self.slew.skip(0.0);
                 self.plays_left = self.plays_left.map(|left| left.saturating_sub(1));

@@ -1,7 +1,7 @@
 //! Between shows: an engine that is loaded waits until somebody lets it go, and the next takes over what the last one knows
 //! of the lanes. Nothing is sent meanwhile.
 
-use super::{Engine, Phase, Rest, Rider, first_phase};
+use super::{Engine, Phase, Rest, Rider};
 use crate::engine::Mix;
 use crate::motion::{MAX_AXES, Pose, Window};
 use crate::time::TRIM_MS;
@@ -13,10 +13,9 @@ const AT_PARK: Pose = [0.000_7; MAX_AXES];
 const A_PULSE: Pose = [0.000_004; MAX_AXES];
 
 impl Engine {
-    /// The same, waiting for [`Engine::go`].
+    /// The same, waiting to be let go ([`Directive::Play`]).
     #[must_use]
     pub fn waiting(mut self) -> Self {
-        self.begun = false;
         self.phase = Phase::Waiting;
         self
     }
@@ -45,30 +44,10 @@ impl Engine {
         self.trim_ms = ms.clamp(-TRIM_MS, TRIM_MS);
     }
 
-    /// Begins, where it waits.
-    pub fn go(&mut self) {
-        if self.phase == Phase::Waiting {
-            self.begun = true;
-            self.phase = first_phase(&self.show);
-        }
-    }
-
-    /// The hall is ready to play: what was loaded before it was, and rests so far, waits to be let go. Its lanes go on from
-    /// where they stand.
-    pub fn stand_by(&mut self) {
-        if !self.begun && self.phase == Phase::Resting(Rest::Stopped) && !self.homeward {
-            self.phase = Phase::Waiting;
-        }
-    }
-
-    /// Takes over from the engine that is done: lanes to which nothing goes stay so, and the others are to be found. Where the hall
-    /// is not ready to play (`ready` false), it rests.
-    pub fn take_over(&mut self, before: &Self, ready: bool) {
+    /// Takes over from the engine that is done: lanes to which nothing goes stay so, and the others are to be found.
+    pub fn take_over(&mut self, before: &Self) {
         for (rider, old) in self.riders.iter_mut().zip(&before.riders) {
             rider.go_on_from(old);
-        }
-        if !ready {
-            self.rest_untold();
         }
     }
 
@@ -87,7 +66,7 @@ impl Engine {
     /// Whether lanes that are to park rest there already, and nobody is waited for.
     pub(super) fn is_parked_untold(&self) -> bool {
         let is_awaited = self.riders.iter().any(Rider::is_awaited);
-        self.homeward && self.sends_nothing() && !is_awaited && !self.is_any_off_park(&A_PULSE)
+        self.is_to_park() && self.sends_nothing() && !is_awaited && !self.is_any_off_park(&A_PULSE)
     }
 
     /// At rest, and no frame says so: the seats have not moved.

@@ -4,18 +4,16 @@
 use std::time::Duration;
 
 use super::mail::{Alarm, News};
-use crate::engine::{Ending, Engine, Rest};
+use crate::engine::{Directive, Ending, Engine, Rest};
 use crate::state::{
     Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble,
 };
 use crate::time::{MonoTime, ShowTime};
 
-/// The machine, and what was last done for it.
+/// The machine, and what was last told of it.
 #[derive(Debug)]
 pub struct Conductor {
     machine: Machine,
-    /// The state that the engine was told last.
-    told: State,
     /// The state that was made known last, why, since when it lasts, and what a person does next.
     known: Option<(State, Cause, MonoTime, Next)>,
     /// Whether a person is there to clear what is latched; else the play ends with it.
@@ -44,7 +42,6 @@ impl Conductor {
     #[must_use]
     pub const fn new(machine: Machine, attended: bool) -> Self {
         Self {
-            told: machine.state(),
             machine,
             known: None,
             attended,
@@ -196,22 +193,14 @@ impl Conductor {
     }
 
     /// Has the engine do what the state says.
-    fn steer(&mut self, engine: &mut Engine) {
-        let state = self.machine.state();
-        if std::mem::replace(&mut self.told, state) == state {
-            return;
-        }
-        match state {
-            State::Playing(_) => {
-                engine.go();
-                engine.resume();
-            }
-            State::Paused => engine.pause(),
-            State::Stopping | State::Stopped | State::Fault => engine.stop(),
-            State::Parking => engine.park(),
-            State::Parked | State::Armed => engine.stand_by(),
-            State::Boot | State::Recovering | State::Homing => {}
-        }
+    fn steer(&self, engine: &mut Engine) {
+        engine.obey(match self.machine.state() {
+            State::Boot | State::Recovering | State::Homing | State::Parked | State::Armed => Directive::Wait,
+            State::Playing(_) => Directive::Play,
+            State::Paused => Directive::Hold,
+            State::Stopping | State::Stopped | State::Fault => Directive::Stop,
+            State::Parking => Directive::Park,
+        });
     }
 
     /// Tells the machine what the engine does; to be called every tick, after the engine's.

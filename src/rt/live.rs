@@ -1,7 +1,7 @@
 //! What anyone may look at while a play runs: atomics that the playing threads store, and nobody waits for. Only the times
 //! are behind a lock, which the ack thread and whoever looks share, never the tick thread.
 
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -9,67 +9,38 @@ use super::TickReport;
 use super::table::Row;
 use crate::belief::Evidence;
 use crate::engine::Engine;
-use crate::state::{PlayMode, State};
+use crate::state::{Machine, State};
 use crate::time::{MonoTime, ShowTime};
 use crate::tracker::{Histogram, histogram};
 
-/// How far a play is, in the order of a show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum Phase {
-    /// The controllers are asked where their seats stand.
-    #[default]
-    Asking,
-    /// Seats are on their slow way to park.
-    Homing,
-    /// Seats are on their way onto the cue.
-    Joining,
-    /// Seats follow the cue.
-    Playing,
-    /// Frames were late; seats hold, and join again.
-    Freewheeling,
-    /// Seats hold; the film waits.
-    Paused,
-    /// Seats come to rest.
-    Stopping,
-    /// Seats rest, and stay so until somebody clears it.
-    Stopped,
-    /// Something is wrong; seats rest, and stay so until somebody clears it.
-    Fault,
-    /// Seats rest anywhere; they may park.
-    Recovering,
-    /// Seats are on their way to park, or there.
-    Parking,
-}
+/// Where a hall stands, in one word: its state by its place in [`State::ALL`], whether motion frames leave, and how often a person
+/// has cleared.
+#[derive(Debug, Default)]
+struct HallWord(AtomicU32);
 
-impl Phase {
-    const ALL: [Self; 11] = [
-        Self::Asking,
-        Self::Homing,
-        Self::Joining,
-        Self::Playing,
-        Self::Freewheeling,
-        Self::Paused,
-        Self::Stopping,
-        Self::Stopped,
-        Self::Fault,
-        Self::Recovering,
-        Self::Parking,
-    ];
+const STATE: u32 = 0xf;
+const MOVING: u32 = 1 << 4;
+const CLEARS: u32 = 5;
 
-    const fn of(state: State) -> Self {
-        match state {
-            State::Boot => Self::Asking,
-            State::Homing => Self::Homing,
-            State::Armed | State::Playing(PlayMode::Joining) => Self::Joining,
-            State::Playing(PlayMode::Following) => Self::Playing,
-            State::Playing(PlayMode::Holding) => Self::Freewheeling,
-            State::Paused => Self::Paused,
-            State::Stopping => Self::Stopping,
-            State::Stopped => Self::Stopped,
-            State::Fault => Self::Fault,
-            State::Recovering => Self::Recovering,
-            State::Parking | State::Parked => Self::Parking,
-        }
+impl HallWord {
+    fn state(&self) -> State {
+        // Acquire: who sees the state sees the homing that it speaks of.
+        let place = self.0.load(Ordering::Acquire) & STATE;
+        State::ALL.get(place as usize).copied().unwrap_or(State::Boot)
+    }
+
+    fn set(&self, state: State, moving: bool, clears: u32) {
+        let place = (0..).zip(State::ALL).find_map(|(place, known)| (known == state).then_some(place));
+        let moving = if moving { MOVING } else { 0 };
+        self.0.store(place.unwrap_or(0) | moving | clears << CLEARS, Ordering::Release);
+    }
+
+    fn is_moving(&self) -> bool {
+        self.0.load(Ordering::Acquire) & MOVING != 0
+    }
+
+    fn clears(&self) -> u32 {
+        self.0.load(Ordering::Acquire) >> CLEARS
     }
 }
 
@@ -92,7 +63,7 @@ impl Default for Times {
 #[derive(Debug, Default)]
 pub struct Live {
     times: Mutex<Times>,
-    phase: AtomicU8,
+    hall: HallWord,
     homing: AtomicU32,
     homing_ms: AtomicU32,
     show_ns: AtomicI64,
@@ -100,8 +71,6 @@ pub struct Live {
     missed: AtomicU64,
     beats: AtomicU64,
     closed: AtomicBool,
-    clears: AtomicU32,
-    moving: AtomicBool,
     /// How often the limiter held each lane back.
     clamps: Box<[AtomicU64]>,
     /// What the ack thread has seen of each lane.
@@ -179,12 +148,10 @@ impl Live {
         }
     }
 
-    /// How far the play is.
+    /// Where the hall stands.
     #[must_use]
-    pub fn phase(&self) -> Phase {
-        // Acquire: who sees the phase sees the homing it speaks of.
-        let phase = usize::from(self.phase.load(Ordering::Acquire));
-        Phase::ALL.get(phase).copied().unwrap_or_default()
+    pub fn state(&self) -> State {
+        self.hall.state()
     }
 
     /// Seats that were not at park before tick 0, and how long the slowest of them takes to get there.
@@ -274,19 +241,18 @@ impl Live {
         self.homing_ms.fetch_max(time_ms, Ordering::Relaxed);
     }
 
-    /// Notes how far the play is.
-    pub fn enter(&self, phase: Phase) {
-        self.phase.store(phase as u8, Ordering::Release);
+    /// Notes where the hall stands before it plays.
+    pub fn enter(&self, state: State) {
+        self.hall.set(state, self.is_moving(), self.clears());
     }
 
     /// Notes where the hall stands.
-    pub(super) fn on_state(&self, state: State, engine: &Engine) {
-        let moving = state.may_send_motion();
-        self.moving.store(moving && !engine.waits_in_pause(), Ordering::Release);
+    pub(super) fn on_hall(&self, machine: &Machine, engine: &Engine) {
+        let moving = machine.may_send_motion();
         if moving {
             self.on_show(engine.film());
         }
-        self.enter(Phase::of(state));
+        self.hall.set(machine.state(), moving && !engine.waits_in_pause(), machine.clears());
     }
 
     /// Notes where the film is.
@@ -294,20 +260,15 @@ impl Live {
         self.show_ns.store(film.as_nanos(), Ordering::Relaxed);
     }
 
-    /// Notes how often a person has cleared.
-    pub(super) fn on_clears(&self, clears: u32) {
-        self.clears.store(clears, Ordering::Release);
-    }
-
     /// How often a person has cleared.
     pub(super) fn clears(&self) -> u32 {
-        self.clears.load(Ordering::Acquire)
+        self.hall.clears()
     }
 
     /// Whether motion frames leave.
     #[must_use]
     pub fn is_moving(&self) -> bool {
-        self.moving.load(Ordering::Acquire)
+        self.hall.is_moving()
     }
 
     /// How the controllers stood when the ack thread last told; empty before it did.
@@ -333,12 +294,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_phase_that_is_entered_is_seen() {
+    fn every_state_that_is_entered_is_seen_beside_what_is_known_already() {
         let live = Live::default();
-        assert_eq!(live.phase(), Phase::Asking);
-        for phase in Phase::ALL {
-            live.enter(phase);
-            assert_eq!(live.phase(), phase);
+        assert_eq!((live.state(), live.is_moving(), live.clears()), (State::Boot, false, 0));
+        live.hall.set(State::Paused, true, 7);
+        for state in State::ALL {
+            live.enter(state);
+            assert_eq!((live.state(), live.is_moving(), live.clears()), (state, true, 7));
         }
     }
 

@@ -338,8 +338,7 @@ impl Mail {
 
     /// Shows how far the play is.
     pub(super) fn look(&self, machine: &Machine, engine: &Engine) {
-        self.live.on_clears(machine.clears());
-        self.live.on_state(machine.state(), engine);
+        self.live.on_hall(machine, engine);
     }
 
     /// The next command, with its ticket.

@@ -20,7 +20,7 @@ pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use line::{Line, line};
-pub use live::{Live, Phase, Times};
+pub use live::{Live, Times};
 pub(crate) use mail::Ticket;
 pub use mail::{
     Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, Planning, Sent, Task, TickReport, mailboxes,
@@ -266,7 +266,7 @@ fn load(
 ) -> News {
     let taken = !state.may_send_motion() && mail.has_room_for_a_show();
     if taken {
-        show.engine.take_over(engine, matches!(state, State::Parked | State::Armed));
+        show.engine.take_over(engine);
         for (lane, old) in show.lanes.iter_mut().zip(&*lanes) {
             lane.go_on_from(old);
         }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use rtrb::{Producer, PushError};
 
-use super::live::{Live, Phase};
+use super::live::Live;
 use super::mail::{Alarm, Sent};
 use super::standby::Standby;
 use super::table::{Row, Turns};
@@ -21,7 +21,7 @@ use crate::fanout::Lane;
 use crate::health::{Change, HealthState, HealthTable, Notice};
 use crate::net::Sender;
 use crate::observe::Observer;
-use crate::state::Event;
+use crate::state::{Event, State};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
 use crate::wire::ReplyCode;
@@ -64,7 +64,7 @@ pub struct Watch {
     clears: u32,
     /// A controller that takes part does not know its position, and the hall was told so.
     lost_zero: bool,
-    phase: Phase,
+    state: State,
     /// When it last judged.
     looked: MonoTime,
     silent: bool,
@@ -105,7 +105,7 @@ impl Watch {
             clears: 0,
             lost_zero: false,
             waiting: VecDeque::with_capacity(4 * (controllers.len() + groups) + 4),
-            phase: Phase::default(),
+            state: State::Boot,
             looked: MonoTime::default(),
             health,
             sender,
@@ -202,7 +202,7 @@ impl Watch {
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
     fn mind_rest(&mut self, controller: usize, place: &Whereabouts) {
         let is_set =
-            matches!(self.phase, Phase::Parking | Phase::Joining | Phase::Paused) && !self.live.is_moving();
+            matches!(self.state, State::Parked | State::Armed | State::Paused) && !self.live.is_moving();
         let stands = self.stands(controller);
         let is_to_rest = is_set && self.standby.is_some() && stands.may_move();
         let rests = place.reading.is_some_and(|reading| reading.rests);

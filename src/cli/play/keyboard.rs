@@ -13,8 +13,8 @@ use rtrb::Producer;
 use super::keys::{Action, Decoder, HELP};
 use crate::app::Control;
 use crate::engine::Mix;
-use crate::rt::{Command, Phase};
-use crate::state::Transition;
+use crate::rt::Command;
+use crate::state::{State, Transition};
 use crate::sys::clock::Monotonic;
 use crate::sys::terminal::Keyboard;
 use crate::time::{Clock as _, MonoTime, ShowTime, TRIM_MS};
@@ -50,7 +50,7 @@ impl Leader {
     /// Does it; returns what there is to say at once.
     fn act(&mut self, action: Action, now: MonoTime) -> Option<&'static str> {
         match action {
-            Action::PauseOrResume if self.control.live.phase() == Phase::Paused => {
+            Action::PauseOrResume if self.control.live.state() == State::Paused => {
                 self.ask(Command::Request(Transition::Resume))
             }
             Action::PauseOrResume => self.ask(Command::Request(Transition::Pause)),
@@ -166,6 +166,7 @@ pub(super) fn start(
 mod tests {
     use super::*;
     use crate::rt::Desk;
+    use crate::state::PlayMode;
     use rtrb::{Consumer, RingBuffer};
     use std::iter;
 
@@ -199,8 +200,9 @@ mod tests {
     #[test]
     fn space_resumes_a_pause_and_pauses_all_else() {
         let (mut leader, mut commands) = leading(1.0);
-        for phase in [Phase::Playing, Phase::Paused, Phase::Joining] {
-            leader.control.live.enter(phase);
+        let plays = [PlayMode::Following, PlayMode::Joining].map(State::Playing);
+        for state in [plays[0], State::Paused, plays[1]] {
+            leader.control.live.enter(state);
             assert_eq!(leader.act(Action::PauseOrResume, at(0)), None);
         }
         let expected = [Transition::Pause, Transition::Resume, Transition::Pause].map(Ok);

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{CtrlC, keyboard};
 use crate::app::Control;
 use crate::engine::Unplanned;
-use crate::rt::{News, Phase};
+use crate::rt::News;
 use crate::state::{Cause, State, Transition, Whose};
 use crate::time::ShowTime;
 
@@ -24,8 +24,8 @@ pub(super) struct Messages {
 
 impl Messages {
     /// What goes on before the hall plays.
-    pub(super) fn preparing(&self, phase: Phase) -> String {
-        if phase != Phase::Homing {
+    pub(super) fn preparing(&self, state: State) -> String {
+        if state != State::Homing {
             return "asking where the seats stand".to_owned();
         }
         let (seats, time) = self.control.live.homing();
@@ -127,9 +127,9 @@ mod tests {
     #[test]
     fn before_the_play_it_says_what_the_seats_are_doing() {
         let said = said();
-        assert_eq!(said.preparing(Phase::Asking), "asking where the seats stand");
+        assert_eq!(said.preparing(State::Boot), "asking where the seats stand");
         [2_000, 3_000].into_iter().for_each(|ms| said.control.live.on_homing(ms));
-        assert_eq!(said.preparing(Phase::Homing), "bringing 2 seats to park (up to 3.0 s)");
+        assert_eq!(said.preparing(State::Homing), "bringing 2 seats to park (up to 3.0 s)");
     }
 
     #[test]

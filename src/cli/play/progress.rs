@@ -17,7 +17,7 @@ use super::keys;
 use super::messages::Messages;
 use crate::app::PlayHandle;
 use crate::cli::print;
-use crate::rt::{Command, News, NewsIn, Phase};
+use crate::rt::{Command, News, NewsIn};
 use crate::state::{Next, State};
 use crate::sys::terminal::Keyboard;
 use crate::time::ShowTime;
@@ -57,7 +57,7 @@ impl Progress {
             notes: notes_end,
             news: None,
             pressed: 0,
-            phase: Phase::Asking,
+            prepared: State::Boot,
             now: None,
             standings: HealthMessages::default(),
         };
@@ -95,7 +95,7 @@ struct Teller {
     /// For how many looks Ctrl-C has been pressed.
     pressed: u32,
     /// How far the preparation was when it was looked at last.
-    phase: Phase,
+    prepared: State,
     /// The state of the hall and the next action, once it plays.
     now: Option<(State, Next)>,
     /// How the controllers stood when they were looked at last.
@@ -117,11 +117,11 @@ impl Teller {
             _ => {}
         }
         if self.now.is_none()
-            && self.said.control.live.phase() == Phase::Homing
-            && self.phase != Phase::Homing
+            && self.said.control.live.state() == State::Homing
+            && self.prepared != State::Homing
         {
-            self.phase = Phase::Homing;
-            lines.push(self.said.preparing(Phase::Homing));
+            self.prepared = State::Homing;
+            lines.push(self.said.preparing(State::Homing));
         }
         self.news = self.news.take().or_else(|| self.news_end.try_recv().ok());
         while let Some(news) = self.news.as_mut().and_then(|news| news.pop().ok()) {
@@ -150,7 +150,7 @@ impl Teller {
             }
             let (figures, next) = match self.now {
                 Some((state, next)) => (self.said.figures(state), self.said.next(next)),
-                None => (self.said.preparing(self.phase), self.said.next("wait")),
+                None => (self.said.preparing(self.prepared), self.said.next("wait")),
             };
             bar.set_prefix(next);
             bar.set_message(figures);

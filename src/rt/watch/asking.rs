@@ -1,20 +1,19 @@
 //! What controllers are asked beside the looks: where seats are before a motion and while nothing moves, and all of it anew once the
 //! hall was cleared.
 
-use super::super::live::Phase;
 use super::super::mail::Alarm;
 use super::{SILENT_AFTER, Watch};
 use crate::drive::Need;
 use crate::health::HealthState;
 use crate::net::Delivery;
-use crate::state::Event;
+use crate::state::{Event, State};
 use crate::time::MonoTime;
 
 impl Watch {
     /// Whoever cleared the hall wants to know where its seats stand: nothing is taken on trust.
     pub(super) fn look_anew(&mut self, now: MonoTime) {
-        let phase = self.live.phase();
-        let has_entered = std::mem::replace(&mut self.phase, phase) != phase && phase == Phase::Recovering;
+        let state = self.live.state();
+        let has_entered = std::mem::replace(&mut self.state, state) != state && state == State::Recovering;
         let clears = self.live.clears();
         let is_cleared = std::mem::replace(&mut self.clears, clears) != clears;
         if !has_entered && !is_cleared {

@@ -1,0 +1,306 @@
+//! What seats may do by where the film is: wait, follow, hold or park. A verdict each tick, as a level; who arms, homes, clears and
+//! stops is the hall, which is above all of this. Tick thread; allocates nothing.
+
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use super::follower::{Follower, PaceLimits};
+use super::point::{FilmPoint, FilmState};
+use crate::time::{MonoTime, ShowTime, Tick};
+
+/// An error beyond this, one frame of film at 24 a second, is never slewed away: seats hold, and join.
+pub const JOIN_ABOVE: Duration = Duration::from_nanos(41_666_667);
+/// Seats that are parked join once the film has been followable for so long: a reader that flickers must not begin a show.
+const READY_FOR: Duration = Duration::from_millis(500);
+/// So long before the first sample of the cue seats join its first pose.
+const PRE_ROLL: ShowTime = ShowTime::from_millis(-10_000);
+/// A film that is outside the cue for longer has left it.
+const LEFT_AFTER: Duration = Duration::from_secs(2);
+/// Seats that have held for longer are parked, as in a pause.
+const HELD_AFTER: Duration = Duration::from_mins(5);
+/// The next join waits for a person if so many came within [`UNSTABLE_WITHIN`].
+const UNSTABLE_JOINS: usize = 5;
+const UNSTABLE_WITHIN: Duration = Duration::from_mins(1);
+
+/// Where a show that chases a film stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ChaseState {
+    /// Seats are parked, and have not joined yet.
+    Waiting,
+    /// Seats follow, or join.
+    Following,
+    /// Seats decelerate, or are at rest, until the film can be followed again.
+    Holding,
+    /// Seats park; only the hall leads on from there.
+    Leaving,
+}
+
+/// Why seats hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum HoldCause {
+    /// What is known of the film does not do: its state says why.
+    Film(FilmState),
+    /// The film is further from the playhead than may be slewed.
+    Apart,
+    /// It was so too often: a person has to let them join.
+    Unstable,
+    /// They were asked to wait for a person before each join.
+    Asks,
+}
+
+/// Why seats park.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ParkCause {
+    /// The film is over.
+    FilmEnded,
+    /// The film is outside the cue.
+    CueLeft,
+    /// Nobody knew for too long where the film is.
+    HeldTooLong,
+}
+
+/// What the seats are to do in this tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ChaseVerdict {
+    /// Stay parked.
+    Wait,
+    /// Follow the cue there, at that pace. Where `join` differs from the tick before, by a join.
+    Follow { join: u32, playhead: ShowTime, pace: f64 },
+    /// Decelerate, and rest.
+    Hold(HoldCause),
+    /// Park.
+    Park(ParkCause),
+}
+
+/// When seats that hold may join again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Rejoin {
+    /// By themselves.
+    Auto,
+    /// When a person lets them.
+    Ask,
+}
+
+/// What is fixed for a show that chases.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChaseRules {
+    /// The pace that the cue was proved at.
+    pub pace: PaceLimits,
+    /// Errors beyond it are joined, not slewed.
+    pub join_above: Duration,
+    /// When seats that hold may join again.
+    pub rejoin: Rejoin,
+    /// Where the cue ends.
+    pub cue_end: ShowTime,
+}
+
+/// What a tick brings.
+#[derive(Debug, Clone, Copy)]
+pub struct ChaseInput<'a> {
+    /// The tick.
+    pub tick: &'a Tick,
+    /// How long its frame takes.
+    pub frame: Duration,
+    /// Where the film is, if anybody has ever told.
+    pub point: Option<FilmPoint>,
+    /// How much later than the film the motion is to be, milliseconds.
+    pub trim_ms: i32,
+    /// Whether the hall is armed and lets the film lead: nothing in here makes it so.
+    pub may_lead: bool,
+}
+
+/// What the point of a tick means for the seats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ChaseSign {
+    /// The hall does not let the film lead.
+    Barred,
+    /// There is nothing more to follow.
+    Over(ParkCause),
+    /// It cannot be followed.
+    Unready(HoldCause),
+    /// It can, for a moment so far.
+    Brief,
+    /// It can.
+    Ready,
+}
+
+impl ChaseState {
+    #[rustfmt::skip] // As a table.
+    const fn next(self, sign: ChaseSign) -> Self {
+        use ChaseState::{Following, Holding, Leaving, Waiting};
+        match (sign, self) {
+            (ChaseSign::Barred, Waiting | Following | Holding | Leaving) => Waiting,
+            (ChaseSign::Over(_), Waiting) => Waiting, // nothing has moved
+            (ChaseSign::Over(_), Following | Holding | Leaving) => Leaving,
+            (ChaseSign::Unready(_), Waiting) => Waiting,
+            (ChaseSign::Unready(_), Following | Holding) => Holding,
+            (ChaseSign::Unready(_) | ChaseSign::Brief | ChaseSign::Ready, Leaving) => Leaving,
+            (ChaseSign::Brief, Waiting) => Waiting,
+            (ChaseSign::Brief, Following | Holding) => Following,
+            (ChaseSign::Ready, Waiting | Following | Holding) => Following,
+        }
+    }
+}
+
+/// The chase of one show.
+#[derive(Debug, Clone)]
+pub struct Chase {
+    rules: ChaseRules,
+    state: ChaseState,
+    since: MonoTime,
+    follower: Follower,
+    /// How often seats have joined, and when they did last.
+    joins: u32,
+    joined: [MonoTime; UNSTABLE_JOINS],
+    /// A person lets them join once.
+    let_join: bool,
+    ready_since: Option<MonoTime>,
+    outside_since: Option<MonoTime>,
+    why: HoldCause,
+    end: ParkCause,
+}
+
+impl Chase {
+    /// A show whose seats are parked.
+    #[must_use]
+    pub const fn new(rules: ChaseRules, now: MonoTime) -> Self {
+        Self {
+            rules,
+            state: ChaseState::Waiting,
+            since: now,
+            follower: Follower::new(rules.pace),
+            joins: 0,
+            joined: [MonoTime::from_nanos(0); UNSTABLE_JOINS],
+            let_join: false,
+            ready_since: None,
+            outside_since: None,
+            why: HoldCause::Film(FilmState::Absent),
+            end: ParkCause::CueLeft,
+        }
+    }
+
+    /// Where it stands.
+    #[must_use]
+    pub const fn state(&self) -> ChaseState {
+        self.state
+    }
+
+    /// A person lets seats that hold join, once.
+    pub const fn let_join(&mut self) {
+        self.let_join = true;
+    }
+
+    /// What the seats are to do.
+    pub fn tick(&mut self, input: &ChaseInput<'_>) -> ChaseVerdict {
+        let now = input.tick.deadline;
+        let end = now + input.frame;
+        let sign = self.sign(input, now, end);
+        let from = self.state;
+        self.state = from.next(sign);
+        if self.state != from {
+            self.since = now;
+        }
+        match (sign, input.point) {
+            (ChaseSign::Over(cause), _) => self.end = cause,
+            (ChaseSign::Unready(cause), _) => self.why = cause,
+            (ChaseSign::Brief | ChaseSign::Ready, Some(point)) if self.state == ChaseState::Following => {
+                if from == ChaseState::Following {
+                    self.follower.follow(&point, end, input.frame, input.trim_ms);
+                } else {
+                    self.join(&point, (now, end), input.trim_ms);
+                }
+            }
+            (ChaseSign::Barred | ChaseSign::Brief | ChaseSign::Ready, _) => {}
+        }
+        self.verdict()
+    }
+
+    fn join(&mut self, point: &FilmPoint, (now, end): (MonoTime, MonoTime), trim_ms: i32) {
+        self.follower.join(point, end, trim_ms);
+        self.joined[self.joins as usize % UNSTABLE_JOINS] = now;
+        self.joins = self.joins.wrapping_add(1);
+        self.let_join = false;
+    }
+
+    const fn verdict(&self) -> ChaseVerdict {
+        match self.state {
+            ChaseState::Waiting => ChaseVerdict::Wait,
+            ChaseState::Following => ChaseVerdict::Follow {
+                join: self.joins,
+                playhead: self.follower.playhead(),
+                pace: self.follower.pace(),
+            },
+            ChaseState::Holding => ChaseVerdict::Hold(self.why),
+            ChaseState::Leaving => ChaseVerdict::Park(self.end),
+        }
+    }
+
+    fn sign(&mut self, input: &ChaseInput<'_>, now: MonoTime, end: MonoTime) -> ChaseSign {
+        if !input.may_lead {
+            (self.ready_since, self.outside_since) = (None, None);
+            return ChaseSign::Barred;
+        }
+        let state = input.point.map_or(FilmState::Absent, |point| point.state);
+        let Some(point) = input.point.filter(|point| point.state.may_lead() && point.rate > 0.0) else {
+            self.ready_since = None;
+            return self.sign_of_nobody(state, now);
+        };
+        if self.has_left(point.media_at(end), now) {
+            return ChaseSign::Over(ParkCause::CueLeft);
+        }
+        let is_apart = self.state == ChaseState::Following
+            && self.follower.error_s(&point, end, input.frame).abs() > self.rules.join_above.as_secs_f64();
+        if is_apart {
+            return ChaseSign::Unready(HoldCause::Apart);
+        }
+        if let Some(cause) = self.waits_for_a_person(now) {
+            return self.held(cause, now);
+        }
+        let since = *self.ready_since.get_or_insert(now);
+        let is_ready = now.since(since) >= READY_FOR || state == FilmState::FreeRunning;
+        // Seats that are parked wait for a film that is before the cue, and for one that is behind it.
+        let is_ready = is_ready && self.outside_since.is_none();
+        if is_ready { ChaseSign::Ready } else { ChaseSign::Brief }
+    }
+
+    /// The film cannot be followed.
+    fn sign_of_nobody(&mut self, state: FilmState, now: MonoTime) -> ChaseSign {
+        if state == FilmState::Ended {
+            return ChaseSign::Over(ParkCause::FilmEnded);
+        }
+        self.outside_since = None;
+        self.held(HoldCause::Film(state), now)
+    }
+
+    fn held(&self, cause: HoldCause, now: MonoTime) -> ChaseSign {
+        let is_too_long = self.state == ChaseState::Holding && now.since(self.since) > HELD_AFTER;
+        if is_too_long { ChaseSign::Over(ParkCause::HeldTooLong) } else { ChaseSign::Unready(cause) }
+    }
+
+    /// Whether the film has been outside the cue for so long that it has left it.
+    fn has_left(&mut self, media: ShowTime, now: MonoTime) -> bool {
+        if (PRE_ROLL..=self.rules.cue_end).contains(&media) {
+            self.outside_since = None;
+            return false;
+        }
+        let since = *self.outside_since.get_or_insert(now);
+        now.since(since) > LEFT_AFTER
+    }
+
+    /// Why seats that hold may not join by themselves, if they may not.
+    fn waits_for_a_person(&self, now: MonoTime) -> Option<HoldCause> {
+        if self.state != ChaseState::Holding || self.let_join {
+            return None;
+        }
+        let oldest = self.joined[self.joins as usize % UNSTABLE_JOINS];
+        let many = self.joins as usize >= UNSTABLE_JOINS && now.since(oldest) < UNSTABLE_WITHIN;
+        match self.rules.rejoin {
+            Rejoin::Ask => Some(HoldCause::Asks),
+            // Said once, it stays so: time alone makes no source stable.
+            Rejoin::Auto if many || self.why == HoldCause::Unstable => Some(HoldCause::Unstable),
+            Rejoin::Auto => None,
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! Where the film is, by whoever knows: timecode, a player, a clock. What a source tells becomes observations, these an estimate,
+//! the best of the estimates the point that the tick thread follows, a little faster or slower, never in a jump.
+//!
+//! ```text
+//!  bytes, sound, lines -> ltc, mtc, artnet, mpv -> Observation -> SourceTracker -> Chooser -> PublishedPoint
+//!                          readers' threads                                                         | tick thread
+//!                                                     playhead, hold, park <- Chase <- Follower <---+
+//! ```
+//!
+//! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
+//! says what a hall that is armed may do, and no more.
+#![cfg_attr(
+    not(test),
+    expect(dead_code, reason = "the readers of sources and the show that they lead come next")
+)]
+
+pub mod chase;
+pub mod follower;
+pub(crate) mod observation;
+pub mod point;
+#[cfg(test)]
+mod testing;
+pub(crate) mod timecode;
+pub(crate) mod tracker;

@@ -1,0 +1,228 @@
+//! Where the film is at an instant, and how that gets from who knows it to the tick thread: levels in atomics, which nobody waits for.
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+use std::time::Duration;
+
+use crate::time::{MonoTime, Rate, ShowTime, Tick};
+
+/// A point older than this speaks for nobody. Whoever publishes does so ten times a second, whatever the source does; if that
+/// thread hangs, seats must not follow its last word for ever. A loaded machine may hold it up for some of these.
+pub const STALE: Duration = Duration::from_millis(500);
+
+/// What may be said of where the film is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FilmState {
+    /// The show is its own film: there is nobody to chase.
+    FreeRunning,
+    /// Nobody has told anything yet.
+    Absent,
+    /// It is told, and not known well enough.
+    Acquiring,
+    /// It is known.
+    Locked,
+    /// Nobody tells at the moment; the estimate runs on.
+    Freewheeling,
+    /// It was stopped.
+    Stopped,
+    /// It is over.
+    Ended,
+    /// It was wound, or jumped; where it is now is not known well enough.
+    Jumped,
+    /// It runs backwards.
+    Reverse,
+    /// It is wound with the picture on, or runs at another speed than the seats may follow.
+    Shuttle,
+    /// What is told makes no sense.
+    Unusable,
+    /// Nobody tells any more.
+    Lost,
+}
+
+impl FilmState {
+    /// All of them; the place of each is its number in [`PublishedPoint`].
+    pub const ALL: [Self; 12] = [
+        Self::FreeRunning,
+        Self::Absent,
+        Self::Acquiring,
+        Self::Locked,
+        Self::Freewheeling,
+        Self::Stopped,
+        Self::Ended,
+        Self::Jumped,
+        Self::Reverse,
+        Self::Shuttle,
+        Self::Unusable,
+        Self::Lost,
+    ];
+
+    /// True if seats may follow.
+    #[must_use]
+    pub const fn may_lead(self) -> bool {
+        matches!(self, Self::FreeRunning | Self::Locked | Self::Freewheeling)
+    }
+}
+
+/// Where the film is at an instant, and how fast it runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilmPoint {
+    /// The instant.
+    pub at: MonoTime,
+    /// Where the film is then.
+    pub media: ShowTime,
+    /// How many times as fast as the clock it runs.
+    pub rate: f64,
+    /// Grows with each jump of the film.
+    pub epoch: u32,
+    /// What this rests on.
+    pub state: FilmState,
+}
+
+impl FilmPoint {
+    /// Where the film is at another instant, if it runs on as it does.
+    #[must_use]
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "a point is used within seconds, in which a nanosecond counts"
+    )]
+    pub fn media_at(&self, at: MonoTime) -> ShowTime {
+        let (ahead, behind) = (at.since(self.at), self.at.since(at));
+        let passed = (ahead.as_nanos() as f64 - behind.as_nanos() as f64) * 1e-9 * self.rate;
+        ShowTime::from_nanos(self.media.as_nanos().saturating_add(ShowTime::from_secs_f64(passed).as_nanos()))
+    }
+}
+
+/// The newest point, for one writer and any reader.
+#[derive(Debug, Default)]
+pub struct PublishedPoint {
+    /// Odd while a point is being written; 0 before the first.
+    version: AtomicU32,
+    at: AtomicU64,
+    media: AtomicU64,
+    rate: AtomicU64,
+    /// The epoch, and below it the number of the state.
+    epoch: AtomicU64,
+}
+
+const STATE_BITS: u32 = 8;
+
+impl PublishedPoint {
+    /// Publishes a point. Only one thread may.
+    pub fn publish(&self, point: &FilmPoint) {
+        let version = self.version.load(Ordering::Relaxed);
+        self.version.store(version.wrapping_add(1), Ordering::Relaxed);
+        // Nothing of the point is seen before the version is odd.
+        fence(Ordering::Release);
+        self.at.store(point.at.as_nanos(), Ordering::Relaxed);
+        self.media.store(point.media.as_nanos().cast_unsigned(), Ordering::Relaxed);
+        self.rate.store(point.rate.to_bits(), Ordering::Relaxed);
+        let state = FilmState::ALL.iter().position(|state| *state == point.state).unwrap_or_default();
+        self.epoch.store(u64::from(point.epoch) << STATE_BITS | state as u64, Ordering::Relaxed);
+        // Zero stays for "none": after 2^31 points the count begins anew.
+        let next = version.wrapping_add(2);
+        self.version.store(if next == 0 { 2 } else { next }, Ordering::Release);
+    }
+
+    /// The newest point; `None` before the first and while one is being written.
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "what was put together is taken apart")]
+    pub fn read(&self) -> Option<FilmPoint> {
+        let version = self.version.load(Ordering::Acquire);
+        if version == 0 || version % 2 == 1 {
+            return None;
+        }
+        let word = self.epoch.load(Ordering::Relaxed);
+        let point = FilmPoint {
+            at: MonoTime::from_nanos(self.at.load(Ordering::Relaxed)),
+            media: ShowTime::from_nanos(self.media.load(Ordering::Relaxed).cast_signed()),
+            rate: f64::from_bits(self.rate.load(Ordering::Relaxed)),
+            epoch: (word >> STATE_BITS) as u32,
+            state: *FilmState::ALL.get((word & 0xff) as usize)?,
+        };
+        // What was loaded before this is of one version if the version is still the same after it.
+        fence(Ordering::Acquire);
+        (self.version.load(Ordering::Relaxed) == version).then_some(point)
+    }
+}
+
+/// A film that runs by the ticks: where nobody is chased.
+#[derive(Debug, Clone)]
+pub struct OwnFilm {
+    rate: Rate,
+    media: ShowTime,
+    runs: bool,
+}
+
+/// The newest point of a film that is chased.
+#[derive(Debug)]
+pub struct ChasedFilm {
+    source: Arc<PublishedPoint>,
+    last: Option<FilmPoint>,
+}
+
+/// Who says where the film is: the ticks or a source. Read once a tick.
+#[derive(Debug)]
+pub enum FilmClock {
+    /// The ticks themselves.
+    FreeRunning(OwnFilm),
+    /// A source.
+    Chase(ChasedFilm),
+}
+
+impl FilmClock {
+    /// A film that starts there and runs by the ticks.
+    #[must_use]
+    pub const fn free_running(rate: Rate, start: ShowTime) -> Self {
+        Self::FreeRunning(OwnFilm { rate, media: start, runs: true })
+    }
+
+    /// A film that somebody else shows.
+    #[must_use]
+    pub const fn chase(source: Arc<PublishedPoint>) -> Self {
+        Self::Chase(ChasedFilm { source, last: None })
+    }
+
+    /// Lets a film that runs by the ticks wait, or go on; one that is chased asks nobody here.
+    pub const fn run(&mut self, runs: bool) {
+        if let Self::FreeRunning(film) = self {
+            film.runs = runs;
+        }
+    }
+
+    /// Where the film is at the deadline of a tick whose frame takes so long; `None` if nobody has ever told.
+    pub fn at(&mut self, tick: &Tick, frame: Duration) -> Option<FilmPoint> {
+        match self {
+            Self::FreeRunning(film) => Some(film.at(tick, frame)),
+            Self::Chase(film) => film.at(tick),
+        }
+    }
+}
+
+impl OwnFilm {
+    /// It counts the frames' Times, not the clock: an undisturbed grid leaves no error to take back.
+    fn at(&mut self, tick: &Tick, frame: Duration) -> FilmPoint {
+        let rate = if self.runs { 1.0 } else { 0.0 };
+        if self.runs {
+            self.media += self.rate.offset(tick.missed);
+        }
+        let media = self.media;
+        if self.runs {
+            self.media += frame;
+        }
+        FilmPoint { at: tick.deadline, media, rate, epoch: 0, state: FilmState::FreeRunning }
+    }
+}
+
+impl ChasedFilm {
+    fn at(&mut self, tick: &Tick) -> Option<FilmPoint> {
+        self.last = self.source.read().or(self.last);
+        let mut point = self.last?;
+        if tick.deadline.since(point.at) > STALE {
+            point.state = FilmState::Lost;
+        }
+        Some(point)
+    }
+}
