@@ -35,8 +35,8 @@ pub mod config;
 pub mod proof;
 
 pub mod belief;
+pub mod drive;
 pub mod engine;
-pub mod fanout;
 pub mod film;
 pub mod limiter;
 pub mod plan;
@@ -49,7 +49,6 @@ pub mod observe;
 pub mod tracker;
 
 pub mod device;
-mod drive;
 pub mod preflight;
 
 pub mod control;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::belief::{KnownPose, Reading, Taken};
 use crate::config::Controller;
-use crate::fanout::Lane;
+use crate::drive::Lane;
 use crate::net::{Delivery, Sender};
 use crate::plan::slow_park_time;
 use crate::rt::{AckLoop, Live, Places, Sent};
@@ -208,7 +208,7 @@ impl<C: Clock> Preparation<'_, C> {
     fn wait_until(&mut self, until: MonoTime, enough: impl Fn(&Self) -> bool) {
         while self.clock.now() < until && !self.stopped() {
             self.clock.sleep_until((self.clock.now() + LOOK).min(until));
-            self.acks.drain(&mut |_, _| false);
+            self.acks.drain(&mut |_, _, _| false);
             if enough(self) {
                 return;
             }

@@ -1,14 +1,20 @@
-//! Families of drives behind one seam: what a running hall needs of a controller into its requests, its answers into evidence.
-//! Ack thread; pure: told the time, handed what came and given a way to send; allocates nothing.
+//! Families of drives behind one seam: poses into datagrams ([`Lane`], tick thread), what a running hall needs of a controller into
+//! requests, and what it answers into evidence ([`Peer`], ack thread). Pure: told the time, handed what came and given a way to
+//! send; allocates nothing once the lanes are made.
 //!
 //! Whoever takes the evidence knows no register, and no family another one.
 
-pub(crate) mod mbox;
+mod lane;
+mod lanes;
+mod mbox;
 mod rounds;
 
+pub use lane::{Lane, Stamped};
+pub use lanes::{Manner, lanes};
 pub(crate) use rounds::Rounds;
 
 use crate::belief::Reading;
+use crate::config::Controller;
 use crate::health::Sighting;
 use crate::motion::Pulses;
 use crate::observe::Look;
@@ -100,58 +106,62 @@ pub(crate) struct Seen {
 }
 
 impl Peer {
-    /// Asks for what is needed by `send`, which says whether the kernel took a datagram; gives how many it took.
-    pub(crate) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
-        let Self::Mbox(peer) = self;
-        peer.poll(need, now, send)
+    /// The controller to which a lane sends.
+    pub(crate) fn new(controller: &Controller, lane: &Lane) -> Self {
+        match &lane.codec {
+            lane::Codec::Mbox(codec) => Self::Mbox(mbox::MboxPeer::new(controller, lane, codec.code)),
+        }
     }
 
-    /// Takes a message that is no reply to a frame; what it does not say, another thread may have asked for where `others_ask`. Says
-    /// whether it answers anything.
+    fn mbox(&mut self) -> &mut mbox::MboxPeer {
+        let Self::Mbox(peer) = self;
+        peer
+    }
+
+    /// Asks for what is needed by `send`, which says whether the kernel took a datagram; gives how many it took.
+    pub(crate) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
+        self.mbox().poll(need, now, send)
+    }
+
+    /// Takes a message that is no reply to a frame: of what it is evidence. What nobody here waits for another thread may have asked
+    /// where `others_ask`.
     pub(crate) fn receive(
         &mut self,
         message: &FromController<'_>,
         others_ask: bool,
         at: MonoTime,
         out: &mut EvidenceList,
-    ) -> bool {
-        let Self::Mbox(peer) = self;
-        peer.receive(message, others_ask, at, out)
+    ) {
+        self.mbox().receive(message, others_ask, at, out);
     }
 
     /// Takes the reply code of a frame; says whether it is a refusal of that frame, and not how the controller is.
     pub(crate) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
-        let Self::Mbox(peer) = self;
-        peer.on_reply_code(code)
+        self.mbox().on_reply_code(code)
     }
 
     /// Takes what a controller reported unasked of where its axes are.
     pub(crate) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Whereabouts {
-        let Self::Mbox(peer) = self;
-        peer.on_report(positions, at)
+        self.mbox().on_report(positions, at)
     }
 
     /// A frame went to it.
     pub(crate) fn on_sent(&mut self, at: MonoTime) {
-        let Self::Mbox(peer) = self;
-        peer.on_sent(at);
+        self.mbox().position.on_sent(at);
     }
 
     /// It is home, as it was asked to be.
     pub(crate) fn on_homed(&mut self) {
-        let Self::Mbox(peer) = self;
-        peer.on_homed();
+        self.mbox().position.on_homed();
     }
 
     /// True if it leaves so much unanswered that it is not to be asked again yet while frames flow.
     pub(crate) fn is_behind(&mut self, now: MonoTime) -> bool {
-        let Self::Mbox(peer) = self;
-        peer.is_full(now)
+        self.mbox().pending.is_full(now)
     }
 
     /// True if it has answered something of what it was when last asked for its identity.
-    pub(crate) fn has_answered(&self) -> bool {
-        let Self::Mbox(peer) = self;
-        peer.has_answered()
+    pub(crate) fn has_answered(&mut self) -> bool {
+        self.mbox().probe.has_answered()
     }
 }

@@ -14,8 +14,8 @@ use crate::app::StagedShow;
 use crate::belief::Reading;
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
+use crate::drive::Manner;
 use crate::engine::{Mix, Show};
-use crate::fanout::Manner;
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
 use crate::rt::{

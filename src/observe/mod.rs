@@ -247,11 +247,6 @@ impl Observer {
         state.heard_at = Some(at);
     }
 
-    /// Hears inputs that were read from the monitor registers.
-    pub fn on_inputs(&mut self, controller: usize, inputs: u16, at: MonoTime) {
-        self.note_inputs(controller, inputs, at);
-    }
-
     /// Which controller sent a report from a port that is none of the frame ports: the one at that address, where there
     /// are several the one whose control ID it says. None where that leaves it open.
     #[must_use]

@@ -9,12 +9,11 @@ use rtrb::Consumer;
 use super::{Live, Sent, TickReport, Watch};
 use crate::drive::Need;
 use crate::health::Change;
-use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Answer, Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, FromController, MotionReply, PerAxis, ReplyCode};
+use crate::wire::{FrameNo, FromController, MotionReply, ReplyCode};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
@@ -162,7 +161,7 @@ impl AckLoop {
 
     /// Drains once, and tells what is new, or all where it is time to; gives when to drain next.
     pub fn step(&mut self, clock: &impl Clock, drains: DrainGrid, tell_at: &mut MonoTime) -> MonoTime {
-        self.drain(&mut |_, _| false);
+        self.drain(&mut |_, _, _| false);
         if clock.now() >= *tell_at {
             self.tell_times();
             *tell_at = clock.now() + TELL;
@@ -199,7 +198,7 @@ impl AckLoop {
 
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
-    pub fn drain(&mut self, other: &mut dyn FnMut(usize, &FromController<'_>) -> bool) {
+    pub fn drain(&mut self, other: &mut dyn FnMut(usize, &FromController<'_>, MonoTime) -> bool) {
         let Self { receiver, accounts, sent, ticks, last_sent, heard, watch, live, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
@@ -225,7 +224,7 @@ impl AckLoop {
                     let passed = watch.pass_on(controller, octets, at);
                     watch.hear(observer, controller, &message, passed, at)
                 })
-                || other(controller, &message);
+                || other(controller, &message, at);
             if !is_known {
                 books.tracker_mut().on_stray(controller);
             }
@@ -260,11 +259,6 @@ impl AckLoop {
     #[must_use]
     pub fn has_heard(&self, controller: usize) -> bool {
         self.heard[controller]
-    }
-
-    /// Notes positions that were read from registers before the tick loop runs.
-    pub fn on_positions(&mut self, controller: usize, positions: PerAxis<Pulses>, at: MonoTime) {
-        self.accounts.observer.on_positions(controller, positions, at);
     }
 
     /// Notes a frame that is about to be sent before the tick loop runs.

@@ -37,8 +37,8 @@ pub use watch::Watch;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::belief::Taken;
+use crate::drive::{Lane, Stamped};
 use crate::engine::{Beat, Ending, Engine, Step};
-use crate::fanout::{Lane, Stamped};
 use crate::net::{Delivery, Sender};
 use crate::state::{Refusal, State};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};

@@ -8,6 +8,7 @@ use rtrb::Consumer;
 use super::desk::Desk;
 use super::line::LineEnd;
 use crate::config::Controller;
+use crate::drive::Seen;
 use crate::health::{HealthState, HealthTable};
 use crate::state::Finding;
 use crate::time::MonoTime;
@@ -28,14 +29,7 @@ pub struct Standby {
     /// Whether the program is still to find out where the seats stand, and whether it crashed the last time.
     boot: Option<bool>,
     /// What each controller said of its zero, and whether its seat stands at park.
-    seen: Vec<Option<Parked>>,
-}
-
-/// What was read of one controller.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Parked {
-    pub(super) homed: bool,
-    pub(super) at_park: bool,
+    seen: Vec<Option<Seen>>,
 }
 
 impl Standby {
@@ -57,13 +51,13 @@ impl Standby {
     }
 
     /// Notes what was read of a controller.
-    pub(super) fn on_seen(&mut self, controller: usize, seen: Parked) {
+    pub(super) fn on_seen(&mut self, controller: usize, seen: Seen) {
         self.seen[controller] = Some(seen);
     }
 
     /// Whether a controller knows its position; none where it never told.
     pub(super) fn homed(&self, controller: usize) -> Option<bool> {
-        self.seen[controller].map(|seen| seen.homed)
+        self.seen[controller].map(|seen| seen.sighting.homed)
     }
 
     /// Whether somebody wants a controller to take part.
@@ -110,7 +104,7 @@ impl Standby {
         let mut finding = Finding { homed: true, at_park: true, crashed };
         for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {
             let seen = known(controller)?;
-            finding.homed &= seen.homed;
+            finding.homed &= seen.sighting.homed;
             finding.at_park &= seen.at_park;
         }
         self.boot = None;

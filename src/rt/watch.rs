@@ -15,9 +15,7 @@ use super::mail::{Alarm, Sent};
 use super::standby::Standby;
 use super::table::{Row, Turns};
 use crate::config::Controller;
-use crate::drive::mbox::{MboxPeer, MboxSetup};
-use crate::drive::{EvidenceList, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
-use crate::fanout::Lane;
+use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
 use crate::health::{Change, HealthState, HealthTable, Notice};
 use crate::net::Sender;
 use crate::observe::Observer;
@@ -92,7 +90,7 @@ impl Watch {
             live.on_reader();
         }
         Self {
-            peers: controllers.iter().zip(lanes).map(peer).collect(),
+            peers: controllers.iter().zip(lanes).map(|(one, lane)| Peer::new(one, lane)).collect(),
             evidence: Vec::with_capacity(MOST_EVIDENCE),
             rounds: Rounds::new(controllers.len()),
             notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
@@ -368,64 +366,5 @@ impl Watch {
     }
 }
 
-/// The other end of a lane.
-fn peer((controller, lane): (&Controller, &Lane)) -> Peer {
-    let (first_slot, own) = (controller.first_slot(), controller.seat.axes);
-    let places = lane.window.slots().len() - first_slot;
-    // Axes beyond those of the seat type are read where frames have no more than places that are always 0: whoever stands there
-    // elsewhere than at 0 would be led there at once.
-    let mut beyond = lane.window.slots().iter().skip(first_slot + own);
-    let axes = if beyond.all(|slot| slot.axis.is_none()) { places } else { own };
-    Peer::Mbox(MboxPeer::new(MboxSetup {
-        code: lane.code,
-        dialect: controller.dialect,
-        seat: Arc::clone(&controller.seat),
-        first_slot,
-        places,
-        axes,
-        park: lane.window.park(),
-        estop_inputs: controller.estop_inputs,
-        has_belts: controller.belt_inputs != 0,
-    }))
-}
-
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use rtrb::RingBuffer;
-
-    use super::*;
-    use crate::config::{LossPolicy, from_to_args};
-    use crate::cue::{Source, read};
-    use crate::fanout::{Manner, lanes};
-    use crate::health::Groups;
-    use crate::net::Ports;
-    use crate::timeline::Timeline;
-
-    #[test]
-    fn no_alarm_is_dropped_where_the_tick_thread_has_no_room_and_all_come_in_their_order() {
-        let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
-        let config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
-        let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
-        let (sender, _) =
-            Ports::open("127.0.0.1:0".parse().unwrap(), &[config.controllers[0].address]).unwrap().split();
-        let (producer, mut alarms) = RingBuffer::new(2);
-        let health = HealthTable::new(
-            Groups::of(&config.controllers),
-            LossPolicy::Continue,
-            1,
-            Duration::from_millis(10),
-        );
-        let mut watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
-        let all: Vec<Alarm> = (0..7).map(Alarm::Leave).collect();
-        all.iter().for_each(|alarm| watch.alarm(*alarm));
-        let mut heard = Vec::new();
-        while heard.len() < all.len() {
-            watch.send_alarms();
-            assert!(!alarms.is_empty(), "{heard:?}");
-            heard.extend(std::iter::from_fn(|| alarms.pop().ok()));
-        }
-        assert_eq!(heard, all);
-    }
-}
+mod tests;

@@ -1,5 +1,6 @@
-//! SMC, IMAX and MBOX controllers, as a running hall asks them for registers and hears of them.
+//! SMC, IMAX and MBOX controllers: their frames, and how a running hall asks them for registers and hears of them.
 
+mod frame;
 mod pending;
 mod position;
 mod probe;
@@ -8,14 +9,16 @@ mod stop_signs;
 
 use std::sync::Arc;
 
-use super::{Evidence, EvidenceList, Need, Seen, Whereabouts};
+use super::{Evidence, EvidenceList, Lane, Need, Seen, Whereabouts};
 use crate::belief::Reading;
+use crate::config::Controller;
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
 use crate::time::MonoTime;
 use crate::wire::{
     Code, DP_POSITIONS, Dialect, FromController, MAX_LEN, RegisterReply, ReplyCode, Words, WriteRequest,
     positions,
 };
+pub(super) use frame::{MotionCodec, Wiring};
 use pending::Pending;
 use position::Positions;
 use probe::Probe;
@@ -32,50 +35,52 @@ const KEEP_ALIVE: [MonitorRead; 4] = [FirstPositions, MorePositions, Inputs, Zer
 /// How far from where it rests a seat has to be found to have been moved, in strokes: 0.3 mm of 150.
 const NEAR: f64 = 0.002;
 
-/// What has to be known of a controller, and of the lane that sends to it.
-#[derive(Debug, Clone)]
-pub(crate) struct MboxSetup {
-    /// Who takes requests, and who answers.
-    pub(crate) code: Code,
-    pub(crate) dialect: Dialect,
-    pub(crate) seat: Arc<SeatType>,
-    /// The place of its first own axis in a frame.
-    pub(crate) first_slot: usize,
-    /// Axes for which its frames have places.
-    pub(crate) places: usize,
-    /// Those of them that are read, though not all have registers.
-    pub(crate) axes: usize,
-    /// Where its lane is parked.
-    pub(crate) park: Pose,
-    /// Inputs of which any one means an emergency stop.
-    pub(crate) estop_inputs: u16,
-    /// Somebody waits for a belt: its inputs are asked for while nothing moves as well.
-    pub(crate) has_belts: bool,
-}
-
 /// One controller.
 #[derive(Debug)]
 pub(crate) struct MboxPeer {
-    setup: MboxSetup,
-    /// Axes whose registers are read.
+    /// Who takes requests, and who answers.
+    code: Code,
+    dialect: Dialect,
+    seat: Arc<SeatType>,
+    /// The place of its first own axis in a frame.
+    first_slot: usize,
+    /// Where its lane is parked.
+    park: Pose,
+    /// Axes for which its frames have places, and those of them whose registers are read.
+    places: usize,
     axes: usize,
-    pending: Pending,
-    position: Positions,
-    probe: Probe,
+    /// Somebody waits for a belt: its inputs are asked for while nothing moves as well.
+    has_belts: bool,
+    pub(super) pending: Pending,
+    pub(super) position: Positions,
+    pub(super) probe: Probe,
     /// How often it was asked for a sign of life: of what it tells, one is asked for at a time.
     turn: usize,
 }
 
 impl MboxPeer {
-    pub(crate) fn new(setup: MboxSetup) -> Self {
-        let axes = setup.axes.min(DP_POSITIONS.len());
+    pub(super) fn new(controller: &Controller, lane: &Lane, code: Code) -> Self {
+        let (dialect, seat, first_slot) = (controller.dialect, &controller.seat, controller.first_slot());
+        let slots = lane.window.slots();
+        let places = slots.len() - first_slot;
+        // Axes beyond those of the seat type are read where frames have no more than places that are always 0: whoever stands there
+        // elsewhere than at 0 would be led there at once.
+        let mut beyond = slots.iter().skip(first_slot + seat.axes);
+        let led = if beyond.all(|slot| slot.axis.is_none()) { places } else { seat.axes };
+        let axes = led.min(DP_POSITIONS.len());
         Self {
+            code,
+            dialect,
+            seat: Arc::clone(seat),
+            first_slot,
+            park: lane.window.park(),
+            places,
             axes,
+            has_belts: controller.belt_inputs != 0,
             pending: Pending::new(),
-            position: Positions::new(Arc::clone(&setup.seat), setup.first_slot, setup.axes),
-            probe: Probe::new(setup.dialect, axes, setup.estop_inputs),
+            position: Positions::new(Arc::clone(seat), first_slot, led),
+            probe: Probe::new(dialect, axes, controller.estop_inputs),
             turn: 0,
-            setup,
         }
     }
 
@@ -108,7 +113,7 @@ impl MboxPeer {
         now: MonoTime,
         send: &mut dyn FnMut(&[u8]) -> bool,
     ) -> u32 {
-        let Some(request) = read.request(self.axes, self.setup.code) else { return 0 };
+        let Some(request) = read.request(self.axes, self.code) else { return 0 };
         let taken = send(request.emit(&mut [0; MAX_LEN]));
         if taken {
             self.pending.asked(read, need, now);
@@ -120,7 +125,7 @@ impl MboxPeer {
     fn next_sign(&mut self, is_led: bool) -> Option<MonitorRead> {
         self.turn = self.turn.wrapping_add(1);
         let is_asked = |read: &MonitorRead| match read {
-            Inputs => self.setup.has_belts,
+            Inputs => self.has_belts,
             Zero => is_led,
             read => read.first_axis().is_some_and(|first| first < self.axes),
         };
@@ -130,7 +135,7 @@ impl MboxPeer {
 
     /// Switches effects off by a register (DPF1, SMC manual 2.3.4), which no frame can that does not move the seat.
     fn darken(&self, send: &mut dyn FnMut(&[u8]) -> bool) -> bool {
-        let (accept, off) = (self.setup.code, [0]);
+        let (accept, off) = (self.code, [0]);
         let data = Words::from(&off[..]);
         let write = WriteRequest { channel: CONTROLS, accept, reply: Code::NONE, start: OUTPUTS, data };
         send(write.emit(&mut [0; MAX_LEN]))
@@ -142,43 +147,40 @@ impl MboxPeer {
         others_ask: bool,
         at: MonoTime,
         out: &mut EvidenceList,
-    ) -> bool {
-        let mut is_answer = others_ask;
+    ) {
         match message {
-            FromController::Registers(reply) => is_answer |= self.on_registers(reply, others_ask, at, out),
+            FromController::Registers(reply) => self.on_registers(reply, others_ask, at, out),
             FromController::WideRegisters => out.push(Evidence::Unreadable),
             _ => {}
         }
         out.extend(others_ask.then_some(Evidence::Answered));
         out.extend(self.take_seen(at).map(Evidence::Seen));
-        if let FromController::Registers(reply) = message
-            && is_answer
-        {
-            self.probe.mind_stop(reply.code);
-            out.push(Evidence::Code(reply.code));
-        }
         out.extend(self.probe.take_look().map(Evidence::Stop));
-        is_answer
     }
 
-    /// Takes the answer to a read; says whether it is one to what is read here.
+    /// Takes the answer to a read.
     fn on_registers(
         &mut self,
         reply: &RegisterReply<'_>,
         others_ask: bool,
         at: MonoTime,
         out: &mut EvidenceList,
-    ) -> bool {
-        let Some(read) = MonitorRead::answered_by(reply, self.axes) else { return false };
+    ) {
+        let read = MonitorRead::answered_by(reply, self.axes);
+        if read.is_some() || others_ask {
+            self.probe.mind_stop(reply.code);
+            out.push(Evidence::Code(reply.code));
+        }
+        let Some(read) = read else { return };
         let claim = self.pending.answered(read, at);
         // What nobody waits for may be the answer to what another thread asked; else it was repeated on its way.
         let is_answer = claim.is_some() || others_ask;
-        let is_sign = read.first_axis().is_some() || (read == Inputs && self.setup.has_belts);
+        let is_sign = read.first_axis().is_some() || (read == Inputs && self.has_belts);
         out.extend((is_answer && is_sign).then_some(Evidence::Alive));
         let word = reply.data.get(0);
         match (read, claim) {
             (FirstPositions | MorePositions, Some(claim)) => {
-                let told = positions(reply.values(self.setup.dialect), self.setup.dialect);
+                let told = positions(reply.values(self.dialect), self.dialect);
                 let first = read.first_axis().unwrap_or_default();
                 let passing = self.position.answer(first, &told, claim, at);
                 out.push(Evidence::Position(self.whereabouts(Some(passing), at)));
@@ -190,7 +192,6 @@ impl MboxPeer {
         }
         self.probe.hear(read, reply);
         out.extend(claim.map(|_| Evidence::Answered));
-        true
     }
 
     /// Whoever joins from where it is found has to be at rest there.
@@ -220,7 +221,7 @@ impl MboxPeer {
     pub(super) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
         self.probe.mind_stop(code);
         // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
-        match self.setup.dialect {
+        match self.dialect {
             Dialect::Smc => matches!(code, ReplyCode::Fault | ReplyCode::Command),
             Dialect::Mbox => code.refused(),
         }
@@ -231,37 +232,21 @@ impl MboxPeer {
         self.whereabouts(None, at)
     }
 
-    pub(super) const fn on_sent(&mut self, at: MonoTime) {
-        self.position.on_sent(at);
-    }
-
-    pub(super) fn on_homed(&mut self) {
-        self.position.on_homed();
-    }
-
-    pub(super) fn is_full(&mut self, now: MonoTime) -> bool {
-        self.pending.is_full(now)
-    }
-
-    pub(super) fn has_answered(&self) -> bool {
-        self.probe.has_answered()
-    }
-
     /// True if frames would lead axes of a controller that nobody here reads: it takes as many as it drives (PA02).
     fn leads_more_axes(&self, drives: u16) -> bool {
-        usize::from(drives).min(self.setup.places) > self.axes.max(self.setup.seat.axes)
+        usize::from(drives).min(self.places) > self.axes.max(self.seat.axes)
     }
 
     /// Whether a seat in that pose stands at park, to a pulse.
     fn is_parked(&self, pose: &Pose) -> bool {
-        let MboxSetup { seat, first_slot, park, .. } = &self.setup;
+        let Self { seat, first_slot, park, .. } = self;
         let apart = |slot: usize| seat.pulses(pose[slot]).0.abs_diff(seat.pulses(park[slot]).0);
         (*first_slot..MAX_AXES.min(first_slot + seat.axes)).all(|slot| apart(slot) <= 1)
     }
 
     /// Whether a seat that is read in that pose is where it is parked, but for what is noise.
     fn rests_at_park(&self, pose: &Pose) -> bool {
-        let MboxSetup { seat, first_slot, park, .. } = &self.setup;
+        let Self { seat, first_slot, park, .. } = self;
         let own = *first_slot..MAX_AXES.min(first_slot + seat.axes.min(DP_POSITIONS.len()));
         own.into_iter().all(|slot| (park[slot] - pose[slot]).abs() <= NEAR)
     }

@@ -20,7 +20,7 @@ const OPEN: usize = 8;
 
 /// All that is open, by the place of each read among [`MonitorRead::ALL`].
 #[derive(Debug)]
-pub(super) struct Pending([VecDeque<(Need, MonoTime)>; MonitorRead::ALL.len()]);
+pub(in crate::drive) struct Pending([VecDeque<(Need, MonoTime)>; MonitorRead::ALL.len()]);
 
 /// What an answer is taken for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl Pending {
     }
 
     /// True if no further request for positions finds a place, since answers are lost.
-    pub(super) fn is_full(&mut self, now: MonoTime) -> bool {
+    pub(in crate::drive) fn is_full(&mut self, now: MonoTime) -> bool {
         MonitorRead::POSITIONS.into_iter().any(|read| self.open(read, now).len() == OPEN)
     }
 

@@ -41,7 +41,7 @@ struct Told {
 
 /// The axes of one controller.
 #[derive(Debug)]
-pub(super) struct Positions {
+pub(in crate::drive) struct Positions {
     seat: Arc<SeatType>,
     /// The place of the first of them in a frame.
     first_slot: usize,
@@ -197,13 +197,13 @@ impl Positions {
     }
 
     /// It says that it is home, as it was asked to be: what it said before was of another zero.
-    pub(super) fn on_homed(&mut self) {
+    pub(in crate::drive) fn on_homed(&mut self) {
         self.told = [None; MAX_AXES];
         self.home = true;
     }
 
     /// A frame went to it: where it stood before says nothing of whether it rests.
-    pub(super) const fn on_sent(&mut self, at: MonoTime) {
+    pub(in crate::drive) const fn on_sent(&mut self, at: MonoTime) {
         (self.home, self.told, self.sent) = (false, [None; MAX_AXES], at);
     }
 

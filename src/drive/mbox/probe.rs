@@ -9,7 +9,7 @@ use crate::wire::{Dialect, RegisterReply, ReplyCode};
 
 /// A look at one controller, again and again.
 #[derive(Debug, Clone)]
-pub(super) struct Probe {
+pub(in crate::drive) struct Probe {
     dialect: Dialect,
     /// Axes whose positions are read.
     axes: usize,
@@ -52,13 +52,12 @@ impl Probe {
     }
 
     /// True if it has answered something of what it was asked last.
-    pub(super) fn has_answered(&self) -> bool {
+    pub(in crate::drive) fn has_answered(&self) -> bool {
         self.seen.answered.contains(&true)
     }
 
     /// Hears an answer to a read.
     pub(super) fn hear(&mut self, read: MonitorRead, reply: &RegisterReply<'_>) {
-        self.mind_stop(reply.code);
         let Self { dialect, seen, .. } = self;
         if !seen.open {
             return;

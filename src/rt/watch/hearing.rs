@@ -1,6 +1,5 @@
 //! What controllers answer to what they were asked, beside acks: evidence for health, observer and the tick thread.
 
-use super::super::standby::Parked;
 use super::Watch;
 use crate::drive::{Evidence, Seen, Whereabouts};
 use crate::observe::Observer;
@@ -23,7 +22,8 @@ impl Watch {
         at: MonoTime,
     ) -> bool {
         let mut evidence = std::mem::take(&mut self.evidence);
-        let is_answer = self.peers[controller].receive(message, passed, at, &mut evidence);
+        self.peers[controller].receive(message, passed, at, &mut evidence);
+        let is_answer = !evidence.is_empty();
         for one in evidence.drain(..) {
             self.take(observer, controller, one, at);
         }
@@ -50,7 +50,7 @@ impl Watch {
             Evidence::Homed(_) => {}
             Evidence::Count(packets) => self.health.on_count(controller, packets),
             Evidence::Unreadable => self.health.on_wide_registers(controller),
-            Evidence::Seen(seen) => self.on_seen(controller, &seen, at),
+            Evidence::Seen(seen) => self.on_seen(controller, seen, at),
             Evidence::Code(code) => observer.on_code(controller, code, at),
             Evidence::Stop(look) => observer.on_look(controller, look, at),
         }
@@ -69,15 +69,15 @@ impl Watch {
         }
     }
 
-    fn on_seen(&mut self, controller: usize, seen: &Seen, at: MonoTime) {
-        let Seen { sighting, rests, at_park, leads_more_axes } = *seen;
+    fn on_seen(&mut self, controller: usize, seen: Seen, at: MonoTime) {
+        let Seen { sighting, rests, leads_more_axes, .. } = seen;
         if leads_more_axes {
             self.health.on_more_axes(controller, sighting.identity.axes);
         }
         if rests || !self.stands(controller).is_looked_at() {
             self.health.on_sighting(controller, &sighting, at);
             if let Some(standby) = &mut self.standby {
-                standby.on_seen(controller, Parked { homed: sighting.homed, at_park });
+                standby.on_seen(controller, seen);
             }
         }
     }

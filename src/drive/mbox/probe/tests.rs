@@ -19,6 +19,7 @@ fn answer(probe: &mut Probe, read: MonitorRead, code: ReplyCode, error: u16, wor
     let (start, num, data) = (request.start, request.num, Words::from(words));
     let reply = RegisterReply { access: Access::Read, code, channel, error, start, num, data };
     assert_eq!(MonitorRead::answered_by(&reply, 3), Some(read));
+    probe.mind_stop(code);
     probe.hear(read, &reply);
 }
 
