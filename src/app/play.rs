@@ -19,6 +19,9 @@ use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
+use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
+use crate::film::follower::PaceLimits;
+use crate::film::point::PublishedPoint;
 use crate::health::{Groups, HealthTable};
 use crate::motion::Window;
 use crate::net::{NetError, Ports, Sender};
@@ -123,6 +126,16 @@ pub struct Play {
     control: Control,
     /// True if nothing may move.
     holds: bool,
+    chased: Option<Chased>,
+}
+
+/// A film that a play chases.
+#[derive(Debug, Clone)]
+pub(super) struct Chased {
+    /// Where its source says where it is.
+    pub(super) source: Arc<PublishedPoint>,
+    /// How it is followed.
+    pub(super) rules: ChaseRules,
 }
 
 /// What a play is led and watched by while it runs.
@@ -172,6 +185,25 @@ impl Play {
         Ok(Self::of(config, staged, manner))
     }
 
+    /// A play that waits, parked, for a film, and follows that: proved at the greatest pace that the film may ask for.
+    ///
+    /// # Errors
+    /// As [`Play::new`].
+    pub fn chasing(
+        config: Config,
+        timeline: Timeline,
+        show: Show,
+        manner: Manner,
+        source: Arc<PublishedPoint>,
+    ) -> Result<Self, PlayError> {
+        let (pace, join_above, rejoin) = (PaceLimits::default(), JOIN_ABOVE, Rejoin::Auto);
+        fit(&config, &timeline)?;
+        keeps_limits(&at_any_pace(&config, pace), &timeline, show.rate, manner.level)?;
+        let rules = ChaseRules { pace, join_above, rejoin, cue_end: timeline.duration() };
+        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        Ok(Self { chased: Some(Chased { source, rules }), ..Self::of(config, staged, manner) })
+    }
+
     /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin
     /// unless every seat tells that it stands there, to a pulse.
     ///
@@ -189,7 +221,7 @@ impl Play {
         let live = Arc::new(Live::new(staged.lanes.len()));
         let (mail, ends) = mailboxes(staged.lanes.len(), staged.show.rate, Arc::clone(&live));
         let control = Control { desk: Arc::new(staged.desk()), live, leave: Arc::default() };
-        Self { config, manner, staged, mail, ends, control, holds: false }
+        Self { config, manner, staged, mail, ends, control, holds: false, chased: None }
     }
 
     /// What it is led and watched by.
@@ -244,7 +276,10 @@ impl Play {
         } else {
             preparation.run(!self.manner.silent).map_err(PlayError::of)?
         };
-        let (engine, lanes, planner, timeline) = self.staged.split();
+        let (mut engine, lanes, planner, timeline) = self.staged.split();
+        if self.chased.is_some() {
+            engine = engine.waiting();
+        }
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         let spin = Duration::from_micros(u64::from(self.config.show.spin_us));
@@ -257,6 +292,7 @@ impl Play {
             places,
             sender,
             mail: self.mail,
+            chased: self.chased,
         };
         let attended = lead(PlayHandle { commands, news });
         let parks: Vec<Window> = stage.lanes.iter().map(|lane| lane.window.clone()).collect();
@@ -345,6 +381,17 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
         return Err(PlayError::Misfit { cue: timeline.cue().path().to_path_buf(), misfits });
     }
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
+}
+
+/// The hall with what is left of its seats' limits at those paces.
+fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
+    let mut config = config.clone();
+    for controller in &mut config.controllers {
+        let seat = Arc::make_mut(&mut controller.seat);
+        [seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3] =
+            pace.leave(seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3);
+    }
+    config
 }
 
 fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) -> Result<(), PlayError> {

@@ -5,12 +5,12 @@ use std::thread;
 use std::time::Duration;
 
 use super::helpers::{EndFlags, Helpers};
-use super::play::Control;
+use super::play::{Chased, Control};
 use super::run::Run;
 use crate::drive::Lane;
 use crate::engine::Engine;
 use crate::net::{DrainGrid, Sender};
-use crate::rt::{AckLoop, Conductor, Mail, Places, PlanLoop, Spinning, TickLoop};
+use crate::rt::{AckLoop, Conductor, FilmLead, Mail, Places, PlanLoop, Spinning, TickLoop};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
 use crate::time::{Clock as _, Rate, TickGrid};
@@ -31,6 +31,8 @@ pub(super) struct Stage {
     pub(super) places: Places,
     pub(super) sender: Sender,
     pub(super) mail: Mail,
+    /// The film that it chases.
+    pub(super) chased: Option<Chased>,
 }
 
 impl Stage {
@@ -46,7 +48,7 @@ impl Stage {
         attended: bool,
         control: &Control,
     ) -> io::Result<Run> {
-        let Self { silent, rate, spin, engine, lanes, places, sender, mut mail } = self;
+        let Self { silent, rate, spin, engine, lanes, places, sender, mut mail, chased } = self;
         let over = EndFlags::default();
         let granted = realtime::request();
         thread::scope(|scope| {
@@ -58,7 +60,8 @@ impl Stage {
             mail.wakes(helpers.planner());
             let grid = TickGrid::new(origin, rate);
             let clock = Spinning::new(&Monotonic, spin, period);
-            let conductor = Conductor::of_a_play(origin, attended);
+            let film = chased.map(|Chased { source, rules }| FilmLead::new(source, rules, origin));
+            let conductor = Conductor::of_a_play(origin, attended).chasing(film);
             let (desk, leave) = (&*control.desk, &*control.leave);
             let mut ticks = TickLoop {
                 clock: &clock,

@@ -11,6 +11,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
+use crate::app::film::{FilmArgs, FilmReader, FilmSource};
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
@@ -88,6 +89,16 @@ pub(super) struct Args {
     /// configuration's].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,
+    /// Follow a film: the seats wait at park, join, and hold while it stands. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
+    /// ltc:alsa:DEVICE, ltc:- or ltc:FILE.wav.
+    #[arg(long, value_name = "SOURCE", conflicts_with_all = ["start", "plays"])]
+    chase: Option<FilmSource>,
+    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
+    #[arg(long, value_name = "N", requires = "chase")]
+    film_fps: Option<String>,
+    /// The film's timecode at which the cue begins, HH:MM:SS:FF [default: 00:00:00:00].
+    #[arg(long, value_name = "TIMECODE", requires = "chase")]
+    tc_start: Option<String>,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
@@ -108,11 +119,28 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         return Err(why).or_exit(Exit::Usage);
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.no_acks };
-    play(config, timeline, show, manner, args.json)
+    let film = match &args.chase {
+        Some(source) => Some(film(source, args)?),
+        None => None,
+    };
+    play(config, timeline, show, manner, film.as_ref(), args.json)
+}
+
+/// Begins to listen to the film that leads.
+fn film(source: &FilmSource, args: &Args) -> Result<FilmReader, Failure> {
+    let film = FilmArgs::new(source.clone(), args.film_fps.as_deref(), args.tc_start.as_deref());
+    FilmReader::start(&film.or_exit(Exit::Usage)?).or_exit(Exit::System)
 }
 
 /// Plays what is proved to fit, and prints the report.
-fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bool) -> Result<Exit, Failure> {
+fn play(
+    config: Config,
+    timeline: Timeline,
+    show: Show,
+    manner: Manner,
+    film: Option<&FilmReader>,
+    json: bool,
+) -> Result<Exit, Failure> {
     let cue = timeline.cue().path().to_path_buf();
     let length = timeline.duration();
     let for_ever = show.plays == 0;
@@ -125,7 +153,11 @@ fn play(config: Config, timeline: Timeline, show: Show, manner: Manner, json: bo
         print::tell(&format!("kinocue: {ACKS_OFF}"));
     }
     let names = config.controllers.iter().map(|one| one.name.clone()).collect();
-    let play = Play::new(config, timeline, show, manner).map_err(|error| refused(error, &cue))?;
+    let play = match film {
+        Some(film) => Play::chasing(config, timeline, show, manner, film.point()),
+        None => Play::new(config, timeline, show, manner),
+    };
+    let play = play.map_err(|error| refused(error, &cue))?;
     let control = play.control().clone();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;

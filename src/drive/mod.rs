@@ -48,6 +48,7 @@ pub(crate) enum Need {
 
 /// What an answer of a controller says.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "the ack thread does not allocate")]
 pub(crate) enum Evidence {
     /// It has answered something.
     Answered,

@@ -3,6 +3,7 @@
 
 mod blind;
 mod fader;
+mod film;
 mod headroom;
 mod mix;
 mod orders;
@@ -126,6 +127,8 @@ pub enum Step {
 pub enum Rest {
     /// Frames stopped for too long; the film runs on.
     Late,
+    /// The film that is chased can be followed, and the way onto the cue is not known yet.
+    Film,
     /// The cue is over, and the way on from there not known yet.
     Ended,
     /// Somebody, or the hall's policy, asked for a pause; the film waits.
@@ -175,6 +178,8 @@ pub struct Engine {
     directive: Directive,
     /// Where in the cue the show is to go on.
     seeking: Option<ShowTime>,
+    /// Where in the cue the film that is chased wants the next frame to lead.
+    target: Option<ShowTime>,
     /// Whether a seek could not be planned, and nobody was told yet.
     seek_refused: bool,
     /// Whether a move that the show needs could not be planned.
@@ -219,6 +224,7 @@ impl Engine {
             plays_left: show.plays.checked_sub(1),
             directive: Directive::Wait,
             seeking: None,
+            target: None,
             seek_refused: false,
             planless: false,
             trim_ms: 0,
@@ -291,11 +297,13 @@ impl Engine {
         rider.part == Part::Unseen && rider.wanted.on
     }
 
-    /// True if lanes rest in a pause, have been told so, and nobody has asked yet for the way on: nothing is sent to them.
+    /// True if nothing is sent until the hall asks for the way on: the show has not begun, or lanes rest in a pause and have been
+    /// told so.
     #[must_use]
-    pub fn waits_in_pause(&self) -> bool {
+    pub fn waits(&self) -> bool {
         let goes_on = matches!(self.directive, Directive::Play | Directive::Park);
-        matches!(self.phase, Phase::Resting(Rest::Paused)) && self.sends_nothing() && !goes_on
+        let rests = matches!(self.phase, Phase::Resting(Rest::Paused)) && self.sends_nothing() && !goes_on;
+        rests || self.phase == Phase::Waiting
     }
 
     /// Whether no frame has led any lane since all rested.
@@ -386,6 +394,7 @@ impl Engine {
         }
         let time_ms = self.show.rate.time_ms(self.frames);
         self.frames += 1;
+        self.take_target(millis(time_ms));
         let show = self.playhead;
         self.move_on(millis(time_ms));
         if let Phase::Resting(rest) = self.phase {
@@ -412,7 +421,7 @@ impl Engine {
             }
             Phase::Closing(left) => return self.close(left),
             Phase::Waiting | Phase::Done => return,
-            Phase::Resting(Rest::Late) => self.playhead += time,
+            Phase::Resting(Rest::Late | Rest::Film) => self.playhead += time,
             // The film waits from the very request on.
             Phase::Braking(_) | Phase::Resting(_) => {}
             Phase::Riding | Phase::Parking => {

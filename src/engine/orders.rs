@@ -72,7 +72,7 @@ impl Engine {
             Phase::Settling
             | Phase::Riding
             | Phase::Braking(Rest::Ended)
-            | Phase::Resting(Rest::Late | Rest::Ended) => self.come_down(Rest::Paused),
+            | Phase::Resting(Rest::Late | Rest::Film | Rest::Ended) => self.come_down(Rest::Paused),
             Phase::Resting(Rest::Paused) => self.drop_switch(),
             _ => {}
         }

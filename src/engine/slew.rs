@@ -48,6 +48,11 @@ impl Slew {
         self.owed_s += seconds;
     }
 
+    /// The show is to be `seconds` further on than it is, by a film that is chased.
+    pub(super) const fn set_owed_s(&mut self, seconds: f64) {
+        (self.owed_s, self.missed_s) = (seconds, seconds.max(0.0));
+    }
+
     /// What the show owes the film, seconds; below zero it is ahead.
     pub(super) const fn owed_s(&self) -> f64 {
         self.owed_s

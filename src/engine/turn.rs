@@ -19,7 +19,7 @@ impl Engine {
     pub(super) fn count_missed(&mut self, missed: u64) {
         let gap = self.show.rate.offset(missed);
         match self.phase {
-            Phase::Resting(Rest::Late) if missed > 0 => {
+            Phase::Resting(Rest::Late | Rest::Film) if missed > 0 => {
                 // A course that was to begin in the gap would be taken up in its middle.
                 self.drop_switch();
                 self.playhead += gap;
@@ -36,7 +36,7 @@ impl Engine {
     }
 
     /// The controllers reached the last poses and stand there.
-    fn halt(&mut self, rest: Rest) {
+    pub(super) fn halt(&mut self, rest: Rest) {
         self.stamps.break_off();
         self.drop_switch();
         self.riders.iter_mut().for_each(Rider::halt);
@@ -109,7 +109,9 @@ impl Engine {
         match rest {
             Rest::Stopped if self.is_parked_untold() => self.phase = Phase::Done,
             _ if self.is_to_park() => self.ask(Goal::Park, None, now),
-            Rest::Late => self.ask(Goal::Cue, Some(soonest), soonest),
+            // A film that is chased is joined once it has reached the cue.
+            Rest::Film if soonest < ShowTime::ZERO => {}
+            Rest::Late | Rest::Film => self.ask(Goal::Cue, Some(soonest), soonest),
             Rest::Ended if self.plays_left == Some(0) => self.ask(Goal::Home, None, now),
             Rest::Ended => self.ask(Goal::Again, None, self.cue_time(ShowTime::ZERO)),
             Rest::Paused if self.directive == Directive::Play => self.ask(Goal::Cue, None, now),

@@ -9,16 +9,22 @@
 //!
 //! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
-#![cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the readers of sources and the show that they lead come next")
-)]
+#![cfg_attr(not(test), expect(dead_code, reason = "readers of further sources come next"))]
 
+pub(crate) mod artnet;
 pub mod chase;
+pub(crate) mod chooser;
+mod estimate;
 pub mod follower;
+mod labels;
+mod late;
+pub(crate) mod ltc;
+pub(crate) mod mpv;
+pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
 mod testing;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
+mod words;

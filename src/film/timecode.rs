@@ -138,6 +138,28 @@ pub(crate) struct Label {
     pub(crate) drops: bool,
 }
 
+impl FromStr for Label {
+    type Err = TimecodeError;
+
+    /// `HH:MM:SS:FF`, with a semicolon before the frames if it drops.
+    fn from_str(text: &str) -> Result<Self, TimecodeError> {
+        let refuse = || TimecodeError::Text(text.to_owned());
+        let (before, frames) = text.rsplit_once([':', ';']).ok_or_else(refuse)?;
+        let mut parts = before.split(':').chain([frames]).map(|part| {
+            let is_short = matches!(part.len(), 1 | 2) && part.bytes().all(|digit| digit.is_ascii_digit());
+            part.parse().ok().filter(|_| is_short).ok_or_else(refuse)
+        });
+        let mut next = || parts.next().ok_or_else(refuse)?;
+        let (hours, minutes, seconds, frames) = (next()?, next()?, next()?, next()?);
+        let drops = text.contains(';');
+        if parts.next().is_some() {
+            Err(refuse())
+        } else {
+            Ok(Self { hours, minutes, seconds, frames, drops })
+        }
+    }
+}
+
 impl fmt::Display for Label {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { hours, minutes, seconds, frames, drops } = self;
@@ -160,6 +182,10 @@ pub(crate) enum TimecodeError {
     LeftOut(Label),
     #[error("{label} is drop frame, which there is at 29.97 frames a second alone; {rate} is configured")]
     Drops { label: Label, rate: FrameRate },
+    #[error("a second ends with frame {last}, so there are {} frames a second; {rate} is configured", last + 1)]
+    SecondEnds { last: u8, rate: FrameRate },
+    #[error("the source says that it has {said} frames a second; {rate} is configured")]
+    Says { said: u32, rate: FrameRate },
 }
 
 /// A frame of a day, by its rate.
@@ -200,21 +226,13 @@ impl Timecode {
         Ok(Self { rate, index: counted - DROPPED * (minute - minute / 10) })
     }
 
-    /// The frame that was typed: `HH:MM:SS:FF`; with a semicolon before the frames, drop frame.
+    /// The frame that was typed, as [`Label`] reads it.
     ///
     /// # Errors
     /// What is wrong with the text, for a person.
     pub(crate) fn parse(text: &str, rate: FrameRate) -> Result<Self, TimecodeError> {
-        let refuse = || TimecodeError::Text(text.to_owned());
-        let drops = text.contains(';') || rate.drops();
-        let mut parts = text.split([':', ';']).map(|part| {
-            let is_short = matches!(part.len(), 1 | 2) && part.bytes().all(|digit| digit.is_ascii_digit());
-            part.parse().ok().filter(|_| is_short).ok_or_else(refuse)
-        });
-        let mut next = || parts.next().ok_or_else(refuse)?;
-        let label = Label { hours: next()?, minutes: next()?, seconds: next()?, frames: next()?, drops };
-        let is_whole = parts.next().is_none() && !text[..text.rfind([':', ';']).unwrap_or(0)].contains(';');
-        if is_whole { Self::of(label, rate) } else { Err(refuse()) }
+        let label: Label = text.parse()?;
+        Self::of(Label { drops: label.drops || rate.drops(), ..label }, rate)
     }
 
     /// Frames since the label of midnight, less whole days.

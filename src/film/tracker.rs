@@ -1,9 +1,7 @@
 //! One source: its observations in, its state and where the film is by it out. The place is an estimate, which may jump; the
 //! seats' place is the [`super::follower`]'s, which may not.
 
-mod estimate;
 mod kind;
-mod late;
 mod recent;
 mod states;
 #[cfg(test)]
@@ -13,12 +11,12 @@ use std::time::Duration;
 
 pub(crate) use kind::SourceKind;
 
+use super::estimate::{Estimate, RATE_SIGMA};
+use super::late::LateBias;
 use super::observation::{FilmWord, Observation};
 use super::point::{FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime};
-use estimate::{Estimate, RATE_SIGMA};
 use kind::Traits;
-use late::LateBias;
 use recent::Recent;
 use states::{SourceSign, next};
 

@@ -3,12 +3,13 @@
 
 use std::time::Duration;
 
+use super::film::FilmLead;
 use super::mail::{Alarm, News};
 use crate::engine::{Directive, Ending, Engine, Rest};
 use crate::state::{
-    Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble,
+    Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
 };
-use crate::time::{MonoTime, ShowTime};
+use crate::time::{MonoTime, ShowTime, Tick};
 
 /// The machine, and what was last told of it.
 #[derive(Debug)]
@@ -28,6 +29,10 @@ pub struct Conductor {
     excused: MonoTime,
     /// Since when a signal wants the program to end.
     ended: Option<MonoTime>,
+    /// The film that leads the show; none where that is a film of its own.
+    film: Option<FilmLead>,
+    /// Whether that is why the seats parked.
+    film_is_over: bool,
 }
 
 /// A signal goes to whoever leads the hall as well, who knows more: this long it is left to them.
@@ -50,12 +55,14 @@ impl Conductor {
             ticked: None,
             excused: MonoTime::from_nanos(0),
             ended: None,
+            film: None,
+            film_is_over: false,
         }
     }
 
     /// One of a hall that lives on when its show is over.
     #[must_use]
-    pub const fn of_a_hall(now: MonoTime) -> Self {
+    pub fn of_a_hall(now: MonoTime) -> Self {
         Self { stays: true, ..Self::new(Machine::new(now), true) }
     }
 
@@ -113,6 +120,25 @@ impl Conductor {
         Self::new(machine, attended)
     }
 
+    /// The same of a show that chases a film.
+    #[must_use]
+    pub fn chasing(self, film: Option<FilmLead>) -> Self {
+        Self { film, ..self }
+    }
+
+    /// Has the film lead a show that chases one; to be told every tick, before the engine's.
+    pub(super) fn mind_film(&mut self, tick: &Tick, engine: &mut Engine, trim_ms: i32, now: MonoTime) {
+        let Some(film) = &mut self.film else { return };
+        let rides = matches!(self.machine.state(), State::Playing(_));
+        let (event, target) = film.tick(tick, engine.frame_time(), trim_ms, rides);
+        if rides {
+            self.machine.event(event, now);
+            self.film_is_over = matches!(event, Event::FilmOver(_));
+            self.steer(engine);
+            target.into_iter().for_each(|target| engine.chase(target));
+        }
+    }
+
     /// Where the hall stands, and why.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
@@ -140,6 +166,10 @@ impl Conductor {
     /// # Errors
     /// As [`Conductor::request`].
     pub fn seek(&mut self, film: ShowTime, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
+        if self.film.is_some() {
+            let (state, asked, why) = (self.machine.state(), Transition::Seek, Why::FilmLeads);
+            return Err(Refusal { state, asked, why });
+        }
         self.machine.request(Transition::Seek, now)?;
         engine.seek(film);
         self.steer(engine);
@@ -196,8 +226,8 @@ impl Conductor {
     fn steer(&self, engine: &mut Engine) {
         engine.obey(match self.machine.state() {
             State::Boot | State::Recovering | State::Homing | State::Parked | State::Armed => Directive::Wait,
+            State::Playing(PlayMode::Waiting) | State::Paused => Directive::Hold,
             State::Playing(_) => Directive::Play,
-            State::Paused => Directive::Hold,
             State::Stopping | State::Stopped | State::Fault => Directive::Stop,
             State::Parking => Directive::Park,
         });
@@ -258,6 +288,7 @@ impl Conductor {
     #[must_use]
     pub fn ending(&self, engine: &Engine) -> Ending {
         match engine.ending() {
+            Some(Ending::Stopped) if self.film_is_over && self.machine.fault().is_none() => Ending::Completed,
             Some(ending) if self.machine.fault().is_none() => ending,
             _ => Ending::Fault,
         }

@@ -252,7 +252,7 @@ impl Live {
         if moving {
             self.on_show(engine.film());
         }
-        self.hall.set(machine.state(), moving && !engine.waits_in_pause(), machine.clears());
+        self.hall.set(machine.state(), moving && !engine.waits(), machine.clears());
     }
 
     /// Notes where the film is.

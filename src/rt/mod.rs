@@ -6,6 +6,7 @@
 mod acks;
 mod conductor;
 mod desk;
+mod film;
 mod line;
 mod live;
 mod mail;
@@ -19,6 +20,7 @@ mod watch;
 pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
+pub use film::FilmLead;
 pub use line::{Line, line};
 pub use live::{Live, Times};
 pub(crate) use mail::Ticket;
@@ -124,8 +126,9 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let tick = self.grid.take(now);
         self.conductor.mind_gap(tick.missed, &mut self.engine, now);
         self.take_mail(now);
+        self.conductor.mind_film(&tick, &mut self.engine, self.desk.trim_ms(), now);
         // In a pause nothing is sent: what follows begins as any motion does.
-        let moving = self.conductor.machine().may_send_motion() && !self.engine.waits_in_pause();
+        let moving = self.conductor.machine().may_send_motion() && !self.engine.waits();
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving);
         let step = if goes_on { self.engine.tick(tick.missed) } else { Step::Quiet };

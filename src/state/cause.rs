@@ -1,6 +1,7 @@
 //! Why a hall is in the state it is in.
 
 use super::{Readiness, Transition};
+use crate::film::chase::{HoldCause, ParkCause};
 
 /// Why a hall is in the state it is in. Its words are [`Cause::words`]; which controller or group they speak of is
 /// [`Cause::whose`], for whoever knows the names.
@@ -36,6 +37,12 @@ pub enum Cause {
     Late,
     /// The cue is over.
     CueEnded,
+    /// The film that is chased can be followed.
+    FilmLeads,
+    /// It cannot.
+    FilmAwaited(HoldCause),
+    /// There is nothing more of it to follow.
+    FilmOver(ParkCause),
     /// A pause took more than five minutes.
     PausedTooLong,
     /// This group of seats is out, and the configuration says what the hall does then.

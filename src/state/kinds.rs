@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::cause::{Cause, Trouble};
+use crate::film::chase::{HoldCause, ParkCause};
 
 /// Where a hall stands (DESIGN: boot, parked, homing, armed, playing and so on).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -40,16 +41,19 @@ pub enum PlayMode {
     Following,
     /// They hold after a gap, and will join again by themselves.
     Holding,
+    /// The film that is chased cannot be followed: they rest, at park or where they are, and will join by themselves.
+    Waiting,
 }
 
 impl State {
     /// Every state there is, in the order of a show.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Boot,
         Self::Recovering,
         Self::Parked,
         Self::Homing,
         Self::Armed,
+        Self::Playing(PlayMode::Waiting),
         Self::Playing(PlayMode::Joining),
         Self::Playing(PlayMode::Following),
         Self::Playing(PlayMode::Holding),
@@ -177,6 +181,12 @@ pub enum Event {
     Late,
     /// The cue is over, with all its repeats.
     CueEnded,
+    /// The film that is chased can be followed.
+    FilmLeads,
+    /// It cannot.
+    FilmAwaited(HoldCause),
+    /// There is nothing more of it to follow.
+    FilmOver(ParkCause),
     /// The seats have decelerated, and the hold frames are out.
     AtRest,
     /// The seats are at their park poses.

@@ -35,6 +35,8 @@ pub enum Next {
     Watch,
     /// Nothing: the seats join again by themselves.
     AwaitJoin,
+    /// See to the film: the seats join it by themselves.
+    AwaitFilm,
     /// Resume, or park.
     Resume,
     /// Release the emergency stop, then clear.
@@ -57,7 +59,7 @@ pub enum Next {
 
 impl Next {
     /// All there are.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 25] = [
         Self::AwaitAnswers,
         Self::AwaitPositions,
         Self::AwaitHome,
@@ -73,6 +75,7 @@ impl Next {
         Self::Go,
         Self::Watch,
         Self::AwaitJoin,
+        Self::AwaitFilm,
         Self::Resume,
         Self::Release,
         Self::PutRight,
@@ -96,6 +99,7 @@ impl Machine {
             State::Homing => Next::AwaitHome,
             State::Armed => Next::Go,
             State::Playing(PlayMode::Holding) => Next::AwaitJoin,
+            State::Playing(PlayMode::Waiting) => Next::AwaitFilm,
             State::Playing(_) => Next::Watch,
             State::Paused => Next::Resume,
             State::Stopping | State::Parking => Next::AwaitRest,

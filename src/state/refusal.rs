@@ -38,6 +38,8 @@ pub enum Why {
     PlaysAlready,
     /// The cue is paused.
     PausedNow,
+    /// A film is chased.
+    FilmLeads,
     /// The cue plays, or is paused.
     Riding,
     /// Nothing plays.

@@ -24,6 +24,13 @@ impl Machine {
             Event::Late if self.rides() && self.state != State::Playing(PlayMode::Holding) => {
                 self.enter(State::Playing(PlayMode::Holding), Cause::Late, now);
             }
+            Event::FilmLeads if self.state == State::Playing(PlayMode::Waiting) => {
+                self.enter(State::Playing(PlayMode::Joining), Cause::FilmLeads, now);
+            }
+            Event::FilmAwaited(why) if self.rides() && self.cause != Cause::FilmAwaited(why) => {
+                self.enter(State::Playing(PlayMode::Waiting), Cause::FilmAwaited(why), now);
+            }
+            Event::FilmOver(why) if self.rides() => self.enter(State::Parking, Cause::FilmOver(why), now),
             Event::CueEnded if self.rides() => self.enter(State::Parking, Cause::CueEnded, now),
             Event::AtRest if self.state == State::Stopping => self.end_stopping(now),
             Event::Parked if self.state == State::Parking => {
@@ -41,6 +48,9 @@ impl Machine {
             Event::JoinBegun
             | Event::Joined
             | Event::Late
+            | Event::FilmLeads
+            | Event::FilmAwaited(_)
+            | Event::FilmOver(_)
             | Event::CueEnded
             | Event::AtRest
             | Event::Parked => {}

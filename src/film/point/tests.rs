@@ -57,7 +57,7 @@ fn a_reader_never_sees_two_points_mixed() {
 fn a_film_of_its_own_advances_by_the_frames_and_by_what_was_slept_through_and_waits_in_a_pause() {
     let mut clock = FilmClock::free_running(Rate::from_hz(100.0), ShowTime::from_millis(500));
     let frame = Duration::from_millis(10);
-    let mut at = |clock: &mut FilmClock, missed| clock.at(&tick(0, missed), frame).expect("it knows").media;
+    let at = |clock: &mut FilmClock, missed| clock.at(&tick(0, missed), frame).expect("it knows").media;
     assert_eq!(at(&mut clock, 0), ShowTime::from_millis(500));
     assert_eq!(at(&mut clock, 0), ShowTime::from_millis(510));
     assert_eq!(at(&mut clock, 2), ShowTime::from_millis(540));

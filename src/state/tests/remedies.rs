@@ -38,7 +38,7 @@ fn follow(hall: &mut Machine, now: MonoTime) {
             hall.event(Event::Parked, now);
             hall.event(Event::Astray(false), now);
         }
-        Next::Watch | Next::AwaitJoin => {}
+        Next::Watch | Next::AwaitJoin | Next::AwaitFilm => {}
     }
 }
 

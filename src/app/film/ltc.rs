@@ -1,0 +1,153 @@
+//! LTC from wherever sound comes: blocks are read as they come, and each is stamped with the instant at which it was.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use super::riff::Samples;
+use super::source::{FilmArgs, LtcInput};
+use super::{FilmError, Told, start};
+use crate::film::ltc::LtcReader;
+use crate::film::observation::{FilmWord, Observation};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+
+/// A block is 10 ms of sound at 48,000 samples a second, or what of it there is.
+const BLOCK: usize = 960;
+/// From the end of a writer to the next look for one.
+const AGAIN: Duration = Duration::from_secs(1);
+
+/// Begins to read an input; a command that is started for it is put there.
+pub(super) fn start_reading(
+    input: &LtcInput,
+    args: &FilmArgs,
+    told: Told,
+    child: &Arc<Mutex<Option<Child>>>,
+) -> Result<(), FilmError> {
+    let line = Line { args: args.clone(), told };
+    let failed = |path: &Path| {
+        let what = path.display().to_string();
+        move |source| FilmError::Open { what, source }
+    };
+    match input {
+        LtcInput::File(path) => {
+            let file = File::open(path).map_err(failed(path))?;
+            start("ltc", move || line.end(line.read(file, true)))?;
+        }
+        LtcInput::Stdin => start("ltc", move || line.end(line.read(io::stdin(), false)))?,
+        LtcInput::Fifo(path) => {
+            let path = path.clone();
+            path.metadata().map_err(failed(&path))?;
+            start("ltc", move || {
+                // Opening waits for a writer.
+                while line.again(File::open(&path).and_then(|fifo| line.read(fifo, false))) {}
+            })?;
+        }
+        LtcInput::Pipe(command) => {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", command]);
+            run(shell, command, line, child)?;
+        }
+        LtcInput::Alsa(device) => {
+            let mut arecord = Command::new("arecord");
+            arecord.args(["-q", "-t", "raw", "-f", "S16_LE", "-c", "1", "-r", "48000", "-D", device]);
+            run(arecord, "arecord", line, child)?;
+        }
+    }
+    Ok(())
+}
+
+/// Reads what a command writes. One that fails, as a sound card does that is pulled out, is started anew; one that ends well has
+/// nothing more to say.
+fn run(
+    mut command: Command,
+    name: &str,
+    line: Line,
+    child: &Arc<Mutex<Option<Child>>>,
+) -> Result<(), FilmError> {
+    command.stdin(Stdio::null()).stdout(Stdio::piped());
+    let failed = |source| FilmError::Command { command: name.to_owned(), source };
+    let mut output = put(command.spawn().map_err(failed)?, child);
+    let child = Arc::clone(child);
+    start("ltc", move || {
+        loop {
+            let read = output.take().map_or(Ok(()), |output| line.read(output, false));
+            let ended = lock(&child).take().map(|mut one| one.wait());
+            if matches!(ended, Some(Ok(status)) if status.success()) {
+                return line.end(read);
+            }
+            if !line.again(read) {
+                return;
+            }
+            output = command.spawn().ok().and_then(|one| put(one, &child));
+        }
+    })?;
+    Ok(())
+}
+
+/// Keeps a command that runs, so that it ends with whoever started it; gives what it writes.
+fn put(mut one: Child, child: &Mutex<Option<Child>>) -> Option<ChildStdout> {
+    let output = one.stdout.take();
+    *lock(child) = Some(one);
+    output
+}
+
+pub(super) fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
+    child.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A line that carries LTC.
+struct Line {
+    args: FilmArgs,
+    told: Told,
+}
+
+impl Line {
+    /// Reads to the end of a stream; one that is `paced`, at the speed of its sound.
+    fn read(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
+        let (mut samples, mut block, mut octets) = (Samples::default(), Vec::new(), [0; BLOCK]);
+        let FilmArgs { rate, start, .. } = self.args;
+        let (begun, mut heard) = (Monotonic.now(), 0_u64);
+        let mut reader: Option<LtcReader> = None;
+        loop {
+            let count = match stream.read(&mut octets) {
+                Ok(0) => return Ok(()),
+                Ok(count) => count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error),
+            };
+            let mut at = Monotonic.now();
+            block.clear();
+            samples.push(&octets[..count], &mut block).map_err(io::Error::other)?;
+            let Some(per_s) = samples.samples_per_s() else { continue };
+            heard += block.len() as u64;
+            if paced {
+                at = begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s));
+                Monotonic.sleep_until(at);
+            }
+            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, Duration::ZERO, rate, start));
+            reader.hear(&block, at, &mut |what| {
+                let _ = self.told.send(what); // without a listener the program ends
+            });
+        }
+    }
+
+    /// Nothing more can come: whoever wrote is gone for good, and the film over.
+    fn end(&self, _read: io::Result<()>) {
+        self.say(FilmWord::End);
+    }
+
+    /// The writer is gone, and another may come; says whether anybody waits for one.
+    fn again(&self, _read: io::Result<()>) -> bool {
+        let is_heard = self.say(FilmWord::Gone);
+        std::thread::sleep(AGAIN);
+        is_heard
+    }
+
+    fn say(&self, word: FilmWord) -> bool {
+        self.told.send(Observation::new(Monotonic.now(), word)).is_ok()
+    }
+}

@@ -1,0 +1,152 @@
+//! Samples out of a stream: raw ones, or those behind a RIFF header, be its sizes known or not (FFFFFFFF, as programs write them into a
+//! pipe).
+
+/// What a stream that is raw has: 16 bits, one channel, so many samples a second.
+const RAW_SAMPLES_PER_S: u32 = 48_000;
+/// RIFF, its size, WAVE; the name and the size of a chunk.
+const RIFF: usize = 12;
+const CHUNK: usize = 8;
+/// What of a header is kept: more says that it is none.
+const HEADER: usize = 64 * 1024;
+/// Samples a second that there are.
+const RATES: std::ops::RangeInclusive<u32> = 8_000..=192_000;
+
+/// Why a stream is none that can be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum RiffFault {
+    #[error("only sound of 16 bits, uncompressed, is read")]
+    Format,
+    #[error("it begins like a WAV file and has no samples")]
+    NoData,
+}
+
+/// Makes samples of octets, whichever way they come in pieces.
+#[derive(Debug, Default)]
+pub(super) struct Samples {
+    /// What came and was not used: a header that is not whole, or part of a frame.
+    kept: Vec<u8>,
+    format: Option<Format>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Format {
+    samples_per_s: u32,
+    channels: usize,
+}
+
+impl Samples {
+    /// Samples a second; none before that is known.
+    pub(super) fn samples_per_s(&self) -> Option<u32> {
+        self.format.map(|format| format.samples_per_s)
+    }
+
+    /// Takes octets; adds to `out` the first channel's samples.
+    pub(super) fn push(&mut self, octets: &[u8], out: &mut Vec<i16>) -> Result<(), RiffFault> {
+        self.kept.extend_from_slice(octets);
+        let format = match self.format {
+            Some(format) => format,
+            None => match header(&self.kept)? {
+                None => return Ok(()),
+                Some((format, length)) => {
+                    self.kept.drain(..length);
+                    *self.format.insert(format)
+                }
+            },
+        };
+        let frame = 2 * format.channels;
+        let whole = self.kept.len() / frame * frame;
+        out.extend(self.kept[..whole].chunks_exact(frame).map(|one| i16::from_le_bytes([one[0], one[1]])));
+        self.kept.drain(..whole);
+        Ok(())
+    }
+}
+
+/// The format, and how long the header is; none while it is not whole.
+fn header(octets: &[u8]) -> Result<Option<(Format, usize)>, RiffFault> {
+    let is_riff = octets.iter().zip(b"RIFF").all(|(one, other)| one == other);
+    if !is_riff {
+        return Ok(Some((Format { samples_per_s: RAW_SAMPLES_PER_S, channels: 1 }, 0)));
+    }
+    let (mut at, mut format) = (RIFF, None);
+    while let Some(chunk) = octets.get(at..at + CHUNK) {
+        let size = u32::from_le_bytes([chunk[4], chunk[5], chunk[6], chunk[7]]) as usize;
+        match &chunk[..4] {
+            b"data" => return format.map(|format| Some((format, at + CHUNK))).ok_or(RiffFault::Format),
+            b"fmt " => {
+                let Some(fields) = octets.get(at + CHUNK..at + CHUNK + 16) else { break };
+                format = Some(read_format(fields)?);
+            }
+            _ => {}
+        }
+        // Chunks begin at even places.
+        at = at.saturating_add(CHUNK).saturating_add(size).saturating_add(size % 2);
+        if at > HEADER {
+            return Err(RiffFault::NoData);
+        }
+    }
+    Ok(None)
+}
+
+fn read_format(fields: &[u8]) -> Result<Format, RiffFault> {
+    let word = |at: usize| u16::from_le_bytes([fields[at], fields[at + 1]]);
+    let samples_per_s = u32::from(word(4)) | u32::from(word(6)) << 16;
+    let (kind, channels, bits) = (word(0), usize::from(word(2)), word(14));
+    // 1: uncompressed; FFFE: the same, with more said of its channels.
+    let is_plain = matches!(kind, 1 | 0xfffe) && bits == 16 && (1..=64).contains(&channels);
+    let is_known = is_plain && RATES.contains(&samples_per_s);
+    is_known.then_some(Format { samples_per_s, channels }).ok_or(RiffFault::Format)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wav(kind: u16, channels: u16, bits: u16, size: u32, samples: &[i16]) -> Vec<u8> {
+        let mut octets = b"RIFF".to_vec();
+        octets.extend(size.to_le_bytes());
+        octets.extend(b"WAVEfmt ");
+        octets.extend(16_u32.to_le_bytes());
+        for word in [kind, channels, 0xbb80, 0, 0, 0, 2 * channels, bits] {
+            octets.extend(word.to_le_bytes());
+        }
+        octets.extend(b"LIST\x03\0\0\0abc\0data");
+        octets.extend(size.to_le_bytes());
+        octets.extend(samples.iter().flat_map(|sample| sample.to_le_bytes()));
+        octets
+    }
+
+    fn read(octets: &[u8], piece: usize) -> (Vec<i16>, Option<u32>) {
+        let (mut samples, mut out) = (Samples::default(), Vec::new());
+        for piece in octets.chunks(piece) {
+            samples.push(piece, &mut out).expect("it is sound");
+        }
+        (out, samples.samples_per_s())
+    }
+
+    #[test]
+    fn samples_are_the_same_however_a_stream_comes_in_pieces_and_whatever_sizes_its_header_has() {
+        for size in [6, u32::MAX] {
+            let octets = wav(1, 2, 16, size, &[1, -1, 2, -2, 3, -3]);
+            for piece in [1, 3, 7, 4_096] {
+                assert_eq!(read(&octets, piece), (vec![1, 2, 3], Some(48_000)), "pieces of {piece}");
+            }
+        }
+        assert_eq!(read(&[1, 0, 2, 0, 9], 2), (vec![1, 2], Some(48_000)), "raw");
+        assert_eq!(read(b"RIFX\0\0", 1).0.len(), 3, "it is none");
+    }
+
+    #[test]
+    fn what_is_no_sound_of_16_bits_is_refused() {
+        let push = |octets: &[u8]| Samples::default().push(octets, &mut Vec::new());
+        assert_eq!(push(&wav(3, 1, 32, 4, &[])), Err(RiffFault::Format));
+        assert_eq!(push(&wav(1, 0, 16, 4, &[])), Err(RiffFault::Format));
+        let mut endless = b"RIFF\0\0\0\0WAVE".to_vec();
+        endless.extend(b"junk\xff\xff\xff\xff");
+        assert_eq!(push(&endless), Err(RiffFault::NoData));
+        assert_eq!(
+            push(b"RIFF\0\0\0\0WAVEdata\0\0\0\0"),
+            Err(RiffFault::Format),
+            "nothing says of what kind"
+        );
+    }
+}

@@ -1,0 +1,171 @@
+//! Labels as they come into places in the film. A label does not say how long its frame lasts: unless that is configured it is
+//! measured, by how long the labels take.
+
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use super::timecode::{FrameRate, Label, Timecode, TimecodeError};
+use crate::time::{MonoTime, ShowTime};
+
+/// Deviations by which the times of two labels differ by chance at the most.
+const SIGMAS: f64 = 4.0;
+/// After so long the rate is guessed from what cannot be told apart yet: 24 and 23.976 are a millisecond apart after a second,
+/// a network's jitter is ten.
+const GUESS_AFTER: Duration = Duration::from_secs(1);
+/// So many seconds in a row that end with the same frame contradict what is configured.
+const CONTRADICTS: u32 = 2;
+
+/// What is known of the labels of one source.
+#[derive(Debug, Clone)]
+pub(crate) struct LabelClock {
+    configured: Option<FrameRate>,
+    start: Label,
+    /// Deviation of the time of a label, seconds.
+    sigma_s: f64,
+    /// The first label since they count on, and the quarters of a frame that had passed.
+    first: Option<(MonoTime, Label, i64)>,
+    newest: Option<(MonoTime, Label)>,
+    highest: u8,
+    found: Option<FrameRate>,
+    is_sure: bool,
+    contradictions: u32,
+    refused: Option<TimecodeError>,
+}
+
+impl LabelClock {
+    /// A source whose frames last as `configured` says, or as is found; the label `start` is time 0 of the film.
+    pub(crate) const fn new(configured: Option<FrameRate>, start: Label, sigma_s: f64) -> Self {
+        Self {
+            configured,
+            start,
+            sigma_s,
+            first: None,
+            newest: None,
+            highest: 0,
+            found: None,
+            is_sure: false,
+            contradictions: 0,
+            refused: None,
+        }
+    }
+
+    /// How frames are labelled, as far as that is known.
+    pub(crate) fn rate(&self) -> Option<FrameRate> {
+        let drops = self.newest.is_some_and(|(_, label)| label.drops);
+        self.configured.map_or(self.found, |rate| rate.dropping(drops))
+    }
+
+    /// Why the labels are none that can be used.
+    pub(crate) const fn refused(&self) -> Option<&TimecodeError> {
+        self.refused.as_ref()
+    }
+
+    /// Where the film was at an instant at which so many quarters of a frame had passed since the begin of the one that a label
+    /// names; `labels` is how many there are in a second, if the source says so.
+    pub(crate) fn media(
+        &mut self,
+        at: MonoTime,
+        label: Label,
+        quarters: i64,
+        labels: Option<u32>,
+    ) -> Option<ShowTime> {
+        self.hold_against_configured(at, label, labels);
+        self.highest = self.highest.max(label.frames);
+        if self.configured.is_none() && !self.is_sure {
+            self.find((at, label, quarters), labels);
+        }
+        self.newest = Some((at, label));
+        let placed = self.place(self.rate()?, label, quarters);
+        // What was refused for how its seconds end is refused until one ends otherwise.
+        match placed {
+            Ok(media) if self.contradictions < CONTRADICTS => {
+                self.refused = None;
+                Some(media)
+            }
+            Ok(_) => None,
+            Err(error) => {
+                self.refused = Some(error);
+                None
+            }
+        }
+    }
+
+    fn place(&self, rate: FrameRate, label: Label, quarters: i64) -> Result<ShowTime, TimecodeError> {
+        let start = Timecode::of(Label { drops: rate.drops(), ..self.start }, rate)?;
+        let frame = Timecode::of(label, rate)?;
+        Ok(rate.quarters(frame.since(start).saturating_mul(4).saturating_add(quarters)))
+    }
+
+    fn hold_against_configured(&mut self, at: MonoTime, label: Label, labels: Option<u32>) {
+        let Some(rate) = self.configured else { return };
+        if let Some(said) = labels {
+            self.contradictions = if said == rate.labels() { 0 } else { CONTRADICTS };
+            self.refused = (said != rate.labels()).then_some(TimecodeError::Says { said, rate });
+            return;
+        }
+        if rate.dropping(label.drops).is_none() {
+            self.refused = Some(TimecodeError::Drops { label, rate });
+            self.newest = None;
+        }
+        let Some((before, last)) = self.newest else { return };
+        let is_next = at.since(before).as_secs_f64() < 1.5 / f64::from(rate.labels());
+        let ends = label.seconds == (last.seconds + 1) % 60 && label.frames <= 2;
+        if !is_next || !ends {
+            return;
+        }
+        if u32::from(last.frames) + 1 == rate.labels() {
+            self.contradictions = 0;
+        } else {
+            self.contradictions += 1;
+            if self.contradictions >= CONTRADICTS {
+                self.refused = Some(TimecodeError::SecondEnds { last: last.frames, rate });
+            }
+        }
+    }
+
+    /// Looks which rate makes the labels take as long as they do.
+    fn find(&mut self, told: (MonoTime, Label, i64), labels: Option<u32>) {
+        let (at, label, quarters) = told;
+        let Some((since, first, begun)) = self.first.filter(|(_, first, _)| first.drops == label.drops)
+        else {
+            self.first = Some(told);
+            return;
+        };
+        let passed = at.since(since);
+        let off = |rate: FrameRate| -> Option<f64> {
+            let frames = Timecode::of(label, rate).ok()?.since(Timecode::of(first, rate).ok()?);
+            Some((rate.quarters(4 * frames + quarters - begun).as_secs_f64() - passed.as_secs_f64()).abs())
+        };
+        let may_be = |rate: &FrameRate| {
+            rate.dropping(label.drops) == Some(*rate)
+                && u32::from(self.highest) < rate.labels()
+                && labels.is_none_or(|labels| labels == rate.labels())
+        };
+        let (mut best, mut second) = (None, f64::INFINITY);
+        for rate in FrameRate::ALL.into_iter().filter(may_be) {
+            let off = off(rate).unwrap_or(f64::INFINITY);
+            match best {
+                Some((_, least)) if off >= least => second = second.min(off),
+                _ => {
+                    second = best.map_or(second, |(_, least)| least);
+                    best = Some((rate, off));
+                }
+            }
+        }
+        let by_chance = SIGMAS * std::f64::consts::SQRT_2 * self.sigma_s;
+        match best {
+            Some((rate, off)) if off < by_chance && second > off + 2.0 * by_chance => {
+                (self.found, self.is_sure) = (Some(rate), true);
+            }
+            Some((rate, off)) if off < 2.0 * by_chance && passed >= GUESS_AFTER => {
+                // Of two that cannot be told apart yet the whole number is likelier.
+                let whole = if rate == FrameRate::F23_976 { FrameRate::F24 } else { rate };
+                self.found.get_or_insert(if rate == FrameRate::F29_97 { FrameRate::F30 } else { whole });
+            }
+            Some((_, off)) if off > 2.0 * by_chance => self.first = Some(told), // it jumped, or is wound
+            _ => {}
+        }
+    }
+}

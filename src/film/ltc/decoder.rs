@@ -1,0 +1,153 @@
+//! Samples into frames that are sure.
+
+use super::cells::{Cell, Cells};
+use super::edges::Edges;
+use super::word::{BITS, Word, follows};
+use super::{Label, Timecode};
+use crate::film::timecode::FrameRate;
+
+/// Frames that have to follow each other before a label is believed. A bit that noise turned is turned in one of them; that the
+/// same one is turned in three does not happen.
+const AGREEING: u32 = 3;
+/// So many frames after a label that was sure the next may still be told from it, by the time that has passed.
+const TOLD_BY_TIME: f64 = 60.0;
+/// How far from a whole number of frames that time may be, frames.
+const OFF_GRID: f64 = 0.2;
+
+/// A frame of which the label is sure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LtcFrame {
+    pub(crate) label: Label,
+    /// Whether the tape runs backwards.
+    pub(crate) backwards: bool,
+    /// When its last bit ended, samples since the first.
+    pub(crate) end: f64,
+}
+
+impl LtcFrame {
+    /// Where the film is at the end of the frame: at the end of its picture, or at the begin of it if it ran backwards; in
+    /// quarters of a frame after the begin of the one that the label names.
+    pub(crate) const fn quarters(&self) -> i64 {
+        if self.backwards { 0 } else { 4 }
+    }
+}
+
+/// Reads LTC from samples.
+#[derive(Debug, Clone)]
+pub(crate) struct LtcDecoder {
+    edges: Edges,
+    cells: Cells,
+    word: Word,
+    /// Bits since the line was broken.
+    bits: u32,
+    /// The newest frame, and how many followed each other up to it.
+    newest: Option<LtcFrame>,
+    agreeing: u32,
+    /// The newest that was sure.
+    sure: Option<LtcFrame>,
+    rate: Option<FrameRate>,
+}
+
+impl LtcDecoder {
+    /// A decoder for so many samples a second.
+    #[expect(clippy::cast_precision_loss, reason = "audio rates")]
+    pub(crate) fn new(samples_per_s: u32) -> Self {
+        Self {
+            edges: Edges::new(samples_per_s as f32),
+            cells: Cells::new(),
+            word: Word::default(),
+            bits: 0,
+            newest: None,
+            agreeing: 0,
+            sure: None,
+            rate: None,
+        }
+    }
+
+    /// How labels are counted, as soon as that is known: then a frame after a hole is told by the time that has passed.
+    pub(crate) const fn set_rate(&mut self, rate: FrameRate) {
+        self.rate = Some(rate);
+    }
+
+    /// Samples so far.
+    pub(crate) const fn count(&self) -> u64 {
+        self.edges.count()
+    }
+
+    /// The height of the signal, of full scale.
+    pub(crate) const fn level(&self) -> f32 {
+        self.edges.height()
+    }
+
+    /// The length of a bit, samples; 0 if it is not known.
+    pub(crate) const fn bit_samples(&self) -> f64 {
+        self.cells.length()
+    }
+
+    /// How many cells have passed since the last edge; `None` before there were any.
+    #[expect(clippy::cast_precision_loss, reason = "exact for 5,000 years")]
+    pub(crate) fn cells_without_an_edge(&self) -> Option<f64> {
+        let length = self.cells.length();
+        (length > 0.0).then(|| (self.edges.count() as f64 - self.cells.edge()) / length)
+    }
+
+    /// Takes a sample, of full scale; the frame that it makes sure of.
+    pub(crate) fn push(&mut self, sample: i16) -> Option<LtcFrame> {
+        let edge = self.edges.push(f32::from(sample) / 32_768.0)?;
+        match self.cells.push(edge) {
+            Cell::Open => None,
+            Cell::Broken => {
+                self.bits = 0;
+                None
+            }
+            Cell::Bit(bit) => {
+                self.word.push(bit);
+                self.bits += 1;
+                if self.bits < BITS {
+                    return None;
+                }
+                let (label, backwards) = self.word.label()?;
+                self.on_frame(LtcFrame { label, backwards, end: edge })
+            }
+        }
+    }
+
+    /// A frame that was read; the same if it is sure.
+    fn on_frame(&mut self, frame: LtcFrame) -> Option<LtcFrame> {
+        let is_next = self.newest.is_some_and(|newest| self.is_next(&frame, &newest));
+        self.agreeing = if is_next { self.agreeing.saturating_add(1) } else { 1 };
+        self.newest = Some(frame);
+        let is_told = self.sure.is_some_and(|sure| self.is_told_by_time(&frame, &sure));
+        if self.agreeing < AGREEING && !is_told {
+            return None;
+        }
+        self.sure = Some(frame);
+        Some(frame)
+    }
+
+    /// Frames between the ends of two, by the length of a cell.
+    fn frames_between(&self, frame: &LtcFrame, before: &LtcFrame) -> f64 {
+        (frame.end - before.end) / (f64::from(BITS) * self.cells.length())
+    }
+
+    fn is_next(&self, frame: &LtcFrame, before: &LtcFrame) -> bool {
+        let is_adjacent = (self.frames_between(frame, before) - 1.0).abs() < OFF_GRID;
+        let (later, earlier) =
+            if frame.backwards { (before.label, frame.label) } else { (frame.label, before.label) };
+        frame.backwards == before.backwards && is_adjacent && follows(later, earlier)
+    }
+
+    /// Whether a frame says what it has to, so long after one that was sure.
+    #[expect(clippy::cast_possible_truncation, reason = "at most 60")]
+    fn is_told_by_time(&self, frame: &LtcFrame, sure: &LtcFrame) -> bool {
+        let passed = self.frames_between(frame, sure);
+        let frames = passed.round();
+        let is_near = frames <= TOLD_BY_TIME && (passed - frames).abs() < OFF_GRID;
+        let Some(rate) = self.rate.filter(|_| is_near && frame.backwards == sure.backwards) else {
+            return false;
+        };
+        let steps = if frame.backwards { -(frames as i64) } else { frames as i64 };
+        let expected = Timecode::of(sure.label, rate).map(|sure| sure.plus(steps).label());
+        expected == Ok(frame.label)
+    }
+}

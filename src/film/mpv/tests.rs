@@ -1,0 +1,175 @@
+use super::*;
+use crate::film::point::FilmState;
+use crate::film::testing::{Luck, TrueFilm, mono};
+use crate::film::tracker::{SourceKind, SourceTracker};
+
+/// What a client makes of lines that come at 1 s.
+fn told(client: &mut MpvClient, lines: &str) -> Vec<FilmWord> {
+    let mut words = Vec::new();
+    client.hear(lines.as_bytes(), mono(1.0), &mut |told| words.push(told.word));
+    words
+}
+
+fn client() -> MpvClient {
+    MpvClient::new(mono(0.0))
+}
+
+fn changed(name: &str, data: &str) -> String {
+    format!("{{\"event\":\"property-change\",\"id\":3,\"name\":\"{name}\",\"data\":{data}}}\n")
+}
+
+#[test]
+fn a_position_is_true_half_way_between_question_and_answer() {
+    let mut client = client();
+    let line = client.poll(mono(1.0)).expect("it is due");
+    assert_eq!(line, "{\"command\":[\"get_property\",\"audio-pts\"],\"request_id\":1}\n");
+    assert_eq!(client.poll(mono(1.05)), None, "one at a time");
+    let mut heard = Vec::new();
+    let reply = b"{\"data\":83.25,\"request_id\":1,\"error\":\"success\"}\n";
+    client.hear(reply, mono(1.06), &mut |told| heard.push(told));
+    let word = FilmWord::Position(ShowTime::from_millis(83_250));
+    assert_eq!(heard, [Observation { at: mono(1.03), bound: Duration::from_millis(30), word }]);
+    client.hear(reply, mono(1.07), &mut |told| heard.push(told));
+    assert_eq!(heard.len(), 1, "nobody asked any more");
+}
+
+#[test]
+fn a_player_that_does_not_answer_is_asked_again_and_its_old_answers_say_nothing() {
+    let mut client = client();
+    client.poll(mono(1.0)).expect("it is due");
+    assert_eq!(client.poll(mono(1.2)), None);
+    assert_eq!(client.next_at(), mono(1.25));
+    assert!(client.poll(mono(1.25)).is_some_and(|line| line.contains("\"request_id\":2")));
+    assert_eq!(told(&mut client, "{\"data\":1,\"request_id\":1,\"error\":\"success\"}\n"), []);
+}
+
+#[test]
+fn without_sound_the_picture_counts_less_the_frame_that_it_is_early() {
+    let mut client = client();
+    let at_10_s = changed("time-pos", "10.0");
+    assert_eq!(told(&mut client, &at_10_s), [], "the sound is better");
+    client.poll(mono(0.9)).expect("it is due");
+    assert_eq!(told(&mut client, "{\"request_id\":1,\"error\":\"property unavailable\"}\n"), []);
+    let shown = |ms| [FilmWord::Position(ShowTime::from_millis(ms))];
+    told(&mut client, &changed("container-fps", "25"));
+    assert_eq!(told(&mut client, &at_10_s), shown(9_960));
+    assert_eq!(told(&mut client, &changed("time-pos", "null")), []);
+}
+
+#[test]
+fn pause_speed_seek_and_end_are_told_as_they_come() {
+    let mut client = client();
+    assert_eq!(told(&mut client, &changed("pause", "false")), [FilmWord::Play]);
+    assert_eq!(told(&mut client, &changed("pause", "true")), [FilmWord::Stop]);
+    assert_eq!(told(&mut client, &changed("core-idle", "true")), [], "it stands already");
+    assert_eq!(
+        told(&mut client, &(changed("core-idle", "false") + &changed("pause", "false"))),
+        [FilmWord::Play]
+    );
+    assert_eq!(told(&mut client, &changed("speed", "1.001")), [FilmWord::Speed(1.001)]);
+    assert_eq!(told(&mut client, &changed("core-idle", "true")), [FilmWord::Stop], "its buffer is dry");
+    assert_eq!(told(&mut client, &changed("core-idle", "false")), [FilmWord::Play]);
+    let seek = "{\"event\":\"seek\"}\n".to_owned() + &changed("core-idle", "true");
+    assert_eq!(told(&mut client, &seek), [FilmWord::Seek]);
+    assert_eq!(told(&mut client, "{\"event\":\"playback-restart\"}\n"), [FilmWord::Landed]);
+    told(&mut client, &changed("core-idle", "false"));
+    assert_eq!(told(&mut client, &changed("eof-reached", "true")), [FilmWord::End]);
+    assert_eq!(told(&mut client, "{\"event\":\"end-file\",\"reason\":\"eof\"}\n"), [FilmWord::End]);
+    assert_eq!(told(&mut client, "{\"event\":\"end-file\",\"reason\":\"quit\"}\n"), [FilmWord::Stop]);
+    let next = "{\"event\":\"start-file\"}\n{\"event\":\"file-loaded\"}\n{\"event\":\"playback-restart\"}\n";
+    assert_eq!(told(&mut client, next), [FilmWord::Seek, FilmWord::Landed, FilmWord::Play]);
+    assert_eq!(told(&mut client, "{\"event\":\"shutdown\"}\n"), [FilmWord::Gone]);
+    told(&mut client, &changed("path", "\"/films/one \\u00e9.mkv\""));
+    assert_eq!(client.path(), Some("/films/one é.mkv"));
+}
+
+#[test]
+fn lines_may_come_in_pieces_or_together_and_what_is_too_long_is_left_out() {
+    let mut client = client();
+    let line = changed("pause", "true");
+    for byte in line.as_bytes() {
+        let mut words = Vec::new();
+        client.hear(&[*byte], mono(1.0), &mut |told| words.push(told.word));
+        assert_eq!(words.is_empty(), *byte != b'\n');
+    }
+    let long = format!("{{\"event\":\"{}\"}}\n", "x".repeat(1_000_000));
+    let both = long + &changed("pause", "false");
+    assert_eq!(told(&mut client, &both), [FilmWord::Play]);
+    let endless = "y".repeat(100_000);
+    (0..20).for_each(|_| drop(told(&mut client, &endless)));
+    assert!(client.line.capacity() <= 2 * LONGEST_LINE, "{}", client.line.capacity());
+    assert_eq!(told(&mut client, &("\n".to_owned() + &changed("pause", "true"))), [FilmWord::Stop]);
+    assert_eq!(client.garbage(), 2);
+}
+
+#[test]
+fn the_greeting_observes_what_is_understood() {
+    let greeting = MpvClient::greeting();
+    assert_eq!(greeting.lines().count(), OBSERVED.len());
+    assert!(greeting.starts_with("{\"command\":[\"observe_property\",0,\"pause\"]}\n"));
+}
+
+#[test]
+fn no_line_makes_the_client_panic() {
+    let mut luck = Luck::new(6);
+    let pieces = [
+        "{",
+        "}",
+        "[",
+        "\"event\":",
+        "\"data\":",
+        "\"name\":",
+        "\"request_id\":",
+        "\"error\":\"success\"",
+        "\"seek\"",
+        "\"property-change\"",
+        "\"pause\"",
+        "\"time-pos\"",
+        ",",
+        "1e999",
+        "-5",
+        "null",
+        "true",
+        "\n",
+        "\u{fffd}",
+        "\\",
+    ];
+    let mut client = client();
+    for n in 0..3_000 {
+        let line: String = (0..luck.below(12)).map(|_| pieces[luck.below(pieces.len())]).collect();
+        client.poll(mono(f64::from(n) * 0.02));
+        client.hear(line.as_bytes(), mono(f64::from(n) * 0.02), &mut |_| ());
+    }
+    told(&mut client, &("\n".to_owned() + &"[".repeat(60_000) + "\n"));
+}
+
+/// A player that answers within a millisecond, and now and then much later.
+#[test]
+fn the_film_of_a_player_is_known_within_half_a_millisecond_and_its_pause_at_once() {
+    let film = TrueFilm::new(60.0, 1.0003).rate_from(30.0, 0.0);
+    let (mut client, mut luck) = (client(), Luck::new(14));
+    let mut tracker = SourceTracker::new(SourceKind::MpvSound, 0.0015, mono(0.0));
+    let mut worst = 0.0_f64;
+    let mut t = 0.0;
+    while t < 29.9 {
+        t += 0.005;
+        let Some(line) = client.poll(mono(t)) else { continue };
+        let id = line
+            .split("\"request_id\":")
+            .nth(1)
+            .expect("it has one")
+            .trim_end()
+            .trim_end_matches('}')
+            .to_owned();
+        let trip = if luck.is(0.01) { luck.between(0.001, 0.017) } else { luck.between(0.0001, 0.0004) };
+        let position = film.media_s(t + trip * luck.share());
+        let reply = format!("{{\"data\":{position},\"request_id\":{id},\"error\":\"success\"}}\n");
+        client.hear(reply.as_bytes(), mono(t + trip), &mut |told| tracker.hear(&told));
+        if t > 3.0 {
+            worst = worst.max((tracker.point(mono(t)).media.as_secs_f64() - film.media_s(t)).abs());
+        }
+    }
+    assert!(tracker.state() == FilmState::Locked && worst < 0.000_5, "{worst} s");
+    client.hear(changed("pause", "true").as_bytes(), mono(30.0), &mut |told| tracker.hear(&told));
+    assert_eq!(tracker.state(), FilmState::Stopped);
+}
