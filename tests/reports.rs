@@ -52,7 +52,7 @@ fn heard(send: impl FnOnce([UdpSocket; 2], SocketAddrV4)) -> Accounts {
     let mut acks = AckLoop::new(receiver, watched.to_vec(), 1, sent, ticks);
     send(controllers, ours);
     // Loopback delivers within the call that sends.
-    acks.drain(&mut |_, _, _| false);
+    acks.drain(&mut |_, _| false);
     acks.into_accounts()
 }
 

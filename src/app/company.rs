@@ -5,11 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::config::Controller;
-use crate::drive::{Evidence, EvidenceList, Lane, Need, Peer};
+use crate::drive::{Evidence, EvidenceList, Incoming, Lane, Need, Peer};
 use crate::net::{Delivery, Sender};
 use crate::rt::AckLoop;
 use crate::time::{Clock, MonoTime};
-use crate::wire::FromController;
 
 /// From the first count to the second: whoever asks at rest does so four times a second.
 const BETWEEN: Duration = Duration::from_millis(800);
@@ -45,7 +44,7 @@ impl<C: Clock> Company<'_, C> {
     /// that does not tell its count, or has none, is none of them.
     pub(super) fn look(&mut self) -> Vec<(usize, u16)> {
         let first = self.counts();
-        self.wait_until(self.clock.now() + BETWEEN, &mut |_, _, _| false, &|| false);
+        self.wait_until(self.clock.now() + BETWEEN, &mut |_, _| false, &|| false);
         let second = self.counts();
         let surplus = |lane: usize| {
             let grown = second[lane].told?.wrapping_sub(first[lane].told?);
@@ -71,10 +70,10 @@ impl<C: Clock> Company<'_, C> {
                     count.sent += u16::from(peer.poll(Need::Count, now, &mut send) > 0);
                 }
             }
-            let mut take = |lane: usize, message: &FromController<'_>, at: MonoTime| {
+            let mut take = |lane: usize, arrival: Incoming<'_>| {
                 let (peer, count) = &mut counts.borrow_mut()[lane];
                 let mut evidence = EvidenceList::new();
-                peer.receive(message, false, at, &mut evidence);
+                peer.receive(arrival, &mut evidence);
                 let is_answer = !evidence.is_empty();
                 let told = |one| if let Evidence::Count(packets) = one { Some(packets) } else { None };
                 count.told = count.told.or(evidence.into_iter().find_map(told));
@@ -88,7 +87,7 @@ impl<C: Clock> Company<'_, C> {
     fn wait_until(
         &mut self,
         until: MonoTime,
-        take: &mut dyn FnMut(usize, &FromController<'_>, MonoTime) -> bool,
+        take: &mut dyn FnMut(usize, Incoming<'_>) -> bool,
         enough: &dyn Fn() -> bool,
     ) {
         while self.clock.now() < until && !self.is_stopped() && !enough() {

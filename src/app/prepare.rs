@@ -208,7 +208,7 @@ impl<C: Clock> Preparation<'_, C> {
     fn wait_until(&mut self, until: MonoTime, enough: impl Fn(&Self) -> bool) {
         while self.clock.now() < until && !self.stopped() {
             self.clock.sleep_until((self.clock.now() + LOOK).min(until));
-            self.acks.drain(&mut |_, _, _| false);
+            self.acks.drain(&mut |_, _| false);
             if enough(self) {
                 return;
             }

@@ -46,6 +46,17 @@ pub(crate) enum Need {
     Dark,
 }
 
+/// A message of a controller that is no reply to a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Incoming<'a> {
+    /// What it is.
+    pub(crate) message: FromController<'a>,
+    /// When the kernel received it.
+    pub(crate) at: MonoTime,
+    /// Another thread asks as well: it may be the answer to that.
+    pub(crate) others_ask: bool,
+}
+
 /// What an answer of a controller says.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "the ack thread does not allocate")]
@@ -124,16 +135,9 @@ impl Peer {
         self.mbox().poll(need, now, send)
     }
 
-    /// Takes a message that is no reply to a frame: of what it is evidence. What nobody here waits for another thread may have asked
-    /// where `others_ask`.
-    pub(crate) fn receive(
-        &mut self,
-        message: &FromController<'_>,
-        others_ask: bool,
-        at: MonoTime,
-        out: &mut EvidenceList,
-    ) {
-        self.mbox().receive(message, others_ask, at, out);
+    /// Takes a message: puts into `out` of what it is evidence, which is nothing where it answers nothing.
+    pub(crate) fn receive(&mut self, arrival: Incoming<'_>, out: &mut EvidenceList) {
+        self.mbox().receive(arrival, out);
     }
 
     /// Takes the reply code of a frame; says whether it is a refusal of that frame, and not how the controller is.

@@ -7,7 +7,7 @@ use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
 use super::{Live, Sent, TickReport, Watch};
-use crate::drive::Need;
+use crate::drive::{Incoming, Need};
 use crate::health::Change;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Answer, Observer, Watched};
@@ -161,7 +161,7 @@ impl AckLoop {
 
     /// Drains once, and tells what is new, or all where it is time to; gives when to drain next.
     pub fn step(&mut self, clock: &impl Clock, drains: DrainGrid, tell_at: &mut MonoTime) -> MonoTime {
-        self.drain(&mut |_, _, _| false);
+        self.drain(&mut |_, _| false);
         if clock.now() >= *tell_at {
             self.tell_times();
             *tell_at = clock.now() + TELL;
@@ -198,7 +198,7 @@ impl AckLoop {
 
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
-    pub fn drain(&mut self, other: &mut dyn FnMut(usize, &FromController<'_>, MonoTime) -> bool) {
+    pub fn drain(&mut self, other: &mut dyn FnMut(usize, Incoming<'_>) -> bool) {
         let Self { receiver, accounts, sent, ticks, last_sent, heard, watch, live, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
@@ -221,10 +221,10 @@ impl AckLoop {
             let is_known = is_report
                 || watch.as_mut().is_some_and(|watch| {
                     // Another thread has a conversation of its own: it is handed what nobody here takes for a report.
-                    let passed = watch.pass_on(controller, octets, at);
-                    watch.hear(observer, controller, &message, passed, at)
+                    let others_ask = watch.pass_on(controller, octets, at);
+                    watch.hear(observer, controller, Incoming { message, at, others_ask })
                 })
-                || other(controller, &message, at);
+                || other(controller, Incoming { message, at, others_ask: false });
             if !is_known {
                 books.tracker_mut().on_stray(controller);
             }

@@ -9,7 +9,7 @@ mod stop_signs;
 
 use std::sync::Arc;
 
-use super::{Evidence, EvidenceList, Lane, Need, Seen, Whereabouts};
+use super::{Evidence, EvidenceList, Incoming, Lane, Need, Seen, Whereabouts};
 use crate::belief::Reading;
 use crate::config::Controller;
 use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
@@ -141,15 +141,10 @@ impl MboxPeer {
         send(write.emit(&mut [0; MAX_LEN]))
     }
 
-    pub(super) fn receive(
-        &mut self,
-        message: &FromController<'_>,
-        others_ask: bool,
-        at: MonoTime,
-        out: &mut EvidenceList,
-    ) {
+    pub(super) fn receive(&mut self, arrival: Incoming<'_>, out: &mut EvidenceList) {
+        let Incoming { message, at, others_ask } = arrival;
         match message {
-            FromController::Registers(reply) => self.on_registers(reply, others_ask, at, out),
+            FromController::Registers(reply) => self.on_registers(&reply, arrival, out),
             FromController::WideRegisters => out.push(Evidence::Unreadable),
             _ => {}
         }
@@ -159,13 +154,8 @@ impl MboxPeer {
     }
 
     /// Takes the answer to a read.
-    fn on_registers(
-        &mut self,
-        reply: &RegisterReply<'_>,
-        others_ask: bool,
-        at: MonoTime,
-        out: &mut EvidenceList,
-    ) {
+    fn on_registers(&mut self, reply: &RegisterReply<'_>, arrival: Incoming<'_>, out: &mut EvidenceList) {
+        let Incoming { at, others_ask, .. } = arrival;
         let read = MonitorRead::answered_by(reply, self.axes);
         if read.is_some() || others_ask {
             self.probe.mind_stop(reply.code);

@@ -46,7 +46,8 @@ fn answer(start: u16, words: &[u16]) -> RegisterReply<'_> {
 fn hear(peer: &mut MboxPeer, reply: RegisterReply<'_>, at: u64) -> Vec<Evidence> {
     let mut out = Vec::with_capacity(crate::drive::MOST_EVIDENCE);
     let room = out.capacity();
-    peer.receive(&FromController::Registers(reply), false, ms(at), &mut out);
+    let message = FromController::Registers(reply);
+    peer.receive(Incoming { message, at: ms(at), others_ask: false }, &mut out);
     assert_eq!(out.capacity(), room, "there is room for all of it");
     out
 }
@@ -114,7 +115,8 @@ fn an_answer_that_nobody_waits_for_tells_no_place_and_is_no_sign_of_life() {
     assert_eq!(place.told.unwrap()[0], Pulses(7));
     // A conversation of another thread: what nobody here waits for may be for that.
     let mut out = Vec::new();
-    peer.receive(&FromController::Registers(position(DP_POSITIONS[0])), true, ms(95), &mut out);
+    let message = FromController::Registers(position(DP_POSITIONS[0]));
+    peer.receive(Incoming { message, at: ms(95), others_ask: true }, &mut out);
     assert!(out.contains(&Evidence::Answered) && out.contains(&Evidence::Alive), "{out:?}");
     assert!(!out.iter().any(|one| matches!(one, Evidence::Position(_))));
 }

@@ -1,10 +1,9 @@
 //! What controllers answer to what they were asked, beside acks: evidence for health, observer and the tick thread.
 
 use super::Watch;
-use crate::drive::{Evidence, Seen, Whereabouts};
+use crate::drive::{Evidence, Incoming, Seen, Whereabouts};
 use crate::observe::Observer;
 use crate::time::MonoTime;
-use crate::wire::FromController;
 
 impl Watch {
     /// Hands a datagram to whoever else asks; says whether somebody does.
@@ -12,17 +11,16 @@ impl Watch {
         self.standby.as_mut().is_some_and(|standby| standby.pass_on(controller, octets, at))
     }
 
-    /// Hears a message that is no reply to a frame, `passed` on or not; says whether it was an answer to something asked.
+    /// Hears a message that is no reply to a frame; says whether it was an answer to something asked.
     pub(in super::super) fn hear(
         &mut self,
         observer: &mut Observer,
         controller: usize,
-        message: &FromController<'_>,
-        passed: bool,
-        at: MonoTime,
+        arrival: Incoming<'_>,
     ) -> bool {
+        let at = arrival.at;
         let mut evidence = std::mem::take(&mut self.evidence);
-        self.peers[controller].receive(message, passed, at, &mut evidence);
+        self.peers[controller].receive(arrival, &mut evidence);
         let is_answer = !evidence.is_empty();
         for one in evidence.drain(..) {
             self.take(observer, controller, one, at);
