@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use kinocue::engine::Ending;
 use kinocue::harness::{Event, Played, Virtual, Worst, swell};
+use kinocue::rt::Alarm;
+use kinocue::state::{self, Transition};
 use kinocue::time::ShowTime;
 use kinocue::timeline::Hint;
 use kinocue::wire::Timing;
@@ -246,4 +248,19 @@ fn a_level_shrinks_the_motion_about_the_neutral_pose() {
     let played = show.play();
     let full = pulses_of_cue(&played, 0, ShowTime::from_millis(5_010));
     assert!((played.frames[500].request.positions[0].0 - full / 2).abs() <= 1);
+}
+
+#[test]
+fn a_show_that_is_paused_or_stopped_before_its_first_frame_can_be_parked() {
+    for ask in [Transition::Pause, Transition::Stop] {
+        let played = Virtual::new(swell(3, 6, 40.0, 0.4))
+            .with(0, Event::Ask(ask))
+            .with(300, Event::Ask(Transition::Clear))
+            .with(310, Event::Alarm(Alarm::Event(state::Event::PositionsRead)))
+            .with(320, Event::Ask(Transition::Park))
+            .with(900, Event::Leave)
+            .play();
+        assert_eq!(played.ended.ending, Ending::Stopped, "{ask}: {:?}", played.news);
+        assert!(played.frames.iter().all(|frame| frame.request.positions[0].0 == 0), "nothing has moved");
+    }
 }

@@ -33,6 +33,7 @@ mod register;
 mod report;
 mod serve;
 mod sim;
+mod sync;
 mod targets;
 mod token;
 
@@ -77,6 +78,7 @@ enum Command {
     Decode(decode::Args),
     Preflight(preflight::Args),
     Register(register::Args),
+    Sync(sync::Args),
     Home(home::Args),
     Doctor(doctor::Args),
     Serve(serve::Args),
@@ -151,6 +153,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Decode(args) => decode::run(&args),
         Command::Preflight(args) => preflight::run(&args),
         Command::Register(args) => register::run(&args),
+        Command::Sync(args) => sync::run(&args),
         Command::Home(args) => home::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Serve(args) => serve::run(&args),

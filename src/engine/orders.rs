@@ -157,7 +157,7 @@ impl Engine {
     /// A lane's seat is known to be at rest in that pose, `near` of which is noise. One that was away is there again, and joins the
     /// others where they follow the cue; one that rests goes on from there; one that is under way goes on.
     pub fn found(&mut self, lane: usize, known: &KnownPose, near: &Pose) {
-        let is_fresh = self.frames == 0 && self.phase != Phase::Resting(Rest::Stopped);
+        let is_fresh = self.frames == 0 && self.rest().is_none();
         let rests = self.is_at_rest() && self.switch.is_none();
         let rider = &mut self.riders[lane];
         let at_park = is_at(&rider.window, known.pose(), &rider.window.park(), near);

@@ -7,11 +7,11 @@ mod tests;
 use std::time::Duration;
 
 use super::follower::{Follower, PaceLimits};
-use super::point::{FilmPoint, FilmState};
+use super::point::{FILM_FRAME, FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime, Tick};
 
-/// An error beyond this, one frame of film at 24 a second, is never slewed away: seats hold, and join.
-pub const JOIN_ABOVE: Duration = Duration::from_nanos(41_666_667);
+/// An error beyond this is never slewed away, unless it is configured otherwise: seats hold, and join.
+pub const JOIN_ABOVE: Duration = FILM_FRAME;
 /// Seats that are parked join once the film has been followable for so long: a reader that flickers must not begin a show.
 const READY_FOR: Duration = Duration::from_millis(500);
 /// So long before the first sample of the cue seats join its first pose.
@@ -66,8 +66,15 @@ pub enum ParkCause {
 pub enum ChaseVerdict {
     /// Stay parked.
     Wait,
-    /// Follow the cue there, at that pace. Where `join` differs from the tick before, by a join.
-    Follow { join: u32, playhead: ShowTime, pace: f64 },
+    /// Follow the cue.
+    Follow {
+        /// How often seats have joined; where this differs from the tick before, they are to join.
+        join: u32,
+        /// Where in the cue the frame of this tick leads.
+        playhead: ShowTime,
+        /// How many times as fast as the clock the playhead moves.
+        pace: f64,
+    },
     /// Decelerate, and rest.
     Hold(HoldCause),
     /// Park.
@@ -247,6 +254,7 @@ impl Chase {
             self.ready_since = None;
             return self.sign_of_nobody(state, now);
         };
+        // Before all that could hold: seats that hold outside the cue would hold there for minutes.
         if self.has_left(point.media_at(end), now) {
             return ChaseSign::Over(ParkCause::CueLeft);
         }
@@ -295,6 +303,7 @@ impl Chase {
             return None;
         }
         let oldest = self.joined[self.joins as usize % UNSTABLE_JOINS];
+        // Of the last five the oldest: its place in the ring is the next that is written.
         let many = self.joins as usize >= UNSTABLE_JOINS && now.since(oldest) < UNSTABLE_WITHIN;
         match self.rules.rejoin {
             Rejoin::Ask => Some(HoldCause::Asks),

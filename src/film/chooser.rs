@@ -6,7 +6,7 @@ mod tests;
 
 use std::time::Duration;
 
-use super::point::{FilmPoint, FilmState};
+use super::point::{FILM_FRAME, FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime};
 
 /// The sources of a ranking at the most.
@@ -14,8 +14,6 @@ pub(crate) const MOST_SOURCES: usize = 8;
 /// A source that ranks higher has to be locked for so long before it takes over: one that comes and goes would have the seats slew
 /// for ever.
 const UP_AFTER: Duration = Duration::from_secs(10);
-/// Sources closer than a frame agree; the change is slewed. From one that is further off seats would have to join.
-const AGREE_WITHIN_NS: u64 = 41_666_667;
 
 /// What is known of the film by one source, at the instant of the choice.
 #[derive(Debug, Clone, Copy)]
@@ -33,6 +31,11 @@ impl SourceView {
     /// How far another film is ahead.
     const fn behind(&self, other: &Self) -> ShowTime {
         ShowTime::from_nanos(other.point.media.as_nanos().saturating_sub(self.point.media.as_nanos()))
+    }
+
+    /// Whether another says the same, so that the change is slewed: from one that is further off seats would have to join.
+    fn agrees(&self, other: &Self) -> bool {
+        u128::from(self.behind(other).as_nanos().unsigned_abs()) <= FILM_FRAME.as_nanos()
     }
 }
 
@@ -112,10 +115,10 @@ impl Chooser {
     fn go_up(&mut self, views: &[SourceView], now: MonoTime) -> Option<(usize, ShowTime)> {
         let present = self.present.filter(|_| !self.by_hand)?;
         let is_long = |since: &Option<MonoTime>| since.is_some_and(|since| now.since(since) >= UP_AFTER);
+        // Only those that rank higher: between lower ones nobody has to choose.
         let higher = self.leads_since[..present].iter().position(is_long)?;
-        let ahead = views[present].behind(&views[higher]);
-        if !views[present].leads() || ahead.as_nanos().unsigned_abs() > AGREE_WITHIN_NS {
-            return Some((higher, ahead));
+        if !views[present].leads() || !views[present].agrees(&views[higher]) {
+            return Some((higher, views[present].behind(&views[higher])));
         }
         self.switch(higher, views);
         None
@@ -126,8 +129,7 @@ impl Chooser {
             return;
         }
         let before = self.present.and_then(|present| views.get(present));
-        let jumps =
-            before.is_none_or(|before| before.behind(&views[to]).as_nanos().unsigned_abs() > AGREE_WITHIN_NS);
+        let jumps = before.is_none_or(|before| !before.agrees(&views[to]));
         self.epoch = self.epoch.wrapping_add(u32::from(jumps && self.present.is_some()));
         self.switches += u64::from(self.present.is_some());
         self.of_source = views[to].point.epoch;

@@ -65,6 +65,7 @@ impl Estimate {
     /// Begins anew elsewhere with what is known of the noise; of the rate as well, if nothing makes that doubtful.
     pub(super) fn move_to(&mut self, at: MonoTime, media_s: f64) {
         (self.at, self.media_s) = (at, media_s);
+        // How far off the rate is says nothing any more of how far off the place is.
         (self.place_2, self.mixed, self.lean) = (self.noise_2, 0.0, 0.0);
         self.rate_2 = self.rate_2.max(RATE_SIGMA * RATE_SIGMA);
     }
@@ -108,6 +109,7 @@ impl Estimate {
     pub(super) fn predict(&mut self, at: MonoTime) {
         let dt = self.until(at);
         self.media_s += self.rate * dt;
+        // A rate that wanders at random: its variance grows by dt, and integrated that of the place by dt³/3, of both by dt²/2.
         let wander = RATE_WANDERS * RATE_WANDERS * dt.abs();
         self.place_2 += 2.0 * dt * self.mixed + dt * dt * self.rate_2 + wander * dt * dt / 3.0;
         self.mixed += dt * self.rate_2 + wander * dt / 2.0;
@@ -129,6 +131,7 @@ impl Estimate {
     /// Takes up a sample of this instant that is `missed` seconds ahead of the estimate.
     pub(super) fn take_up(&mut self, missed: f64, bound: Duration) {
         let noise_2 = self.noise_of(bound);
+        // The gain is the share of what was missed that is the estimate's fault, and not the sample's.
         let expected_2 = self.place_2 + noise_2;
         let (gain, rate_gain) = (self.place_2 / expected_2, self.mixed / expected_2);
         self.media_s += gain * missed;

@@ -26,7 +26,7 @@ const CHANGE: f64 = 2.0;
 const TRIM_WAITS_S: f64 = 0.010;
 /// Below these an error and a difference of pace are rounding, seconds and a share.
 const NOTHING_S: f64 = 1e-9;
-const NO_PACE: f64 = 1e-7;
+const NO_PACE: f64 = 4e-9;
 
 /// How the pace of the playhead may differ from the clock's. The proof of a cue is made for the greatest that they allow together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,9 +137,11 @@ impl Follower {
             (self.pace, self.change) = (rate, 0.0);
         } else {
             let most = self.limits.change_per_s();
+            // From a slew c, changing by r, the playhead comes c²/2r further: so c may be √(2r e) at an error e.
             let braked = BRAKES_EARLY * (2.0 * most * error.abs()).sqrt();
             let extra = self.limits.slew.min(error.abs() / CLOSES_IN_S).min(braked) * error.signum();
             let wanted = ((rate + extra - self.pace) / PACE_LAGS_S.max(2.0 * dt)).clamp(-most, most);
+            // The change itself has no steps, or the acceleration of a moving seat would have them.
             let step = most / CHANGE_REACHED_S * dt;
             self.change = wanted.clamp(self.change - step, self.change + step);
             let (least, most) = (2.0 - self.limits.most(), self.limits.most());

@@ -110,6 +110,7 @@ impl LabelClock {
             self.newest = None;
         }
         let Some((before, last)) = self.newest else { return };
+        // Of a source that loses some the last of a second may be any.
         let is_next = at.since(before).as_secs_f64() < 1.5 / f64::from(rate.labels());
         let ends = label.seconds == (last.seconds + 1) % 60 && label.frames <= 2;
         if !is_next || !ends {
@@ -134,6 +135,7 @@ impl LabelClock {
             return;
         };
         let passed = at.since(since);
+        // Labels of 24 and of 23.976 are the same; how long they take is not.
         let off = |rate: FrameRate| -> Option<f64> {
             let frames = Timecode::of(label, rate).ok()?.since(Timecode::of(first, rate).ok()?);
             Some((rate.quarters(4 * frames + quarters - begun).as_secs_f64() - passed.as_secs_f64()).abs())

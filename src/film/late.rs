@@ -4,8 +4,9 @@
 const KEPT: usize = 512;
 /// The share of the residuals that is behind the envelope. Beyond it are those few that were early by mistake.
 const ENVELOPE: f64 = 0.97;
-/// The envelope is made anew after so many.
+/// The envelope is made anew after so many; at first, with each.
 const EVERY: usize = 8;
+const FEW: usize = 32;
 
 /// How far the quickest samples of a source are ahead of its mean.
 #[derive(Debug, Clone)]
@@ -35,13 +36,15 @@ impl LateBias {
     pub(super) fn push(&mut self, residual_s: f64) {
         self.residuals[self.count % KEPT] = residual_s as f32;
         self.count += 1;
-        if self.count >= KEPT && self.count % EVERY != 0 {
+        if self.count > FEW && !self.count.is_multiple_of(EVERY) {
             return;
         }
+        // A selection, not a sort: it is most of the work of a tracker.
         let mut sorted = self.residuals;
         let kept = &mut sorted[..self.count.min(KEPT)];
         let index = ((kept.len() - 1) as f64 * ENVELOPE) as usize;
         let (_, envelope, _) = kept.select_nth_unstable_by(index, f32::total_cmp);
+        // Below zero it would say that a sample came before it was sent.
         self.bias_s = f64::from(*envelope).max(0.0);
     }
 }

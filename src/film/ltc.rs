@@ -5,14 +5,12 @@
 mod cells;
 mod decoder;
 mod edges;
-mod generator;
+pub(crate) mod generator;
 mod reader;
 #[cfg(test)]
 mod tests;
 mod word;
 
-pub(crate) use decoder::{LtcDecoder, LtcFrame};
-pub(crate) use generator::LtcGenerator;
 pub(crate) use reader::LtcReader;
 
 use super::timecode::{Label, Timecode};

@@ -9,7 +9,17 @@
 //!
 //! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
-#![cfg_attr(not(test), expect(dead_code, reason = "readers of further sources come next"))]
+#![expect(dead_code, reason = "readers of further sources come next")]
+#![cfg_attr(
+    test,
+    expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        clippy::print_stdout,
+        reason = "tests reckon with small numbers, and print their figures to who asks for them"
+    )
+)]
 
 pub(crate) mod artnet;
 pub mod chase;
@@ -24,7 +34,7 @@ pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
 #[cfg(test)]
-mod testing;
+mod tests;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
 mod words;

@@ -142,6 +142,7 @@ impl MpvClient {
     pub(crate) fn hear(&mut self, bytes: &[u8], at: MonoTime, out: &mut impl FnMut(Observation)) {
         for piece in bytes.split_inclusive(|byte| *byte == b'\n') {
             let is_whole = piece.ends_with(b"\n");
+            // Nothing is kept of a line that grows too long, so that a player that lies fills no memory.
             self.overlong |= self.line.len() + piece.len() > LONGEST_LINE;
             if !self.overlong {
                 self.line.extend_from_slice(piece);
@@ -183,6 +184,7 @@ impl MpvClient {
         let trip = at.since(question.sent);
         let position = message.data.as_ref().and_then(Value::as_f64);
         self.has_sound = message.error.as_deref() == Some("success") && position.is_some();
+        // Neither way is known to be the slower one: half way, and off by half the trip at the most.
         let Some(position) = position.filter(|_| self.has_sound && trip <= MUTE_AFTER) else { return };
         let word = FilmWord::Position(ShowTime::from_secs_f64(position));
         out(Observation { at: question.sent + trip / 2, bound: trip / 2, word });

@@ -58,7 +58,7 @@ pub(crate) fn quarter_frames(frame: Timecode) -> [[u8; 2]; QUARTERS as usize] {
 
 /// Which of the last quarter frames were what.
 #[derive(Debug, Clone, Copy, Default)]
-struct Set {
+struct QuarterSet {
     data: [u8; QUARTERS as usize],
     /// How many came in order, up to the newest.
     run: u8,
@@ -66,7 +66,7 @@ struct Set {
     backwards: bool,
 }
 
-impl Set {
+impl QuarterSet {
     /// Notes a quarter frame; true if a whole set is there.
     fn push(&mut self, data: u8) -> bool {
         let piece = data >> 4 & 7;
@@ -102,7 +102,7 @@ pub(crate) struct MtcReader {
     status: u8,
     data: [u8; LONGEST],
     length: usize,
-    set: Set,
+    set: QuarterSet,
     /// The label of the newest whole set, and whether the one before agreed.
     whole: Option<(Label, u8, bool)>,
     /// The label that the set under way has to have, once two agreed.
@@ -117,7 +117,7 @@ impl MtcReader {
             status: 0,
             data: [0; LONGEST],
             length: 0,
-            set: Set::default(),
+            set: QuarterSet::default(),
             whole: None,
             expected: None,
         }
@@ -158,6 +158,7 @@ impl MtcReader {
         let is_whole = self.set.push(data);
         let (piece, backwards) = (self.set.newest, self.set.backwards);
         let is_first = piece == if backwards { QUARTERS - 1 } else { 0 };
+        // Where a set begins its label is known from the one before; at its end it has to be what it said.
         if is_first {
             self.expected = self.whole.filter(|whole| whole.2).and_then(|(label, bits, _)| {
                 Some((

@@ -13,6 +13,9 @@ use crate::time::{MonoTime, Rate, ShowTime, Tick};
 /// thread hangs, seats must not follow its last word for ever. A loaded machine may hold it up for some of these.
 pub const STALE: Duration = Duration::from_millis(500);
 
+/// A frame of film, at 24 a second. What is off by no more is slewed, and nobody in a seat notices; what is off by more is joined.
+pub const FILM_FRAME: Duration = Duration::from_nanos(41_666_667);
+
 /// What may be said of where the film is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FilmState {
@@ -218,6 +221,7 @@ impl OwnFilm {
 
 impl ChasedFilm {
     fn at(&mut self, tick: &Tick) -> Option<FilmPoint> {
+        // While a point is being written the one before does: it is a few milliseconds old.
         self.last = self.source.read().or(self.last);
         let mut point = self.last?;
         if tick.deadline.since(point.at) > STALE {

@@ -98,16 +98,21 @@ impl FrameRate {
     }
 }
 
+/// What each rate is called; the first name of one is the one that is shown.
+const NAMES: [(&str, FrameRate); 7] = [
+    ("23.976", FrameRate::F23_976),
+    ("23.98", FrameRate::F23_976),
+    ("24", FrameRate::F24),
+    ("25", FrameRate::F25),
+    ("29.97", FrameRate::F29_97),
+    ("29.97 drop", FrameRate::F29_97Drop),
+    ("30", FrameRate::F30),
+];
+
 impl fmt::Display for FrameRate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::F23_976 => "23.976",
-            Self::F24 => "24",
-            Self::F25 => "25",
-            Self::F29_97 => "29.97",
-            Self::F29_97Drop => "29.97 drop",
-            Self::F30 => "30",
-        })
+        let name = NAMES.iter().find(|(_, rate)| rate == self);
+        f.write_str(name.map_or("", |(name, _)| name))
     }
 }
 
@@ -116,14 +121,8 @@ impl FromStr for FrameRate {
 
     /// `29.97` is either of its two until a label says which: the bit in the label decides.
     fn from_str(text: &str) -> Result<Self, TimecodeError> {
-        Ok(match text {
-            "23.976" | "23.98" => Self::F23_976,
-            "24" => Self::F24,
-            "25" => Self::F25,
-            "29.97" => Self::F29_97,
-            "30" => Self::F30,
-            _ => return Err(TimecodeError::Rate(text.to_owned())),
-        })
+        let rate = NAMES.iter().find(|(name, _)| *name == text).map(|(_, rate)| *rate);
+        rate.ok_or_else(|| TimecodeError::Rate(text.to_owned()))
     }
 }
 

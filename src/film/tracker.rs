@@ -14,7 +14,7 @@ pub(crate) use kind::SourceKind;
 use super::estimate::{Estimate, RATE_SIGMA};
 use super::late::LateBias;
 use super::observation::{FilmWord, Observation};
-use super::point::{FilmPoint, FilmState};
+use super::point::{FILM_FRAME, FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime};
 use kind::Traits;
 use recent::Recent;
@@ -95,12 +95,20 @@ pub(crate) struct SourceTracker {
     /// Positions that fitted since the estimate began, or jumped; how many it takes.
     fitted: u32,
     needed: u32,
-    sure_since: Option<MonoTime>,
-    off_speed_since: Option<MonoTime>,
-    on_speed_since: Option<MonoTime>,
+    held: HeldSince,
     /// For how long after the newest position the estimate may run on.
     patience: Duration,
     counts: TrackerCounts,
+}
+
+/// Since when something has been so that has to last.
+#[derive(Debug, Clone, Copy, Default)]
+struct HeldSince {
+    /// The lock rule holds.
+    sure: Option<MonoTime>,
+    /// The film runs at a speed that seats may not follow, or at one that they may.
+    off_speed: Option<MonoTime>,
+    on_speed: Option<MonoTime>,
 }
 
 /// The newest position.
@@ -136,9 +144,7 @@ impl SourceTracker {
             was_misfit: false,
             fitted: 0,
             needed: if traits.coarse { SAMPLES_AGAIN } else { SAMPLES },
-            sure_since: None,
-            off_speed_since: None,
-            on_speed_since: None,
+            held: HeldSince::default(),
             patience: traits.silent_for,
             counts: TrackerCounts::default(),
         }
@@ -245,13 +251,13 @@ impl SourceTracker {
         self.anew |= to == FilmState::Lost;
         self.state = to;
         self.since = at;
-        self.sure_since = None;
+        self.held.sure = None;
     }
 
     fn begin_anew(&mut self) {
         self.anew = true;
         self.recent.clear();
-        (self.off_speed_since, self.on_speed_since) = (None, None);
+        (self.held.off_speed, self.held.on_speed) = (None, None);
     }
 
     /// The line is there and carries no timecode.
@@ -264,6 +270,7 @@ impl SourceTracker {
         if !rate.is_finite() {
             return;
         }
+        // Up to here it ran at the old speed, from here on at the new: no sample has to show that first.
         if let Some(estimate) = &mut self.estimate {
             estimate.predict(at);
             estimate.set_rate(rate, TOLD_RATE_SIGMA);
@@ -314,6 +321,7 @@ impl SourceTracker {
             }
             return true;
         }
+        // By eighths, so that one gap does not make the source a slow one.
         let passed = at.since(newest.moved);
         newest.period =
             if newest.period.is_zero() { passed } else { (7 * newest.period + passed.min(WINDOW * 4)) / 8 };
@@ -328,6 +336,7 @@ impl SourceTracker {
         match &mut self.estimate {
             None => self.estimate = Some(Estimate::new(at, media.as_secs_f64(), self.traits.sigma_s)),
             Some(estimate) => {
+                // It was wound, and that is over.
                 if (estimate.rate() - 1.0).abs() > self.band {
                     estimate.set_rate(1.0, RATE_SIGMA);
                 }
@@ -369,9 +378,14 @@ impl SourceTracker {
         if let Some(ahead) = self.recent.agreed(window, span, estimate.rate(), estimate.noise_s()) {
             estimate.move_to(at, media.as_secs_f64() + ahead);
             self.recent.clear();
-            (self.fitted, self.needed) = (1, SAMPLES_AGAIN);
             self.epoch = self.epoch.wrapping_add(1);
-            self.on_sign(SourceSign::Jump, at);
+            // A cut of a frame is slewed: the noise is known, so nobody has to hold until the new place is.
+            if (missed + ahead).abs() > FILM_FRAME.as_secs_f64() {
+                (self.fitted, self.needed) = (1, SAMPLES_AGAIN);
+                self.on_sign(SourceSign::Jump, at);
+            } else {
+                self.counts.jumps += 1;
+            }
         } else if self.misfits > MISFITS_MOST && !self.was_misfit {
             // Such as come between others that fit; after a jump none fits any more, and the noise is what it was.
             estimate.widen(missed);
@@ -408,13 +422,15 @@ impl SourceTracker {
             return;
         }
         let is_backward = speeds.iter().flatten().any(|speed| speed.rate < -speed.off);
+        // The filter knows the rate best, once it knows it.
         let fine = self.estimate.as_ref().filter(|_| self.fitted > SAMPLES);
         let off = |rate: f64, by: f64| (rate - 1.0).abs() > self.band + by;
         let is_off = speeds.iter().flatten().any(|speed| off(speed.rate, speed.off))
             || fine.is_some_and(|estimate| off(estimate.rate(), 3.0 * estimate.rate_sigma()));
         if is_off || is_backward {
-            self.on_speed_since = None;
-            let since = *self.off_speed_since.get_or_insert(at);
+            self.held.on_speed = None;
+            let since = *self.held.off_speed.get_or_insert(at);
+            // What runs backwards is no noise, and no pull-down: it is believed at once.
             if is_backward {
                 self.on_sign(SourceSign::Backward, at);
             } else if at.since(since) >= SPEED_HELD {
@@ -422,8 +438,8 @@ impl SourceTracker {
             }
             return;
         }
-        self.off_speed_since = None;
-        let since = *self.on_speed_since.get_or_insert(at);
+        self.held.off_speed = None;
+        let since = *self.held.on_speed.get_or_insert(at);
         if matches!(self.state, FilmState::Reverse | FilmState::Shuttle) && at.since(since) >= SPEED_HELD {
             self.begin_anew();
             self.on_sign(SourceSign::InBand, at);
@@ -436,10 +452,10 @@ impl SourceTracker {
         let limit = if self.traits.coarse { SURE_COARSE_S } else { SURE_S };
         let is_in_band = (estimate.rate() - 1.0).abs() <= self.band + 2.0 * estimate.rate_sigma();
         if 3.0 * estimate.sigma_s(at) >= limit || self.fitted < self.needed || !is_in_band {
-            self.sure_since = None;
+            self.held.sure = None;
             return;
         }
-        let since = *self.sure_since.get_or_insert(at);
+        let since = *self.held.sure.get_or_insert(at);
         if self.needed == SAMPLES_AGAIN || at.since(since) >= SURE_FOR {
             self.on_sign(SourceSign::Sure, at);
         }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use rtrb::Producer;
 
+use super::film::{Showing, ShownFilm};
 use super::{Frame, Played};
 use crate::app::StagedShow;
 use crate::belief::Reading;
@@ -16,11 +17,14 @@ use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::drive::Manner;
 use crate::engine::{Mix, Show};
+use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
+use crate::film::follower::PaceLimits;
+use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
 use crate::rt::{
-    Alarm, Answer, Command, Conductor, Desk, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Task,
-    TickLoop, mailboxes,
+    Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning,
+    Task, TickLoop, mailboxes,
 };
 use crate::state::Transition;
 use crate::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
@@ -59,6 +63,8 @@ pub enum Event {
     Refuse,
     /// From here on nobody reads replies, or somebody does again.
     Deaf(bool),
+    /// From here on the film that is chased is said to be there, at that pace, and in that state.
+    Film(ShowTime, f64, FilmState),
 }
 
 /// A show to be played in virtual time.
@@ -70,6 +76,10 @@ pub struct Virtual {
     pub start: ShowTime,
     pub plays: u32,
     pub level: f64,
+    /// True if it chases a film, of which nobody has heard before the first [`Event::Film`].
+    pub chases: bool,
+    /// Whoever tells of it, where it is not the script.
+    pub film: Option<ShownFilm>,
     /// What happens at the wake-up of that number, counted from 0.
     pub script: Vec<(u64, Event)>,
     /// Wake-ups after which a show that does not end is given up.
@@ -87,6 +97,8 @@ impl Virtual {
             start: ShowTime::ZERO,
             plays: 1,
             level: 1.0,
+            chases: false,
+            film: None,
             script: Vec::new(),
             at_most: 1_000_000,
         }
@@ -120,7 +132,10 @@ impl Virtual {
         let staged = StagedShow::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
         let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
         let desk = staged.desk();
-        let (engine, lanes, planner, timeline) = staged.split();
+        let (mut engine, lanes, planner, timeline) = staged.split();
+        if self.chases {
+            engine = engine.waiting();
+        }
         let live = Arc::new(Live::new(lanes.len()));
         (0..lanes.len()).for_each(|lane| read_at_rest(&live, lane, [0.0; MAX_AXES], ORIGIN));
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
@@ -137,10 +152,20 @@ impl Virtual {
             live: &live,
             stands: &stands,
             deaf: Cell::new(false),
+            film: Arc::default(),
+            shown: Cell::new(None),
+            showing: RefCell::new(self.film.as_ref().map(Showing::new)),
         };
+        let rules = ChaseRules {
+            pace: PaceLimits::default(),
+            join_above: JOIN_ABOVE,
+            rejoin: Rejoin::Auto,
+            cue_end: timeline.duration(),
+        };
+        let film = self.chases.then(|| FilmLead::new(Arc::clone(&hands.film), rules, ORIGIN));
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);
-        let conductor = Conductor::of_a_play(clock.now(), true);
+        let conductor = Conductor::of_a_play(clock.now(), true).chasing(film);
         let sink = Link { now: &clock.now, live: &live, stands: &stands, frames: Vec::new() };
         let places = Places::new(&lanes, rate);
         let mut tick_loop = TickLoop {
@@ -174,9 +199,24 @@ struct Hands<'a> {
     /// Where the last frame of each lane led it.
     stands: &'a RefCell<Vec<Pose>>,
     deaf: Cell<bool>,
+    film: Arc<PublishedPoint>,
+    /// Where the film was said to be last.
+    shown: Cell<Option<FilmPoint>>,
+    /// Whoever reads the film from a source.
+    showing: RefCell<Option<Showing>>,
 }
 
 impl Hands<'_> {
+    /// Whoever reads the film publishes where it is.
+    fn show(&self, now: MonoTime) {
+        if let Some(showing) = &mut *self.showing.borrow_mut() {
+            showing.hear(now, &self.film);
+        }
+        if let Some(point) = self.shown.get() {
+            self.film.publish(&FilmPoint { at: now, media: point.media_at(now), ..point });
+        }
+    }
+
     fn command(&self, command: Command) {
         self.commands.borrow_mut().push(command).expect("there is room");
     }
@@ -273,6 +313,7 @@ impl Clock for Stage<'_> {
         self.serve_planner();
         self.beat();
         self.hands.hear(self.now.get());
+        self.hands.show(self.now.get());
         for (_, event) in self.script.iter().filter(|(at, _)| *at == wake_up) {
             self.happened.borrow_mut().push((self.now.get(), *event));
             match event {
@@ -301,6 +342,13 @@ impl Clock for Stage<'_> {
                 }
                 Event::Mix(lane, mix) => self.hands.desk.set(*lane, *mix),
                 Event::Trim(ms) => self.hands.desk.set_trim_ms(*ms),
+                Event::Film(media, rate, state) => {
+                    let epoch = self.hands.shown.get().map_or(0, |point| point.epoch + 1);
+                    let point =
+                        FilmPoint { at: self.now.get(), media: *media, rate: *rate, epoch, state: *state };
+                    self.hands.shown.set(Some(point));
+                    self.hands.show(self.now.get());
+                }
                 Event::Deaf(deaf) => self.hands.deaf.set(*deaf),
                 Event::Refuse => self.planner_refuses.set(true),
                 Event::SlowPlanner(ticks) => {

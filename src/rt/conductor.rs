@@ -226,8 +226,8 @@ impl Conductor {
     fn steer(&self, engine: &mut Engine) {
         engine.obey(match self.machine.state() {
             State::Boot | State::Recovering | State::Homing | State::Parked | State::Armed => Directive::Wait,
-            State::Playing(PlayMode::Waiting) | State::Paused => Directive::Hold,
-            State::Playing(_) => Directive::Play,
+            State::Playing(_) if self.film.as_ref().is_none_or(FilmLead::leads) => Directive::Play,
+            State::Playing(_) | State::Paused => Directive::Hold,
             State::Stopping | State::Stopped | State::Fault => Directive::Stop,
             State::Parking => Directive::Park,
         });

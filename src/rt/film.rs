@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, HoldCause};
+use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, HoldCause};
 use crate::film::point::{FilmClock, FilmState, PublishedPoint};
 use crate::state::Event;
 use crate::time::{MonoTime, ShowTime, Tick};
@@ -20,6 +20,11 @@ impl FilmLead {
     #[must_use]
     pub const fn new(source: Arc<PublishedPoint>, rules: ChaseRules, now: MonoTime) -> Self {
         Self { clock: FilmClock::chase(source), chase: Chase::new(rules, now) }
+    }
+
+    /// Whether seats may follow it.
+    pub(super) fn leads(&self) -> bool {
+        self.chase.state() == ChaseState::Following
     }
 
     /// What this tick makes of the film, for the hall, and where in the cue its frame is to lead, if anywhere.

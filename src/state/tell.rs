@@ -18,10 +18,10 @@ impl Machine {
             Event::JoinBegun if self.state == State::Playing(PlayMode::Holding) => {
                 self.enter(State::Playing(PlayMode::Joining), Cause::GapOver, now);
             }
-            Event::Joined if self.rides() && self.state != State::Playing(PlayMode::Following) => {
+            Event::Joined if self.rides_in(&[PlayMode::Joining, PlayMode::Holding]) => {
                 self.enter(State::Playing(PlayMode::Following), Cause::Joined, now);
             }
-            Event::Late if self.rides() && self.state != State::Playing(PlayMode::Holding) => {
+            Event::Late if self.rides_in(&[PlayMode::Joining, PlayMode::Following]) => {
                 self.enter(State::Playing(PlayMode::Holding), Cause::Late, now);
             }
             Event::FilmLeads if self.state == State::Playing(PlayMode::Waiting) => {
@@ -55,6 +55,10 @@ impl Machine {
             | Event::AtRest
             | Event::Parked => {}
         }
+    }
+
+    fn rides_in(&self, modes: &[PlayMode]) -> bool {
+        modes.iter().any(|mode| self.state == State::Playing(*mode))
     }
 
     const fn rides(&self) -> bool {

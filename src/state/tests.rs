@@ -3,6 +3,8 @@ mod remedies;
 mod table;
 
 use super::*;
+use crate::film::chase::{HoldCause, ParkCause};
+use crate::film::point::FilmState;
 
 const fn s(seconds: u64) -> MonoTime {
     MonoTime::from_nanos(seconds * 1_000_000_000)
@@ -26,6 +28,7 @@ fn way_to(state: State) -> (Vec<Step>, State) {
         State::Parked => then(&[]),
         State::Homing => then(&[Step::Command(Home)]),
         State::Armed => then(&[Step::Command(Arm)]),
+        State::Playing(PlayMode::Waiting) => going(&[Step::Tell(Event::FilmAwaited(HoldCause::Apart))]),
         State::Playing(PlayMode::Joining) => going(&[]),
         State::Playing(PlayMode::Following) => going(&[Step::Tell(Event::Joined)]),
         State::Playing(PlayMode::Holding) => going(&[Step::Tell(Event::Late)]),
@@ -91,8 +94,8 @@ fn why(from: State, request: Transition) -> Why {
     refusal.why
 }
 
-fn riding() -> [State; 3] {
-    [PlayMode::Joining, PlayMode::Following, PlayMode::Holding].map(State::Playing)
+fn riding() -> [State; 4] {
+    [PlayMode::Waiting, PlayMode::Joining, PlayMode::Following, PlayMode::Holding].map(State::Playing)
 }
 
 #[test]
@@ -122,7 +125,7 @@ fn a_show_goes_from_arm_to_go_to_the_cue_to_its_end_to_park() {
 
 #[test]
 fn a_second_go_is_refused() {
-    assert_eq!(riding().map(|state| why(state, Transition::Go)), [Why::PlaysAlready; 3]);
+    assert_eq!(riding().map(|state| why(state, Transition::Go)), [Why::PlaysAlready; 4]);
     assert_eq!(why(State::Paused, Transition::Go), Why::PausedNow);
     assert_eq!(why(State::Parked, Transition::Go), Why::NotArmed);
 }
@@ -469,4 +472,31 @@ fn every_state_says_what_comes_next() {
     );
     assert_eq!(told(State::Armed, Event::Trouble(DRIVE)).next(), Next::PutRight);
     assert_eq!(asked(State::Homing, Transition::Stop).next(), Next::AwaitStandstill);
+}
+
+#[test]
+fn a_show_waits_while_its_film_cannot_be_followed_and_says_why_and_parks_when_it_is_over() {
+    let waiting = |why| (State::Playing(PlayMode::Waiting), Cause::FilmAwaited(why));
+    let absent = HoldCause::Film(FilmState::Absent);
+    for from in riding() {
+        let mut hall = told(from, Event::FilmAwaited(absent));
+        assert_eq!(
+            (hall.state(), hall.cause(), hall.next()),
+            (waiting(absent).0, waiting(absent).1, Next::AwaitFilm)
+        );
+        hall.event(Event::FilmAwaited(HoldCause::Unstable), s(2));
+        assert_eq!((hall.state(), hall.cause()), waiting(HoldCause::Unstable), "another cause is told");
+        hall.event(Event::FilmAwaited(HoldCause::Unstable), s(3));
+        assert_eq!(hall.since(), s(2), "the same is not");
+        hall.event(Event::FilmLeads, s(4));
+        assert_eq!((hall.state(), hall.cause()), (State::Playing(PlayMode::Joining), Cause::FilmLeads));
+        let over = told(from, Event::FilmOver(ParkCause::FilmEnded));
+        assert_eq!((over.state(), over.cause()), (State::Parking, Cause::FilmOver(ParkCause::FilmEnded)));
+    }
+    let others = State::ALL.into_iter().filter(|state| !riding().contains(state));
+    for from in others {
+        for event in [Event::FilmLeads, Event::FilmAwaited(absent), Event::FilmOver(ParkCause::CueLeft)] {
+            assert_eq!(told(from, event).state(), from, "a film moves nobody out of {from}");
+        }
+    }
 }

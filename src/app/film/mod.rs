@@ -4,16 +4,18 @@
 mod ltc;
 mod mpv;
 mod riff;
+mod sound;
 mod source;
 
 use std::io;
 use std::process::Child;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-pub use source::{FilmArgs, FilmSource, LtcInput};
+pub use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
+pub use source::{FilmArgError, FilmArgs, FilmSource, LtcInput};
 
 use crate::film::follower::PaceLimits;
 use crate::film::observation::Observation;
@@ -117,3 +119,4 @@ fn track(point: &PublishedPoint, mut tracker: SourceTracker, heard: &Receiver<Ob
 
 /// Where a reader's observations go.
 type Told = SyncSender<Observation>;
+

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::film::timecode::{FrameRate, Label, Timecode};
+use crate::film::timecode::{FrameRate, Label, Timecode, TimecodeError};
 use crate::film::tracker::SourceKind;
 use crate::time::ShowTime;
 
@@ -47,6 +47,12 @@ pub struct FilmArgs {
 #[error("{0}")]
 pub struct FilmArgError(String);
 
+impl FilmArgError {
+    pub(super) fn of(error: &TimecodeError) -> Self {
+        Self(error.to_string())
+    }
+}
+
 impl FilmArgs {
     /// Where a film is whose first frame is labelled 00:00:00:00 when the cue begins.
     pub(super) fn begin(&self) -> ShowTime {
@@ -60,12 +66,10 @@ impl FilmArgs {
     /// # Errors
     /// [`FilmArgError`] where one of them is nothing known.
     pub fn new(source: FilmSource, rate: Option<&str>, start: Option<&str>) -> Result<Self, FilmArgError> {
-        let rate =
-            rate.map(FrameRate::from_str).transpose().map_err(|error| FilmArgError(error.to_string()))?;
-        let start =
-            start.map(Label::from_str).transpose().map_err(|error| FilmArgError(error.to_string()))?;
+        let rate = rate.map(FrameRate::from_str).transpose().map_err(|error| FilmArgError::of(&error))?;
+        let start = start.map(Label::from_str).transpose().map_err(|error| FilmArgError::of(&error))?;
         if let (Some(start), Some(rate)) = (start, rate) {
-            Timecode::of(start, rate).map_err(|error| FilmArgError(error.to_string()))?;
+            Timecode::of(start, rate).map_err(|error| FilmArgError::of(&error))?;
         }
         Ok(Self { source, rate, start: start.unwrap_or_default() })
     }

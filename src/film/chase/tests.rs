@@ -1,6 +1,6 @@
 use super::*;
 use crate::film::follower::tests::tries;
-use crate::film::testing::{Luck, mono};
+use crate::harness::film::{Luck, mono};
 
 const FRAME: Duration = Duration::from_millis(10);
 

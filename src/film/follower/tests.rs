@@ -1,6 +1,6 @@
 use super::*;
 use crate::film::point::FilmState;
-use crate::film::testing::{Luck, mono};
+use crate::harness::film::{Luck, mono};
 
 fn point(t: f64, media_s: f64, rate: f64) -> FilmPoint {
     FilmPoint {
@@ -45,7 +45,7 @@ fn a_step_is_taken_back_to_the_goal_and_never_passed() {
                 println!("{hz} Hz: {step_ms} ms to {to_ms} ms in {took:.2} s, over by {over:.4} ms");
                 assert!(took <= goal_s, "{hz} Hz: {step_ms} ms to {to_ms} ms in {took} s");
                 assert!(over <= 0.05, "{hz} Hz: over by {over} ms");
-                assert!(errors[errors.len() - 1].abs() < 0.001, "it gets there");
+                assert!(errors[errors.len() - 1].abs() < 0.000_5, "it gets there: {:?}", errors.last());
             }
         }
     }
@@ -127,7 +127,7 @@ fn whatever_the_points_say_pace_and_its_changes_keep_their_limits() {
                 follower.pace()
             );
             assert!(changed.abs() <= most + 1e-9, "{changed} of {most}");
-            assert!((changed - change).abs() * hz <= 20.0 * most + 1e-6, "{changed} after {change}");
+            assert!((changed - change).abs() * hz <= 10.0 * most * 1.001 + 1e-6, "{changed} after {change}");
             let moved = follower.playhead().as_nanos() - before.as_nanos();
             assert!((moved as f64 - frame.as_nanos() as f64 * follower.pace()).abs() <= 1.0, "{moved}");
             (pace, change) = (follower.pace(), changed);

@@ -16,7 +16,7 @@ const LOST: u32 = 4;
 
 /// What an edge makes sure of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Cell {
+pub(super) enum LtcCell {
     /// Half a 1 so far.
     Open,
     /// A whole bit.
@@ -27,7 +27,7 @@ pub(super) enum Cell {
 
 /// Reads bits from the distances of edges.
 #[derive(Debug, Clone)]
-pub(super) struct Cells {
+pub(super) struct LtcCells {
     edge: f64,
     /// The length of a cell, samples; 0 until it is known.
     length: f64,
@@ -37,7 +37,7 @@ pub(super) struct Cells {
     count: usize,
 }
 
-impl Cells {
+impl LtcCells {
     pub(super) const fn new() -> Self {
         Self { edge: 0.0, length: 0.0, is_half: false, odd: 0, kept: [0.0; KEPT], count: 0 }
     }
@@ -52,7 +52,7 @@ impl Cells {
         self.edge
     }
 
-    pub(super) fn push(&mut self, edge: f64) -> Cell {
+    pub(super) fn push(&mut self, edge: f64) -> LtcCell {
         let interval = edge - self.edge;
         self.edge = edge;
         self.kept[self.count % KEPT] = interval;
@@ -63,33 +63,34 @@ impl Cells {
         }
         self.odd = 0;
         let is_whole = share > HALF_UP_TO;
+        // Halves count double, so that a frame of ones teaches as much as one of zeros.
         let seen = if is_whole { interval } else { 2.0 * interval };
         self.length += LEARNS * (seen - self.length);
         match (self.is_half, is_whole) {
-            (false, true) => Cell::Bit(false),
+            (false, true) => LtcCell::Bit(false),
             (false, false) => {
                 self.is_half = true;
-                Cell::Open
+                LtcCell::Open
             }
             (true, false) => {
                 self.is_half = false;
-                Cell::Bit(true)
+                LtcCell::Bit(true)
             }
             // The half before was the second of a 1 whose first was missed, or noise: this one begins a cell.
             (true, true) => {
                 self.is_half = false;
-                Cell::Broken
+                LtcCell::Broken
             }
         }
     }
 
-    fn on_odd(&mut self) -> Cell {
+    fn on_odd(&mut self) -> LtcCell {
         self.is_half = false;
         self.odd += 1;
         if self.length == 0.0 || self.odd >= LOST {
             self.learn();
         }
-        Cell::Broken
+        LtcCell::Broken
     }
 
     /// Learns the length of a cell from the intervals of late: they are of two lengths, one twice the other.
@@ -104,6 +105,7 @@ impl Cells {
         (0..used).for_each(|back| sorted[back] = self.kept[(self.count - 1 - back) % KEPT]);
         let sorted = &mut sorted[..used];
         sorted.sort_unstable_by(f64::total_cmp);
+        // A tenth at either end is noise: the quantiles, not the extremes.
         let (short, long) = (sorted[used / 10], sorted[used - 1 - used / 10]);
         let ratio = long / short;
         self.length = if (1.6..2.6).contains(&ratio) {

@@ -1,8 +1,8 @@
 //! Samples into frames that are sure.
 
-use super::cells::{Cell, Cells};
-use super::edges::Edges;
-use super::word::{BITS, Word, follows};
+use super::cells::{LtcCell, LtcCells};
+use super::edges::LtcEdges;
+use super::word::{BITS, LtcWord, follows};
 use super::{Label, Timecode};
 use crate::film::timecode::FrameRate;
 
@@ -35,9 +35,9 @@ impl LtcFrame {
 /// Reads LTC from samples.
 #[derive(Debug, Clone)]
 pub(crate) struct LtcDecoder {
-    edges: Edges,
-    cells: Cells,
-    word: Word,
+    edges: LtcEdges,
+    cells: LtcCells,
+    word: LtcWord,
     /// Bits since the line was broken.
     bits: u32,
     /// The newest frame, and how many followed each other up to it.
@@ -53,9 +53,9 @@ impl LtcDecoder {
     #[expect(clippy::cast_precision_loss, reason = "audio rates")]
     pub(crate) fn new(samples_per_s: u32) -> Self {
         Self {
-            edges: Edges::new(samples_per_s as f32),
-            cells: Cells::new(),
-            word: Word::default(),
+            edges: LtcEdges::new(samples_per_s as f32),
+            cells: LtcCells::new(),
+            word: LtcWord::default(),
             bits: 0,
             newest: None,
             agreeing: 0,
@@ -95,14 +95,15 @@ impl LtcDecoder {
     pub(crate) fn push(&mut self, sample: i16) -> Option<LtcFrame> {
         let edge = self.edges.push(f32::from(sample) / 32_768.0)?;
         match self.cells.push(edge) {
-            Cell::Open => None,
-            Cell::Broken => {
+            LtcCell::Open => None,
+            LtcCell::Broken => {
                 self.bits = 0;
                 None
             }
-            Cell::Bit(bit) => {
+            LtcCell::Bit(bit) => {
                 self.word.push(bit);
                 self.bits += 1;
+                // A sync word that was put together across a break has bits of two frames before it.
                 if self.bits < BITS {
                     return None;
                 }
@@ -131,6 +132,7 @@ impl LtcDecoder {
     }
 
     fn is_next(&self, frame: &LtcFrame, before: &LtcFrame) -> bool {
+        // Two that follow each other by their labels and not in time were cut together.
         let is_adjacent = (self.frames_between(frame, before) - 1.0).abs() < OFF_GRID;
         let (later, earlier) =
             if frame.backwards { (before.label, frame.label) } else { (frame.label, before.label) };

@@ -14,7 +14,7 @@ const HIGH_PASS_HZ: f32 = 150.0;
 
 /// Finds the edges of a signal.
 #[derive(Debug, Clone)]
-pub(super) struct Edges {
+pub(super) struct LtcEdges {
     keeps: f32,
     shrinks: f32,
     /// The newest sample, as it came and filtered.
@@ -28,7 +28,7 @@ pub(super) struct Edges {
     count: u64,
 }
 
-impl Edges {
+impl LtcEdges {
     pub(super) fn new(samples_per_s: f32) -> Self {
         Self {
             keeps: 1.0 / (1.0 + std::f32::consts::TAU * HIGH_PASS_HZ / samples_per_s),
@@ -54,6 +54,7 @@ impl Edges {
     /// Takes a sample of -1 to 1. The instant of an edge that it makes sure of, samples since the first.
     #[expect(clippy::cast_precision_loss, reason = "exact for 5,000 years")]
     pub(super) fn push(&mut self, raw: f32) -> Option<f64> {
+        // One pole: a second one would ring after each edge, and shift the next.
         let before = self.sound;
         self.sound = self.keeps * (self.sound + raw - self.raw);
         self.raw = raw;
@@ -61,6 +62,7 @@ impl Edges {
         self.count += 1;
         self.height =
             (self.height * self.shrinks).max(self.sound.abs().min((self.height * GROWS).max(SILENT / 2.0)));
+        // Between two samples sound is a straight line, near enough: the rest is a constant part of a sample.
         if (before < 0.0) != (self.sound < 0.0) {
             self.crossed = here - f64::from(self.sound / (self.sound - before));
         }

@@ -1,7 +1,7 @@
 //! Labels into the sound of LTC: for tests, and for technicians who have no other generator.
 
 use super::Timecode;
-use super::word::{BITS, Word};
+use super::word::{BITS, LtcWord};
 
 /// Makes the samples of LTC, frame after frame, either way and at any speed.
 #[derive(Debug, Clone)]
@@ -10,7 +10,7 @@ pub(crate) struct LtcGenerator {
     level: f64,
     speed: f64,
     frame: Timecode,
-    word: Word,
+    word: LtcWord,
     /// Half cells of the frame that are behind.
     halves: u32,
     sign: f64,
@@ -29,7 +29,7 @@ impl LtcGenerator {
             level,
             speed: 1.0,
             frame,
-            word: Word::of(frame.label(), frame.rate()),
+            word: LtcWord::of(frame.label(), frame.rate()),
             halves: 0,
             sign: 1.0,
             left: 0.0,
@@ -74,13 +74,14 @@ impl LtcGenerator {
         let (is_whole, is_backwards) = (self.halves.is_multiple_of(2), self.speed < 0.0);
         let index = (self.halves - 1) / 2;
         let bit = self.word.bit(if is_backwards { BITS - 1 - index } else { index });
+        // Biphase mark: each cell begins with an edge, and a 1 has one more in its middle.
         if is_whole || bit {
             self.sign = -self.sign;
         }
         if self.halves == 2 * BITS {
             self.ended = Some((self.frame, at));
             self.frame = self.frame.plus(if is_backwards { -1 } else { 1 });
-            self.word = Word::of(self.frame.label(), self.frame.rate());
+            self.word = LtcWord::of(self.frame.label(), self.frame.rate());
             self.halves = 0;
         }
         self.left = self.half_cell();

@@ -59,6 +59,7 @@ impl SampleClock {
     fn time_of(&self, sample: f64, now: MonoTime) -> Option<(MonoTime, Duration)> {
         let estimate = self.estimate.as_ref()?;
         let captured_s = estimate.media_s(now) + self.late.bias_s();
+        // A rate of half or less is one that has not been learned yet.
         let ago = (captured_s - sample / self.samples_per_s) / estimate.rate().max(0.5);
         let bound = Duration::try_from_secs_f64(estimate.sigma_s(now)).unwrap_or(Duration::MAX);
         let span = Duration::try_from_secs_f64(ago.abs()).unwrap_or(Duration::MAX);
@@ -112,6 +113,7 @@ impl LtcReader {
     /// Takes a block that was read at an instant.
     #[expect(clippy::cast_precision_loss, reason = "exact for 5,000 years")]
     pub(crate) fn hear(&mut self, block: &[i16], at: MonoTime, out: &mut impl FnMut(Observation)) {
+        // Before the frames of the block: its own time is the best that is known of them.
         self.samples.note((self.decoder.count() + block.len() as u64) as f64, at);
         for sample in block {
             if let Some(frame) = self.decoder.push(*sample) {

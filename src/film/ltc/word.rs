@@ -21,9 +21,9 @@ const DIGITS: [(u32, u32); 8] = [(0, 4), (8, 2), (16, 4), (24, 3), (32, 4), (40,
 
 /// The last 80 bits of a line.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Word(u128);
+pub(super) struct LtcWord(u128);
 
-impl Word {
+impl LtcWord {
     /// Takes the next bit of the line.
     pub(super) const fn push(&mut self, bit: bool) {
         self.0 = self.0 >> 1 | (bit as u128) << (BITS - 1);

@@ -17,7 +17,7 @@ const STRAIGHT: f64 = 3.0;
 const SPEED_SIGMAS: f64 = 4.0;
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct SeenPlace {
     at: MonoTime,
     media: ShowTime,
 }
@@ -25,7 +25,7 @@ struct Place {
 /// The last samples, oldest first.
 #[derive(Debug, Clone)]
 pub(super) struct Recent {
-    places: [Place; KEPT],
+    places: [SeenPlace; KEPT],
     count: usize,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Speed {
 
 impl Recent {
     pub(super) fn new() -> Self {
-        Self { places: [Place::default(); KEPT], count: 0 }
+        Self { places: [SeenPlace::default(); KEPT], count: 0 }
     }
 
     pub(super) const fn clear(&mut self) {
@@ -46,7 +46,7 @@ impl Recent {
     }
 
     pub(super) const fn push(&mut self, at: MonoTime, media: ShowTime) {
-        self.places[self.count % KEPT] = Place { at, media };
+        self.places[self.count % KEPT] = SeenPlace { at, media };
         self.count += 1;
     }
 
@@ -61,6 +61,7 @@ impl Recent {
         let from_newest = move |back: usize| {
             let place = self.places[(self.count - 1 - back) % KEPT];
             let span = newest.at.since(place.at);
+            // From the newest on: squares of seconds since midnight would lose the microseconds.
             let media = place.media.as_nanos().saturating_sub(newest.media.as_nanos());
             (span, (-span.as_secs_f64(), ShowTime::from_nanos(media).as_secs_f64()))
         };
@@ -82,6 +83,7 @@ impl Recent {
                 (oldest, seen_by_then) = (-when, seen);
             }
         }
+        // Of those since the oldest: what came before a jump agrees as well, on where the film was.
         let is_agreed = agreeing >= AGREEING && 2 * agreeing > seen_by_then && oldest >= span.as_secs_f64();
         is_agreed.then(|| ahead / f64::from(u32::try_from(agreeing).unwrap_or(1)))
     }
@@ -105,6 +107,7 @@ impl Recent {
         if n < 4.0 || oldest < span.as_secs_f64() {
             return None;
         }
+        // Least squares: slope, and what is left beside the line.
         let (stt, stm, smm) = (tt - t * t / n, tm - t * m / n, mm - m * m / n);
         let rate = stm / stt;
         let left = ((smm - rate * stm) / (n - 2.0)).max(0.0).sqrt();

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::*;
 
-const EVENTS: [(&str, Event); 17] = [
+const EVENTS: [(&str, Event); 20] = [
     ("identified, at park", Event::Identified(PARKED)),
     ("identified, elsewhere", Event::Identified(Finding { at_park: false, ..PARKED })),
     ("rebooted", Event::Rebooted(0)),
@@ -13,6 +13,9 @@ const EVENTS: [(&str, Event); 17] = [
     ("join begun", Event::JoinBegun),
     ("joined", Event::Joined),
     ("late", Event::Late),
+    ("film leads", Event::FilmLeads),
+    ("film awaited", Event::FilmAwaited(HoldCause::Apart)),
+    ("film over", Event::FilmOver(ParkCause::FilmEnded)),
     ("cue ended", Event::CueEnded),
     ("at rest", Event::AtRest),
     ("parked", Event::Parked),

@@ -1,0 +1,138 @@
+//! LTC as sound: made for technicians and tests, and looked for in a recording.
+
+use serde::Serialize;
+
+use super::riff::{RiffFault, Samples};
+use super::source::FilmArgError;
+use crate::film::ltc::{LtcDecoder, LtcFrame, LtcGenerator};
+use crate::film::timecode::{FrameRate, Timecode};
+
+/// Samples a second of the sound that is made.
+pub const SAMPLES_PER_S: u32 = 48_000;
+/// A fifth of full scale, about as loud as a line is driven.
+const LEVEL: f64 = 0.2;
+
+/// The samples of LTC, without an end.
+#[derive(Debug)]
+pub struct LtcSound(LtcGenerator);
+
+impl LtcSound {
+    /// From a label on, at so many frames a second.
+    ///
+    /// # Errors
+    /// [`FilmArgError`] where there is no such rate, or no such label at it.
+    pub fn new(fps: &str, start: &str) -> Result<Self, FilmArgError> {
+        let words = |error: crate::film::timecode::TimecodeError| FilmArgError::of(&error);
+        let rate: FrameRate = fps.parse().map_err(words)?;
+        let frame = Timecode::parse(start, rate).map_err(words)?;
+        Ok(Self(LtcGenerator::new(frame, SAMPLES_PER_S, LEVEL)))
+    }
+}
+
+impl Iterator for LtcSound {
+    type Item = i16;
+
+    fn next(&mut self) -> Option<i16> {
+        Some(self.0.sample())
+    }
+}
+
+/// The header of a WAV file of one channel and so many samples, or of a stream of nobody knows how many.
+#[must_use]
+pub fn wav_header(samples: Option<u32>) -> Vec<u8> {
+    let octets = samples.map_or(u32::MAX, |samples| 2 * samples);
+    let mut header = b"RIFF".to_vec();
+    header.extend(octets.saturating_add(36).to_le_bytes());
+    header.extend(b"WAVEfmt \x10\0\0\0\x01\0\x01\0");
+    header.extend(SAMPLES_PER_S.to_le_bytes());
+    header.extend((2 * SAMPLES_PER_S).to_le_bytes());
+    header.extend(b"\x02\0\x10\0data");
+    header.extend(octets.to_le_bytes());
+    header
+}
+
+/// What timecode is in a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LtcFound {
+    /// How long the recording is.
+    pub seconds: f64,
+    /// Frames whose labels are sure.
+    pub frames: u64,
+    /// The first label, and the last.
+    pub first: Option<String>,
+    /// See above.
+    pub last: Option<String>,
+    /// Frames a second, by their labels over the samples between them.
+    pub fps: Option<f64>,
+    /// How loud the signal is at the end, of full scale, dB.
+    pub level_db: f64,
+    /// How often a label did not follow the one before it.
+    pub jumps: u64,
+    /// Frames that were played backwards.
+    pub backwards: u64,
+}
+
+/// Looks for timecode in the octets of a WAV file.
+///
+/// # Errors
+/// In words, where it is none that can be read.
+pub fn look_for_ltc(octets: &[u8]) -> Result<LtcFound, impl std::error::Error + Send + Sync + 'static> {
+    let (mut samples, mut sound) = (Samples::default(), Vec::new());
+    samples.push(octets, &mut sound)?;
+    let per_s = samples.samples_per_s().ok_or(RiffFault::NoData)?;
+    let mut decoder = LtcDecoder::new(per_s);
+    let frames: Vec<LtcFrame> = sound.iter().filter_map(|sample| decoder.push(*sample)).collect();
+    let steps = frames.windows(2).map(|pair| (pair[1].end - pair[0].end) / f64::from(per_s));
+    let mut lengths: Vec<f64> = steps.collect();
+    lengths.sort_by(f64::total_cmp);
+    let middle = lengths.get(lengths.len() / 2).copied();
+    let is_jump = |pair: &[LtcFrame]| {
+        let step_s = (pair[1].end - pair[0].end) / f64::from(per_s);
+        middle.is_some_and(|length| step_s > 1.5 * length || step_s < 0.5 * length)
+    };
+    let label = |frame: &LtcFrame| frame.label.to_string();
+    #[expect(clippy::cast_precision_loss, reason = "some hours of samples")]
+    let seconds = sound.len() as f64 / f64::from(per_s);
+    Ok::<_, RiffFault>(LtcFound {
+        seconds,
+        frames: frames.len() as u64,
+        first: frames.first().map(label),
+        last: frames.last().map(label),
+        fps: middle.map(|length| 1.0 / length),
+        level_db: 20.0 * f64::from(decoder.level()).max(1e-6).log10(),
+        jumps: frames.windows(2).filter(|pair| is_jump(pair)).count() as u64,
+        backwards: frames.iter().filter(|frame| frame.backwards).count() as u64,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(seconds: u32, sound: impl Iterator<Item = i16>) -> Vec<u8> {
+        let samples = seconds * SAMPLES_PER_S;
+        let octets = sound.take(samples as usize).flat_map(i16::to_le_bytes);
+        wav_header(Some(samples)).into_iter().chain(octets).collect()
+    }
+
+    #[test]
+    fn what_is_made_is_found_with_its_labels_its_rate_and_where_it_is_broken() {
+        let sound = LtcSound::new("25", "01:00:00:00").unwrap();
+        let found = look_for_ltc(&file(4, sound)).unwrap();
+        assert!((95..=100).contains(&found.frames) && found.jumps == 0 && found.backwards == 0, "{found:?}");
+        assert!(found.first.as_deref().unwrap() < "01:00:00:05" && found.last.as_deref().unwrap() > "01:00:03:20");
+        assert!((found.fps.unwrap() - 25.0).abs() < 0.01 && (found.level_db + 14.0).abs() < 2.0, "{found:?}");
+        let gap = |(at, sample): (usize, i16)| if (96_000..115_200).contains(&at) { 0 } else { sample };
+        let broken = LtcSound::new("25", "01:00:00:00").unwrap().enumerate().map(gap);
+        assert_eq!(look_for_ltc(&file(4, broken)).unwrap().jumps, 1);
+        assert_eq!(look_for_ltc(&file(1, std::iter::repeat(0))).unwrap().frames, 0);
+    }
+
+    #[test]
+    fn a_label_that_there_is_not_is_refused_in_words() {
+        for (fps, start) in [("12", "00:00:00:00"), ("25", "00:00:00:25"), ("29.97", "00:01:00;00"), ("25", "now")] {
+            let error = LtcSound::new(fps, start).expect_err("there is none").to_string();
+            assert!(error.len() > 20, "{error}");
+        }
+    }
+}

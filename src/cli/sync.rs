@@ -1,0 +1,33 @@
+//! `kinocue sync`: timecode for technicians and tests.
+
+use super::{Exit, Failure};
+
+mod check;
+mod send;
+
+const EXAMPLES: &str = "\
+Examples:
+  kinocue sync send --ltc --film-fps 25 --tc-start 01:00:00:00 --seconds 60 -o reel.wav
+  kinocue sync check reel.wav
+  kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
+
+/// Makes timecode, and says what is in a recording of it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    Send(send::Args),
+    Check(check::Args),
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    match &args.command {
+        Command::Send(args) => send::run(args),
+        Command::Check(args) => check::run(args),
+    }
+}

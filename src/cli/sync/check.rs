@@ -1,0 +1,43 @@
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, anyhow};
+
+use crate::app::film::{LtcFound, look_for_ltc};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+
+/// Says what timecode is in a WAV file: its labels, its gaps and jumps, and how loud it is.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct Args {
+    /// The file: 16 bits; the first channel counts.
+    file: PathBuf,
+    /// Print it as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let path = args.file.display();
+    let octets = std::fs::read(&args.file).with_context(|| path.to_string()).or_exit(Exit::NoInput)?;
+    let found = look_for_ltc(&octets).with_context(|| path.to_string()).or_exit(Exit::BadCue)?;
+    if args.json {
+        print::json(&found)?;
+    } else {
+        print::out(&text(&found))?;
+    }
+    if found.frames == 0 {
+        return Err(anyhow!("{path}: no timecode in the first channel")).or_exit(Exit::BadCue);
+    }
+    Ok(Exit::Done)
+}
+
+fn text(found: &LtcFound) -> String {
+    let LtcFound { frames, first, last, fps, level_db, jumps, backwards, seconds } = found;
+    let mut text = format!("{seconds:.1} s of sound, {frames} frames of timecode");
+    if let (Some(first), Some(last)) = (first, last) {
+        let fps = fps.map_or("?".to_owned(), |fps| format!("{fps:.3}"));
+        let _ = write!(text, " from {first} to {last}, {fps} a second, {level_db:.0} dBFS"); // a String takes it
+        let _ = write!(text, "\n{jumps} jumps or gaps, {backwards} frames backwards");
+    }
+    text + "\n"
+}

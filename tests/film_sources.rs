@@ -1,0 +1,147 @@
+//! Whole shows led by a film in virtual time: source, tracker, follower, engine, limiter, frames. The cue is a ramp, so each frame's
+//! position says which instant of the film it was made for.
+
+use std::fmt::Write as _;
+
+use kinocue::harness::{Event, ORIGIN, Played, ShownFilm, TrueFilm, Virtual, swell};
+use kinocue::time::MonoTime;
+
+/// The stroke of a seat, mm, and what of it the ramp covers, in how many seconds.
+const STROKE_MM: f64 = 150.0;
+const RAMP: (f64, f64, f64) = (0.1, 0.9, 24.0);
+/// Sources that may lead seats.
+const SOURCES: std::ops::Range<usize> = 0..5;
+
+fn ramp() -> String {
+    let mut text = "time_ms,a1".to_owned();
+    for row in 0..=240 {
+        let at = RAMP.0 + (RAMP.1 - RAMP.0) * f64::from(row) / 240.0;
+        write!(text, "\n{},{at:.9}", row * 100).expect("a String takes what is written to it");
+    }
+    text.push('\n');
+    text
+}
+
+fn seconds(at: MonoTime) -> f64 {
+    at.since(ORIGIN).as_secs_f64()
+}
+
+/// When each frame of a ramp has its seat where, and how far the film is off there, milliseconds.
+fn errors_ms(played: &Played, film: &TrueFilm) -> Vec<(f64, f64)> {
+    let period = played.rate.period().as_secs_f64();
+    let media = |mm: &f64| (mm / STROKE_MM - RAMP.0) / (RAMP.1 - RAMP.0) * RAMP.2;
+    let ends = played.lane(0).map(|frame| seconds(frame.at) + period);
+    ends.zip(&played.positions_mm(0, 0))
+        .map(|(end, mm)| (end, (media(mm) - film.media_s(end)) * 1e3))
+        .collect()
+}
+
+/// The worst of 99 in a hundred of those in a span.
+fn p99(errors: &[(f64, f64)], span: std::ops::Range<f64>) -> f64 {
+    let mut those: Vec<f64> =
+        errors.iter().filter(|error| span.contains(&error.0)).map(|error| error.1.abs()).collect();
+    those.sort_by(f64::total_cmp);
+    assert!(those.len() > 100, "there are frames in {span:?}: {}", those.len());
+    those[(those.len() - 1) * 99 / 100]
+}
+
+fn assert_unclamped(played: &Played, what: &str) {
+    assert_eq!((played.clamps[0].worst, played.clamps[0].beyond), (None, 0), "{what}");
+}
+
+#[test]
+fn seats_are_where_the_film_is_by_every_source_and_the_limiter_has_nothing_to_do() {
+    for source in SOURCES {
+        let film = ShownFilm::told_by(source, TrueFilm::new(-3.0, 1.0002), 7);
+        let truth = film.truth.clone();
+        let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
+        let name = ShownFilm::name(source);
+        let error = p99(&errors_ms(&played, &truth), 8.0..25.0);
+        println!("{name:<12} p99 {error:.3} ms");
+        // A pulse is a tenth of a millisecond.
+        assert!(error <= if name == "Art-Net" { 1.5 } else { 0.6 }, "{name}: {error} ms");
+        assert_unclamped(&played, name);
+    }
+}
+
+#[test]
+fn a_step_of_40_ms_is_slewed_to_20_ms_in_3_s_and_to_5_ms_in_4_and_a_half() {
+    let film = ShownFilm::told_by(0, TrueFilm::new(-1.0, 1.0).step_at(12.0, 0.040), 3);
+    let truth = film.truth.clone();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
+    let errors = errors_ms(&played, &truth);
+    let worst = |from: f64, to: f64| {
+        let those = errors.iter().filter(|error| (from..to).contains(&error.0));
+        those.map(|error| error.1.abs()).fold(0.0, f64::max)
+    };
+    let over = errors
+        .iter()
+        .filter(|error| (12.0..24.0).contains(&error.0))
+        .map(|error| error.1)
+        .fold(0.0, f64::max);
+    println!(
+        "after 3 s {:.2} ms, after 4.5 s {:.2} ms, over by {over:.2} ms",
+        worst(15.0, 24.0),
+        worst(16.5, 24.0)
+    );
+    assert!(worst(15.0, 24.0) <= 20.0 && worst(16.5, 24.0) <= 5.0 && over <= 2.0);
+    let slewed = errors.iter().filter(|error| (12.2..14.0).contains(&error.0)).map(|error| error.1);
+    assert!(slewed.fold(0.0, f64::min) >= -41.0, "nobody held for it");
+    assert_unclamped(&played, "a step");
+}
+
+/// How far the seat moves from each frame to the next, and when, mm.
+fn moves(played: &Played) -> Vec<(f64, f64)> {
+    let at = played.lane(0).map(|frame| seconds(frame.at));
+    let mm = played.positions_mm(0, 0);
+    at.zip(mm.windows(2).map(|pair| pair[1] - pair[0])).collect()
+}
+
+#[test]
+fn a_told_pause_is_felt_at_once_the_seats_rest_through_it_and_join_after() {
+    let film = ShownFilm::told_by(1, TrueFilm::new(-1.0, 1.0), 3).paused(10.0, 14.0);
+    let truth = film.truth.clone();
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
+    let moving = moves(&played).into_iter().filter(|(_, mm)| mm.abs() > 0.001).map(|(at, _)| at);
+    let in_pause: Vec<f64> = moving.filter(|at| (10.0..14.0).contains(at)).collect();
+    let rest = in_pause.last().copied().unwrap_or(10.0);
+    println!("at rest {:.0} ms after the pause", (rest - 10.0) * 1e3);
+    assert!(rest < 10.4, "{rest}");
+    let error = p99(&errors_ms(&played, &truth), 17.0..27.0);
+    assert!(error <= 0.6, "{error} ms after the pause");
+    assert_unclamped(&played, "a pause");
+}
+
+#[test]
+fn a_second_without_a_word_changes_nothing_and_a_seek_is_joined() {
+    let truth = TrueFilm::new(-1.0, 1.0).step_at(12.0, 5.0);
+    let film = ShownFilm::told_by(1, truth.clone(), 3).unheard(7.0, 8.0);
+    let played = Virtual { chases: true, film: Some(film), ..Virtual::new(ramp()) }.play();
+    let errors = errors_ms(&played, &truth);
+    assert!(p99(&errors, 5.0..11.9) <= 0.6 && p99(&errors, 15.0..19.0) <= 0.6);
+    assert_unclamped(&played, "a seek");
+}
+
+#[test]
+fn whatever_the_film_does_the_seat_keeps_its_limits_and_the_limiter_has_nothing_to_do() {
+    for seed in 0..12_u32 {
+        let dice = |n: u32, sides: u32| (seed * 7_919 + n * 104_729) / 17 % sides;
+        let mut truth = TrueFilm::new(-2.0, 1.0);
+        for n in 0..4 {
+            let t = 4.0 + 5.0 * f64::from(n) + f64::from(dice(n, 10)) / 5.0;
+            truth = match dice(n + 4, 6) {
+                0 => truth.step_at(t, 0.030),
+                1 => truth.step_at(t, -0.041),
+                2 => truth.step_at(t, f64::from(dice(n, 40)) - 20.0),
+                3 => truth.rate_from(t, 1.001),
+                4 => truth.rate_from(t, -1.0).rate_from(t + 2.0, 1.0),
+                _ => truth.rate_from(t, 0.0).rate_from(t + 2.0, 1.0),
+            };
+        }
+        let film = ShownFilm::told_by(dice(9, 5) as usize, truth, seed.into());
+        let show = Virtual { chases: true, film: Some(film), ..Virtual::new(swell(3, 60, 50.0, 0.25)) };
+        let played = show.with(4_000, Event::Leave).play();
+        assert_unclamped(&played, &format!("seed {seed}"));
+        assert!(played.lane(0).count() > 500, "seed {seed}: {} frames", played.lane(0).count());
+    }
+}
