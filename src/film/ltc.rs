@@ -11,6 +11,8 @@ mod reader;
 mod tests;
 mod word;
 
+pub(crate) use decoder::{LtcDecoder, LtcFrame};
+pub(crate) use generator::LtcGenerator;
 pub(crate) use reader::LtcReader;
 
 use super::timecode::{Label, Timecode};
