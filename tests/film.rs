@@ -67,13 +67,22 @@ fn errors_mm(played: &Played, from_s: f64, to_s: f64, media_s: impl Fn(f64) -> f
 fn the_seat_waits_at_park_joins_the_film_where_that_is_follows_it_and_parks_at_the_cues_end() {
     let played = play(vec![film(2.0, 7.0, 1.0, FilmState::Locked)]);
     let first = played.frames[0].at.since(ORIGIN).as_secs_f64();
-    assert!((2.5..2.7).contains(&first), "no frame before the film was followable for half a second: {first}");
+    assert!(
+        (2.5..2.7).contains(&first),
+        "no frame before the film was followable for half a second: {first}"
+    );
     // 7 s of film at 2 s: the wave's greatest speed is 47 mm/s, so 0.05 mm are a millisecond.
     assert!(errors_mm(&played, 6.0, 24.0, |at| at + 5.0) < 0.05);
-    assert_eq!((played.ended.ending, played.frames.last().unwrap().request.positions[0].0), (Ending::Completed, 0));
+    assert_eq!(
+        (played.ended.ending, played.frames.last().unwrap().request.positions[0].0),
+        (Ending::Completed, 0)
+    );
     let states: Vec<State> = states(&played).into_iter().map(|(state, _)| state).collect();
     let playing = [PlayMode::Waiting, PlayMode::Joining, PlayMode::Following].map(State::Playing);
-    assert_eq!(states, [&[State::Playing(PlayMode::Waiting)], &playing[..], &[State::Parking, State::Parked]].concat());
+    assert_eq!(
+        states,
+        [&[State::Playing(PlayMode::Waiting)], &playing[..], &[State::Parking, State::Parked]].concat()
+    );
 }
 
 #[test]
@@ -88,7 +97,8 @@ fn a_film_at_another_speed_is_followed_at_that() {
 
 #[test]
 fn a_film_that_is_a_frame_off_is_slewed_and_one_that_jumps_is_joined() {
-    let lead = |media_s| vec![film(0.5, 0.5, 1.0, FilmState::Locked), film(10.0, media_s, 1.0, FilmState::Locked)];
+    let lead =
+        |media_s| vec![film(0.5, 0.5, 1.0, FilmState::Locked), film(10.0, media_s, 1.0, FilmState::Locked)];
     let slewed = play(lead(10.03));
     assert!(errors_mm(&slewed, 16.0, 24.0, |at| at + 0.03) < 0.05);
     let waits = |played: &Played| {
@@ -111,7 +121,8 @@ fn the_seat_rests_while_the_film_stands_and_joins_it_where_it_goes_on() {
         film(14.3, 8.3, 1.0, FilmState::Locked),
     ]);
     let sent = |from_s: f64, to_s: f64| {
-        let at = |frame: &&kinocue::harness::Frame| (from_s..to_s).contains(&frame.at.since(ORIGIN).as_secs_f64());
+        let at =
+            |frame: &&kinocue::harness::Frame| (from_s..to_s).contains(&frame.at.since(ORIGIN).as_secs_f64());
         played.frames.iter().filter(at).count()
     };
     assert!(sent(8.0, 8.5) > 10, "it slows down by frames");
@@ -123,10 +134,17 @@ fn the_seat_rests_while_the_film_stands_and_joins_it_where_it_goes_on() {
 #[test]
 fn a_film_that_ends_parks_the_seats_and_a_show_that_it_never_led_moves_none() {
     let played = play(vec![film(0.5, 0.5, 1.0, FilmState::Locked), film(8.0, 8.0, 0.0, FilmState::Ended)]);
-    assert_eq!((played.ended.ending, played.frames.last().unwrap().request.positions[0].0), (Ending::Completed, 0));
+    assert_eq!(
+        (played.ended.ending, played.frames.last().unwrap().request.positions[0].0),
+        (Ending::Completed, 0)
+    );
     let absent = Virtual { script: vec![(900, Event::Leave)], ..chasing() }.play();
     assert_eq!((absent.frames.len(), absent.ended.ending), (0, Ending::Stopped));
-    let lost = play(vec![film(0.5, 0.5, 1.0, FilmState::Locked), film(8.0, 8.0, 1.0, FilmState::Lost), (1_500, Event::Leave)]);
+    let lost = play(vec![
+        film(0.5, 0.5, 1.0, FilmState::Locked),
+        film(8.0, 8.0, 1.0, FilmState::Lost),
+        (1_500, Event::Leave),
+    ]);
     assert_eq!(lost.frames.last().unwrap().request.positions[0].0, 0, "it parks from where it rests");
 }
 

@@ -9,8 +9,8 @@ mod source;
 
 use std::io;
 use std::process::Child;
-use std::sync::{Arc, Mutex};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
@@ -119,4 +119,3 @@ fn track(point: &PublishedPoint, mut tracker: SourceTracker, heard: &Receiver<Ob
 
 /// Where a reader's observations go.
 type Told = SyncSender<Observation>;
-

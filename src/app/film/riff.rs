@@ -143,6 +143,10 @@ mod tests {
         let mut endless = b"RIFF\0\0\0\0WAVE".to_vec();
         endless.extend(b"junk\xff\xff\xff\xff");
         assert_eq!(push(&endless), Err(RiffFault::NoData));
-        assert_eq!(push(b"RIFF\0\0\0\0WAVEdata\0\0\0\0"), Err(RiffFault::Format), "nothing says of what kind");
+        assert_eq!(
+            push(b"RIFF\0\0\0\0WAVEdata\0\0\0\0"),
+            Err(RiffFault::Format),
+            "nothing says of what kind"
+        );
     }
 }

@@ -120,7 +120,9 @@ mod tests {
         let sound = LtcSound::new("25", "01:00:00:00").unwrap();
         let found = look_for_ltc(&file(4, sound)).unwrap();
         assert!((95..=100).contains(&found.frames) && found.jumps == 0 && found.backwards == 0, "{found:?}");
-        assert!(found.first.as_deref().unwrap() < "01:00:00:05" && found.last.as_deref().unwrap() > "01:00:03:20");
+        assert!(
+            found.first.as_deref().unwrap() < "01:00:00:05" && found.last.as_deref().unwrap() > "01:00:03:20"
+        );
         assert!((found.fps.unwrap() - 25.0).abs() < 0.01 && (found.level_db + 14.0).abs() < 2.0, "{found:?}");
         let gap = |(at, sample): (usize, i16)| if (96_000..115_200).contains(&at) { 0 } else { sample };
         let broken = LtcSound::new("25", "01:00:00:00").unwrap().enumerate().map(gap);
@@ -130,7 +132,9 @@ mod tests {
 
     #[test]
     fn a_label_that_there_is_not_is_refused_in_words() {
-        for (fps, start) in [("12", "00:00:00:00"), ("25", "00:00:00:25"), ("29.97", "00:01:00;00"), ("25", "now")] {
+        for (fps, start) in
+            [("12", "00:00:00:00"), ("25", "00:00:00:25"), ("29.97", "00:01:00;00"), ("25", "now")]
+        {
             let error = LtcSound::new(fps, start).expect_err("there is none").to_string();
             assert!(error.len() > 20, "{error}");
         }
