@@ -5,8 +5,9 @@
 mod cells;
 mod decoder;
 mod edges;
-pub(crate) mod generator;
+mod generator;
 mod reader;
+mod samples;
 #[cfg(test)]
 mod tests;
 mod word;

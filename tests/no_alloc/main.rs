@@ -5,17 +5,21 @@
 mod counting;
 mod stage;
 
+use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
 use counting::Calls;
 use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
+use kinocue::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, JOIN_ABOVE, Rejoin};
+use kinocue::film::follower::PaceLimits;
+use kinocue::film::point::{FilmClock, FilmPoint, FilmState, PublishedPoint};
 use kinocue::health::{Groups, HealthTable, Notice};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
 use kinocue::state::{Event, Machine, PlayMode, State, Transition, Why};
-use kinocue::time::{MonoTime, ShowTime};
+use kinocue::time::{MonoTime, ShowTime, Tick};
 use kinocue::wire::FrameNo;
 use stage::{CONTROLLERS, Deed, Outcome, PERIOD, play};
 
@@ -161,4 +165,32 @@ fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_s
     }
     assert_eq!(Calls::so_far().since(before), Calls { allocations: 0, frees: 0 });
     assert!(notices > 2, "groups were lost");
+}
+
+#[test]
+fn what_leads_seats_by_a_film_allocates_nothing() {
+    let published = Arc::new(PublishedPoint::default());
+    let mut clock = FilmClock::chase(Arc::clone(&published));
+    let (pace, frame) = (PaceLimits::default(), Duration::from_millis(10));
+    let cue_end = ShowTime::from_millis(600_000);
+    let rules = ChaseRules { pace, join_above: JOIN_ABOVE, rejoin: Rejoin::Auto, cue_end };
+    let mut chase = Chase::new(rules, MonoTime::default());
+    let (mut followed, mut held) = (0, 0);
+    let before = Calls::so_far();
+    for index in 0..10_000_u32 {
+        let deadline = MonoTime::default() + frame * (index + 1);
+        // Now and then it is stopped, and each time it goes on it is a little off.
+        let state = if index % 2_000 < 100 { FilmState::Stopped } else { FilmState::Locked };
+        let media = ShowTime::ZERO + frame * index + Duration::from_millis(u64::from(index % 30));
+        published.publish(&FilmPoint { at: deadline, media, rate: 1.000_3, epoch: index / 2_000, state });
+        let tick = Tick { index: index.into(), deadline, late: Duration::ZERO, missed: 0 };
+        let point = clock.at(&tick, frame);
+        match chase.tick(&ChaseInput { tick: &tick, frame, point, trim_ms: 40, may_lead: true }) {
+            ChaseVerdict::Follow { .. } => followed += 1,
+            ChaseVerdict::Hold(_) => held += 1,
+            ChaseVerdict::Wait | ChaseVerdict::Park(_) => {}
+        }
+    }
+    assert_eq!(Calls::so_far().since(before), NOTHING);
+    assert!(followed > 9_000 && held > 300, "{followed} followed, {held} held");
 }

@@ -7,6 +7,7 @@ mod process;
 mod controllers;
 mod cue_files;
 mod demo;
+mod film;
 mod frames;
 mod keyboard;
 mod loss;

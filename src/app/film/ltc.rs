@@ -143,7 +143,7 @@ impl Line {
     /// The writer is gone, and another may come; says whether anybody waits for one.
     fn again(&self, _read: io::Result<()>) -> bool {
         let is_heard = self.say(FilmWord::Gone);
-        std::thread::sleep(AGAIN);
+        Monotonic.sleep_until(Monotonic.now() + AGAIN);
         is_heard
     }
 

@@ -109,7 +109,7 @@ fn track(point: &PublishedPoint, mut tracker: SourceTracker, heard: &Receiver<Ob
         match heard.recv_timeout(PUBLISH_EVERY) {
             Ok(told) => tracker.hear(&told),
             Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => thread::sleep(PUBLISH_EVERY),
+            Err(RecvTimeoutError::Disconnected) => return,
         }
         let now = Monotonic.now();
         tracker.poll(now);

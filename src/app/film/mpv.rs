@@ -3,7 +3,6 @@
 use std::io::{self, Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::thread;
 use std::time::Duration;
 
 use super::{Told, start};
@@ -38,7 +37,7 @@ impl Player {
         let _ = UnixStream::connect(&self.socket).and_then(|stream| self.converse(stream, &mut client));
         let mut is_heard = true;
         client.hear_end(Monotonic.now(), &mut |what| is_heard &= self.tell(what));
-        thread::sleep(AGAIN);
+        Monotonic.sleep_until(Monotonic.now() + AGAIN);
         is_heard
     }
 

@@ -4,68 +4,18 @@ use std::time::Duration;
 
 use super::Label;
 use super::decoder::{LtcDecoder, LtcFrame};
-use crate::film::estimate::Estimate;
+use super::samples::SampleClock;
 use crate::film::labels::LabelClock;
-use crate::film::late::LateBias;
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::timecode::{FrameRate, TimecodeError};
 use crate::time::{MonoTime, ShowTime};
 
-/// Deviation of the instants at which a pipe gives its blocks, seconds.
-const READ_SIGMA_S: f64 = 0.002;
-/// So many blocks in a row that are not where they should be begin the clock of the samples anew: samples were lost.
-const ASTRAY: u32 = 8;
 /// A line is silent after so many cells without an edge: 2 ms of a film at its speed.
 const SILENT_CELLS: f64 = 4.0;
 /// It is dirty after so many without a frame: four frames.
 const DIRTY_CELLS: f64 = 320.0;
 /// Deviation of the instant of a frame, seconds.
 const FRAME_SIGMA_S: f64 = 0.000_05;
-
-/// When each sample was captured, by when blocks were read: which is late, now more, now less.
-#[derive(Debug, Clone)]
-struct SampleClock {
-    samples_per_s: f64,
-    estimate: Option<Estimate>,
-    late: LateBias,
-    astray: u32,
-}
-
-impl SampleClock {
-    /// Notes that so many samples were there at an instant.
-    fn note(&mut self, count: f64, at: MonoTime) {
-        let captured_s = count / self.samples_per_s;
-        let Some(estimate) = &mut self.estimate else {
-            self.estimate = Some(Estimate::new(at, captured_s, READ_SIGMA_S));
-            return;
-        };
-        estimate.predict(at);
-        let missed = captured_s - estimate.media_s(at);
-        if missed.abs() <= estimate.gate_s(Duration::ZERO) {
-            estimate.take_up(missed, Duration::ZERO);
-            self.late.push(missed);
-            self.astray = 0;
-            return;
-        }
-        estimate.widen(missed);
-        self.astray += 1;
-        if self.astray >= ASTRAY {
-            estimate.move_to(at, captured_s);
-            self.astray = 0;
-        }
-    }
-
-    /// When a sample was captured, and how far off that may be.
-    fn time_of(&self, sample: f64, now: MonoTime) -> Option<(MonoTime, Duration)> {
-        let estimate = self.estimate.as_ref()?;
-        let captured_s = estimate.media_s(now) + self.late.bias_s();
-        // A rate of half or less is one that has not been learned yet.
-        let ago = (captured_s - sample / self.samples_per_s) / estimate.rate().max(0.5);
-        let bound = Duration::try_from_secs_f64(estimate.sigma_s(now)).unwrap_or(Duration::MAX);
-        let span = Duration::try_from_secs_f64(ago.abs()).unwrap_or(Duration::MAX);
-        Some((if ago < 0.0 { now + span } else { now.before(span) }, bound))
-    }
-}
 
 /// Reads one channel of sound as LTC.
 #[derive(Debug, Clone)]
@@ -84,10 +34,9 @@ pub(crate) struct LtcReader {
 impl LtcReader {
     /// A line of so many samples a second; a rate that is not configured is found.
     pub(crate) fn new(samples_per_s: u32, latency: Duration, rate: Option<FrameRate>, start: Label) -> Self {
-        let (estimate, late) = (None, LateBias::new());
         Self {
             decoder: LtcDecoder::new(samples_per_s),
-            samples: SampleClock { samples_per_s: f64::from(samples_per_s), estimate, late, astray: 0 },
+            samples: SampleClock::new(samples_per_s),
             labels: LabelClock::new(rate, start, FRAME_SIGMA_S),
             latency,
             frame_end: 0.0,
@@ -117,23 +66,23 @@ impl LtcReader {
         self.samples.note((self.decoder.count() + block.len() as u64) as f64, at);
         for sample in block {
             if let Some(frame) = self.decoder.push(*sample) {
-                self.on_frame(&frame, at, out);
+                self.on_frame(&frame, out);
             }
         }
         self.on_quiet(at, out);
     }
 
-    fn on_frame(&mut self, frame: &LtcFrame, now: MonoTime, out: &mut impl FnMut(Observation)) {
+    fn on_frame(&mut self, frame: &LtcFrame, out: &mut impl FnMut(Observation)) {
         self.frame_end = frame.end;
         self.said = None;
-        let Some((read, bound)) = self.samples.time_of(frame.end, now) else { return };
+        let Some(read) = self.samples.time_of(frame.end) else { return };
         let at = read.before(self.latency);
         let media: Option<ShowTime> = self.labels.media(at, frame.label, frame.quarters(), None);
         if let Some(rate) = self.labels.rate() {
             self.decoder.set_rate(rate);
         }
         if let Some(media) = media {
-            out(Observation { at, bound, word: FilmWord::Position(media) });
+            out(Observation::new(at, FilmWord::Position(media)));
         }
     }
 

@@ -2,8 +2,6 @@
 
 use std::time::Duration;
 
-use super::decoder::{LtcDecoder, LtcFrame};
-use super::generator::LtcGenerator;
 use super::*;
 use crate::film::follower::tests::tries;
 use crate::film::observation::{FilmWord, Observation};

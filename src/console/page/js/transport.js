@@ -14,9 +14,9 @@ const MAY = {
   arm: ['parked'],
   disarm: ['armed', 'homing'],
   go: ['armed'],
-  pause: ['joining', 'playing', 'holding'],
+  pause: ['waiting', 'joining', 'playing', 'holding'],
   resume: ['paused'],
-  park: ['recovering', 'parked', 'armed', 'joining', 'playing', 'holding', 'paused'],
+  park: ['recovering', 'parked', 'armed', 'waiting', 'joining', 'playing', 'holding', 'paused'],
   home: ['recovering', 'parked'],
 };
 

@@ -1,0 +1,171 @@
+//! Plays that chase a film: timecode out of a file, and a player that speaks as mpv does.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::Duration;
+
+use kinocue::sys::clock::Monotonic;
+use kinocue::time::{Clock as _, MonoTime};
+
+use serde_json::{Value, json};
+
+use super::process::{Playing, Sim, kinocue};
+use super::{Folder, STROKE, pulses};
+
+/// A cue that rises a third of the stroke in so many seconds, from rest to rest, and stays there for one more.
+fn rise(folder: &Folder, seconds: u32) -> std::path::PathBuf {
+    let part = |ms: u32| (f64::from(ms) / f64::from(1_000 * seconds)).min(1.0);
+    let row = |ms: u32| {
+        let part = part(ms);
+        format!("{ms},{:.7}\n", part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part) / 3.0)
+    };
+    let rows: String = (0..=1_000 * (seconds + 1)).step_by(20).map(row).collect();
+    folder.write("rise.csv", format!("time_ms,a1\n{rows}"))
+}
+
+fn reel(folder: &Folder, start: &str, seconds: &str) -> String {
+    let path = folder.write("reel.wav", String::new()).to_str().expect("text").to_owned();
+    let made = kinocue(&["sync", "send", "--ltc", "--tc-start", start, "--seconds", seconds, "-o", &path]);
+    assert_eq!(made.code, Some(0), "{made:?}");
+    path
+}
+
+#[test]
+fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let chase = format!("ltc:{}", reel(&folder, "00:59:58:00", "9"));
+    let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
+    let run = Playing::start(&rise(&folder, 4), &sim.to(), &args).finish();
+    let report = run.report_of(0);
+    assert_eq!(report["result"], "completed", "{}", run.stderr);
+    assert!(
+        run.stderr.contains("waiting: ") && run.stderr.contains("parking: the cue is over"),
+        "{}",
+        run.stderr
+    );
+    let seen = sim.end();
+    assert!(seen.rest_in_park());
+    // It is where the cue is at a time that goes on as the frames do.
+    let rows: Vec<_> = seen.rows.iter().map(|row| (f64::from(row.frame), row.commanded[0])).collect();
+    let media_s = |at: i32| {
+        let wanted = f64::from(at) / STROKE * 3.0;
+        let (mut low, mut high) = (0.0_f64, 1.0_f64);
+        for _ in 0..60 {
+            let part = f64::midpoint(low, high);
+            let risen = part.powi(3) * (10.0 - 15.0 * part + 6.0 * part * part);
+            if risen < wanted { low = part } else { high = part }
+        }
+        4.0 * low
+    };
+    // What comes down to park after the cue is no part of it.
+    let top = rows.iter().position(|(_, at)| *at >= pulses(0.33)).expect("it comes to the top");
+    let rising = rows[..top].iter().filter(|(_, at)| *at > pulses(0.1));
+    let off: Vec<f64> = rising.map(|(frame, at)| media_s(*at) - frame * 0.01).collect();
+    let (least, most) =
+        off.iter().fold((f64::MAX, f64::MIN), |(least, most), off| (least.min(*off), most.max(*off)));
+    assert!(off.len() > 50 && most - least < 0.005, "{} frames, {least}..{most}", off.len());
+}
+
+/// A player that speaks as mpv does: its film runs until it is told.
+struct Player {
+    told: Sender<Value>,
+}
+
+impl Player {
+    /// Its film is at `media_s` now.
+    fn start(socket: &Path, media_s: f64) -> Self {
+        let listener = UnixListener::bind(socket).expect("the socket is free");
+        let (told, tells) = channel();
+        std::thread::spawn(move || {
+            let (stream, _) = listener.accept().expect("kinocue connects");
+            serve(stream, media_s, &tells);
+        });
+        Self { told }
+    }
+
+    fn tell(&self, what: Value) {
+        self.told.send(what).expect("it lives");
+    }
+
+    fn pause(&self, paused: bool) {
+        self.tell(json!({ "event": "property-change", "id": 0, "name": "pause", "data": paused }));
+    }
+}
+
+fn serve(stream: UnixStream, media_s: f64, tells: &Receiver<Value>) {
+    let mut out = stream.try_clone().expect("it can be cloned");
+    stream.set_read_timeout(Some(Duration::from_millis(5))).expect("it can be set");
+    let (mut lines, mut line) = (BufReader::new(stream), String::new());
+    // Where the film is at an instant, while it runs.
+    let (mut at, mut runs) = ((Monotonic.now(), media_s), true);
+    let media = |at: (MonoTime, f64), runs: bool| {
+        at.1 + if runs { Monotonic.now().since(at.0).as_secs_f64() } else { 0.0 }
+    };
+    loop {
+        for what in tells.try_iter() {
+            if what["name"] == "pause" {
+                at = (Monotonic.now(), media(at, runs));
+                runs = what["data"] == false;
+            }
+            if writeln!(out, "{what}").is_err() {
+                return;
+            }
+        }
+        match lines.read_line(&mut line) {
+            Ok(0) => return,
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => continue,
+            Err(_) => return,
+            Ok(_) => {}
+        }
+        let asked: Value = serde_json::from_str(&line).expect("JSON");
+        line.clear();
+        let answer =
+            json!({ "data": media(at, runs), "error": "success", "request_id": asked["request_id"] });
+        if asked["command"][0] == "get_property" && writeln!(out, "{answer}").is_err() {
+            return;
+        }
+    }
+}
+
+#[test]
+fn a_player_leads_the_seat_which_rests_while_it_is_paused_and_parks_when_its_film_is_over() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let cue = rise(&folder, 20);
+    let socket = cue.with_file_name("mpv.sock");
+    let player = Player::start(&socket, 1.0);
+    player.pause(false);
+    let chase = format!("mpv:{}", socket.display());
+    let mut playing = Playing::start(&cue, &sim.to(), &["--json", "--chase", &chase]);
+    playing.wait_for("playing: ");
+    player.pause(true);
+    playing.wait_for("waiting: the film is stopped");
+    player.pause(false);
+    playing.wait_for("playing: ");
+    player.tell(json!({ "event": "end-file", "reason": "eof" }));
+    playing.wait_for("parked");
+    let run = playing.finish();
+    assert_eq!(run.report_of(0)["result"], "completed");
+    let seen = sim.end();
+    assert!(seen.rest_in_park() && seen.rows.iter().any(|row| row.commanded[0] > pulses(0.001)));
+}
+
+#[test]
+fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
+    let (folder, to) = (Folder::new(), ["127.0.0.1:9".to_owned()]);
+    let cue = rise(&folder, 2);
+    let refused = [
+        (&["--chase", "tape:1"][..], 64, "is no source; take mpv:SOCKET"),
+        (&["--chase", "ltc:nothing.wav"], 71, "nothing.wav cannot be opened"),
+        (&["--chase", "ltc:-", "--start", "1"], 64, "cannot be used with"),
+        (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is no frame rate; take"),
+        (&["--chase", "ltc:-", "--film-fps", "25", "--tc-start", "01:00:00:25"], 64, "outside 0..=24"),
+        (&["--film-fps", "25"], 64, "--chase"),
+    ];
+    for (args, code, says) in refused {
+        let run = Playing::start(&cue, &to, args).finish();
+        assert_eq!(run.code, Some(code), "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains(says), "{args:?}: {}", run.stderr);
+    }
+}
