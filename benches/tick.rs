@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
-use kinocue::belief::{Evidence, Reading, Taken};
+use kinocue::belief::{LaneEvidence, Reading, Taken};
 use kinocue::engine::Step;
 use kinocue::harness::{ride, stage};
 use kinocue::motion::MAX_AXES;
@@ -149,7 +149,7 @@ fn round(links: &[Link]) -> Round {
     round
 }
 
-fn evidence(live: &Live) -> impl Iterator<Item = &Evidence> {
+fn evidence(live: &Live) -> impl Iterator<Item = &LaneEvidence> {
     (0..).map_while(|lane| live.evidence(lane))
 }
 

@@ -6,7 +6,7 @@
 //!              +------------------- v ------------------------------+
 //!              | tick thread, fixed rate, up to 1 kHz               |
 //!              |   engine   clock -> tick -> playhead -> Pose       |
-//!  control --> |   fanout   Pose -> + axis offset -> bytes -> net  | --> controllers
+//!  control --> |   drive    Pose -> + axis offset -> bytes -> net  | --> controllers
 //!              +--------------------|-------------------------------+          |
 //!                                   v Sent, TickReport                        acks
 //!       report, progress <----- tracker (latency, loss, silence) <---- net <---+
@@ -35,8 +35,8 @@ pub mod config;
 pub mod proof;
 
 pub mod belief;
+pub mod drive;
 pub mod engine;
-pub mod fanout;
 pub mod film;
 pub mod limiter;
 pub mod plan;

@@ -10,8 +10,8 @@ use kinocue::app::StagedShow;
 use kinocue::belief::Reading;
 use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
+use kinocue::drive::{Lane, Manner};
 use kinocue::engine::{Ending, Show};
-use kinocue::fanout::{Lane, Manner};
 use kinocue::motion::MAX_AXES;
 use kinocue::net::Delivery;
 use kinocue::rt::{

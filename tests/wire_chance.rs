@@ -2,9 +2,9 @@
 
 use kinocue::motion::Pulses;
 use kinocue::wire::{
-    Access, Code, FrameNo, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply, MotionRequest, PerAxis,
-    ReadRequest, RegisterReply, ReplyCode, Report, ServoRead, ServoReply, ServoWrite, Status, Timing,
-    Vibration, Words, WriteRequest,
+    Access, Code, FrameNo, FromController, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply,
+    MotionRequest, PerAxis, ReadRequest, RegisterReply, ReplyCode, Report, ServoRead, ServoReply, ServoWrite,
+    Status, Timing, Vibration, VibrationPort, Words, WriteRequest,
 };
 use proptest::prelude::*;
 
@@ -114,6 +114,7 @@ proptest! {
     fn what_was_written_is_read_again(message in prop_oneof![motion(), motion_reply(), status()]) {
         let bytes = emitted(&message);
         prop_assert_eq!(Message::parse(&bytes), Ok(message));
+        assert_told_apart(&bytes);
     }
 
     #[test]
@@ -152,6 +153,7 @@ proptest! {
         ] {
             let bytes = emitted(&message);
             prop_assert_eq!(Message::parse(&bytes), Ok(message));
+            assert_told_apart(&bytes);
         }
     }
 }
@@ -164,6 +166,25 @@ fn read_all_ways(bytes: &[u8]) {
     if let Ok(reply) = ImaxRegisters::parse(bytes) {
         let _ = reply.values().count();
     }
+    assert_told_apart(bytes);
+}
+
+/// What a controller may send is told apart at once as each reader of one message alone would tell.
+fn assert_told_apart(bytes: &[u8]) {
+    let told = FromController::parse(VibrationPort::Two, bytes);
+    let (reply, registers) = (MotionReply::parse(bytes).ok(), RegisterReply::parse(bytes).ok());
+    let (status, report) = (Status::parse(bytes).ok(), Report::parse(bytes).ok());
+    let is_wide = ImaxRegisters::parse(bytes).is_ok_and(|reply| reply.is_wide());
+    let alone = match (reply, registers, status, report) {
+        (Some(reply), None, None, None) => FromController::Reply(reply),
+        (None, Some(registers), None, None) => FromController::Registers(registers),
+        (None, None, Some(status), None) => FromController::Status(status),
+        (None, None, None, Some(report)) => FromController::Report(report),
+        (None, None, None, None) if is_wide => FromController::WideRegisters,
+        (None, None, None, None) => FromController::Other,
+        more => panic!("two readers take it: {more:?}"),
+    };
+    assert_eq!(told, alone);
 }
 
 proptest! {

@@ -8,7 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use kinocue::belief::Reading;
-use kinocue::fanout::Lane;
+use kinocue::drive::Lane;
 use kinocue::harness::{ride, stage};
 use kinocue::motion::MAX_AXES;
 use kinocue::net::{DrainGrid, Ports, Sender};

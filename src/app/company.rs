@@ -1,17 +1,15 @@
 //! Before a play's first frame: whether somebody else sends to its controllers, by their count of datagrams (DP34).
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::config::Controller;
-use crate::fanout::Lane;
+use crate::drive::{Evidence, EvidenceList, Incoming, Lane, Need, Peer};
 use crate::net::{Delivery, Sender};
 use crate::rt::AckLoop;
 use crate::time::{Clock, MonoTime};
-use crate::wire::{Access, Dialect, MAX_LEN, ReadRequest, RegisterReply, ReplyCode};
 
-/// DP34: datagrams received; SMC alone.
-const PACKETS: u16 = 0x34;
 /// From the first count to the second: whoever asks at rest does so four times a second.
 const BETWEEN: Duration = Duration::from_millis(800);
 /// Reads of each count, and how long each is waited for.
@@ -58,44 +56,38 @@ impl<C: Clock> Company<'_, C> {
     }
 
     fn counts(&mut self) -> Vec<Count> {
-        let mut counts = vec![Count::default(); self.lanes.len()];
+        let (ends, sender) = (self.controllers.iter().zip(self.lanes), self.sender);
+        let peers = ends.map(|(controller, lane)| (Peer::new(controller, lane), Count::default()));
+        let counts = RefCell::new(peers.collect::<Vec<_>>());
+        // Of one that has no counter nothing is asked.
+        let enough = || counts.borrow().iter().all(|(_, count)| count.told.is_some() || count.sent == 0);
         for _ in 0..TRIES {
-            let smc = |lane: &usize| self.controllers[*lane].dialect == Dialect::Smc;
-            let open: Vec<usize> =
-                (0..counts.len()).filter(smc).filter(|lane| counts[*lane].told.is_none()).collect();
-            if open.is_empty() || self.is_stopped() {
-                break;
+            let now = self.clock.now();
+            for (lane, (peer, count)) in counts.borrow_mut().iter_mut().enumerate() {
+                if count.told.is_none() && !self.is_stopped() {
+                    let mut send =
+                        |datagram: &[u8]| !matches!(sender.send(lane, datagram), Delivery::Failed(_));
+                    count.sent += u16::from(peer.poll(Need::Count, now, &mut send) > 0);
+                }
             }
-            for lane in open {
-                counts[lane].sent += u16::from(self.ask(lane));
-            }
-            let until = self.clock.now() + WAIT;
-            let told = std::cell::RefCell::new(&mut counts);
-            let mut take = |lane: usize, bytes: &[u8]| {
-                let count = count_of(bytes);
-                let mut told = told.borrow_mut();
-                told[lane].told = told[lane].told.or(count);
-                count.is_some()
+            let mut take = |lane: usize, arrival: Incoming<'_>| {
+                let (peer, count) = &mut counts.borrow_mut()[lane];
+                let mut evidence = EvidenceList::new();
+                peer.receive(arrival, &mut evidence);
+                let is_answer = !evidence.is_empty();
+                let told = |one| if let Evidence::Count(packets) = one { Some(packets) } else { None };
+                count.told = count.told.or(evidence.into_iter().find_map(told));
+                is_answer
             };
-            let dialects = self.controllers.iter().map(|one| one.dialect);
-            let mbox: Vec<bool> = dialects.map(|dialect| dialect != Dialect::Smc).collect();
-            let enough =
-                || told.borrow().iter().zip(&mbox).all(|(count, mbox)| *mbox || count.told.is_some());
-            self.wait_until(until, &mut take, &enough);
+            self.wait_until(now + WAIT, &mut take, &enough);
         }
-        counts
-    }
-
-    fn ask(&self, lane: usize) -> bool {
-        let code = self.lanes[lane].code;
-        let read = ReadRequest { channel: 0, accept: code, reply: code, start: PACKETS, num: 1 };
-        !matches!(self.sender.send(lane, read.emit(&mut [0; MAX_LEN])), Delivery::Failed(_))
+        counts.into_inner().into_iter().map(|(_, count)| count).collect()
     }
 
     fn wait_until(
         &mut self,
         until: MonoTime,
-        take: &mut dyn FnMut(usize, &[u8]) -> bool,
+        take: &mut dyn FnMut(usize, Incoming<'_>) -> bool,
         enough: &dyn Fn() -> bool,
     ) {
         while self.clock.now() < until && !self.is_stopped() && !enough() {
@@ -107,13 +99,4 @@ impl<C: Clock> Company<'_, C> {
     fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
-}
-
-/// The count that an answer tells; with x over 2 it does not say its channel.
-fn count_of(bytes: &[u8]) -> Option<u16> {
-    let reply = RegisterReply::parse(bytes).ok()?;
-    let is_ours = reply.access == Access::Read
-        && (reply.start, reply.num) == (PACKETS, 1)
-        && (reply.channel == 0 || reply.code != ReplyCode::Running);
-    reply.data.get(0).filter(|_| is_ours)
 }

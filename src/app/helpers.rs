@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle, Thread};
 
 use super::run::Run;
-use crate::fanout::Lane;
+use crate::drive::Lane;
 use crate::net::{DrainGrid, Sender};
 use crate::plan::PlanError;
 use crate::rt::{Accounts, AckLoop, Ended, PlanLoop, Spinning, TickLoop};

@@ -14,11 +14,11 @@ use super::report::Report;
 use super::stage::Stage;
 use super::staged::StagedShow;
 use super::sum_up::{About, sum_up};
-use crate::belief::{Evidence, FRESH, Reading};
+use crate::belief::{FRESH, LaneEvidence, Reading};
 use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
+use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
-use crate::fanout::{Lane, Manner};
 use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
 use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
@@ -328,7 +328,7 @@ fn look_for_others(
 fn off_park(config: &Config, windows: &[Window], live: &Live, now: MonoTime) -> Vec<String> {
     let is_up = |lane: &usize| {
         let window = &windows[*lane];
-        let reading = live.evidence(*lane).and_then(Evidence::reading);
+        let reading = live.evidence(*lane).and_then(LaneEvidence::reading);
         reading.is_some_and(|(_, Reading { pose, slots, at, .. })| {
             if now.since(at) > FRESH {
                 return false; // what it told before the show says nothing of its end

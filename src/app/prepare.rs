@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::belief::{KnownPose, Reading, Taken};
 use crate::config::Controller;
-use crate::fanout::Lane;
+use crate::drive::Lane;
 use crate::net::{Delivery, Sender};
 use crate::plan::slow_park_time;
 use crate::rt::{AckLoop, Live, Places, Sent};

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::config::Config;
+use crate::drive::{Lane, Manner, lanes};
 use crate::engine::{Engine, Headroom, Mix, Show};
-use crate::fanout::{Lane, Manner, lanes};
 use crate::motion::Window;
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
 use crate::rt::{Desk, Loaded, Planning};

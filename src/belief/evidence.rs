@@ -47,7 +47,7 @@ impl Reading {
 
 /// The newest ack of a lane and the newest reading of its seat.
 #[derive(Debug, Default)]
-pub struct Evidence {
+pub struct LaneEvidence {
     /// The number of the newest frame that was acked, and [`SOME`]; 0 where there is none.
     acked: AtomicU64,
     /// Odd while a reading is being written.
@@ -62,7 +62,7 @@ const RESTS: u32 = 1 << 16;
 const MOVES: u32 = 1 << 17;
 const BY: u32 = 18;
 
-impl Evidence {
+impl LaneEvidence {
     /// The newest frame that was acked.
     #[must_use]
     pub fn acked(&self) -> Option<FrameNo> {

@@ -14,7 +14,7 @@ mod tests;
 
 use std::time::Duration;
 
-pub use evidence::{Evidence, Reading, Source};
+pub use evidence::{LaneEvidence, Reading, Source};
 use history::History;
 use span::Spans;
 
@@ -26,7 +26,7 @@ use crate::wire::FrameNo;
 pub const GAP: Duration = Duration::from_millis(50);
 /// So long without one it is, even if the ack thread has not told meanwhile of what arrived.
 const GAP_UNTOLD: Duration = Duration::from_millis(100);
-/// Evidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
+/// LaneEvidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
 /// three axes each, and one of them may be lost.
 pub const FRESH: Duration = Duration::from_millis(1_500);
 /// Frames further apart are not one motion: what comes after begins anew, from evidence. Hold frames are 100 ms apart.
@@ -214,7 +214,7 @@ impl Belief {
     }
 
     /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it.
-    pub fn look(&mut self, evidence: &Evidence, told: MonoTime, now: MonoTime) -> Found {
+    pub fn look(&mut self, evidence: &LaneEvidence, told: MonoTime, now: MonoTime) -> Found {
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {

@@ -21,13 +21,13 @@ fn window() -> Window {
 /// What the ack thread sees of a lane, and what the tick thread makes of it.
 struct Bench {
     belief: Belief,
-    evidence: Evidence,
+    evidence: LaneEvidence,
     next: u32,
 }
 
 impl Bench {
     fn new() -> Self {
-        Self { belief: Belief::new(&window(), PERIOD, true), evidence: Evidence::default(), next: 1 }
+        Self { belief: Belief::new(&window(), PERIOD, true), evidence: LaneEvidence::default(), next: 1 }
     }
 
     /// One that was read at rest there at 0 ms.
@@ -162,7 +162,7 @@ fn that_the_ack_thread_is_slow_is_no_gap_for_a_tenth_of_a_second() {
 fn frames_that_the_kernel_does_not_take_for_fifty_milliseconds_are_a_gap_with_acks_or_without() {
     for asks in [true, false] {
         let mut belief = Belief::new(&window(), PERIOD, asks);
-        let evidence = Evidence::default();
+        let evidence = LaneEvidence::default();
         let begins = |belief: &mut Belief, when| belief.look(&evidence, ms(when), ms(when)) == Found::Gap;
         belief.refused(ms(0));
         assert!(!begins(&mut belief, 50));
@@ -198,7 +198,7 @@ fn a_frame_that_waits_for_another_is_counted_as_late_and_one_that_waits_for_seve
 #[test]
 fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() {
     let mut belief = Belief::new(&window(), PERIOD, false);
-    let evidence = Evidence::default();
+    let evidence = LaneEvidence::default();
     let pose = at(0.0);
     belief.taken(&Taken {
         frame: FrameNo(1),
@@ -218,7 +218,7 @@ fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() 
 fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
     let seat = SeatType::bench3(2);
     let window = Window::new((0..2).map(|axis| Slot::new(&seat, axis, Some(axis), 1.0)).collect());
-    let (mut belief, evidence) = (Belief::new(&window, PERIOD, true), Evidence::default());
+    let (mut belief, evidence) = (Belief::new(&window, PERIOD, true), LaneEvidence::default());
     let half = Reading { slots: 1, ..Reading::at_rest(at(0.2), ms(0)) };
     evidence.on_reading(&half);
     belief.look(&evidence, ms(0), ms(0));
@@ -247,7 +247,7 @@ fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
 
 #[test]
 fn a_reading_is_taken_whole_or_not_at_all() {
-    let evidence = Evidence::default();
+    let evidence = LaneEvidence::default();
     assert_eq!(evidence.reading(), None);
     let reading = Reading { slots: 5, rests: false, by: Source::Homing, ..Reading::at_rest(at(0.3), ms(7)) };
     evidence.on_reading(&reading);

@@ -24,7 +24,7 @@ const HEAD_LEN: usize = 16;
 
 /// How a controller is spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Peer {
+pub struct Endpoint {
     /// The message set it speaks.
     pub dialect: Dialect,
     /// The accept and reply code of what it is sent.
@@ -98,7 +98,7 @@ pub struct Exchange {
 
 #[derive(Debug)]
 struct Lane {
-    peer: Peer,
+    peer: Endpoint,
     queue: VecDeque<(usize, Request)>,
     flight: Option<Flight>,
     /// What may still be answered, though nobody waits for it.
@@ -128,8 +128,8 @@ struct Owed {
 impl Exchange {
     /// Nothing under way with any of `peers`.
     #[must_use]
-    pub fn new(peers: &[Peer]) -> Self {
-        let lane = |&peer: &Peer| Lane {
+    pub fn new(peers: &[Endpoint]) -> Self {
+        let lane = |&peer: &Endpoint| Lane {
             peer,
             queue: VecDeque::new(),
             flight: None,

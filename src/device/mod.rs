@@ -29,7 +29,7 @@ mod talk;
 mod testing;
 
 pub use address::Address;
-pub use exchange::{Answer, Exchange, Odds, Outcome, Patience, Peer};
+pub use exchange::{Answer, Endpoint, Exchange, Odds, Outcome, Patience};
 pub use fault::{Fault, Odd, refusal};
 pub use request::{MAX_READ, Request, reads};
 pub use select::{Assignment, SelectError, Selection, assignments, selections};

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::address::CONTROL;
-use super::{Address, Peer};
+use super::{Address, Endpoint};
 use crate::wire::{
     Access, Dialect, MAX_LEN, MAX_SERVO_READ, ReadRequest, ServoRead, ServoWrite, Words, WriteRequest,
 };
@@ -99,7 +99,7 @@ impl Request {
     }
 
     /// Writes the request to the front of `buf` and returns it.
-    pub(super) fn emit<'b>(&self, id: Id, peer: &Peer, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(super) fn emit<'b>(&self, id: Id, peer: &Endpoint, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let Id { servo, channel, start, num, .. } = id;
         let (accept, reply) = (peer.code, peer.code);
         match *self {
@@ -187,7 +187,7 @@ mod tests {
     use crate::wire::{Code, Message};
 
     fn bytes(request: &Request, dialect: Dialect) -> Option<String> {
-        let peer = Peer { dialect, code: Code::ALL };
+        let peer = Endpoint { dialect, code: Code::ALL };
         let id = request.id(dialect)?;
         let mut buf = [0xa5; MAX_LEN];
         let bytes = request.emit(id, &peer, &mut buf);

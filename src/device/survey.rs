@@ -261,7 +261,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
 fn hearing(observer: &mut Observer) -> impl FnMut(Origin, &[u8], MonoTime) {
     |origin, bytes, at| {
         let _ = match origin {
-            Origin::Controller(lane) => observer.hear(lane, bytes, at),
+            Origin::Controller(lane) => observer.hear(lane, &observer.read(lane, bytes), at),
             Origin::Stranger(from) => observer.hear_elsewhere(from, bytes, at),
         };
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddrV4;
 use std::time::Duration;
 
-use super::{Exchange, Odds, Outcome, Patience, Peer, Request};
+use super::{Endpoint, Exchange, Odds, Outcome, Patience, Request};
 use crate::config::Controller;
 use crate::net::{Delivery, NetError, Origin, Ports, Receiver, SendFault, Sender};
 use crate::sys::clock::Monotonic;
@@ -63,8 +63,8 @@ pub struct Talk<L = (Sender, Receiver), C = Monotonic> {
 
 /// How the controllers of a configuration are spoken to.
 #[must_use]
-pub fn peers(controllers: &[Controller]) -> Vec<Peer> {
-    let peer = |one: &Controller| Peer { dialect: one.dialect, code: Code(one.accept.code(one.address)) };
+pub fn peers(controllers: &[Controller]) -> Vec<Endpoint> {
+    let peer = |one: &Controller| Endpoint { dialect: one.dialect, code: Code(one.accept.code(one.address)) };
     controllers.iter().map(peer).collect()
 }
 
@@ -82,7 +82,7 @@ impl Talk {
 impl<L: Link, C: Clock> Talk<L, C> {
     /// A conversation over a link of one's own.
     #[must_use]
-    pub fn over(link: L, clock: C, peers: &[Peer]) -> Self {
+    pub fn over(link: L, clock: C, peers: &[Endpoint]) -> Self {
         let exchange = Exchange::new(peers);
         Self { link, clock, closed: vec![0; exchange.lanes()], exchange, strangers: BTreeMap::new() }
     }

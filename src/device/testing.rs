@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use super::talk::{Link, Watch};
-use super::{Peer, Talk};
+use super::{Endpoint, Talk};
 use crate::net::{Origin, SendFault};
 use crate::sim::{Controller, Setup};
 use crate::time::{Clock, MonoTime};
@@ -28,7 +28,7 @@ type Filter = dyn FnMut(usize, Vec<u8>) -> Vec<Vec<u8>>;
 
 struct Net {
     controllers: Vec<Controller>,
-    peers: Vec<Peer>,
+    peers: Vec<Endpoint>,
     inbox: VecDeque<(MonoTime, Origin, Vec<u8>)>,
     filter: Box<Filter>,
     replies: usize,
@@ -49,7 +49,7 @@ impl Rig {
         let controllers = setups.iter().enumerate();
         let net = Net {
             controllers: controllers.map(|(n, setup)| Controller::new(setup, address(n), BEGIN)).collect(),
-            peers: setups.iter().map(|setup| Peer { dialect: setup.dialect, code: Code::ALL }).collect(),
+            peers: setups.iter().map(|setup| Endpoint { dialect: setup.dialect, code: Code::ALL }).collect(),
             inbox: VecDeque::new(),
             filter: Box::new(|_, reply| vec![reply]),
             replies: 0,

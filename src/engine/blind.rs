@@ -203,7 +203,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::belief::{Belief, Evidence, Reading, Taken};
+    use crate::belief::{Belief, LaneEvidence, Reading, Taken};
     use crate::motion::{Measure, SeatType, Slot, Window};
     use crate::time::{MonoTime, ShowTime};
     use crate::wire::FrameNo;
@@ -300,7 +300,7 @@ mod tests {
     /// is led.
     fn in_a_gap(window: &Window, speed: f64) -> (Belief, Pose) {
         let mut belief = Belief::new(window, Duration::from_millis(10), true);
-        let evidence = Evidence::default();
+        let evidence = LaneEvidence::default();
         let mut pose = [0.0; MAX_AXES];
         pose[0] = 0.5;
         evidence.on_reading(&Reading::at_rest(pose, ms(0)));

@@ -60,7 +60,7 @@ pub fn cue(controllers: &[Controller], seconds: u32) -> Result<Timeline, CueFaul
 mod tests {
     use super::*;
     use crate::config::from_to_args;
-    use crate::fanout::{Manner, lanes};
+    use crate::drive::{Manner, lanes};
     use crate::time::ShowTime;
 
     /// The positions that frames to these controllers carry, which were read at `places`, whatever pose is asked for.
@@ -70,7 +70,7 @@ mod tests {
         let timeline = cue(&config.controllers, 2).unwrap();
         assert_eq!(timeline.duration(), ShowTime::from_secs_f64(2.0));
         let mut lanes = lanes(&config, &timeline, Manner { level: 0.0, silent: false });
-        let pulses = |lane: &mut crate::fanout::Lane| {
+        let pulses = |lane: &mut crate::drive::Lane| {
             lane.hold();
             lane.window.slots().iter().map(|slot| slot.pulses(asked).0).collect()
         };

@@ -4,24 +4,24 @@ use std::net::SocketAddrV4;
 
 use super::Observer;
 use crate::time::MonoTime;
-use crate::wire::{Access, DP_INPUTS, RegisterReply, Report, Status};
+use crate::wire::{Access, DP_INPUTS, FromController, RegisterReply, VibrationPort};
 
 impl Observer {
     /// Hears a report that a controller sent unasked (0x3101, 0x1001); says whether it was one. What a register tells of the
     /// inputs is heard too, whoever asked for it: where no frames go, nothing else may tell that an emergency stop is over.
-    pub fn hear(&mut self, controller: usize, bytes: &[u8], at: MonoTime) -> bool {
-        if let Ok(status) = Status::parse(bytes) {
-            return self.on_status(controller, &status, at);
+    pub fn hear(&mut self, controller: usize, message: &FromController<'_>, at: MonoTime) -> bool {
+        match message {
+            FromController::Status(status) => self.on_status(controller, status, at),
+            FromController::Report(report) => {
+                self.on_report(controller, report, at);
+                true
+            }
+            FromController::Registers(reply) => {
+                self.on_register(controller, reply, at);
+                false
+            }
+            FromController::Reply(_) | FromController::WideRegisters | FromController::Other => false,
         }
-        if let Ok(reply) = RegisterReply::parse(bytes) {
-            self.on_register(controller, &reply, at);
-            return false;
-        }
-        let report = Report::parse(bytes);
-        report.is_ok_and(|report| {
-            self.on_report(controller, &report, at);
-            true
-        })
     }
 
     fn on_register(&mut self, controller: usize, reply: &RegisterReply<'_>, at: MonoTime) {
@@ -34,8 +34,10 @@ impl Observer {
 
     /// Hears a report that came from a port that is no controller's frame port; says whether it was one.
     pub fn hear_elsewhere(&mut self, from: SocketAddrV4, bytes: &[u8], at: MonoTime) -> bool {
-        let station = Status::parse(bytes).ok().map(|status| status.station);
+        // No report has a port of outputs that may be of two widths.
+        let message = FromController::parse(VibrationPort::Two, bytes);
+        let station = if let FromController::Status(status) = message { Some(status.station) } else { None };
         let controller = self.sender_of_report(*from.ip(), station);
-        controller.is_some_and(|controller| self.hear(controller, bytes, at))
+        controller.is_some_and(|controller| self.hear(controller, &message, at))
     }
 }

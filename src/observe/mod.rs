@@ -17,7 +17,8 @@ use crate::config::Controller;
 use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{
-    Code, DPFE, Dialect, FrameNo, MotionReply, PerAxis, ReplyCode, Report, Status, VibrationPort, WireError,
+    Code, DPFE, Dialect, FrameNo, FromController, MotionReply, PerAxis, ReplyCode, Report, Status,
+    VibrationPort,
 };
 
 /// Events that are kept; of more the oldest go.
@@ -110,12 +111,10 @@ impl Observer {
         }
     }
 
-    /// A reply to a motion frame, as that controller writes them.
-    ///
-    /// # Errors
-    /// As [`MotionReply::parse`].
-    pub fn read_reply(&self, controller: usize, bytes: &[u8]) -> Result<MotionReply, WireError> {
-        MotionReply::parse_as(self.watched[controller].vibration_port, bytes)
+    /// A datagram, as that controller writes them.
+    #[must_use]
+    pub fn read<'a>(&self, controller: usize, bytes: &'a [u8]) -> FromController<'a> {
+        FromController::parse(self.watched[controller].vibration_port, bytes)
     }
 
     /// The last known states.
@@ -246,11 +245,6 @@ impl Observer {
         let state = &mut self.states[controller];
         state.measured = Some(Heard { value: positions, at });
         state.heard_at = Some(at);
-    }
-
-    /// Hears inputs that were read from the monitor registers.
-    pub fn on_inputs(&mut self, controller: usize, inputs: u16, at: MonoTime) {
-        self.note_inputs(controller, inputs, at);
     }
 
     /// Which controller sent a report from a port that is none of the frame ports: the one at that address, where there

@@ -1,5 +1,5 @@
 use super::*;
-use crate::wire::{Access, DP_INPUTS, FrameNo, MAX_LEN, RegisterReply, Timing, VibrationPort, Words};
+use crate::wire::{Access, DP_INPUTS, FrameNo, RegisterReply, Timing, VibrationPort, Words};
 
 const X01: u16 = 0b0001;
 const STATION: Code = Code(0x0fc9);
@@ -132,7 +132,7 @@ fn an_input_that_is_read_tells_of_an_emergency_stop_too_and_looks_alone_that_it_
         let (data, access) = ([inputs], Access::Read);
         let data = Words::from(&data[..]);
         let reply = RegisterReply { access, code, channel, error: 0, start: DP_INPUTS, num: 1, data };
-        assert!(!observer.hear(0, reply.emit(&mut [0; MAX_LEN]), at(ms)), "somebody asked for it");
+        assert!(!observer.hear(0, &FromController::Registers(reply), at(ms)), "somebody asked for it");
         observer.states()[0].emergency_stop()
     };
     assert!(read(1, 0, ReplyCode::Running, X01));

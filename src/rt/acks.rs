@@ -7,13 +7,13 @@ use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
 use super::{Live, Sent, TickReport, Watch};
+use crate::drive::{Incoming, Need};
 use crate::health::Change;
-use crate::motion::Pulses;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Answer, Observer, Watched};
 use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
-use crate::wire::{FrameNo, MotionReply, PerAxis, RegisterReply, ReplyCode};
+use crate::wire::{FrameNo, FromController, MotionReply, ReplyCode};
 
 /// How often replies are looked for while a hall sends no frames.
 const IDLE: Duration = Duration::from_millis(5);
@@ -124,7 +124,7 @@ impl AckLoop {
     /// Asks a controller where its axes are, at `now`. What the kernel does not take is like what is lost: ask again.
     pub fn ask_positions(&mut self, controller: usize, now: MonoTime) {
         if let Some(watch) = &mut self.watch {
-            watch.ask_positions(controller, now);
+            watch.ask(controller, Need::Position, now);
         }
     }
 
@@ -198,7 +198,7 @@ impl AckLoop {
 
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
-    pub fn drain(&mut self, other: &mut dyn FnMut(usize, &[u8]) -> bool) {
+    pub fn drain(&mut self, other: &mut dyn FnMut(usize, Incoming<'_>) -> bool) {
         let Self { receiver, accounts, sent, ticks, last_sent, heard, watch, live, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
@@ -210,19 +210,23 @@ impl AckLoop {
                 }
             };
             heard[controller] = true;
-            match observer.read_reply(controller, octets) {
-                Ok(reply) => {
-                    observer.on_reply(controller, &reply, at);
-                    let MotionReply { frame, code, error, inputs, .. } = reply;
-                    let reply = Reply { controller, frame, code, error, inputs, at };
-                    let mut records = Records { sent, last_sent, watch, observer, live };
-                    books.on_reply(reply, &mut records);
-                }
-                Err(_) if observer.hear(controller, octets, at) => {}
-                Err(_)
-                    if watch.as_mut().is_some_and(|watch| hear(watch, observer, controller, octets, at)) => {}
-                Err(_) if other(controller, octets) => {}
-                Err(_) => books.tracker_mut().on_stray(controller),
+            let message = observer.read(controller, octets);
+            if let FromController::Reply(reply) = message {
+                observer.on_reply(controller, &reply, at);
+                let MotionReply { frame, code, error, inputs, .. } = reply;
+                let reply = Reply { controller, frame, code, error, inputs, at };
+                return books.on_reply(reply, &mut Records { sent, last_sent, watch, observer, live });
+            }
+            let is_report = observer.hear(controller, &message, at);
+            let is_known = is_report
+                || watch.as_mut().is_some_and(|watch| {
+                    // Another thread has a conversation of its own: it is handed what nobody here takes for a report.
+                    let others_ask = watch.pass_on(controller, octets, at);
+                    watch.hear(observer, controller, Incoming { message, at, others_ask })
+                })
+                || other(controller, Incoming { message, at, others_ask: false });
+            if !is_known {
+                books.tracker_mut().on_stray(controller);
             }
         });
         books.settle(began, &mut Records { sent, last_sent, watch, observer, live });
@@ -257,38 +261,10 @@ impl AckLoop {
         self.heard[controller]
     }
 
-    /// Notes positions that were read from registers before the tick loop runs.
-    pub fn on_positions(&mut self, controller: usize, positions: PerAxis<Pulses>, at: MonoTime) {
-        self.accounts.observer.on_positions(controller, positions, at);
-    }
-
     /// Notes a frame that is about to be sent before the tick loop runs.
     pub fn on_sent(&mut self, sent: Sent) {
         record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
     }
-}
-
-/// Has the watch hear what is no reply to a frame; says whether it was an answer to something asked.
-fn hear(watch: &mut Watch, observer: &mut Observer, controller: usize, octets: &[u8], at: MonoTime) -> bool {
-    // One answer may be waited for by several.
-    let beat = watch.hear_beat(controller, octets, at);
-    if let Some(positions) = beat {
-        observer.on_positions(controller, positions, at);
-    }
-    let inputs = watch.hear_inputs(controller, octets, at);
-    if let Some(inputs) = inputs {
-        observer.on_inputs(controller, inputs, at);
-    }
-    let zero = watch.hear_zero(controller, octets, at);
-    let is_answer = watch.hear(controller, octets, at) || beat.is_some() || inputs.is_some() || zero;
-    if let Some(reply) = RegisterReply::parse(octets).ok().filter(|_| is_answer) {
-        observer.on_code(controller, reply.code, at);
-        watch.mind_stop(controller, reply.code);
-    }
-    if let Some(look) = watch.take_look(controller) {
-        observer.on_look(controller, look, at);
-    }
-    is_answer
 }
 
 /// What the tick thread told of its frames, and who wants to know what became of them.

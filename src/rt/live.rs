@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::TickReport;
 use super::table::Row;
-use crate::belief::Evidence;
+use crate::belief::LaneEvidence;
 use crate::engine::Engine;
 use crate::state::{Machine, State};
 use crate::time::{MonoTime, ShowTime};
@@ -74,7 +74,7 @@ pub struct Live {
     /// How often the limiter held each lane back.
     clamps: Box<[AtomicU64]>,
     /// What the ack thread has seen of each lane.
-    evidence: Box<[Evidence]>,
+    evidence: Box<[LaneEvidence]>,
     /// Up to when it has told all that arrived.
     told_ns: AtomicU64,
     /// Since when a reading of all seats is waited for, and whether anybody reads them.
@@ -91,14 +91,14 @@ impl Live {
     pub fn new(lanes: usize) -> Self {
         Self {
             clamps: (0..lanes).map(|_| AtomicU64::new(0)).collect(),
-            evidence: (0..lanes).map(|_| Evidence::default()).collect(),
+            evidence: (0..lanes).map(|_| LaneEvidence::default()).collect(),
             ..Self::default()
         }
     }
 
     /// What the ack thread has seen of a lane; none where there is no such lane.
     #[must_use]
-    pub fn evidence(&self, lane: usize) -> Option<&Evidence> {
+    pub fn evidence(&self, lane: usize) -> Option<&LaneEvidence> {
         self.evidence.get(lane)
     }
 

@@ -6,10 +6,10 @@ use std::thread::Thread;
 use rtrb::{Consumer, PopError, Producer, RingBuffer};
 
 use super::live::Live;
-use crate::belief::Evidence;
 use crate::belief::Fall;
+use crate::belief::LaneEvidence;
+use crate::drive::Lane;
 use crate::engine::{Engine, Unplanned};
-use crate::fanout::Lane;
 use crate::plan::{Course, Planner, Request as PlanRequest, Scene};
 use crate::state::{Cause, Event, Machine, Next, Refusal, State, Transition};
 use crate::time::{MonoTime, Rate, ShowTime};
@@ -138,7 +138,7 @@ pub enum Alarm {
     Leave(u16),
     /// Nothing goes to that lane from now on.
     Cut(u16),
-    /// A controller takes part again: where its seat was read at rest stands in [`crate::belief::Evidence`].
+    /// A controller takes part again: where its seat was read at rest stands in [`crate::belief::LaneEvidence`].
     Found(u16),
 }
 
@@ -307,7 +307,7 @@ impl Mail {
     }
 
     /// What the ack thread has seen of a lane; none where nobody tells.
-    pub(super) fn evidence(&self, lane: usize) -> Option<&Evidence> {
+    pub(super) fn evidence(&self, lane: usize) -> Option<&LaneEvidence> {
         self.live.evidence(lane)
     }
 

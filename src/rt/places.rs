@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use super::mail::{Mail, Sent};
 use crate::belief::{Belief, Fall, Found, Taken, Tally};
+use crate::drive::Lane;
 use crate::engine::{Beat, Engine};
-use crate::fanout::Lane;
 use crate::net::Delivery;
 use crate::time::{MonoTime, Rate};
 use crate::wire::Timing;

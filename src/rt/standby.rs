@@ -8,6 +8,7 @@ use rtrb::Consumer;
 use super::desk::Desk;
 use super::line::LineEnd;
 use crate::config::Controller;
+use crate::drive::Seen;
 use crate::health::{HealthState, HealthTable};
 use crate::state::Finding;
 use crate::time::MonoTime;
@@ -29,13 +30,6 @@ pub struct Standby {
     boot: Option<bool>,
     /// What each controller said of its zero, and whether its seat stands at park.
     seen: Vec<Option<Seen>>,
-}
-
-/// What was read of one controller.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
-    pub(super) homed: bool,
-    pub(super) at_park: bool,
 }
 
 impl Standby {
@@ -63,7 +57,7 @@ impl Standby {
 
     /// Whether a controller knows its position; none where it never told.
     pub(super) fn homed(&self, controller: usize) -> Option<bool> {
-        self.seen[controller].map(|seen| seen.homed)
+        self.seen[controller].map(|seen| seen.sighting.homed)
     }
 
     /// Whether somebody wants a controller to take part.
@@ -110,7 +104,7 @@ impl Standby {
         let mut finding = Finding { homed: true, at_park: true, crashed };
         for controller in (0..self.seen.len()).filter(|controller| self.takes_part(*controller)) {
             let seen = known(controller)?;
-            finding.homed &= seen.homed;
+            finding.homed &= seen.sighting.homed;
             finding.at_park &= seen.at_park;
         }
         self.boot = None;

@@ -10,22 +10,19 @@ use std::time::Duration;
 
 use rtrb::{Producer, PushError};
 
-use super::idle::Beats;
 use super::live::Live;
 use super::mail::{Alarm, Sent};
-use super::positions::Positions;
-use super::sight::{Looker, axes_to_read};
 use super::standby::Standby;
 use super::table::{Row, Turns};
 use crate::config::Controller;
-use crate::fanout::Lane;
+use crate::drive::{EvidenceList, Lane, MOST_EVIDENCE, Need, Peer, Rounds, Whereabouts};
 use crate::health::{Change, HealthState, HealthTable, Notice};
 use crate::net::Sender;
-use crate::observe::{Look, Observer};
+use crate::observe::Observer;
 use crate::state::{Event, State};
 use crate::time::MonoTime;
 use crate::tracker::{Fate, Reply, Tracker};
-use crate::wire::{Dialect, ReplyCode};
+use crate::wire::ReplyCode;
 
 /// Changes that are kept for the report.
 const CHANGES_KEPT: usize = 1_000;
@@ -39,11 +36,11 @@ const SILENT_AFTER: Duration = Duration::from_secs(3);
 #[derive(Debug)]
 pub struct Watch {
     health: HealthTable,
-    lookers: Vec<Looker>,
-    /// What each seat tells of where it is.
-    positions: Vec<Positions>,
-    /// Asks for that while nothing moves.
-    beats: Beats,
+    peers: Vec<Peer>,
+    /// What the message says that is being heard.
+    evidence: EvidenceList,
+    /// When they are asked for a sign of life.
+    rounds: Rounds,
     sender: Sender,
     alarms: Producer<Alarm>,
     /// Alarms for which there was no room yet, oldest first: none is ever dropped.
@@ -93,9 +90,9 @@ impl Watch {
             live.on_reader();
         }
         Self {
-            lookers: controllers.iter().zip(lanes).map(|(one, lane)| Looker::new(one, lane)).collect(),
-            positions: controllers.iter().zip(lanes).map(positions).collect(),
-            beats: Beats::new(controllers, lanes),
+            peers: controllers.iter().zip(lanes).map(|(one, lane)| Peer::new(one, lane)).collect(),
+            evidence: Vec::with_capacity(MOST_EVIDENCE),
+            rounds: Rounds::new(controllers.len()),
             notices: Vec::with_capacity(4 * (controllers.len() + groups) + 4),
             changes: Vec::with_capacity(CHANGES_KEPT),
             wanted: MonoTime::default(),
@@ -145,7 +142,7 @@ impl Watch {
         match sent {
             Sent::Posted { lane, frame, asked, at } => {
                 self.health.on_sent(usize::from(lane), frame, asked, at);
-                self.positions[usize::from(lane)].on_sent(at);
+                self.peers[usize::from(lane)].on_sent(at);
                 self.lit[usize::from(lane)] = DARKENED;
             }
             Sent::Failed { .. } => {}
@@ -180,28 +177,12 @@ impl Watch {
 
     /// What became of a reply.
     pub(super) fn on_fate(&mut self, reply: &Reply, fate: Fate) {
-        let smc = self.lookers.get(reply.controller).is_some_and(|one| one.dialect() == Dialect::Smc);
-        self.mind_stop(reply.controller, reply.code);
+        let is_refusal = self.peers[reply.controller].on_reply_code(reply.code);
         match fate {
             Fate::Answered(ReplyCode::Running) => self.health.on_ack(reply.controller, reply.frame, reply.at),
-            // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
-            Fate::Answered(code) if !(smc && code == ReplyCode::EmergencyStop) => {
-                self.health.on_refused(reply.controller);
-            }
+            Fate::Answered(_) if is_refusal => self.health.on_refused(reply.controller),
             _ => {}
         }
-    }
-
-    /// Minds a sign of an emergency stop: what was asked before it says nothing of its end.
-    pub(super) fn mind_stop(&mut self, controller: usize, code: ReplyCode) {
-        if let Some(looker) = self.lookers.get_mut(controller) {
-            looker.mind_stop(code);
-        }
-    }
-
-    /// What the newest look at a controller says of an emergency stop, once it is whole.
-    pub(super) fn take_look(&mut self, controller: usize) -> Option<Look> {
-        self.lookers[controller].take_look()
     }
 
     /// Whether it is that of a hall that sends no frames.
@@ -217,18 +198,13 @@ impl Watch {
     }
 
     /// The next show begins where the last one left the seats. That somebody has moved one since is worth a word.
-    fn mind_rest(&mut self, controller: usize, at: MonoTime) {
+    fn mind_rest(&mut self, controller: usize, place: &Whereabouts) {
         let is_set =
             matches!(self.state, State::Parked | State::Armed | State::Paused) && !self.live.is_moving();
-        if !is_set || self.standby.is_none() || !self.stands(controller).may_move() {
-            return;
-        }
-        let Some(reading) = self.positions[controller].reading(at).filter(|reading| reading.rests) else {
-            return;
-        };
-        if self.stands(controller) != HealthState::Rejoining
-            && !self.lookers[controller].rests_at_park(&reading.pose)
-        {
+        let stands = self.stands(controller);
+        let is_to_rest = is_set && self.standby.is_some() && stands.may_move();
+        let rests = place.reading.is_some_and(|reading| reading.rests);
+        if is_to_rest && rests && place.is_off_park && stands != HealthState::Rejoining {
             self.health.on_moved(controller);
         }
     }
@@ -271,8 +247,8 @@ impl Watch {
             if let Some(told) = state.measured.filter(|told| told.at == at && at > self.reported[controller])
             {
                 self.reported[controller] = at;
-                self.positions[controller].report(&told.value, at);
-                self.on_positions(controller, None, at);
+                let place = self.peers[controller].on_report(&told.value, at);
+                self.publish(controller, &place);
             }
         }
         self.look_anew(now);
@@ -299,20 +275,15 @@ impl Watch {
             Notice::Read(_) | Notice::Count(_) if self.is_hushed() => {}
             // A homing is watched by who ordered it; only those that are looked for are looked at beside.
             Notice::Read(controller) if self.is_asked_otherwise() && self.stands(controller).may_move() => {}
-            Notice::Count(controller) => self.lookers[controller].ask_count(controller, &self.sender),
+            Notice::Count(controller) => drop(self.ask(controller, Need::Count, self.looked)),
             Notice::Read(controller) => {
                 self.darken(controller);
-                let now = self.looked;
-                let where_it_is = !self.positions[controller].is_behind(now);
-                if where_it_is {
-                    self.positions[controller].on_all_asked(now);
-                }
-                let datagrams = self.lookers[controller].ask(controller, &self.sender, where_it_is);
+                let datagrams = self.ask(controller, Need::Identity, self.looked);
                 self.health.on_read_sent(controller, datagrams);
             }
             Notice::Group(change) => {
                 self.keep(change);
-                for controller in 0..self.lookers.len() {
+                for controller in 0..self.peers.len() {
                     if self.health.groups().group_of(controller) == change.group {
                         self.tell_lane(controller, change);
                     }
@@ -356,8 +327,9 @@ impl Watch {
         if self.lit[controller] == 0 || self.stands(controller).may_move() {
             return;
         }
-        self.lit[controller] -= u8::from(self.lookers[controller].has_answered());
-        self.lookers[controller].darken(controller, &self.sender);
+        self.lit[controller] -= u8::from(self.peers[controller].has_answered());
+        // It is sent three times: what the kernel does not take is like what is lost.
+        self.ask(controller, Need::Dark, self.looked);
         self.health.on_other_sent(controller, 1);
     }
 
@@ -394,48 +366,5 @@ impl Watch {
     }
 }
 
-/// What the seat of a controller tells of where it is.
-fn positions((controller, lane): (&Controller, &Lane)) -> Positions {
-    Positions::new(Arc::clone(&controller.seat), controller.first_slot(), axes_to_read(controller, lane))
-}
-
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use rtrb::RingBuffer;
-
-    use super::*;
-    use crate::config::{LossPolicy, from_to_args};
-    use crate::cue::{Source, read};
-    use crate::fanout::{Manner, lanes};
-    use crate::health::Groups;
-    use crate::net::Ports;
-    use crate::timeline::Timeline;
-
-    #[test]
-    fn no_alarm_is_dropped_where_the_tick_thread_has_no_room_and_all_come_in_their_order() {
-        let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
-        let config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
-        let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
-        let (sender, _) =
-            Ports::open("127.0.0.1:0".parse().unwrap(), &[config.controllers[0].address]).unwrap().split();
-        let (producer, mut alarms) = RingBuffer::new(2);
-        let health = HealthTable::new(
-            Groups::of(&config.controllers),
-            LossPolicy::Continue,
-            1,
-            Duration::from_millis(10),
-        );
-        let mut watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
-        let all: Vec<Alarm> = (0..7).map(Alarm::Leave).collect();
-        all.iter().for_each(|alarm| watch.alarm(*alarm));
-        let mut heard = Vec::new();
-        while heard.len() < all.len() {
-            watch.send_alarms();
-            assert!(!alarms.is_empty(), "{heard:?}");
-            heard.extend(std::iter::from_fn(|| alarms.pop().ok()));
-        }
-        assert_eq!(heard, all);
-    }
-}
+mod tests;

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::device::Address;
 
-const PEER: Peer = Peer { dialect: Dialect::Smc, code: Code::ALL };
+const PEER: Endpoint = Endpoint { dialect: Dialect::Smc, code: Code::ALL };
 
 fn at(ms: u64) -> MonoTime {
     MonoTime::from_nanos(5_000_000_000 + ms * 1_000_000)
@@ -43,7 +43,11 @@ fn requests() -> impl Strategy<Value = Request> {
 
 /// Asks once, answers every sending with what `replies` makes of the right answer, and gives the outcome and the time
 /// it took in milliseconds.
-fn run(peer: Peer, request: &Request, mut replies: impl FnMut(Vec<u8>) -> Vec<Vec<u8>>) -> (Outcome, u64) {
+fn run(
+    peer: Endpoint,
+    request: &Request,
+    mut replies: impl FnMut(Vec<u8>) -> Vec<Vec<u8>>,
+) -> (Outcome, u64) {
     let mut exchange = Exchange::new(&[peer]);
     exchange.begin(vec![(0, request.clone())], Patience::default());
     for ms in 0..5_000 {
@@ -72,7 +76,7 @@ proptest! {
         mbox in any::<bool>(),
     ) {
         let dialect = if mbox { Dialect::Mbox } else { Dialect::Smc };
-        let peer = Peer { dialect, ..PEER };
+        let peer = Endpoint { dialect, ..PEER };
         let (outcome, ms) = run(peer, &request, |mut reply| {
             for (place, byte) in &mangled {
                 if let Some(there) = reply.get_mut(*place) {
@@ -126,7 +130,7 @@ fn registers_of_a_drive_are_told_by_that_drive_alone() {
 #[test]
 fn x_3_and_4_tell_of_an_smc_controllers_state_and_refuse_on_mbox() {
     let read = Request::read(Address::Pa(2));
-    let with = |peer: Peer, x: u8, slot: u8, words: usize| {
+    let with = |peer: Endpoint, x: u8, slot: u8, words: usize| {
         let (outcome, _) = run(peer, &read, |mut reply| {
             (reply[5], reply[7]) = (x, slot);
             reply.truncate(16 + 2 * words);
@@ -139,7 +143,7 @@ fn x_3_and_4_tell_of_an_smc_controllers_state_and_refuse_on_mbox() {
     assert!(matches!(with(PEER, 3, 12, 0), Err(Fault::Refused { error: DeviceError(12), .. })));
     assert_eq!(with(PEER, 4, 0, 1).unwrap().code, ReplyCode::EmergencyStop);
     assert!(matches!(with(PEER, 5, 0, 1), Err(Fault::Refused { code: ReplyCode::Command, .. })));
-    let mbox = Peer { dialect: Dialect::Mbox, ..PEER };
+    let mbox = Endpoint { dialect: Dialect::Mbox, ..PEER };
     // The channel stays, and an error number stands where the words belong.
     let Err(Fault::Refused { error, .. }) = with(mbox, 3, 1, 1) else { panic!("it was refused") };
     assert_eq!(error, DeviceError(0x1717));

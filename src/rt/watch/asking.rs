@@ -3,7 +3,9 @@
 
 use super::super::mail::Alarm;
 use super::{SILENT_AFTER, Watch};
+use crate::drive::Need;
 use crate::health::HealthState;
+use crate::net::Delivery;
 use crate::state::{Event, State};
 use crate::time::MonoTime;
 
@@ -32,18 +34,19 @@ impl Watch {
         if self.silent || std::mem::replace(&mut self.wanted, wanted) == wanted {
             return;
         }
-        for controller in 0..self.lookers.len() {
+        for controller in 0..self.peers.len() {
             if self.stands(controller).may_move() {
-                let sent = self.ask_positions(controller, self.looked);
-                self.health.on_other_sent(controller, sent);
+                let sent = self.ask(controller, Need::Position, self.looked);
+                self.health.on_other_sent(controller, u64::from(sent));
             }
         }
     }
 
-    /// Asks where all axes of a seat are; says in how many datagrams.
-    pub(in super::super) fn ask_positions(&mut self, controller: usize, now: MonoTime) -> u64 {
-        self.positions[controller].on_all_asked(now);
-        self.beats.send_all(controller, &self.sender)
+    /// Asks a controller for something; says in how many datagrams. What the kernel does not take is asked for again.
+    pub(in super::super) fn ask(&mut self, controller: usize, need: Need, now: MonoTime) -> u32 {
+        let Self { peers, sender, .. } = self;
+        let mut send = |datagram: &[u8]| !matches!(sender.send(controller, datagram), Delivery::Failed(_));
+        peers[controller].poll(need, now, &mut send)
     }
 
     /// While nothing moves, no ack tells that a controller lives, nor where its seat is; and while frames flow none tells that a seat
@@ -54,32 +57,29 @@ impl Watch {
             return;
         }
         if self.live.is_moving() {
-            while let Some(controller) = self.beats.take_led(now) {
-                if !self.positions[controller].is_full(now) {
+            while let Some(controller) = self.rounds.take_led(now) {
+                if !self.peers[controller].is_behind(now) {
                     self.ask_beat(controller, true, now);
                 }
             }
-        } else if self.beats.take(now) {
-            (0..self.lookers.len()).for_each(|controller| self.ask_beat(controller, false, now));
+        } else if self.rounds.take(now) {
+            (0..self.peers.len()).for_each(|controller| self.ask_beat(controller, false, now));
         }
     }
 
     fn ask_beat(&mut self, controller: usize, is_led: bool, now: MonoTime) {
-        if self.stands(controller).may_move()
-            && let Some(register) = self.beats.send(controller, is_led, &self.sender)
-        {
-            self.positions[controller].on_asked(register, now);
+        if self.stands(controller).may_move() && self.ask(controller, Need::KeepAlive { is_led }, now) > 0 {
             self.health.on_beat_sent(controller, now);
         }
     }
 
     pub(super) fn stand_by(&mut self) {
-        let Self { standby, health, positions, live, untold, .. } = self;
+        let Self { standby, health, peers, live, untold, .. } = self;
         let Some(standby) = standby else { return };
         for controller in 0..health.groups().controllers() {
             health.on_part(controller, standby.takes_part(controller));
         }
-        standby.serve(health, |homed| positions[homed].on_homed());
+        standby.serve(health, |homed| peers[homed].on_homed());
         if live.is_moving() {
             return;
         }

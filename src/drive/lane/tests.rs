@@ -1,9 +1,13 @@
+use std::path::Path;
+
 use super::*;
+use crate::channel::{ChannelId, Sample};
 use crate::config::{Config, from_to_args};
 use crate::cue::{Source, read};
+use crate::drive::{Manner, lanes};
+use crate::motion::MAX_AXES;
 use crate::timeline::{EffectSet, Timeline};
-use crate::wire::MotionRequest;
-use std::path::Path;
+use crate::wire::{Code, MotionRequest, Vibration, VibrationPort};
 
 const FULL: Manner = Manner { level: 1.0, silent: false };
 

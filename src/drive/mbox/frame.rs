@@ -1,24 +1,20 @@
-//! From a pose to the bytes of one controller's frame: slots to pulses, effects to outputs, the frame number.
-//! Tick thread; allocates nothing.
-
-mod lanes;
-
-pub use lanes::{Manner, lanes};
+//! From a pose to the bytes of a motion frame: slots to pulses, effects to outputs. Tick thread; allocates nothing.
 
 use crate::channel::{ChannelId, SWITCHES, Sample};
 use crate::cue;
+use crate::drive::Stamped;
 use crate::engine::{Beat, Mix};
 use crate::motion::{MAX_AXES, Pose, Pulses, Window};
 use crate::timeline::EffectSet;
-use crate::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing, Vibration, VibrationPort};
+use crate::wire::{Analogue, Code, MAX_LEN, Motion, Vibration, VibrationPort};
 
 /// Which outputs a cue's effects switch on one controller, and how far its analogue ones go.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Wiring {
+pub(crate) struct Wiring {
     /// Output word of each effect of the cue, by its place among the cue's names.
-    pub named: Vec<u16>,
+    pub(crate) named: Vec<u16>,
     /// The bits of a raw output word that reach the controller.
-    pub raw: u16,
+    pub(crate) raw: u16,
     /// The highest level of each output of the table ([`crate::channel::switches`]), 0 where it has none.
     pub(crate) at_most: [f64; SWITCHES],
 }
@@ -26,7 +22,7 @@ pub struct Wiring {
 impl Wiring {
     /// The output word for what the cue switches.
     #[must_use]
-    pub fn outputs(&self, switched: EffectSet) -> u16 {
+    pub(crate) fn outputs(&self, switched: EffectSet) -> u16 {
         match switched {
             EffectSet::Word(word) => word & self.raw,
             EffectSet::Named(on) => {
@@ -43,50 +39,33 @@ impl Wiring {
     }
 }
 
-/// Our state for one controller, as far as sending goes.
+/// How the frames to one controller are written.
 #[derive(Debug, Clone)]
-pub struct Lane {
-    /// The axes of its frames.
-    pub window: Window,
+pub(crate) struct MotionCodec {
     /// Object channel of its frames (SMC manual 2.2.2.5).
-    pub channel: u16,
+    pub(crate) channel: u16,
     /// Who takes its frames, and who answers those that ask.
-    pub code: Code,
+    pub(crate) code: Code,
     /// True if its frames carry vibration.
-    pub vibrates: bool,
+    pub(crate) vibrates: bool,
     /// How these have Port Out.
-    pub vibration_port: VibrationPort,
+    pub(crate) vibration_port: VibrationPort,
     /// Which outputs it switches.
-    pub wiring: Wiring,
-    /// Asks for a reply in each Nth frame; 0 never asks.
-    pub ack_every: u32,
-    /// The longest Time that its controller executes as it is, ms (PA0b).
-    pub longest_ms: u32,
-    next_frame: FrameNo,
+    pub(crate) wiring: Wiring,
 }
 
-/// A frame that was written: its number, and whether it asks for a reply.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stamped {
-    /// Its number.
-    pub frame: FrameNo,
-    /// True if it asks for a reply.
-    pub asked: bool,
-    /// The greatest amplitude of vibration that it asks of any slot, strokes.
-    pub shakes: f64,
-}
-
-impl Lane {
-    /// Writes the frame of this tick to `buf`, and takes a frame number for it.
-    pub fn encode<'b>(
-        &mut self,
+impl MotionCodec {
+    /// Writes a frame that is numbered already.
+    pub(crate) fn write<'b>(
+        &self,
+        window: &Window,
         beat: &Beat,
         pose: &Pose,
         mix: Mix,
+        stamped: &mut Stamped,
         buf: &'b mut [u8; MAX_LEN],
-    ) -> (Stamped, &'b [u8]) {
-        let mut stamped = self.stamp();
-        let slots = self.window.slots();
+    ) -> &'b [u8] {
+        let slots = window.slots();
         let mut positions = [Pulses(0); MAX_AXES];
         let mut vibration = [Vibration::NONE; MAX_AXES];
         for (index, slot) in slots.iter().enumerate() {
@@ -112,49 +91,12 @@ impl Lane {
             analogue: Analogue::from_levels(self.wiring.within(ChannelId::Analogue, levels).0),
             vibration: self.vibrates.then_some(&vibration[..slots.len()]),
         };
-        (stamped, motion.emit_as(self.vibration_port, buf))
+        motion.emit_as(self.vibration_port, buf)
     }
 
-    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects and outputs off.
-    pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
-        let (park, vibrates) = (self.window.park(), std::mem::take(&mut self.vibrates));
-        let beat = Beat::still(Timing::Relative, time_ms);
-        let written = self.encode(&beat, &park, Mix::STILL, buf);
-        self.vibrates = vibrates;
-        written
-    }
-
-    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
-    pub fn hold(&mut self) {
-        self.window.hold();
+    /// Its frames carry neither vibration nor outputs from now on.
+    pub(crate) fn hold(&mut self) {
         self.vibrates = false;
         self.wiring = Wiring::default();
     }
-
-    /// The lane with the number of its next frame.
-    #[must_use]
-    pub fn starting_at(self, next_frame: FrameNo) -> Self {
-        Self { next_frame, ..self }
-    }
-
-    /// Goes on counting where another left off: a frame number never comes twice.
-    pub const fn go_on_from(&mut self, before: &Self) {
-        self.next_frame = before.next_frame;
-    }
-
-    /// The number of the frame written last; one less than the first where there was none.
-    #[must_use]
-    pub const fn last_frame(&self) -> FrameNo {
-        FrameNo(self.next_frame.0.wrapping_sub(1))
-    }
-
-    fn stamp(&mut self) -> Stamped {
-        let frame = self.next_frame;
-        self.next_frame = frame.next();
-        let asked = frame.asks(self.ack_every);
-        Stamped { frame, asked, shakes: 0.0 }
-    }
 }
-
-#[cfg(test)]
-mod tests;

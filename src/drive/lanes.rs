@@ -1,6 +1,8 @@
 //! Builds the lanes of a play from configuration and cue.
 
-use super::{Lane, Wiring};
+use super::Lane;
+use super::lane::Codec;
+use super::mbox::{MotionCodec, Wiring};
 use crate::config::{Config, Controller, FanOut};
 use crate::motion::{SeatType, Slot, Window};
 use crate::timeline::Timeline;
@@ -38,11 +40,13 @@ fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: M
     let vibrates = window.moving().filter_map(|(_, slot)| slot.axis).any(|axis| timeline.vibrates(axis));
     Lane {
         window,
-        channel,
-        code: Code(controller.accept.code(controller.address)),
-        vibrates,
-        vibration_port: controller.vibration_port,
-        wiring: wiring(config, controller, timeline),
+        codec: Codec::Mbox(MotionCodec {
+            channel,
+            code: Code(controller.accept.code(controller.address)),
+            vibrates,
+            vibration_port: controller.vibration_port,
+            wiring: wiring(config, controller, timeline),
+        }),
         ack_every: manner.ack_every(config),
         longest_ms: controller.seat.max_interval_ms,
         next_frame: FrameNo::FIRST,

@@ -1,0 +1,97 @@
+//! From a pose to the datagram of one controller: the frame number, whether a reply is asked for, and the bytes as its family has
+//! them. Tick thread; allocates nothing.
+
+use super::mbox::MotionCodec;
+use crate::engine::{Beat, Mix};
+use crate::motion::{Pose, Window};
+use crate::wire::{FrameNo, MAX_LEN, Timing};
+
+/// Our state for one controller, as far as sending goes.
+#[derive(Debug, Clone)]
+pub struct Lane {
+    /// The axes of its frames.
+    pub window: Window,
+    /// Asks for a reply in each Nth frame; 0 never asks.
+    pub ack_every: u32,
+    /// The longest Time that its controller executes as it is, ms (PA0b).
+    pub longest_ms: u32,
+    pub(super) codec: Codec,
+    pub(super) next_frame: FrameNo,
+}
+
+/// How the frames of a family are written.
+#[derive(Debug, Clone)]
+pub(super) enum Codec {
+    /// SMC, IMAX and MBOX controllers.
+    Mbox(MotionCodec),
+}
+
+/// A frame that was written: its number, and whether it asks for a reply.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stamped {
+    /// Its number.
+    pub frame: FrameNo,
+    /// True if it asks for a reply.
+    pub asked: bool,
+    /// The greatest amplitude of vibration that it asks of any slot, strokes.
+    pub shakes: f64,
+}
+
+impl Lane {
+    /// Writes the frame of this tick to `buf`, and takes a frame number for it.
+    pub fn encode<'b>(
+        &mut self,
+        beat: &Beat,
+        pose: &Pose,
+        mix: Mix,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> (Stamped, &'b [u8]) {
+        let mut stamped = self.stamp();
+        let Codec::Mbox(codec) = &self.codec;
+        let datagram = codec.write(&self.window, beat, pose, mix, &mut stamped, buf);
+        (stamped, datagram)
+    }
+
+    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects and outputs off. For before the first tick: it
+    /// allocates.
+    pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+        let mut held = self.clone();
+        held.hold();
+        self.stamp();
+        held.encode(&Beat::still(Timing::Relative, time_ms), &self.window.park(), Mix::STILL, buf)
+    }
+
+    /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
+    pub fn hold(&mut self) {
+        self.window.hold();
+        let Codec::Mbox(codec) = &mut self.codec;
+        codec.hold();
+    }
+
+    /// The lane with the number of its next frame.
+    #[must_use]
+    pub fn starting_at(self, next_frame: FrameNo) -> Self {
+        Self { next_frame, ..self }
+    }
+
+    /// Goes on counting where another left off: a frame number never comes twice.
+    pub const fn go_on_from(&mut self, before: &Self) {
+        self.next_frame = before.next_frame;
+    }
+
+    /// The number of the frame written last; one less than the first where there was none.
+    #[must_use]
+    pub const fn last_frame(&self) -> FrameNo {
+        FrameNo(self.next_frame.0.wrapping_sub(1))
+    }
+
+    fn stamp(&mut self) -> Stamped {
+        let frame = self.next_frame;
+        self.next_frame = frame.next();
+        let asked = frame.asks(self.ack_every);
+        Stamped { frame, asked, shakes: 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,246 @@
+//! SMC, IMAX and MBOX controllers: their frames, and how a running hall asks them for registers and hears of them.
+
+mod frame;
+mod pending;
+mod position;
+mod probe;
+mod reads;
+mod stop_signs;
+
+use std::sync::Arc;
+
+use super::{Evidence, EvidenceList, Incoming, Lane, Need, Seen, Whereabouts};
+use crate::belief::Reading;
+use crate::config::Controller;
+use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
+use crate::time::MonoTime;
+use crate::wire::{
+    Code, DP_POSITIONS, Dialect, FromController, MAX_LEN, RegisterReply, ReplyCode, Words, WriteRequest,
+    positions,
+};
+pub(super) use frame::{MotionCodec, Wiring};
+use pending::Pending;
+use position::Positions;
+use probe::Probe;
+use reads::{
+    MonitorRead::{self, FirstPositions, Inputs, MorePositions, Packets, Zero},
+    ZERO_KNOWN,
+};
+
+/// DPF1: outputs, counted from DPF0 in the channel of writes.
+const CONTROLS: u16 = 2;
+const OUTPUTS: u16 = 1;
+/// What is asked for as a sign of life, one after the other.
+const KEEP_ALIVE: [MonitorRead; 4] = [FirstPositions, MorePositions, Inputs, Zero];
+/// How far from where it rests a seat has to be found to have been moved, in strokes: 0.3 mm of 150.
+const NEAR: f64 = 0.002;
+
+/// One controller.
+#[derive(Debug)]
+pub(crate) struct MboxPeer {
+    /// Who takes requests, and who answers.
+    code: Code,
+    dialect: Dialect,
+    seat: Arc<SeatType>,
+    /// The place of its first own axis in a frame.
+    first_slot: usize,
+    /// Where its lane is parked.
+    park: Pose,
+    /// Axes for which its frames have places, and those of them whose registers are read.
+    places: usize,
+    axes: usize,
+    /// Somebody waits for a belt: its inputs are asked for while nothing moves as well.
+    has_belts: bool,
+    pub(super) pending: Pending,
+    pub(super) position: Positions,
+    pub(super) probe: Probe,
+    /// How often it was asked for a sign of life: of what it tells, one is asked for at a time.
+    turn: usize,
+}
+
+impl MboxPeer {
+    pub(super) fn new(controller: &Controller, lane: &Lane, code: Code) -> Self {
+        let (dialect, seat, first_slot) = (controller.dialect, &controller.seat, controller.first_slot());
+        let slots = lane.window.slots();
+        let places = slots.len() - first_slot;
+        // Axes beyond those of the seat type are read where frames have no more than places that are always 0: whoever stands there
+        // elsewhere than at 0 would be led there at once.
+        let mut beyond = slots.iter().skip(first_slot + seat.axes);
+        let led = if beyond.all(|slot| slot.axis.is_none()) { places } else { seat.axes };
+        let axes = led.min(DP_POSITIONS.len());
+        Self {
+            code,
+            dialect,
+            seat: Arc::clone(seat),
+            first_slot,
+            park: lane.window.park(),
+            places,
+            axes,
+            has_belts: controller.belt_inputs != 0,
+            pending: Pending::new(),
+            position: Positions::new(Arc::clone(seat), first_slot, led),
+            probe: Probe::new(dialect, axes, controller.estop_inputs),
+            turn: 0,
+        }
+    }
+
+    pub(super) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
+        let next = match need {
+            Need::Dark => return u32::from(self.darken(send)),
+            Need::KeepAlive { is_led } => self.next_sign(is_led),
+            Need::Identity | Need::Count | Need::Position => None,
+        };
+        let is_behind = self.pending.is_behind(now);
+        let wanted = MonitorRead::ALL.map(|read| match need {
+            Need::Identity if read.first_axis().is_some() => !is_behind,
+            Need::Identity => self.probe.asks(read),
+            Need::Count => read == Packets && self.probe.asks(read),
+            Need::Position => read.first_axis().is_some(),
+            Need::KeepAlive { .. } | Need::Dark => next == Some(read),
+        });
+        if need == Need::Identity {
+            self.probe.begin();
+        }
+        let reads = MonitorRead::ALL.into_iter().zip(wanted).filter(|(_, wanted)| *wanted);
+        reads.map(|(read, _)| self.ask(read, need, now, send)).sum()
+    }
+
+    /// Asks for that, if the controller has it; what the kernel does not take is not waited for.
+    fn ask(
+        &mut self,
+        read: MonitorRead,
+        need: Need,
+        now: MonoTime,
+        send: &mut dyn FnMut(&[u8]) -> bool,
+    ) -> u32 {
+        let Some(request) = read.request(self.axes, self.code) else { return 0 };
+        let taken = send(request.emit(&mut [0; MAX_LEN]));
+        if taken {
+            self.pending.asked(read, need, now);
+        }
+        u32::from(taken)
+    }
+
+    /// What is asked for next as a sign of life.
+    fn next_sign(&mut self, is_led: bool) -> Option<MonitorRead> {
+        self.turn = self.turn.wrapping_add(1);
+        let is_asked = |read: &MonitorRead| match read {
+            Inputs => self.has_belts,
+            Zero => is_led,
+            read => read.first_axis().is_some_and(|first| first < self.axes),
+        };
+        let signs = || KEEP_ALIVE.into_iter().filter(is_asked);
+        signs().nth(self.turn % signs().count().max(1))
+    }
+
+    /// Switches effects off by a register (DPF1, SMC manual 2.3.4), which no frame can that does not move the seat.
+    fn darken(&self, send: &mut dyn FnMut(&[u8]) -> bool) -> bool {
+        let (accept, off) = (self.code, [0]);
+        let data = Words::from(&off[..]);
+        let write = WriteRequest { channel: CONTROLS, accept, reply: Code::NONE, start: OUTPUTS, data };
+        send(write.emit(&mut [0; MAX_LEN]))
+    }
+
+    pub(super) fn receive(&mut self, arrival: Incoming<'_>, out: &mut EvidenceList) {
+        let Incoming { message, at, others_ask } = arrival;
+        match message {
+            FromController::Registers(reply) => self.on_registers(&reply, arrival, out),
+            FromController::WideRegisters => out.push(Evidence::Unreadable),
+            _ => {}
+        }
+        out.extend(others_ask.then_some(Evidence::Answered));
+        out.extend(self.take_seen(at).map(Evidence::Seen));
+        out.extend(self.probe.take_look().map(Evidence::Stop));
+    }
+
+    /// Takes the answer to a read.
+    fn on_registers(&mut self, reply: &RegisterReply<'_>, arrival: Incoming<'_>, out: &mut EvidenceList) {
+        let Incoming { at, others_ask, .. } = arrival;
+        let read = MonitorRead::answered_by(reply, self.axes);
+        if read.is_some() || others_ask {
+            self.probe.mind_stop(reply.code);
+            out.push(Evidence::Code(reply.code));
+        }
+        let Some(read) = read else { return };
+        let claim = self.pending.answered(read, at);
+        // What nobody waits for may be the answer to what another thread asked; else it was repeated on its way.
+        let is_answer = claim.is_some() || others_ask;
+        let is_sign = read.first_axis().is_some() || (read == Inputs && self.has_belts);
+        out.extend((is_answer && is_sign).then_some(Evidence::Alive));
+        let word = reply.data.get(0);
+        match (read, claim) {
+            (FirstPositions | MorePositions, Some(claim)) => {
+                let told = positions(reply.values(self.dialect), self.dialect);
+                let first = read.first_axis().unwrap_or_default();
+                let passing = self.position.answer(first, &told, claim, at);
+                out.push(Evidence::Position(self.whereabouts(Some(passing), at)));
+            }
+            (FirstPositions | MorePositions, None) if !others_ask => self.position.on_repeated(at),
+            (Zero, _) => out.extend(word.map(|state| Evidence::Homed(state == ZERO_KNOWN))),
+            (Packets, Some(claim)) if claim.is_count => out.extend(word.map(Evidence::Count)),
+            _ => {}
+        }
+        self.probe.hear(read, reply);
+        out.extend(claim.map(|_| Evidence::Answered));
+    }
+
+    /// Whoever joins from where it is found has to be at rest there.
+    fn take_seen(&mut self, at: MonoTime) -> Option<Seen> {
+        let reading = self.position.reading(at)?;
+        let sighting = self.probe.take()?;
+        Some(Seen {
+            sighting,
+            rests: reading.rests,
+            at_park: self.is_parked(&reading.pose),
+            leads_more_axes: self.leads_more_axes(sighting.identity.axes),
+        })
+    }
+
+    fn whereabouts(&self, passing: Option<Reading>, at: MonoTime) -> Whereabouts {
+        let reading = self.position.reading(at);
+        Whereabouts {
+            passing,
+            told: self.position.told(),
+            outside: self.position.outside(),
+            is_ambiguous: self.position.is_ambiguous(),
+            is_off_park: reading.is_some_and(|reading| !self.rests_at_park(&reading.pose)),
+            reading,
+        }
+    }
+
+    pub(super) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
+        self.probe.mind_stop(code);
+        // With x = 4 an SMC controller tells of an emergency stop, which the observer hears.
+        match self.dialect {
+            Dialect::Smc => matches!(code, ReplyCode::Fault | ReplyCode::Command),
+            Dialect::Mbox => code.refused(),
+        }
+    }
+
+    pub(super) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Whereabouts {
+        self.position.report(positions, at);
+        self.whereabouts(None, at)
+    }
+
+    /// True if frames would lead axes of a controller that nobody here reads: it takes as many as it drives (PA02).
+    fn leads_more_axes(&self, drives: u16) -> bool {
+        usize::from(drives).min(self.places) > self.axes.max(self.seat.axes)
+    }
+
+    /// Whether a seat in that pose stands at park, to a pulse.
+    fn is_parked(&self, pose: &Pose) -> bool {
+        let Self { seat, first_slot, park, .. } = self;
+        let apart = |slot: usize| seat.pulses(pose[slot]).0.abs_diff(seat.pulses(park[slot]).0);
+        (*first_slot..MAX_AXES.min(first_slot + seat.axes)).all(|slot| apart(slot) <= 1)
+    }
+
+    /// Whether a seat that is read in that pose is where it is parked, but for what is noise.
+    fn rests_at_park(&self, pose: &Pose) -> bool {
+        let Self { seat, first_slot, park, .. } = self;
+        let own = *first_slot..MAX_AXES.min(first_slot + seat.axes.min(DP_POSITIONS.len()));
+        own.into_iter().all(|slot| (park[slot] - pose[slot]).abs() <= NEAR)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,256 @@
+//! What a controller tells of where its axes are, from whichever register or report, put together into readings of the
+//! seat. Ack thread; pure: told the time; allocates nothing.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::pending::{ANSWERED_WITHIN, Claim};
+use crate::belief::{Reading, Source};
+use crate::motion::{MAX_AXES, Pulses, SeatType, in_stroke};
+use crate::time::MonoTime;
+use crate::wire::{DP_POSITIONS, PerAxis, in_other_order};
+
+/// How far apart two answers may see an axis at rest, in strokes.
+const STILL: f64 = 0.001;
+/// For how long an axis has to be seen in one place to be at rest there. What comes in one burst proves nothing.
+const REST: Duration = Duration::from_millis(100);
+/// So many answers have to see it there. One may be an older one that the network repeats in place of another that it holds back.
+const TIMES: u32 = 3;
+/// As [`REST`] while the network repeats answers: one of them may be from before a move, and so may the next.
+const REST_REPEATED: Duration = Duration::from_millis(500);
+/// A repeated answer is hardly older than this.
+const REPEATED: Duration = Duration::from_millis(300);
+/// Answers further apart say nothing of what was between them.
+const APART: Duration = Duration::from_millis(1_200);
+/// How far outside its stroke an axis may be told and be at the end of it: rounding, and what a drive at rest swings by.
+const OUTSIDE: f64 = 0.002;
+
+/// What one axis told.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    fraction: f64,
+    /// When it was read at the earliest.
+    at: MonoTime,
+    /// In which place it has been, and when it was read there first, at the latest.
+    since: (f64, MonoTime),
+    /// Whether it was elsewhere before.
+    moved: bool,
+    /// How many answers have found it there.
+    times: u32,
+}
+
+/// The axes of one controller.
+#[derive(Debug)]
+pub(in crate::drive) struct Positions {
+    seat: Arc<SeatType>,
+    /// The place of the first of them in a frame.
+    first_slot: usize,
+    /// The axes that frames lead, of its seat type or not.
+    led: usize,
+    told: [Option<Told>; MAX_AXES],
+    /// The axis, from 0, that told a position outside of its stroke, and which.
+    outside: Option<(usize, Pulses)>,
+    /// Whether something has told in which order the two words of a position come: the manuals differ, and both may make a
+    /// place inside the stroke.
+    ordered: bool,
+    /// The axes whose last position would be another one inside the stroke in the other order, a bit each.
+    ambiguous: u16,
+    /// Whether it was homed, no frame went to it since, and none was found elsewhere: all its axes are at 0.
+    home: bool,
+    by: Source,
+    /// When the newest answer was made, at the earliest.
+    answered: MonoTime,
+    /// When the last frame went to it.
+    sent: MonoTime,
+    /// Until when answers may be repeated.
+    repeats_until: MonoTime,
+}
+
+impl Positions {
+    pub(super) fn new(seat: Arc<SeatType>, first_slot: usize, led: usize) -> Self {
+        let told = [None; MAX_AXES];
+        Self {
+            seat,
+            first_slot,
+            led,
+            told,
+            answered: MonoTime::default(),
+            sent: MonoTime::default(),
+            repeats_until: MonoTime::default(),
+            outside: None,
+            ordered: false,
+            ambiguous: 0,
+            home: false,
+            by: Source::Registers,
+        }
+    }
+
+    /// Hears an answer: where axes are, from `first` on. Gives what it tells by itself.
+    pub(super) fn answer(
+        &mut self,
+        first: usize,
+        positions: &[Pulses],
+        claim: Claim,
+        at: MonoTime,
+    ) -> Reading {
+        self.answered = self.answered.max(claim.oldest);
+        self.hear(first, positions, claim.oldest, at, Source::Registers);
+        // Whether a seat follows its frames is a question of now: it is looked at once more than needs be where this is an older answer.
+        let made = if self.may_be_repeated(at) { claim.newest.before(REPEATED) } else { claim.newest };
+        self.in_passing(first, positions, made)
+    }
+
+    /// What one answer tells of the axes from `first` on, of however many the seat has.
+    fn in_passing(&self, first: usize, positions: &[Pulses], made: MonoTime) -> Reading {
+        let own = self.seat.axes.min(MAX_AXES - self.first_slot);
+        let mut reading = Reading {
+            slots: 0,
+            rests: false,
+            by: Source::Passing,
+            ..Reading::at_rest([0.0; MAX_AXES], made)
+        };
+        for (axis, pulses) in (first..own).zip(positions) {
+            reading.pose[self.first_slot + axis] = self.seat.fraction(*pulses);
+            reading.slots |= 1 << (self.first_slot + axis);
+        }
+        reading
+    }
+
+    /// True while any answer may be an older one that the network repeats.
+    fn may_be_repeated(&self, at: MonoTime) -> bool {
+        at < self.repeats_until
+    }
+
+    /// The network repeats answers: for a while each may be from before a move.
+    pub(super) fn on_repeated(&mut self, at: MonoTime) {
+        self.repeats_until = at + ANSWERED_WITHIN;
+    }
+
+    /// Hears a report: it tells of those axes alone that have no register, since it comes unasked, past frames that are held back on
+    /// their way. What comes after an answer was made after it.
+    pub(super) fn report(&mut self, positions: &[Pulses], at: MonoTime) {
+        for (axis, pulses) in positions.iter().enumerate().take(self.seat.axes.min(REGISTERS)) {
+            self.hold_against(axis, *pulses);
+        }
+        if let Some(others) = positions.get(REGISTERS..) {
+            self.hear(REGISTERS, others, self.answered, at, Source::Report);
+        }
+    }
+
+    /// Hears where axes were between `made` and `at`.
+    fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
+        for (axis, pulses) in (first..self.led).zip(positions) {
+            let fraction = self.seat.fraction(*pulses);
+            let is_own = axis < self.seat.axes;
+            // Frames would lead an axis that its seat type does not have to 0 at once: all of its stroke is there.
+            let end = if is_own { 1.0 } else { 0.0 };
+            let is_outside = !(-OUTSIDE..=end + OUTSIDE).contains(&fraction);
+            let other = self.outside.filter(|(other, _)| *other != axis);
+            self.outside = if is_outside { Some((axis, *pulses)) } else { other };
+            // What may be from before the last frame says nothing of where it comes to rest.
+            if !is_own || made < self.sent {
+                continue;
+            }
+            self.by = by;
+            if is_outside {
+                self.told[axis] = None;
+                continue;
+            }
+            if by == Source::Registers {
+                self.mind_order(axis, *pulses);
+            }
+            let fraction = fraction.clamp(0.0, 1.0);
+            self.home &= fraction <= STILL;
+            let stays = |told: Told| made.since(told.at) <= APART && (told.since.0 - fraction).abs() <= STILL;
+            let before = self.told[axis];
+            let (since, moved, times) = match before {
+                Some(told) if stays(told) => (told.since, told.moved, told.times.saturating_add(1)),
+                _ => ((fraction, at), before.is_some(), 1),
+            };
+            self.told[axis] = Some(Told { fraction, at: made, since, moved, times });
+        }
+    }
+
+    /// A position that only its own order puts inside the stroke settles the order for the whole controller; so does a seat that is
+    /// known to be at 0.
+    fn mind_order(&mut self, axis: usize, pulses: Pulses) {
+        let other = in_other_order(pulses);
+        let is_open = other != pulses && in_stroke(other, self.seat.stroke_pulses());
+        let bit = 1 << axis;
+        self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
+        let near_zero = self.home && pulses.0.unsigned_abs() < 1 << 15;
+        self.ordered |= near_zero || (other != pulses && !is_open);
+    }
+
+    /// A report has no words: one that tells the place that the registers told, and not what they would tell in the other order,
+    /// settles it as well.
+    fn hold_against(&mut self, axis: usize, reported: Pulses) {
+        let Some(told) = self.told[axis] else { return };
+        let told = self.seat.pulses(told.fraction);
+        let apart = |one: Pulses| (self.seat.fraction(one) - self.seat.fraction(reported)).abs();
+        self.ordered |= apart(told) <= STILL && apart(in_other_order(told)) > STILL;
+    }
+
+    /// Whether it tells two places for some axis, and nothing says which of them is true.
+    pub(super) const fn is_ambiguous(&self) -> bool {
+        self.ambiguous != 0 && !self.ordered
+    }
+
+    /// It says that it is home, as it was asked to be: what it said before was of another zero.
+    pub(in crate::drive) fn on_homed(&mut self) {
+        self.told = [None; MAX_AXES];
+        self.home = true;
+    }
+
+    /// A frame went to it: where it stood before says nothing of whether it rests.
+    pub(in crate::drive) const fn on_sent(&mut self, at: MonoTime) {
+        (self.home, self.told, self.sent) = (false, [None; MAX_AXES], at);
+    }
+
+    /// The axis, from 0, that is not inside its stroke, and where it says that it is.
+    pub(super) const fn outside(&self) -> Option<(usize, Pulses)> {
+        self.outside
+    }
+
+    /// Its axes, from the first on, as far as it told them; none where it told nothing.
+    pub(super) fn told(&self) -> Option<PerAxis<Pulses>> {
+        let known = self.told.iter().take_while(|told| told.is_some()).count();
+        let pulses = |axis: usize| self.told[axis].map_or(Pulses(0), |told| self.seat.pulses(told.fraction));
+        (known > 0).then(|| PerAxis::from_fn(known, pulses))
+    }
+
+    /// The seat as it was told last; none while an axis that tells its position has not.
+    pub(super) fn reading(&self, now: MonoTime) -> Option<Reading> {
+        let (pose, by) = ([0.0; MAX_AXES], self.by);
+        let mut reading = Reading { pose, slots: 0, at: now, rests: true, moves: false, by };
+        let is_beyond = self.outside.is_some_and(|(axis, _)| axis >= self.seat.axes);
+        if self.is_ambiguous() || is_beyond {
+            return None;
+        }
+        let rest = if self.may_be_repeated(now) { REST_REPEATED } else { REST };
+        for axis in 0..self.seat.axes.min(MAX_AXES - self.first_slot) {
+            let slot = self.first_slot + axis;
+            match self.told[axis] {
+                Some(told) => {
+                    reading.pose[slot] = told.fraction;
+                    reading.at = reading.at.min(told.at);
+                    let rests = told.times >= TIMES && told.at.since(told.since.1) >= rest;
+                    reading.rests &= rests;
+                    reading.moves |= told.moved && !rests;
+                }
+                None if axis < REGISTERS => return None,
+                // There is no register for it.
+                None if !self.home => continue,
+                None => reading.by = Source::Homing,
+            }
+            reading.slots |= 1 << slot;
+        }
+        Some(reading)
+    }
+}
+
+/// Axes that have position registers.
+const REGISTERS: usize = DP_POSITIONS.len();
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,167 @@
+use super::*;
+use crate::wire::{AXES_PER_BLOCK, motion_channel_and_slots};
+
+fn ms(ms: u64) -> MonoTime {
+    MonoTime::from_nanos(ms * 1_000_000)
+}
+
+fn claim(at: u64) -> Claim {
+    Claim { oldest: ms(at), newest: ms(at), is_count: false }
+}
+
+/// It is asked, and answers at once.
+fn look(positions: &mut Positions, first: usize, told: &[Pulses], at: u64) {
+    for (index, block) in told.chunks(AXES_PER_BLOCK).enumerate() {
+        positions.answer(first + index * AXES_PER_BLOCK, block, claim(at), ms(at));
+    }
+}
+
+fn seat(axes: usize) -> Positions {
+    Positions::new(Arc::new(SeatType::bench3(axes)), 0, motion_channel_and_slots(axes).1)
+}
+
+#[test]
+fn a_seat_rests_where_three_answers_over_a_tenth_of_a_second_see_it() {
+    let mut positions = seat(1);
+    let looks = [
+        (0, 30_000, false),   // the first
+        (200, 32_000, false), // it moves
+        (201, 32_000, false), // of the same burst
+        (202, 32_000, false),
+        (401, 32_000, true),
+        (601, 32_100, true),
+        (801, 35_000, false),
+        (5_000, 35_000, false), // what was between nobody knows
+        (5_200, 35_000, false), // one of the two may be an older one
+        (5_400, 35_000, true),
+    ];
+    for (at, pulses, rests) in looks {
+        look(&mut positions, 0, &[Pulses(pulses)], at);
+        assert_eq!(positions.reading(ms(at)).map(|reading| reading.rests), Some(rests), "at {at} ms");
+    }
+}
+
+#[test]
+fn a_seat_of_six_axes_is_read_once_both_halves_are_and_is_as_old_as_the_older() {
+    let mut positions = seat(6);
+    look(&mut positions, 3, &[Pulses(4), Pulses(5), Pulses(6)], 10);
+    assert_eq!(positions.reading(ms(10)), None);
+    look(&mut positions, 0, &[Pulses(1), Pulses(2), Pulses(3)], 260);
+    let reading = positions.reading(ms(260)).unwrap();
+    assert_eq!((reading.slots, reading.at), (0b11_1111, ms(10)));
+    assert!((reading.pose[5] - 6.0 / 300_000.0).abs() < 1e-12);
+}
+
+#[test]
+fn axes_without_a_register_are_known_from_a_report_or_right_after_homing_alone() {
+    let mut positions = seat(8);
+    look(&mut positions, 0, &[Pulses(0); 6], 0);
+    assert_eq!(positions.reading(ms(0)).unwrap().slots, 0b11_1111);
+    positions.on_homed();
+    look(&mut positions, 0, &[Pulses(0); 6], 100);
+    let homed = positions.reading(ms(100)).unwrap();
+    assert_eq!((homed.slots, homed.by), (0xff, Source::Homing));
+    positions.on_sent(ms(100));
+    assert_eq!(positions.reading(ms(100)), None, "frames have led them since");
+    look(&mut positions, 0, &[Pulses(0); 6], 150);
+    assert_eq!(positions.reading(ms(150)).unwrap().slots, 0b11_1111);
+    positions.report(&[Pulses(9); 8], ms(200));
+    assert_eq!(positions.reading(ms(200)).unwrap().slots, 0xff);
+}
+
+#[test]
+fn an_answer_is_as_old_as_the_oldest_request_that_is_open_and_in_passing_as_the_newest() {
+    let mut positions = seat(1);
+    look(&mut positions, 0, &[Pulses(7)], 0);
+    let claim = Claim { oldest: ms(250), newest: ms(500), is_count: false };
+    assert_eq!(positions.answer(0, &[Pulses(7)], claim, ms(501)).at, ms(500));
+    assert_eq!(positions.reading(ms(501)).unwrap().at, ms(250));
+    positions.on_repeated(ms(502));
+    let passing = positions.answer(0, &[Pulses(7)], Claim { newest: ms(510), ..claim }, ms(511));
+    assert_eq!(passing.at, ms(210), "while answers are repeated it may be an older one");
+}
+
+#[test]
+fn a_seat_is_looked_at_for_longer_while_answers_are_repeated() {
+    let mut positions = seat(1);
+    look(&mut positions, 0, &[Pulses(7)], 0);
+    positions.on_repeated(ms(90));
+    for (at, rests) in [(200, false), (450, false), (501, true)] {
+        look(&mut positions, 0, &[Pulses(7)], at);
+        assert_eq!(positions.reading(ms(at)).unwrap().rests, rests, "at {at} ms");
+    }
+}
+
+#[test]
+fn a_report_is_as_old_as_the_answer_before_it() {
+    let mut positions = seat(8);
+    look(&mut positions, 0, &[Pulses(0); 6], 100);
+    positions.report(&[Pulses(0); 8], ms(900));
+    assert_eq!(positions.reading(ms(900)).unwrap().at, ms(100));
+}
+
+#[test]
+fn a_position_outside_the_stroke_is_none_and_is_named() {
+    let mut positions = seat(2);
+    look(&mut positions, 0, &[Pulses(-20), Pulses(300_050)], 0);
+    assert_eq!(positions.reading(ms(0)).unwrap().pose[..2], [0.0, 1.0], "rounding is not outside");
+    look(&mut positions, 0, &[Pulses(-20_000), Pulses(7)], 1);
+    assert_eq!((positions.reading(ms(1)), positions.outside()), (None, Some((0, Pulses(-20_000)))));
+    look(&mut positions, 0, &[Pulses(0)], 2);
+    assert_eq!(positions.outside(), None);
+}
+
+#[test]
+fn a_seat_with_an_axis_beyond_those_of_its_type_that_is_not_at_0_is_nowhere() {
+    let mut positions = seat(2);
+    look(&mut positions, 0, &[Pulses(7), Pulses(7), Pulses(90_000)], 0);
+    assert_eq!((positions.reading(ms(0)), positions.outside()), (None, Some((2, Pulses(90_000)))));
+    look(&mut positions, 0, &[Pulses(7), Pulses(7), Pulses(0)], 1);
+    assert!(positions.reading(ms(1)).is_some());
+    let mut many = seat(8);
+    look(&mut many, 0, &[Pulses(0); 6], 0);
+    many.report(
+        &[
+            Pulses(0),
+            Pulses(0),
+            Pulses(0),
+            Pulses(0),
+            Pulses(0),
+            Pulses(0),
+            Pulses(0),
+            Pulses(0),
+            Pulses(900),
+        ],
+        ms(1),
+    );
+    assert_eq!(many.outside(), Some((8, Pulses(900))));
+}
+
+#[test]
+fn a_position_that_either_order_of_words_puts_inside_the_stroke_is_none_before_something_tells_the_order() {
+    // 1 pulse, or 32.8 mm.
+    let ambiguous = || {
+        let mut positions = seat(2);
+        look(&mut positions, 0, &[Pulses(1), Pulses(0)], 0);
+        assert!(positions.reading(ms(0)).is_none() && positions.is_ambiguous());
+        positions
+    };
+    let mut told = ambiguous();
+    look(&mut told, 0, &[Pulses(1), Pulses(45_000)], 1);
+    look(&mut told, 0, &[Pulses(1), Pulses(0)], 2);
+    assert!(told.reading(ms(2)).is_some(), "its other axis has told");
+    let mut reported = ambiguous();
+    reported.report(&[Pulses(1), Pulses(0)], ms(1));
+    assert!(reported.reading(ms(1)).is_some());
+    let mut reversed = ambiguous();
+    reversed.report(&[Pulses(1 << 16), Pulses(0)], ms(1));
+    look(&mut reversed, 0, &[Pulses(1), Pulses(0)], 2);
+    assert!(reversed.reading(ms(2)).is_none(), "the report says that the registers come the other way round");
+    let mut homed = ambiguous();
+    homed.on_homed();
+    look(&mut homed, 0, &[Pulses(1), Pulses(0)], 1);
+    assert!(homed.reading(ms(1)).is_some());
+    let mut at_zero = seat(2);
+    look(&mut at_zero, 0, &[Pulses(0), Pulses(0)], 0);
+    assert!(at_zero.reading(ms(0)).is_some(), "both orders say the same");
+}

@@ -1,0 +1,183 @@
+use std::path::Path;
+
+use super::*;
+use crate::config::from_to_args;
+use crate::cue::{Source, read};
+use crate::drive::{Manner, lanes};
+use crate::timeline::Timeline;
+use crate::wire::{Access, ReadRequest};
+
+const CODE: Code = Code(0x0fc9);
+
+fn ms(ms: u64) -> MonoTime {
+    MonoTime::from_nanos(ms * 1_000_000)
+}
+
+/// A controller of that many axes, with belts, of which a cue of one axis leads the first.
+fn peer(dialect: Dialect, axes: usize) -> MboxPeer {
+    let text = &b"time_ms,a1\n0,0\n1000,0.1\n"[..];
+    let cue = Timeline::new(read(Path::new("a.csv"), text, &Source::Native).unwrap());
+    let mut config = from_to_args(&[format!("127.0.0.1:1,axes={axes}")], &[], 1).unwrap();
+    (config.controllers[0].dialect, config.controllers[0].belt_inputs) = (dialect, 1);
+    let lane = lanes(&config, &cue, Manner { level: 1.0, silent: false }).remove(0);
+    MboxPeer::new(&config.controllers[0], &lane, CODE)
+}
+
+/// What it is asked for, by channel, first register and count.
+fn asked(peer: &mut MboxPeer, need: Need, at: u64) -> Vec<(u16, u16, u16)> {
+    let mut asked = Vec::new();
+    let sent = peer.poll(need, ms(at), &mut |datagram| {
+        let ReadRequest { channel, accept, reply, start, num } = ReadRequest::parse(datagram).unwrap();
+        assert_eq!((accept, reply), (CODE, CODE));
+        asked.push((channel, start, num));
+        true
+    });
+    assert_eq!(asked.len(), usize::try_from(sent).unwrap());
+    asked
+}
+
+fn answer(start: u16, words: &[u16]) -> RegisterReply<'_> {
+    let (num, data) = (u16::try_from(words.len()).unwrap(), Words::from(words));
+    let code = ReplyCode::Running;
+    RegisterReply { access: Access::Read, code, channel: 0, error: 0, start, num, data }
+}
+
+/// What an answer is evidence of, while nobody else asks anything.
+fn hear(peer: &mut MboxPeer, reply: RegisterReply<'_>, at: u64) -> Vec<Evidence> {
+    let mut out = Vec::with_capacity(crate::drive::MOST_EVIDENCE);
+    let room = out.capacity();
+    let message = FromController::Registers(reply);
+    peer.receive(Incoming { message, at: ms(at), others_ask: false }, &mut out);
+    assert_eq!(out.capacity(), room, "there is room for all of it");
+    out
+}
+
+fn position(start: u16) -> RegisterReply<'static> {
+    answer(start, &[7, 0, 7, 0, 7, 0])
+}
+
+#[test]
+fn a_look_asks_for_all_that_tells_who_it_is_and_an_mbox_for_less() {
+    let smc = [(1, 0, 3), (0, 0xf0, 1), (0, 0xfe, 2), (0, 0x34, 1), (1, 0x92, 1), (0, 0x5e, 1)];
+    // Its frames have places for six axes.
+    let places = [(0, DP_POSITIONS[0], 6), (0, DP_POSITIONS[3], 6)];
+    assert_eq!(asked(&mut peer(Dialect::Smc, 4), Need::Identity, 0), [&smc[..], &places].concat());
+    let mbox = asked(&mut peer(Dialect::Mbox, 4), Need::Identity, 0);
+    assert_eq!(mbox, [&smc[..3], &places].concat());
+    assert!(asked(&mut peer(Dialect::Mbox, 4), Need::Count, 0).is_empty(), "it does not tell one");
+    assert_eq!(asked(&mut peer(Dialect::Smc, 4), Need::Count, 0), [(0, 0x34, 1)]);
+}
+
+#[test]
+fn one_thing_at_a_time_is_asked_for_as_a_sign_of_life_and_its_zero_while_frames_lead_it() {
+    let mut peer = peer(Dialect::Smc, 6);
+    let mut starts = |is_led| -> Vec<u16> {
+        (0..12)
+            .flat_map(|turn| asked(&mut peer, Need::KeepAlive { is_led }, 100 * turn))
+            .map(|(_, start, _)| start)
+            .collect()
+    };
+    let at_rest = [0x06, 0x21, 0x5e];
+    let mut told = starts(false);
+    told[..3].sort_unstable();
+    assert_eq!(told[..3], at_rest);
+    let mut led = starts(true);
+    led[..4].sort_unstable();
+    assert_eq!(led[..4], [0x06, 0x21, 0x5e, 0xf0]);
+}
+
+#[test]
+fn an_answer_to_a_position_read_tells_of_three_axes_and_no_other_answer_is_one() {
+    let mut peer = peer(Dialect::Smc, 6);
+    asked(&mut peer, Need::Position, 0);
+    let told = hear(&mut peer, answer(DP_POSITIONS[3], &[4, 0, 5, 0, 6, 0]), 1);
+    let Some(Evidence::Position(place)) = told.get(2) else { panic!("{told:?}") };
+    assert_eq!(place.passing.unwrap().slots, 0b11_1000);
+    assert_eq!((place.reading, &place.told), (None, &None), "the first three are to come");
+    let told = hear(&mut peer, position(DP_POSITIONS[0]), 2);
+    assert!(matches!(&told[2], Evidence::Position(place) if place.reading.is_some()), "{told:?}");
+    assert_eq!(hear(&mut peer, position(DP_POSITIONS[1]), 3), [], "nobody asks so");
+    let many = [0; 40];
+    assert_eq!(hear(&mut peer, answer(DP_POSITIONS[0], &many), 3), [], "nor so");
+}
+
+#[test]
+fn an_answer_that_nobody_waits_for_tells_no_place_and_is_no_sign_of_life() {
+    let mut peer = peer(Dialect::Smc, 3);
+    asked(&mut peer, Need::KeepAlive { is_led: false }, 0);
+    asked(&mut peer, Need::Position, 0);
+    for _ in 0..2 {
+        let _ = hear(&mut peer, position(DP_POSITIONS[0]), 1);
+    }
+    let told = hear(&mut peer, answer(DP_POSITIONS[0], &[9, 0, 9, 0, 9, 0]), 90);
+    assert_eq!(told, [Evidence::Code(ReplyCode::Running)], "it was repeated on its way");
+    let place = peer.whereabouts(None, ms(91));
+    assert_eq!(place.told.unwrap()[0], Pulses(7));
+    // A conversation of another thread: what nobody here waits for may be for that.
+    let mut out = Vec::new();
+    let message = FromController::Registers(position(DP_POSITIONS[0]));
+    peer.receive(Incoming { message, at: ms(95), others_ask: true }, &mut out);
+    assert!(out.contains(&Evidence::Answered) && out.contains(&Evidence::Alive), "{out:?}");
+    assert!(!out.iter().any(|one| matches!(one, Evidence::Position(_))));
+}
+
+#[test]
+fn what_the_kernel_does_not_take_is_not_waited_for() {
+    let mut peer = peer(Dialect::Smc, 3);
+    assert_eq!(peer.poll(Need::Position, ms(0), &mut |_| false), 0);
+    let told = hear(&mut peer, position(DP_POSITIONS[0]), 1);
+    assert!(!told.iter().any(|one| matches!(one, Evidence::Position(_) | Evidence::Alive)));
+}
+
+#[test]
+fn an_answer_with_inputs_is_a_sign_of_life_where_they_are_asked_for() {
+    for (has_belts, alive) in [(true, true), (false, false)] {
+        let mut peer = peer(Dialect::Smc, 3);
+        peer.has_belts = has_belts;
+        asked(&mut peer, Need::Identity, 0);
+        let inputs = RegisterReply { code: ReplyCode::EmergencyStop, ..answer(0x5e, &[3]) };
+        let told = hear(&mut peer, inputs, 1);
+        assert_eq!(told.contains(&Evidence::Alive), alive, "also while it says that no belt is closed");
+        assert!(told.contains(&Evidence::Code(ReplyCode::EmergencyStop)));
+    }
+}
+
+#[test]
+fn its_packet_counter_is_told_where_that_alone_was_asked_for() {
+    let mut peer = peer(Dialect::Smc, 3);
+    asked(&mut peer, Need::Identity, 0);
+    assert!(!hear(&mut peer, answer(0x34, &[77]), 1).contains(&Evidence::Count(77)));
+    asked(&mut peer, Need::Count, 2);
+    assert!(hear(&mut peer, answer(0x34, &[78]), 3).contains(&Evidence::Count(78)));
+    assert!(!hear(&mut peer, answer(0x34, &[79]), 4).contains(&Evidence::Count(79)), "it was repeated");
+}
+
+#[test]
+fn axes_that_a_controller_drives_and_nobody_reads_are_led_where_its_frames_have_places_for_them() {
+    let mut peer = peer(Dialect::Smc, 1);
+    (peer.places, peer.axes) = (3, 3);
+    assert!([1, 3, 12].into_iter().all(|drives| !peer.leads_more_axes(drives)));
+    (peer.places, peer.axes) = (10, 6);
+    assert_eq!([6, 7, 12].map(|drives| peer.leads_more_axes(drives)), [false, true, true]);
+}
+
+#[test]
+fn effects_are_switched_off_by_a_register_that_moves_nothing_and_nobody_answers() {
+    let mut heard = Vec::new();
+    let sent = peer(Dialect::Mbox, 3).poll(Need::Dark, ms(0), &mut |datagram| {
+        heard = datagram.to_vec();
+        true
+    });
+    let write = WriteRequest::parse(&heard).unwrap();
+    assert_eq!((write.channel, write.start, write.data.get(0)), (2, 1, Some(0)), "DPF1");
+    assert_eq!((write.accept, write.reply, sent), (CODE, Code::NONE, 1));
+}
+
+#[test]
+fn only_an_smc_tells_by_the_code_of_a_reply_to_a_frame_how_it_is() {
+    use ReplyCode::{Command, EmergencyStop, Fault, Running};
+    let codes = [Running, Fault, EmergencyStop, Command];
+    let refusals = |dialect| codes.map(|code| peer(dialect, 3).on_reply_code(code));
+    assert_eq!(refusals(Dialect::Smc), [false, true, false, true]);
+    assert_eq!(refusals(Dialect::Mbox), [false, true, true, true]);
+}

@@ -1,0 +1,172 @@
+//! Families of drives behind one seam: poses into datagrams ([`Lane`], tick thread), what a running hall needs of a controller into
+//! requests, and what it answers into evidence ([`Peer`], ack thread). Pure: told the time, handed what came and given a way to
+//! send; allocates nothing once the lanes are made.
+//!
+//! Whoever takes the evidence knows no register, and no family another one.
+
+mod lane;
+mod lanes;
+mod mbox;
+mod rounds;
+
+pub use lane::{Lane, Stamped};
+pub use lanes::{Manner, lanes};
+pub(crate) use rounds::Rounds;
+
+use crate::belief::Reading;
+use crate::config::Controller;
+use crate::health::Sighting;
+use crate::motion::Pulses;
+use crate::observe::Look;
+use crate::time::MonoTime;
+use crate::wire::{FromController, PerAxis, ReplyCode};
+
+/// The other end of a lane: one controller. A variant for each family, matched and never boxed.
+#[derive(Debug)]
+pub(crate) enum Peer {
+    /// SMC, IMAX and MBOX controllers.
+    Mbox(mbox::MboxPeer),
+}
+
+/// What is wanted of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Need {
+    /// What it is, whether it was reset, how it stands with an emergency stop; and where its seat is.
+    Identity,
+    /// How many datagrams it has received.
+    Count,
+    /// Where all of its axes are.
+    Position,
+    /// A sign of life, one thing of what it tells at a time; also whether it knows its zero where frames lead it.
+    KeepAlive {
+        /// Frames go there.
+        is_led: bool,
+    },
+    /// That its effects are off: no frame can switch them off that does not move it. Nobody answers.
+    Dark,
+}
+
+/// A message of a controller that is no reply to a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Incoming<'a> {
+    /// What it is.
+    pub(crate) message: FromController<'a>,
+    /// When the kernel received it.
+    pub(crate) at: MonoTime,
+    /// Another thread asks as well: it may be the answer to that.
+    pub(crate) others_ask: bool,
+}
+
+/// What an answer of a controller says.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "the ack thread does not allocate")]
+pub(crate) enum Evidence {
+    /// It has answered something.
+    Answered,
+    /// It lives: it has answered what is asked for to know that.
+    Alive,
+    /// Its seat was read.
+    Position(Whereabouts),
+    /// Whether it knows its zero, asked for alone.
+    Homed(bool),
+    /// How many datagrams it has received, round after 65,535.
+    Count(u16),
+    /// It speaks in a way that nobody here can read.
+    Unreadable,
+    /// What it is.
+    Seen(Seen),
+    /// The reply code of its answer.
+    Code(ReplyCode),
+    /// What all of a look says of an emergency stop.
+    Stop(Look),
+}
+
+/// Evidence of one message; room for all of it is made at the start.
+pub(crate) type EvidenceList = Vec<Evidence>;
+
+/// The most that one message is evidence of.
+pub(crate) const MOST_EVIDENCE: usize = 9;
+
+/// Where the seat of a controller is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Whereabouts {
+    /// All of it; none while an axis that tells its position has not.
+    pub(crate) reading: Option<Reading>,
+    /// What this answer tells by itself, of however many axes.
+    pub(crate) passing: Option<Reading>,
+    /// Its axes from the first on, as far as it told them.
+    pub(crate) told: Option<PerAxis<Pulses>>,
+    /// An axis, from 0, that is not inside its stroke, and where it says that it is.
+    pub(crate) outside: Option<(usize, Pulses)>,
+    /// Its positions make two places of each, and nothing tells which is true.
+    pub(crate) is_ambiguous: bool,
+    /// It is read elsewhere than at park, by more than noise.
+    pub(crate) is_off_park: bool,
+}
+
+/// A controller that was looked at, and its seat then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seen {
+    /// What it is.
+    pub(crate) sighting: Sighting,
+    /// Its seat was found in the same place more than once.
+    pub(crate) rests: bool,
+    /// It stands at park, to a pulse.
+    pub(crate) at_park: bool,
+    /// Frames would lead axes that nobody here reads.
+    pub(crate) leads_more_axes: bool,
+}
+
+impl Peer {
+    /// The controller to which a lane sends.
+    pub(crate) fn new(controller: &Controller, lane: &Lane) -> Self {
+        match &lane.codec {
+            lane::Codec::Mbox(codec) => Self::Mbox(mbox::MboxPeer::new(controller, lane, codec.code)),
+        }
+    }
+
+    fn mbox(&mut self) -> &mut mbox::MboxPeer {
+        let Self::Mbox(peer) = self;
+        peer
+    }
+
+    /// Asks for what is needed by `send`, which says whether the kernel took a datagram; gives how many it took.
+    pub(crate) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
+        self.mbox().poll(need, now, send)
+    }
+
+    /// Takes a message: puts into `out` of what it is evidence, which is nothing where it answers nothing.
+    pub(crate) fn receive(&mut self, arrival: Incoming<'_>, out: &mut EvidenceList) {
+        self.mbox().receive(arrival, out);
+    }
+
+    /// Takes the reply code of a frame; says whether it is a refusal of that frame, and not how the controller is.
+    pub(crate) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
+        self.mbox().on_reply_code(code)
+    }
+
+    /// Takes what a controller reported unasked of where its axes are.
+    pub(crate) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Whereabouts {
+        self.mbox().on_report(positions, at)
+    }
+
+    /// A frame went to it.
+    pub(crate) fn on_sent(&mut self, at: MonoTime) {
+        self.mbox().position.on_sent(at);
+    }
+
+    /// It is home, as it was asked to be.
+    pub(crate) fn on_homed(&mut self) {
+        self.mbox().position.on_homed();
+    }
+
+    /// True if it leaves so much unanswered that it is not to be asked again yet while frames flow.
+    pub(crate) fn is_behind(&mut self, now: MonoTime) -> bool {
+        self.mbox().pending.is_full(now)
+    }
+
+    /// True if it has answered something of what it was when last asked for its identity.
+    pub(crate) fn has_answered(&mut self) -> bool {
+        self.mbox().probe.has_answered()
+    }
+}

@@ -1,0 +1,62 @@
+use std::path::Path;
+
+use rtrb::RingBuffer;
+
+use super::*;
+use crate::config::{LossPolicy, from_to_args};
+use crate::cue::{Source, read};
+use crate::drive::{Incoming, Manner, lanes};
+use crate::health::Groups;
+use crate::net::Ports;
+use crate::observe::Watched;
+use crate::timeline::Timeline;
+use crate::wire::{Access, Dialect, FromController, RegisterReply, Words};
+
+/// A watch over one controller with a belt, and room for two alarms.
+fn watch(dialect: Dialect) -> (Watch, rtrb::Consumer<Alarm>, Observer) {
+    let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
+    let mut config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
+    (config.controllers[0].dialect, config.controllers[0].belt_inputs) = (dialect, 1);
+    let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
+    let (sender, _) =
+        Ports::open("127.0.0.1:0".parse().unwrap(), &[config.controllers[0].address]).unwrap().split();
+    let (producer, alarms) = RingBuffer::new(2);
+    let health =
+        HealthTable::new(Groups::of(&config.controllers), LossPolicy::Continue, 1, Duration::from_millis(10));
+    let watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
+    (watch, alarms, Observer::new(config.controllers.iter().map(Watched::of).collect()))
+}
+
+#[test]
+fn a_refusal_of_an_mbox_tells_no_inputs_though_a_belt_waits_for_them() {
+    let refusal = RegisterReply {
+        access: Access::Read,
+        code: ReplyCode::Fault,
+        channel: 0,
+        error: 0,
+        start: 0x5e,
+        num: 1,
+        data: Words::from(&[3][..]),
+    };
+    for (dialect, told) in [(Dialect::Smc, Some(3)), (Dialect::Mbox, None)] {
+        let (mut watch, _, mut observer) = watch(dialect);
+        let (message, at) = (FromController::Registers(refusal), MonoTime::default());
+        assert!(!observer.hear(0, &message, at));
+        watch.hear(&mut observer, 0, Incoming { message, at, others_ask: false });
+        assert_eq!(observer.states()[0].inputs.map(|inputs| inputs.value), told, "{dialect:?}");
+    }
+}
+
+#[test]
+fn no_alarm_is_dropped_where_the_tick_thread_has_no_room_and_all_come_in_their_order() {
+    let (mut watch, mut alarms, _) = watch(Dialect::Smc);
+    let all: Vec<Alarm> = (0..7).map(Alarm::Leave).collect();
+    all.iter().for_each(|alarm| watch.alarm(*alarm));
+    let mut heard = Vec::new();
+    while heard.len() < all.len() {
+        watch.send_alarms();
+        assert!(!alarms.is_empty(), "{heard:?}");
+        heard.extend(std::iter::from_fn(|| alarms.pop().ok()));
+    }
+    assert_eq!(heard, all);
+}
