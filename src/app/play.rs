@@ -276,17 +276,13 @@ impl Play {
         } else {
             preparation.run(!self.manner.silent).map_err(PlayError::of)?
         };
-        let (mut engine, lanes, planner, timeline) = self.staged.split();
-        if self.chased.is_some() {
-            engine = engine.waiting();
-        }
+        let (engine, lanes, planner, timeline) = self.staged.split();
         let cue = timeline.cue().path().display().to_string();
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
-        let spin = Duration::from_micros(u64::from(self.config.show.spin_us));
         let stage = Stage {
             silent: self.manner.silent,
             rate: show.rate,
-            spin,
+            spin: Duration::from_micros(u64::from(self.config.show.spin_us)),
             engine,
             lanes,
             places,

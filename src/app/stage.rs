@@ -49,6 +49,7 @@ impl Stage {
         control: &Control,
     ) -> io::Result<Run> {
         let Self { silent, rate, spin, engine, lanes, places, sender, mut mail, chased } = self;
+        let engine = if chased.is_some() { engine.waiting() } else { engine };
         let over = EndFlags::default();
         let granted = realtime::request();
         thread::scope(|scope| {

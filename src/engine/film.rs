@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{Directive, Engine, Phase, Rest};
-use crate::time::{Rate, ShowTime};
+use crate::time::ShowTime;
 
 impl Engine {
     /// Where in the cue the frame of the next tick is to lead: told before each tick of a show that chases a film, as often as that
@@ -18,12 +18,6 @@ impl Engine {
         Duration::from_millis(u64::from(self.show.rate.time_ms(self.frames)))
     }
 
-    /// The rate of its ticks.
-    #[must_use]
-    pub const fn rate(&self) -> Rate {
-        self.show.rate
-    }
-
     /// Takes up where the film is, before a frame that takes so long.
     pub(super) fn take_target(&mut self, time: Duration) {
         let Some(target) = self.target.take() else { return };
@@ -32,21 +26,19 @@ impl Engine {
         }
         let before = ShowTime::from_nanos(target.as_nanos() - (ShowTime::ZERO + time).as_nanos());
         match self.phase {
-            // Wherever the film is, the lanes join it from park.
-            Phase::Settling | Phase::Riding if self.frames == 1 => self.rest_for_film(before),
-            Phase::Settling | Phase::Riding => self.slew.set_owed_s(seconds_from(self.playhead, before)),
-            Phase::Resting(Rest::Paused) => self.rest_for_film(before),
+            // At the first frame, and out of a rest, the lanes join the film wherever it is.
+            Phase::Settling | Phase::Riding if self.frames > 1 => {
+                self.slew.set_owed_s(seconds_from(self.playhead, before));
+            }
+            Phase::Settling | Phase::Riding | Phase::Resting(Rest::Paused) => {
+                self.halt(Rest::Film);
+                self.slew.reset();
+                self.playhead = before;
+            }
             // Once a course is asked for, show time runs on to where that begins.
             Phase::Resting(Rest::Late | Rest::Film) if self.switch.is_none() => self.playhead = before,
             _ => {}
         }
-    }
-
-    /// The lanes rest, and join the film that runs on.
-    fn rest_for_film(&mut self, film: ShowTime) {
-        self.halt(Rest::Film);
-        self.slew.reset();
-        self.playhead = film;
     }
 }
 

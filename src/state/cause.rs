@@ -37,12 +37,6 @@ pub enum Cause {
     Late,
     /// The cue is over.
     CueEnded,
-    /// The film that is chased can be followed.
-    FilmLeads,
-    /// It cannot.
-    FilmAwaited(HoldCause),
-    /// There is nothing more of it to follow.
-    FilmOver(ParkCause),
     /// A pause took more than five minutes.
     PausedTooLong,
     /// This group of seats is out, and the configuration says what the hall does then.
@@ -55,6 +49,12 @@ pub enum Cause {
     Cleared,
     /// No tick came for more than two seconds: the machine or the program slept.
     Slept,
+    /// The seats have left the film that they chased.
+    FilmOver(ParkCause),
+    /// They wait for it.
+    FilmAwaited(HoldCause),
+    /// They join it.
+    FilmLeads,
 }
 
 /// Something that no play goes on with.

@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::riff::Samples;
+use super::riff::SampleStream;
 use super::source::{FilmArgs, LtcInput};
 use super::{FilmError, Told, start};
 use crate::film::ltc::LtcReader;
@@ -27,7 +27,7 @@ pub(super) fn start_reading(
     told: Told,
     child: &Arc<Mutex<Option<Child>>>,
 ) -> Result<(), FilmError> {
-    let line = Line { args: args.clone(), told };
+    let line = LtcLine { args: args.clone(), told };
     let failed = |path: &Path| {
         let what = path.display().to_string();
         move |source| FilmError::Open { what, source }
@@ -65,7 +65,7 @@ pub(super) fn start_reading(
 fn run(
     mut command: Command,
     name: &str,
-    line: Line,
+    line: LtcLine,
     child: &Arc<Mutex<Option<Child>>>,
 ) -> Result<(), FilmError> {
     command.stdin(Stdio::null()).stdout(Stdio::piped());
@@ -100,15 +100,15 @@ pub(super) fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>
 }
 
 /// A line that carries LTC.
-struct Line {
+struct LtcLine {
     args: FilmArgs,
     told: Told,
 }
 
-impl Line {
+impl LtcLine {
     /// Reads to the end of a stream; one that is `paced`, at the speed of its sound.
     fn read(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
-        let (mut samples, mut block, mut octets) = (Samples::default(), Vec::new(), [0; BLOCK]);
+        let (mut samples, mut block, mut octets) = (SampleStream::default(), Vec::new(), [0; BLOCK]);
         let FilmArgs { rate, start, .. } = self.args;
         let (begun, mut heard) = (Monotonic.now(), 0_u64);
         let mut reader: Option<LtcReader> = None;

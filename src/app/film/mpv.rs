@@ -18,17 +18,17 @@ const READ_FOR: Duration = Duration::from_millis(10);
 
 /// Begins to ask the player at that socket; the cue begins where its film is at `begin`.
 pub(super) fn start_reading(socket: &Path, begin: ShowTime, told: Told) -> io::Result<()> {
-    let player = Player { socket: socket.to_path_buf(), begin, told };
+    let player = MpvPlayer { socket: socket.to_path_buf(), begin, told };
     start("mpv", move || while player.talk() {})
 }
 
-struct Player {
+struct MpvPlayer {
     socket: PathBuf,
     begin: ShowTime,
     told: Told,
 }
 
-impl Player {
+impl MpvPlayer {
     /// One connection, from its begin to its end; false once nobody listens.
     fn talk(&self) -> bool {
         let now = Monotonic.now();

@@ -1,4 +1,4 @@
-//! Samples out of a stream: raw ones, or those behind a RIFF header, be its sizes known or not (FFFFFFFF, as programs write them into a
+//! SampleStream out of a stream: raw ones, or those behind a RIFF header, be its sizes known or not (FFFFFFFF, as programs write them into a
 //! pipe).
 
 /// What a stream that is raw has: 16 bits, one channel, so many samples a second.
@@ -8,7 +8,7 @@ const RIFF: usize = 12;
 const CHUNK: usize = 8;
 /// What of a header is kept: more says that it is none.
 const HEADER: usize = 64 * 1024;
-/// Samples a second that there are.
+/// SampleStream a second that there are.
 const RATES: std::ops::RangeInclusive<u32> = 8_000..=192_000;
 
 /// Why a stream is none that can be read.
@@ -22,20 +22,20 @@ pub(super) enum RiffFault {
 
 /// Makes samples of octets, whichever way they come in pieces.
 #[derive(Debug, Default)]
-pub(super) struct Samples {
+pub(super) struct SampleStream {
     /// What came and was not used: a header that is not whole, or part of a frame.
     kept: Vec<u8>,
-    format: Option<Format>,
+    format: Option<SoundFormat>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Format {
+struct SoundFormat {
     samples_per_s: u32,
     channels: usize,
 }
 
-impl Samples {
-    /// Samples a second; none before that is known.
+impl SampleStream {
+    /// SampleStream a second; none before that is known.
     pub(super) fn samples_per_s(&self) -> Option<u32> {
         self.format.map(|format| format.samples_per_s)
     }
@@ -62,10 +62,10 @@ impl Samples {
 }
 
 /// The format, and how long the header is; none while it is not whole.
-fn header(octets: &[u8]) -> Result<Option<(Format, usize)>, RiffFault> {
+fn header(octets: &[u8]) -> Result<Option<(SoundFormat, usize)>, RiffFault> {
     let is_riff = octets.iter().zip(b"RIFF").all(|(one, other)| one == other);
     if !is_riff {
-        return Ok(Some((Format { samples_per_s: RAW_SAMPLES_PER_S, channels: 1 }, 0)));
+        return Ok(Some((SoundFormat { samples_per_s: RAW_SAMPLES_PER_S, channels: 1 }, 0)));
     }
     let (mut at, mut format) = (RIFF, None);
     while let Some(chunk) = octets.get(at..at + CHUNK) {
@@ -87,14 +87,14 @@ fn header(octets: &[u8]) -> Result<Option<(Format, usize)>, RiffFault> {
     Ok(None)
 }
 
-fn read_format(fields: &[u8]) -> Result<Format, RiffFault> {
+fn read_format(fields: &[u8]) -> Result<SoundFormat, RiffFault> {
     let word = |at: usize| u16::from_le_bytes([fields[at], fields[at + 1]]);
     let samples_per_s = u32::from(word(4)) | u32::from(word(6)) << 16;
     let (kind, channels, bits) = (word(0), usize::from(word(2)), word(14));
     // 1: uncompressed; FFFE: the same, with more said of its channels.
     let is_plain = matches!(kind, 1 | 0xfffe) && bits == 16 && (1..=64).contains(&channels);
     let is_known = is_plain && RATES.contains(&samples_per_s);
-    is_known.then_some(Format { samples_per_s, channels }).ok_or(RiffFault::Format)
+    is_known.then_some(SoundFormat { samples_per_s, channels }).ok_or(RiffFault::Format)
 }
 
 #[cfg(test)]
@@ -116,7 +116,7 @@ mod tests {
     }
 
     fn read(octets: &[u8], piece: usize) -> (Vec<i16>, Option<u32>) {
-        let (mut samples, mut out) = (Samples::default(), Vec::new());
+        let (mut samples, mut out) = (SampleStream::default(), Vec::new());
         for piece in octets.chunks(piece) {
             samples.push(piece, &mut out).expect("it is sound");
         }
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn what_is_no_sound_of_16_bits_is_refused() {
-        let push = |octets: &[u8]| Samples::default().push(octets, &mut Vec::new());
+        let push = |octets: &[u8]| SampleStream::default().push(octets, &mut Vec::new());
         assert_eq!(push(&wav(3, 1, 32, 4, &[])), Err(RiffFault::Format));
         assert_eq!(push(&wav(1, 0, 16, 4, &[])), Err(RiffFault::Format));
         let mut endless = b"RIFF\0\0\0\0WAVE".to_vec();

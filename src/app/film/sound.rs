@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use super::riff::{RiffFault, Samples};
+use super::riff::{RiffFault, SampleStream};
 use super::source::FilmArgError;
 use crate::film::ltc::{LtcDecoder, LtcFrame, LtcGenerator};
 use crate::film::timecode::{FrameRate, Timecode};
 
-/// Samples a second of the sound that is made.
+/// SampleStream a second of the sound that is made.
 pub const SAMPLES_PER_S: u32 = 48_000;
 /// A fifth of full scale, about as loud as a line is driven.
 const LEVEL: f64 = 0.2;
@@ -77,7 +77,7 @@ pub struct LtcFound {
 /// # Errors
 /// In words, where it is none that can be read.
 pub fn look_for_ltc(octets: &[u8]) -> Result<LtcFound, impl std::error::Error + Send + Sync + 'static> {
-    let (mut samples, mut sound) = (Samples::default(), Vec::new());
+    let (mut samples, mut sound) = (SampleStream::default(), Vec::new());
     samples.push(octets, &mut sound)?;
     let per_s = samples.samples_per_s().ok_or(RiffFault::NoData)?;
     let mut decoder = LtcDecoder::new(per_s);
