@@ -33,12 +33,17 @@ const SAMPLES_AGAIN: u32 = 4;
 const SURE_FOR: Duration = Duration::from_millis(250);
 /// Without a lock for so long the source is no use.
 const ACQUIRE_FOR: Duration = Duration::from_secs(5);
+/// Rates are told within that of what they are: the crystal's error.
+const TOLD_RATE_SIGMA: f64 = 1e-4;
 /// Samples that agree on another place have to span so long: a burst that a network held up agrees as well.
 const JUMP_SPAN: Duration = Duration::from_millis(120);
 /// What came longer ago says nothing of where the film is now.
 const WINDOW: Duration = Duration::from_millis(500);
 /// For a source that is slower than that, so many of its periods.
 const WINDOW_PERIODS: u32 = 6;
+/// One in so many positions makes up the share of those that do not fit; beyond this share the gate is too narrow.
+const MISFITS_SHARE: f64 = 1.0 / 16.0;
+const MISFITS_MOST: f64 = 0.25;
 /// A speed has to be held so long: to be wound, or to have been.
 const SPEED_HELD: Duration = Duration::from_millis(300);
 /// Samples are missing after this, or after [`MISSING_PERIODS`]: a player that does not answer for that long hangs.
@@ -48,15 +53,10 @@ const MISSING_PERIODS: u32 = 4;
 const SILENT_FOR: Duration = Duration::from_millis(500);
 /// A line that carries what cannot be read carries a film that runs.
 const DIRTY_FOR: Duration = Duration::from_secs(5);
-/// One in so many positions makes up the share of those that do not fit; beyond this share the gate is too narrow.
-const MISFITS_SHARE: f64 = 1.0 / 16.0;
-const MISFITS_MOST: f64 = 0.25;
 /// So many times the same place in a row is a film that stands: 125 ms of timecode.
 const FROZEN: u32 = 3;
 /// No film is longer; a player that says so lies.
 const LONGEST: Duration = Duration::from_hours(100);
-/// Rates are told within that of what they are: the crystal's error.
-const TOLD_RATE_SIGMA: f64 = 1e-4;
 
 /// What became of the observations of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -74,20 +74,20 @@ pub(crate) struct TrackerCounts {
 /// The tracker of one source. Any thread; allocates nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct SourceTracker {
+    estimate: Option<Estimate>,
     traits: Traits,
     /// How far the rate may be from 1.
     band: f64,
     state: FilmState,
     since: MonoTime,
     epoch: u32,
-    estimate: Option<Estimate>,
     late: LateBias,
     recent: Recent,
     newest: Option<Newest>,
     /// The next position begins the estimate anew.
     anew: bool,
-    /// Somebody said that the film was stopped, and nobody that it runs again.
-    told_to_stand: bool,
+    /// How fast it was said to run.
+    told_rate: f64,
     winding: bool,
     /// The share of positions that did not fit, and whether the last one did not.
     misfits: f64,
@@ -138,7 +138,7 @@ impl SourceTracker {
             recent: Recent::new(),
             newest: None,
             anew: true,
-            told_to_stand: false,
+            told_rate: 1.0,
             winding: false,
             misfits: 0.0,
             was_misfit: false,
@@ -192,12 +192,10 @@ impl SourceTracker {
         match told.word {
             FilmWord::Position(media) => self.on_position(told, media),
             FilmWord::Stop => {
-                self.told_to_stand = true;
                 self.recent.clear();
                 self.on_sign(SourceSign::Stop, at);
             }
             FilmWord::Play => {
-                self.told_to_stand = false;
                 self.begin_anew();
                 self.on_sign(SourceSign::Play, at);
             }
@@ -215,7 +213,7 @@ impl SourceTracker {
             FilmWord::Silence => self.on_quiet(SILENT_FOR, at),
             FilmWord::Dirt => self.on_quiet(DIRTY_FOR, at),
             FilmWord::Gone => {
-                (self.winding, self.told_to_stand) = (false, false);
+                self.winding = false;
                 self.begin_anew();
                 self.on_sign(SourceSign::Gone, at);
             }
@@ -270,11 +268,12 @@ impl SourceTracker {
         if !rate.is_finite() {
             return;
         }
-        // Up to here it ran at the old speed, from here on at the new: no sample has to show that first.
+        // Up to here it ran at the old speed, from here on at the new: no sample has to show that first. Its clock is off by as much.
         if let Some(estimate) = &mut self.estimate {
             estimate.predict(at);
-            estimate.set_rate(rate, TOLD_RATE_SIGMA);
+            estimate.set_rate(rate * (estimate.rate() / self.told_rate).clamp(0.999, 1.001), TOLD_RATE_SIGMA);
         }
+        self.told_rate = if rate == 0.0 { 1.0 } else { rate };
         if rate < 0.0 {
             self.on_sign(SourceSign::Backward, at);
         } else if (rate - 1.0).abs() > self.band {
@@ -405,7 +404,6 @@ impl SourceTracker {
     fn watch_for_play(&mut self, at: MonoTime) {
         let speed = self.recent.speed(self.window(), self.span(), self.traits.sigma_s, self.traits.sigma_s);
         if speed.is_some_and(|speed| speed.rate > speed.off.max(0.5)) {
-            self.told_to_stand = false;
             self.begin_anew();
             self.on_sign(SourceSign::Play, at);
         }

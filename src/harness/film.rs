@@ -42,6 +42,7 @@ impl Luck {
     }
 
     #[cfg(test)]
+    #[expect(clippy::cast_possible_truncation, reason = "it is less than a usize")]
     pub(crate) const fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }

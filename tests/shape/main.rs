@@ -34,9 +34,10 @@ const ROWS: &[Row] = &[
     ("pairs of runs, but for names", repeats::but_for_names, Less, 250.0, 170.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 16.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
-    // tells in a show, 150 for the seam to a family of drives: words for what is needed and told, and lanes in two halves.
-    ("lines of code", counts::lines_of_code, Less, 49_628.0, 39_800.0),
-    ("public items and fields", counts::public_items, Less, 2_854.0, 400.0),
+    // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
+    // a family of drives; 700 for shows that chase a film: sources that are read, seats that wait, sync send and check.
+    ("lines of code", counts::lines_of_code, Less, 52_418.0, 39_800.0),
+    ("public items and fields", counts::public_items, Less, 2_914.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 473.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.5, 3.0),

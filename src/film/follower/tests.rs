@@ -127,7 +127,9 @@ fn whatever_the_points_say_pace_and_its_changes_keep_their_limits() {
                 follower.pace()
             );
             assert!(changed.abs() <= most + 1e-9, "{changed} of {most}");
-            assert!((changed - change).abs() * hz <= 10.0 * most * 1.001 + 1e-6, "{changed} after {change}");
+            // Where the playhead is on the film to a nanosecond its pace is set to the film's: four billionths at the most.
+            let set = 4e-9 * hz * hz * 2.0;
+            assert!((changed - change).abs() * hz <= 10.0 * most + set + 1e-6, "{changed} after {change}");
             let moved = follower.playhead().as_nanos() - before.as_nanos();
             assert!((moved as f64 - frame.as_nanos() as f64 * follower.pace()).abs() <= 1.0, "{moved}");
             (pace, change) = (follower.pace(), changed);

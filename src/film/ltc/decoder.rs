@@ -20,6 +20,8 @@ pub(crate) struct LtcFrame {
     pub(crate) label: Label,
     /// Whether the tape runs backwards.
     pub(crate) backwards: bool,
+    /// Whether the frames before it have the same label: whoever sends it was paused.
+    pub(crate) stands: bool,
     /// When its last bit ended, samples since the first.
     pub(crate) end: f64,
 }
@@ -43,6 +45,8 @@ pub(crate) struct LtcDecoder {
     /// The newest frame, and how many followed each other up to it.
     newest: Option<LtcFrame>,
     agreeing: u32,
+    /// How many had the same label.
+    standing: u32,
     /// The newest that was sure.
     sure: Option<LtcFrame>,
     rate: Option<FrameRate>,
@@ -59,6 +63,7 @@ impl LtcDecoder {
             bits: 0,
             newest: None,
             agreeing: 0,
+            standing: 0,
             sure: None,
             rate: None,
         }
@@ -108,7 +113,7 @@ impl LtcDecoder {
                     return None;
                 }
                 let (label, backwards) = self.word.label()?;
-                self.on_frame(LtcFrame { label, backwards, end: edge })
+                self.on_frame(LtcFrame { label, backwards, stands: false, end: edge })
             }
         }
     }
@@ -117,7 +122,14 @@ impl LtcDecoder {
     fn on_frame(&mut self, frame: LtcFrame) -> Option<LtcFrame> {
         let is_next = self.newest.is_some_and(|newest| self.is_next(&frame, &newest));
         self.agreeing = if is_next { self.agreeing.saturating_add(1) } else { 1 };
+        let is_same = self.newest.is_some_and(|newest| self.is_again(&frame, &newest));
+        self.standing = if is_same { self.standing.saturating_add(1) } else { 1 };
         self.newest = Some(frame);
+        if self.standing >= AGREEING {
+            // Time says nothing any more of the label that has to come.
+            self.sure = None;
+            return Some(LtcFrame { stands: true, ..frame });
+        }
         let is_told = self.sure.is_some_and(|sure| self.is_told_by_time(&frame, &sure));
         if self.agreeing < AGREEING && !is_told {
             return None;
@@ -131,12 +143,20 @@ impl LtcDecoder {
         (frame.end - before.end) / (f64::from(BITS) * self.cells.length())
     }
 
+    /// Whether one comes right after another, the same way. Two that do so by their labels and not in time were cut together.
+    fn is_adjacent(&self, frame: &LtcFrame, before: &LtcFrame) -> bool {
+        let is_near = (self.frames_between(frame, before) - 1.0).abs() < OFF_GRID;
+        is_near && frame.backwards == before.backwards
+    }
+
+    fn is_again(&self, frame: &LtcFrame, before: &LtcFrame) -> bool {
+        frame.label == before.label && self.is_adjacent(frame, before)
+    }
+
     fn is_next(&self, frame: &LtcFrame, before: &LtcFrame) -> bool {
-        // Two that follow each other by their labels and not in time were cut together.
-        let is_adjacent = (self.frames_between(frame, before) - 1.0).abs() < OFF_GRID;
         let (later, earlier) =
             if frame.backwards { (before.label, frame.label) } else { (frame.label, before.label) };
-        frame.backwards == before.backwards && is_adjacent && follows(later, earlier)
+        self.is_adjacent(frame, before) && follows(later, earlier)
     }
 
     /// Whether a frame says what it has to, so long after one that was sure.

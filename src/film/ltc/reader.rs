@@ -77,6 +77,9 @@ impl LtcReader {
         self.said = None;
         let Some(read) = self.samples.time_of(frame.end) else { return };
         let at = read.before(self.latency);
+        if frame.stands {
+            return out(Observation::new(at, FilmWord::Stop));
+        }
         let media: Option<ShowTime> = self.labels.media(at, frame.label, frame.quarters(), None);
         if let Some(rate) = self.labels.rate() {
             self.decoder.set_rate(rate);

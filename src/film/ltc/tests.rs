@@ -315,6 +315,35 @@ fn a_line_that_falls_silent_says_so_once_and_a_rate_that_nobody_configured_is_fo
 }
 
 #[test]
+fn a_sender_that_repeats_its_frame_in_a_pause_says_stop_and_positions_again_when_it_goes_on() {
+    let mut reader = LtcReader::new(SAMPLES, Duration::ZERO, Some(FrameRate::F25), Label::default());
+    let mut words = Vec::new();
+    let mut block = Vec::new();
+    for n in 0..60 {
+        // A second that runs, half of one that stands, and on.
+        let frame = at_25().plus(if n < 25 { n } else { (n - 12).max(25) });
+        let mut generator = LtcGenerator::new(frame, SAMPLES, 0.5);
+        block.clear();
+        block.extend((0..1_920).map(|_| generator.sample()));
+        reader.hear(&block, mono((n + 1) as f64 * 0.04), &mut |heard| words.push((n, heard.word)));
+    }
+    let is_stop = |word: &&(i64, FilmWord)| word.1 == FilmWord::Stop;
+    let stops: Vec<i64> = words.iter().filter(is_stop).map(|(n, _)| *n).collect();
+    let after_s = (stops[0] - 25) as f64 * 0.04;
+    assert!(after_s <= 0.13, "it is told after {after_s} s");
+    assert!(
+        words.iter().all(|(_, word)| matches!(word, FilmWord::Stop | FilmWord::Position(_))),
+        "{words:?}"
+    );
+    let moved = words
+        .iter()
+        .filter(|(n, word)| *n > 30 && *word != FilmWord::Stop)
+        .map(|(n, _)| *n)
+        .collect::<Vec<_>>();
+    assert!(moved[0] > 37 && moved[0] <= 42 && moved.len() >= 18, "{moved:?}");
+}
+
+#[test]
 fn noise_on_the_line_is_dirt() {
     let mut reader = LtcReader::new(SAMPLES, Duration::ZERO, None, Label::default());
     let mut generator = LtcGenerator::new(at_25(), SAMPLES, 0.5);

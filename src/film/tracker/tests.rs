@@ -278,7 +278,11 @@ fn how_long_the_estimate_runs_on_hangs_on_the_cause() {
 
 #[test]
 fn a_told_speed_is_believed_at_once() {
-    let film = TrueFilm::new(10.0, 1.0).rate_from(10.0, 1.001).rate_from(12.0, 1.5).rate_from(14.0, 1.0);
+    // The player's clock is 300 ppm fast all the while.
+    let film = TrueFilm::new(10.0, 1.0003)
+        .rate_from(10.0, 1.001_300_3)
+        .rate_from(12.0, 1.500_45)
+        .rate_from(14.0, 1.0003);
     let speeds = [(10.0, FilmWord::Speed(1.001)), (12.0, FilmWord::Speed(1.5)), (14.0, FilmWord::Speed(1.0))];
     let run = Run::of(SourceKind::MpvSound, &film, &player(&film, 16.0, &speeds), 16.0);
     let worst =
