@@ -160,7 +160,8 @@ mod tests {
 
     #[test]
     fn a_second_in_which_nobody_reads_changes_nothing_and_samples_that_are_lost_are_noticed() {
-        let held_up = |block: u32| if (500..600).contains(&block) { f64::from(600 - block) * 10.0 } else { 0.1 };
+        let held_up =
+            |block: u32| if (500..600).contains(&block) { f64::from(600 - block) * 10.0 } else { 0.1 };
         assert!(worst_ms(0.0, 0.0, held_up) < 0.2);
         let lost = |block: u32| if block < 1_000 { 0.0 } else { 40.0 };
         // Blocks from there on are 40 ms later than their count says: that is when they were captured.
