@@ -1,5 +1,5 @@
-//! Families of drives behind one seam: poses into datagrams ([`Lane`], tick thread), what a running hall needs of a controller into
-//! requests, and what it answers into evidence ([`Peer`], ack thread). Pure: told the time, handed what came and given a way to
+//! Families of drives behind one seam: poses into datagrams (`Lane`, tick thread), what a running hall needs of a controller into
+//! requests, and what it answers into evidence (`Peer`, ack thread). Pure: told the time, handed what came and given a way to
 //! send; allocates nothing once the lanes are made.
 //!
 //! Whoever takes the evidence knows no register, and no family another one.
