@@ -13,7 +13,7 @@ const AT_PARK: Pose = [0.000_7; MAX_AXES];
 const A_PULSE: Pose = [0.000_004; MAX_AXES];
 
 impl Engine {
-    /// The same, waiting to be let go ([`Directive::Play`]).
+    /// The same, waiting to be let go ([`super::Directive::Play`]).
     #[must_use]
     pub fn waiting(mut self) -> Self {
         self.phase = Phase::Waiting;
