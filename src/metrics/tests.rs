@@ -160,7 +160,7 @@ fn the_state_is_the_one_of_all_states_that_is_1() {
     let page = page(&playing());
     let states: Vec<_> =
         page.samples.iter().filter(|(series, _)| series.starts_with("kinocue_state{")).collect();
-    assert_eq!(states.len(), 13);
+    assert_eq!(states.len(), 14);
     let on: Vec<_> =
         states.iter().filter(|(_, value)| **value == 1.0).map(|(series, _)| series.as_str()).collect();
     assert_eq!(on, ["kinocue_state{state=\"playing\"}"]);

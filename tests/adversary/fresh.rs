@@ -337,7 +337,7 @@ fn no_two_requests_one_after_the_other_move_a_seat_as_none_may() {
 }
 
 /// Tries of 256 in which a seat of which 100 ms of frames were lost vibrates on: it is never read at rest then, and stays out.
-const VIBRATES_ON: u32 = 22;
+const VIBRATES_ON: u32 = 24;
 
 #[test]
 fn a_seat_that_still_vibrates_is_never_joined_from_where_it_is_read_and_few_do() {
