@@ -55,7 +55,9 @@ pub enum Ending {
 /// What the hall wants of the engine: told every tick, so that none can be missed, and told again it changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Directive {
-    /// Nothing is to begin: the hall is not ready, or waits for somebody to let the show go.
+    /// Nothing is to begin: the hall is not ready.
+    Off,
+    /// Nothing is to begin until somebody lets the show go.
     Wait,
     /// The lanes are to follow the cue, from a pause as well.
     Play,
@@ -222,7 +224,7 @@ impl Engine {
             retired: Retired::default(),
             serial: course.serial,
             plays_left: show.plays.checked_sub(1),
-            directive: Directive::Wait,
+            directive: Directive::Off,
             seeking: None,
             target: None,
             seek_refused: false,

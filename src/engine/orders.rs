@@ -11,7 +11,7 @@ impl Engine {
     pub fn obey(&mut self, directive: Directive) {
         let before = std::mem::replace(&mut self.directive, directive);
         match directive {
-            Directive::Wait => {}
+            Directive::Off | Directive::Wait => {}
             Directive::Play => {
                 if self.phase == Phase::Waiting {
                     self.phase = first_phase(&self.show);
@@ -157,7 +157,8 @@ impl Engine {
     /// A lane's seat is known to be at rest in that pose, `near` of which is noise. One that was away is there again, and joins the
     /// others where they follow the cue; one that rests goes on from there; one that is under way goes on.
     pub fn found(&mut self, lane: usize, known: &KnownPose, near: &Pose) {
-        let is_fresh = self.frames == 0 && self.rest().is_none();
+        let is_ready = matches!(self.directive, Directive::Wait | Directive::Play);
+        let is_fresh = is_ready && self.frames == 0 && self.rest().is_none();
         let rests = self.is_at_rest() && self.switch.is_none();
         let rider = &mut self.riders[lane];
         let at_park = is_at(&rider.window, known.pose(), &rider.window.park(), near);

@@ -53,7 +53,8 @@ fn an_emergency_stop_in_mid_show_is_cleared_once_it_was_released_though_no_frame
     assert_eq!(hall.run(&["clear"]).code, Some(75));
     hall.happens("2@estop=0");
     cleared_and_parked(&hall);
-    assert!(hall.end().rest_in_park());
+    let seen = hall.end();
+    assert!(seen.rest_in_park(), "{:?}", seen.controllers);
 }
 
 #[test]
