@@ -223,10 +223,10 @@ impl Conductor {
     }
 
     /// Has the engine do what the state says.
-    fn steer(&self, engine: &mut Engine) {
+    pub(super) fn steer(&self, engine: &mut Engine) {
         engine.obey(match self.machine.state() {
-            State::Boot | State::Recovering | State::Homing => Directive::Off,
-            State::Parked | State::Armed => Directive::Wait,
+            State::Boot | State::Recovering => Directive::Off,
+            State::Homing | State::Parked | State::Armed => Directive::Wait,
             State::Playing(_) if self.film.as_ref().is_none_or(FilmLead::leads) => Directive::Play,
             State::Playing(_) | State::Paused => Directive::Hold,
             State::Stopping | State::Stopped | State::Fault => Directive::Stop,

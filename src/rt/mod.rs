@@ -171,7 +171,11 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         for _ in 0..COMMANDS_PER_TICK {
             let Some((ticket, command)) = mail.command() else { break };
             let news = match command {
-                Command::Load(show) => load(show, conductor.machine().state(), engine, lanes, mail),
+                Command::Load(show) => {
+                    let news = load(show, conductor.machine().state(), engine, lanes, mail);
+                    conductor.steer(engine);
+                    news
+                }
                 Command::Request(request) => told(conductor.request(request, engine, now)),
                 Command::Seek(film) => told(conductor.seek(film, engine, now)),
                 Command::Event(event) => {
