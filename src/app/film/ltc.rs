@@ -75,7 +75,9 @@ fn run(
     start("ltc", move || {
         loop {
             let read = output.take().map_or(Ok(()), |output| line.read(output, false));
-            let ended = lock(&child).take().map(|mut one| one.wait());
+            // Whoever ends the program meanwhile does not wait for the lock.
+            let done = lock(&child).take();
+            let ended = done.map(|mut one| one.wait());
             if matches!(ended, Some(Ok(status)) if status.success()) {
                 return line.end(read);
             }
