@@ -19,7 +19,7 @@ use crate::config::{Config, Misfit};
 use crate::cue::{CueFaults, Place};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
-use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
+use crate::film::chase::ChaseRules;
 use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
 use crate::health::{Groups, HealthTable};
@@ -196,10 +196,9 @@ impl Play {
         manner: Manner,
         source: Arc<PublishedPoint>,
     ) -> Result<Self, PlayError> {
-        let (pace, join_above, rejoin) = (PaceLimits::default(), JOIN_ABOVE, Rejoin::Auto);
+        let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
-        keeps_limits(&at_any_pace(&config, pace), &timeline, show.rate, manner.level)?;
-        let rules = ChaseRules { pace, join_above, rejoin, cue_end: timeline.duration() };
+        keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
         let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
         Ok(Self { chased: Some(Chased { source, rules }), ..Self::of(config, staged, manner) })
     }

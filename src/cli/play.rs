@@ -119,10 +119,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         return Err(why).or_exit(Exit::Usage);
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.no_acks };
-    let film = match &args.chase {
-        Some(source) => Some(film(source, args)?),
-        None => None,
-    };
+    let film = args.chase.as_ref().map(|source| film(source, args)).transpose()?;
     play(config, timeline, show, manner, film.as_ref(), args.json)
 }
 

@@ -94,13 +94,21 @@ pub enum Rejoin {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChaseRules {
     /// The pace that the cue was proved at.
-    pub pace: PaceLimits,
+    pub(crate) pace: PaceLimits,
     /// Errors beyond it are joined, not slewed.
-    pub join_above: Duration,
+    pub(crate) join_above: Duration,
     /// When seats that hold may join again.
-    pub rejoin: Rejoin,
+    pub(crate) rejoin: Rejoin,
     /// Where the cue ends.
-    pub cue_end: ShowTime,
+    pub(crate) cue_end: ShowTime,
+}
+
+impl ChaseRules {
+    /// Those of a cue that ends there, where nobody says otherwise.
+    #[must_use]
+    pub fn until(cue_end: ShowTime) -> Self {
+        Self { pace: PaceLimits::default(), join_above: JOIN_ABOVE, rejoin: Rejoin::Auto, cue_end }
+    }
 }
 
 /// What a tick brings.

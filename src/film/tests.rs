@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, JOIN_ABOVE, Rejoin};
+use super::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict};
 use super::chooser::{Chooser, SourceView};
 use super::follower::PaceLimits;
 use super::follower::tests::tries;
@@ -32,8 +32,7 @@ struct Chain {
 impl Chain {
     fn new(sources: &[Told]) -> Self {
         let (limits, published) = (PaceLimits::default(), Arc::default());
-        let cue_end = ShowTime::from_millis(100_000_000);
-        let rules = ChaseRules { pace: limits, join_above: JOIN_ABOVE, rejoin: Rejoin::Auto, cue_end };
+        let rules = ChaseRules::until(ShowTime::from_millis(100_000_000));
         Self {
             trackers: sources
                 .iter()

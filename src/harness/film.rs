@@ -6,45 +6,40 @@ use crate::film::follower::PaceLimits;
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::point::PublishedPoint;
 use crate::film::tracker::{SourceKind, SourceTracker};
+use crate::harness::asked::Chance;
 use crate::time::{MonoTime, ShowTime};
 
-/// Chance that a seed repeats: SplitMix64.
-#[derive(Debug, Clone)]
-pub(crate) struct Luck(u64);
+/// Chance, with what films and their sources ask of it.
+pub(crate) struct Luck(Chance);
 
 impl Luck {
     pub(crate) const fn new(seed: u64) -> Self {
-        Self(seed ^ 0x5851_f42d_4c95_7f2d)
+        Self(Chance::new(seed ^ 0x5851_f42d_4c95_7f2d))
     }
 
-    pub(crate) const fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+    #[cfg(test)]
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0.next()
     }
 
     /// Uniform in 0..1.
-    #[expect(clippy::cast_precision_loss, reason = "53 bits")]
-    pub(crate) const fn share(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    pub(crate) fn share(&mut self) -> f64 {
+        self.0.between(0.0, 1.0)
     }
 
     /// Uniform in from..to.
     #[cfg(test)]
-    pub(crate) const fn between(&mut self, from: f64, to: f64) -> f64 {
-        from + (to - from) * self.share()
+    pub(crate) fn between(&mut self, from: f64, to: f64) -> f64 {
+        self.0.between(from, to)
     }
 
-    pub(crate) const fn is(&mut self, chance: f64) -> bool {
+    pub(crate) fn is(&mut self, chance: f64) -> bool {
         self.share() < chance
     }
 
     #[cfg(test)]
-    #[expect(clippy::cast_possible_truncation, reason = "it is less than a usize")]
-    pub(crate) const fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        self.0.below(n)
     }
 
     /// About normal, of deviation 1: the sum of twelve.

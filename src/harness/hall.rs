@@ -17,8 +17,7 @@ use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
 use crate::drive::Manner;
 use crate::engine::{Mix, Show};
-use crate::film::chase::{ChaseRules, JOIN_ABOVE, Rejoin};
-use crate::film::follower::PaceLimits;
+use crate::film::chase::ChaseRules;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
 use crate::motion::{MAX_AXES, Pose, SeatType};
 use crate::net::Delivery;
@@ -156,12 +155,7 @@ impl Virtual {
             shown: Cell::new(None),
             showing: RefCell::new(self.film.as_ref().map(Showing::new)),
         };
-        let rules = ChaseRules {
-            pace: PaceLimits::default(),
-            join_above: JOIN_ABOVE,
-            rejoin: Rejoin::Auto,
-            cue_end: timeline.duration(),
-        };
+        let rules = ChaseRules::until(timeline.duration());
         let film = self.chases.then(|| FilmLead::new(Arc::clone(&hands.film), rules, ORIGIN));
         let clock = Stage::new(plans, hands, &self.script, self.at_most);
         let grid = TickGrid::new(clock.now(), rate);

@@ -12,8 +12,7 @@ use std::time::Duration;
 use counting::Calls;
 use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
-use kinocue::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict, JOIN_ABOVE, Rejoin};
-use kinocue::film::follower::PaceLimits;
+use kinocue::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
 use kinocue::film::point::{FilmClock, FilmPoint, FilmState, PublishedPoint};
 use kinocue::health::{Groups, HealthTable, Notice};
 use kinocue::motion::MAX_AXES;
@@ -171,10 +170,8 @@ fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_s
 fn what_leads_seats_by_a_film_allocates_nothing() {
     let published = Arc::new(PublishedPoint::default());
     let mut clock = FilmClock::chase(Arc::clone(&published));
-    let (pace, frame) = (PaceLimits::default(), Duration::from_millis(10));
-    let cue_end = ShowTime::from_millis(600_000);
-    let rules = ChaseRules { pace, join_above: JOIN_ABOVE, rejoin: Rejoin::Auto, cue_end };
-    let mut chase = Chase::new(rules, MonoTime::default());
+    let frame = Duration::from_millis(10);
+    let mut chase = Chase::new(ChaseRules::until(ShowTime::from_millis(600_000)), MonoTime::default());
     let (mut followed, mut held) = (0, 0);
     let before = Calls::so_far();
     for index in 0..10_000_u32 {

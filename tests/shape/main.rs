@@ -38,7 +38,7 @@ const ROWS: &[Row] = &[
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check.
     ("lines of code", counts::lines_of_code, Less, 53_382.0, 39_800.0),
-    ("public items and fields", counts::public_items, Less, 2_940.0, 400.0),
+    ("public items and fields", counts::public_items, Less, 2_937.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 475.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.6, 3.0),

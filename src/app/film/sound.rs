@@ -82,14 +82,11 @@ pub fn look_for_ltc(octets: &[u8]) -> Result<LtcFound, impl std::error::Error + 
     let per_s = samples.samples_per_s().ok_or(RiffFault::NoData)?;
     let mut decoder = LtcDecoder::new(per_s);
     let frames: Vec<LtcFrame> = sound.iter().filter_map(|sample| decoder.push(*sample)).collect();
-    let steps = frames.windows(2).map(|pair| (pair[1].end - pair[0].end) / f64::from(per_s));
-    let mut lengths: Vec<f64> = steps.collect();
-    lengths.sort_by(f64::total_cmp);
-    let middle = lengths.get(lengths.len() / 2).copied();
-    let is_jump = |pair: &[LtcFrame]| {
-        let step_s = (pair[1].end - pair[0].end) / f64::from(per_s);
-        middle.is_some_and(|length| step_s > 1.5 * length || step_s < 0.5 * length)
-    };
+    let step_s = |pair: &[LtcFrame]| (pair[1].end - pair[0].end) / f64::from(per_s);
+    let mut steps: Vec<f64> = frames.windows(2).map(step_s).collect();
+    steps.sort_by(f64::total_cmp);
+    let middle = steps.get(steps.len() / 2).copied();
+    let is_jump = |step: &&f64| middle.is_some_and(|length| **step > 1.5 * length || **step < 0.5 * length);
     let label = |frame: &LtcFrame| frame.label.to_string();
     #[expect(clippy::cast_precision_loss, reason = "some hours of samples")]
     let seconds = sound.len() as f64 / f64::from(per_s);
@@ -100,7 +97,7 @@ pub fn look_for_ltc(octets: &[u8]) -> Result<LtcFound, impl std::error::Error + 
         last: frames.last().map(label),
         fps: middle.map(|length| 1.0 / length),
         level_db: 20.0 * f64::from(decoder.level()).max(1e-6).log10(),
-        jumps: frames.windows(2).filter(|pair| is_jump(pair)).count() as u64,
+        jumps: steps.iter().filter(is_jump).count() as u64,
         backwards: frames.iter().filter(|frame| frame.backwards).count() as u64,
     })
 }

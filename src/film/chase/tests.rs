@@ -5,12 +5,7 @@ use crate::harness::film::{Luck, mono};
 const FRAME: Duration = Duration::from_millis(10);
 
 fn rules() -> ChaseRules {
-    ChaseRules {
-        pace: PaceLimits::default(),
-        join_above: JOIN_ABOVE,
-        rejoin: Rejoin::Auto,
-        cue_end: ShowTime::from_millis(600_000),
-    }
+    ChaseRules::until(ShowTime::from_millis(600_000))
 }
 
 /// A chase at 100 Hz of a film that is locked, and 10 s behind the clock.
