@@ -8,6 +8,8 @@
 
 mod evidence;
 mod history;
+mod kinds;
+mod shaking;
 mod span;
 #[cfg(test)]
 mod tests;
@@ -16,6 +18,8 @@ use std::time::Duration;
 
 pub use evidence::{LaneEvidence, Reading, Source};
 use history::History;
+pub use kinds::{Fall, Found, Known, Taken, Tally};
+use shaking::Shaking;
 use span::Spans;
 
 use crate::motion::{MAX_AXES, Pose, Window};
@@ -69,74 +73,6 @@ impl KnownPose {
     }
 }
 
-/// What is known of where the axes of a seat are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Known {
-    /// Nothing: they may be anywhere in their strokes.
-    Nothing,
-    /// They were read, at that instant and from there.
-    Measured(MonoTime, Source),
-    /// The newest frame was acked; that was seen at this instant.
-    Confirmed(MonoTime),
-    /// The newest frames are not confirmed, the oldest of them since this instant. Where no acks are asked for this is all
-    /// there ever is.
-    Commanded(MonoTime),
-    /// They were found elsewhere than the frames that were confirmed had led them, and are not at rest.
-    Contradicted(MonoTime),
-}
-
-/// What the check before the kernel has done for one lane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
-    /// Frames that were not sent, because from somewhere that the seat may be they would have been too fast.
-    pub withheld: u64,
-    /// Gaps in which it was not known which frames arrive.
-    pub gaps: u64,
-    /// Frames that reached a controller which was still busy with the one before, by the sum of their Times.
-    pub late: u64,
-    /// Frames that reached one with more than two still to do: it plays them faster than they say (PA06).
-    pub hurried: u64,
-}
-
-/// What a look at the evidence has brought.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Found {
-    /// Nothing that keeps frames from leading the seat on.
-    Nothing,
-    /// From now on nobody knows which frames arrive.
-    Gap,
-    /// The seat is elsewhere than its frames have led it, though they are acked.
-    Astray,
-}
-
-/// Why nobody knows where a seat is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fall {
-    /// Nobody knows which frames reached it.
-    Gap,
-    /// It was found elsewhere than acked frames led it.
-    Astray,
-    /// It was out, and is to take part again.
-    PutBack,
-}
-
-/// A frame that the kernel took.
-#[derive(Debug, Clone, Copy)]
-pub struct Taken<'a> {
-    /// Its number.
-    pub frame: FrameNo,
-    /// Whether it asks for an ack.
-    pub asked: bool,
-    /// Where it leads, as fractions of each slot's stroke.
-    pub pose: &'a Pose,
-    /// How long it takes, ms.
-    pub lasts_ms: u32,
-    /// The greatest amplitude of vibration that it asks of any slot, strokes.
-    pub shakes: f64,
-    /// When it was sent.
-    pub at: MonoTime,
-}
-
 /// What is known of one lane.
 #[derive(Debug, Clone)]
 pub struct Belief {
@@ -152,10 +88,7 @@ pub struct Belief {
     spans: Spans,
     history: History,
     acked: Option<FrameNo>,
-    /// The greatest amplitude of vibration, strokes, of the frames since the last that is known to have arrived without any; and the first
-    /// of those without any after it.
-    shakes: f64,
-    still_from: Option<FrameNo>,
+    shaking: Shaking,
     /// How far from where its spans say a seat may be that was read while it vibrated, strokes.
     sways: f64,
     /// The version of the reading that was taken last.
@@ -191,8 +124,7 @@ impl Belief {
             spans: Spans::default(),
             history: History::at([0.0; MAX_AXES]),
             acked: None,
-            shakes: 0.0,
-            still_from: None,
+            shaking: Shaking::default(),
             sways: 0.0,
             reading: 0,
             busy_until: MonoTime::default(),
@@ -229,9 +161,7 @@ impl Belief {
         {
             self.acked = Some(acked);
             self.spans.confirm(acked);
-            if self.still_from.is_some_and(|still| acked.since(still) >= 0) {
-                self.shakes = 0.0;
-            }
+            self.shaking.on_ack(acked);
         }
         if !self.spans.is_empty() {
             self.settle(now);
@@ -260,9 +190,7 @@ impl Belief {
             return;
         }
         self.spans.end_at_last();
-        if self.still_from.is_some() {
-            self.shakes = 0.0;
-        }
+        self.shaking.on_all_taken();
         (self.within, self.sways) = (self.own, 0.0);
         // Since then it may have been moved.
         let over = self.busy_until.min(now);
@@ -351,7 +279,7 @@ impl Belief {
     /// The amplitude, strokes, with which a seat may vibrate by the frames that it was sent; 0 once one without is known to have arrived.
     #[must_use]
     pub const fn shakes(&self) -> f64 {
-        self.shakes
+        self.shaking.amplitude()
     }
 
     /// Whether the seat was read since then and is known to be at rest; where no acks are asked for, whether it is known at all.
@@ -447,11 +375,7 @@ impl Belief {
         self.tally.late += u64::from(behind > lasts.max(self.period));
         self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
         self.busy_until = self.busy_until.max(at) + lasts;
-        if shakes > 0.0 {
-            (self.shakes, self.still_from) = (self.shakes.max(shakes), None);
-        } else {
-            self.still_from.get_or_insert(frame);
-        }
+        self.shaking.on_frame(frame, shakes);
         // One that vibrates on does so until this frame arrives.
         self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));
         // What was refused before it is missing as well, until it is acked.
