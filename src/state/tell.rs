@@ -132,14 +132,16 @@ impl Machine {
         }
     }
 
+    /// Of a show that runs. Nothing moves out of a pause but by a person: somebody may have got up, or be at work on the seat.
     fn policy(&mut self, demand: Demand, group: usize, now: MonoTime) {
-        match (demand, self.state) {
-            (Demand::Pause, State::Playing(_)) => self.enter(State::Paused, Cause::GroupOut(group), now),
-            (Demand::Park, State::Playing(_) | State::Paused) => {
-                self.enter(State::Parking, Cause::GroupOut(group), now);
-            }
-            _ => {}
+        if !matches!(self.state, State::Playing(_)) {
+            return;
         }
+        let state = match demand {
+            Demand::Pause => State::Paused,
+            Demand::Park => State::Parking,
+        };
+        self.enter(state, Cause::GroupOut(group), now);
     }
 
     /// An emergency stop goes before a person's stop as a cause; the first controller that told of it is the one named.
