@@ -180,7 +180,7 @@ fn about(rate_hz: f64, controllers: usize, of_our_own: bool) -> String {
 
 /// Sends the frames that hold the seats, and gives the times of all.
 fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Failure> {
-    let timeline = cue(&config.controllers, args.seconds).or_exit(Exit::Internal)?;
+    let timeline = cue(&config.controllers, args.seconds);
     let rate = Rate::from_hz(config.show.rate_hz);
     let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
     let play = Play::holding(config, timeline, show, args.no_acks).map_err(failed)?;

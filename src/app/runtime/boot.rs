@@ -1,13 +1,12 @@
 //! The hall as it opens: the frame port is bound, and an engine rests that knows of no seat where it stands. It can do one
 //! thing, bring seats that were found to their park poses.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use super::super::StagedShow;
 use super::{Numbers, RuntimeError};
 use crate::config::Config;
-use crate::cue::{self, Cue, Source};
+use crate::cue::{Cue, CueBuilder};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Engine, Mix, Show};
 use crate::motion::MAX_AXES;
@@ -69,8 +68,9 @@ pub(super) fn open(
 /// A cue that has every axis of the hall, and asks for nothing.
 fn rest(config: &Config) -> Cue {
     let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
-    let names: Vec<String> = (1..=axes).map(|axis| format!("a{axis}")).collect();
-    let zeros = vec!["0"; axes].join(",");
-    let text = format!("time_ms,{}\n0,{zeros}\n1000,{zeros}\n", names.join(","));
-    cue::read(Path::new("park"), text.as_bytes(), &Source::Native).expect("the cue is sound")
+    let mut cue = CueBuilder::new("park", axes);
+    for ms in [0, 1_000] {
+        cue.row(ShowTime::from_millis(ms), std::iter::repeat_n(0.0, axes), None);
+    }
+    cue.build().expect("it has no effects")
 }
