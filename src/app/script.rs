@@ -1,19 +1,30 @@
-//! Before tick 0: reads the position of every seat, so that it joins from there. A seat that does not report all its axes is brought to
-//! park by one frame that is slow enough from anywhere in the stroke, and has to be acked if acks are on.
+//! How a play is led through its runtime: where every seat stands, those to park that stand elsewhere, the show loaded and let go, and
+//! the end once it is over. A thread of its own, which only asks: what moves is the tick thread's to allow.
+//!
+//! A seat that tells all its axes parks and joins as engine and limiter lead it. One that does not is brought to park by one frame
+//! that is slow enough from anywhere in the stroke, and has to be acked if acks are on.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::Duration;
 
-use crate::belief::{KnownPose, Reading, Taken};
-use crate::config::Controller;
+use rtrb::Producer;
+
+use super::play::{PlayError, PlayHandle};
+use super::runtime::{Control, RuntimeHandle};
+use super::staged::StagedShow;
+use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
+use crate::config::Config;
 use crate::drive::Lane;
-use crate::net::{Delivery, Sender};
-use crate::plan::slow_park_time;
-use crate::rt::{AckLoop, Live, Places, Sent};
-use crate::state::State;
-use crate::time::{Clock, MonoTime};
-use crate::wire::MAX_LEN;
+use crate::motion::Slot;
+use crate::plan::{PARK_VELOCITY_MM_S, slow_park_time};
+use crate::rt::{Command, Live, News, NewsIn};
+use crate::state::{Event, Finding, Readiness, State, Transition};
+use crate::sys::clock::Monotonic;
+use crate::sys::realtime;
+use crate::time::{Clock as _, MonoTime};
+use crate::wire::FrameNo;
 
 /// Rounds of position reads, and how long each waits for the answers. A seat is at rest where three rounds find it.
 const READ_TRIES: usize = 5;
@@ -22,12 +33,16 @@ const READ_WAIT: Duration = Duration::from_millis(150);
 const PARK_TRIES: usize = 3;
 /// How long that ack is waited for.
 const ACK_WAIT: Duration = Duration::from_millis(200);
-/// How often replies are looked for meanwhile.
-const LOOK: Duration = Duration::from_millis(2);
+/// How often it is looked whether something has come; news wakes sooner.
+const LOOK: Duration = Duration::from_millis(5);
+/// The same where only news is waited for.
+const NEWS: Duration = Duration::from_millis(100);
 /// What is waited beyond the Time of the slow frame.
 const SETTLE: Duration = Duration::from_millis(20);
+/// How far from park a seat may be read that was brought there, in strokes: 0.3 mm of 150.
+const PARKED: f64 = 0.002;
 
-/// What was done before tick 0.
+/// What was done before the show.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Prepared {
     /// Slow frames, by controller.
@@ -43,179 +58,293 @@ impl Prepared {
     }
 }
 
-/// Everything that preparing needs.
-pub(super) struct Preparation<'a, C> {
-    pub(super) clock: &'a C,
-    pub(super) sender: &'a Sender,
-    pub(super) acks: &'a mut AckLoop,
-    pub(super) controllers: &'a [Controller],
-    pub(super) lanes: &'a mut [Lane],
-    pub(super) places: &'a mut Places,
-    /// Read throughout: somebody wants the show to stop.
-    pub(super) stop: &'a AtomicBool,
-    /// Has what the ack thread sees; told of the seats that are brought to park.
-    pub(super) live: &'a Arc<Live>,
+/// What a script came to.
+#[derive(Debug)]
+pub(super) struct ScriptEnd {
+    pub(super) prepared: Prepared,
+    /// When the show was let go; `None` where it was not.
+    pub(super) began: Option<MonoTime>,
+    /// True if it was not let go, or was stopped before it was over.
+    pub(super) is_cut_short: bool,
 }
 
-/// Why nothing can begin.
-#[derive(Debug, Default)]
-pub(super) struct Unready {
-    /// Seats that move, though no frame has left from here.
-    pub(super) moving: Vec<String>,
-    /// Seats of which it cannot be known where they are.
-    pub(super) unsure: Vec<String>,
+/// Whoever leads a play.
+pub(super) struct Script {
+    control: Control,
+    config: Arc<Config>,
+    commands: Producer<Command>,
+    news: NewsIn,
+    /// As the show has them.
+    lanes: Vec<Lane>,
+    /// The number of the last frame that each was sent.
+    last: Vec<FrameNo>,
+    /// True if nobody reads what controllers say.
+    is_blind: bool,
+    prepared: Prepared,
+    end: EndOfPlay,
 }
 
-impl<C: Clock> Preparation<'_, C> {
-    /// Finds out where every seat stands, and brings those to park that do not tell.
+/// Ends the play with its script, whatever becomes of that.
+struct EndOfPlay(Arc<AtomicBool>);
+
+impl Drop for EndOfPlay {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Script {
+    pub(super) fn new(handle: RuntimeHandle, show: &StagedShow, is_blind: bool) -> Self {
+        let RuntimeHandle { config, desk, live, leave, commands, news, .. } = handle;
+        let end = EndOfPlay(Arc::clone(&leave));
+        let lanes = show.lanes.clone();
+        let last = lanes.iter().map(Lane::last_frame).collect();
+        let prepared = Prepared::nothing(lanes.len());
+        let control = Control { desk, live, leave };
+        Self { control, config, commands, news, lanes, last, is_blind, prepared, end }
+    }
+
+    /// Leads the show from the first look at the seats to its end; `holds` says that nothing may move. As it is let go `lead` gets what
+    /// it is led with, and says whether somebody will.
     ///
     /// # Errors
-    /// The seats that move already, or cannot be brought to park for certain.
-    pub(super) fn run(&mut self, ask: bool) -> Result<Prepared, Unready> {
-        if ask {
+    /// Why the show was not let go.
+    pub(super) fn run(
+        mut self,
+        show: StagedShow,
+        holds: bool,
+        lead: impl FnOnce(PlayHandle) -> bool,
+    ) -> Result<ScriptEnd, PlayError> {
+        let _ = realtime::normal_priority();
+        if !self.is_blind {
             self.read_positions();
         }
-        let mut prepared = Prepared::nothing(self.lanes.len());
-        let moving = self.names(|this, lane| this.reading(lane).is_some_and(|reading| reading.moves));
-        if self.stopped() {
-            return Ok(prepared);
+        if holds {
+            self.make_sure()?;
+        } else {
+            self.find_seats()?;
         }
-        if !moving.is_empty() {
-            return Err(Unready { moving, ..Unready::default() });
+        if !self.is_called_off() {
+            let found = Finding { homed: true, at_park: true, crashed: false };
+            self.ask(vec![Command::Event(Event::Identified(found))]);
+            if !holds {
+                self.park();
+            }
         }
-        let untold: Vec<usize> = (0..self.lanes.len()).filter(|&lane| !self.is_known(lane)).collect();
-        let unsure = self.park_slowly(&untold, &mut prepared);
-        if unsure.is_empty() { Ok(prepared) } else { Err(Unready { unsure, ..Unready::default() }) }
+        Ok(self.let_go(show, lead))
     }
 
-    /// Moves nothing: only makes sure that every seat stands at its park pose.
-    ///
-    /// # Errors
-    /// The names of the controllers whose seat does not tell that it does.
-    pub(super) fn make_sure(&mut self) -> Result<Prepared, Vec<String>> {
-        self.read_positions();
-        let unsure = self.names(|this, lane| !this.is_at_park(lane));
-        if unsure.is_empty() { Ok(Prepared::nothing(self.lanes.len())) } else { Err(unsure) }
+    /// True once somebody wants the play to end, or something keeps it from beginning.
+    fn is_called_off(&self) -> bool {
+        self.control.leave.load(Ordering::Relaxed) || self.control.live.state().is_latched() || self.is_over()
     }
 
-    fn names(&self, which: impl Fn(&Self, usize) -> bool) -> Vec<String> {
-        let lanes = (0..self.lanes.len()).filter(|&lane| which(self, lane));
-        lanes.map(|lane| self.controllers[lane].name.clone()).collect()
+    fn is_over(&self) -> bool {
+        self.control.live.pulse().is_none()
+    }
+
+    /// Waits until an instant, or until there is nothing left to wait for.
+    fn wait_until(&self, until: MonoTime, enough: impl Fn() -> bool) {
+        while Monotonic.now() < until && !self.is_called_off() && !enough() {
+            thread::park_timeout(LOOK.min(until.since(Monotonic.now())));
+        }
+    }
+
+    /// Gives commands to the tick thread and waits for its answers: whether it took each. What they led to is seen by then.
+    fn ask(&mut self, commands: Vec<Command>) -> Vec<bool> {
+        let (all, mut commands) = (commands.len(), commands.into_iter());
+        let mut taken = Vec::with_capacity(all);
+        while taken.len() < all && !self.is_over() {
+            while self.commands.slots() > 0
+                && let Some(command) = commands.next()
+            {
+                let _ = self.commands.push(command); // there is room
+            }
+            thread::park_timeout(LOOK);
+            while let Some((ticket, news)) = self.news.take() {
+                taken.extend(ticket.map(|_| matches!(news, News::Taken)));
+            }
+        }
+        wait_for_ticks(&self.control.live, 1);
+        taken
+    }
+
+    fn names(&self, which: impl Fn(usize) -> bool) -> Vec<String> {
+        let lanes = (0..self.lanes.len()).filter(|&lane| which(lane));
+        lanes.map(|lane| self.config.controllers[lane].name.clone()).collect()
     }
 
     fn reading(&self, lane: usize) -> Option<Reading> {
-        self.live.evidence(lane)?.reading().map(|(_, reading)| reading)
+        self.control.live.evidence(lane)?.reading().map(|(_, reading)| reading)
     }
 
-    /// True if a seat told of all its axes, and was at rest.
-    fn is_known(&self, lane: usize) -> bool {
-        self.reading(lane).is_some_and(|reading| KnownPose::of(&reading, &self.lanes[lane].window).is_some())
-    }
-
-    /// True if a seat tells that it stands at park, to a pulse.
-    fn is_at_park(&self, lane: usize) -> bool {
-        let window = &self.lanes[lane].window;
-        self.reading(lane).is_some_and(|reading| {
-            let own = window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own);
-            own.into_iter().all(|(index, slot)| {
-                let apart = slot.pulses(reading.pose[index]).0.abs_diff(slot.pulses(slot.park).0);
-                let held = (reading.pose[index] - slot.park).abs() * slot.stroke_pulses <= 1.5;
-                reading.rests && reading.slots >> index & 1 == 1 && apart <= 1 && held
-            })
-        })
+    /// Where a seat is that told of all its axes, and was at rest.
+    fn known(&self, lane: usize) -> Option<KnownPose> {
+        KnownPose::of(&self.reading(lane)?, &self.lanes[lane].window)
     }
 
     /// Reads where the seats stand, until each was seen at rest.
-    fn read_positions(&mut self) {
+    fn read_positions(&self) {
+        let rests = |lane| self.reading(lane).is_some_and(|reading| reading.rests);
         for _ in 0..READ_TRIES {
-            let open: Vec<usize> = (0..self.lanes.len())
-                .filter(|&lane| !self.reading(lane).is_some_and(|reading| reading.rests))
-                .collect();
-            if open.is_empty() || self.stopped() {
-                break;
-            }
-            for lane in open {
-                self.acks.ask_positions(lane, self.clock.now());
-            }
-            let until = self.clock.now() + READ_WAIT;
-            self.wait_until(until, |_| false);
+            let now = Monotonic.now();
+            self.control.live.want(now);
+            self.wait_until(now + READ_WAIT, || (0..self.lanes.len()).all(rests));
         }
     }
 
-    /// Sends those seats to park by a frame that is slow enough from anywhere; gives the names of those that cannot be known to
-    /// get there.
-    fn park_slowly(&mut self, lanes: &[usize], prepared: &mut Prepared) -> Vec<String> {
-        let mut open = lanes.to_vec();
+    /// Moves nothing: only makes sure that every seat tells that it stands at its park pose, to a pulse.
+    fn make_sure(&self) -> Result<(), PlayError> {
+        let is_at_park = |lane: usize| {
+            let mut slots = self.lanes[lane].window.slots().iter().enumerate();
+            self.known(lane).is_some_and(|known| {
+                let far =
+                    |index: usize, slot: &Slot| (known.pose()[index] - slot.park).abs() * slot.stroke_pulses;
+                slots.all(|(index, slot)| !slot.is_own || far(index, slot) <= 1.5)
+            })
+        };
+        let unsure = self.names(|lane| !is_at_park(lane));
+        if unsure.is_empty() || self.is_called_off() { Ok(()) } else { Err(PlayError::Unsure(unsure)) }
+    }
+
+    /// Makes sure that nothing moves, and brings the seats to park that do not tell where they are.
+    fn find_seats(&mut self) -> Result<(), PlayError> {
+        let moving = self.names(|lane| self.reading(lane).is_some_and(|reading| reading.moves));
+        if self.is_called_off() {
+            return Ok(());
+        }
+        if !moving.is_empty() {
+            return Err(PlayError::Moving(moving));
+        }
+        let untold = (0..self.lanes.len()).filter(|&lane| self.known(lane).is_none()).collect();
+        let unsure = self.park_slowly(untold);
+        if unsure.is_empty() || self.is_called_off() {
+            return Ok(());
+        }
+        Err(PlayError::Unplaced(self.names(|lane| unsure.contains(&lane))))
+    }
+
+    /// Has those seats sent to park by a frame that is slow enough from anywhere; gives those that cannot be known to get there.
+    fn park_slowly(&mut self, mut open: Vec<usize>) -> Vec<usize> {
         let mut unsure = Vec::new();
         for _ in 0..PARK_TRIES {
-            let arrivals: Vec<(usize, Option<MonoTime>)> =
-                open.iter().map(|&lane| (lane, self.send_to_park(lane, prepared))).collect();
-            let refused = arrivals.iter().filter(|(_, arrival)| arrival.is_none());
-            unsure.extend(refused.map(|(lane, _)| self.controllers[*lane].name.clone()));
-            let under_way = arrivals.into_iter().filter_map(|(lane, arrival)| Some((lane, arrival?)));
-            let (sent, arrivals): (Vec<usize>, Vec<MonoTime>) = under_way.unzip();
-            let Some(arrival) = arrivals.into_iter().max() else { break };
-            self.live.enter(State::Homing);
+            let slowly = |&lane: &usize| {
+                let of = u16::try_from(lane).expect("fewer controllers than ports");
+                Command::ParkSlowly { lane: of, time_ms: self.slow_time(lane).0 }
+            };
+            let mut taken = self.ask(open.iter().map(slowly).collect()).into_iter();
+            let mut slowest = Duration::ZERO;
+            open.retain(|&lane| {
+                let is_sent = taken.next().unwrap_or(false);
+                if is_sent {
+                    slowest = slowest.max(self.on_slow_frame(lane));
+                } else {
+                    unsure.push(lane);
+                }
+                is_sent
+            });
+            let (now, slowest) = (Monotonic.now(), slowest + SETTLE);
             // One that has not acked by then has the whole way to do so.
-            let acked = |this: &Self| sent.iter().all(|&lane| this.is_acked(lane));
-            self.wait_until((self.clock.now() + ACK_WAIT).min(arrival), acked);
-            self.wait_until(arrival, |_| false);
+            self.wait_until(now + ACK_WAIT.min(slowest), || open.iter().all(|&lane| self.is_acked(lane)));
+            self.wait_until(now + slowest, || open.is_empty());
             // One that says nothing at all is left out.
-            let is_open = |lane: &usize| !self.is_acked(*lane) && self.acks.has_heard(*lane);
-            open = sent.into_iter().filter(is_open).collect();
-            if open.is_empty() || self.stopped() {
+            open.retain(|&lane| !self.is_acked(lane) && self.control.live.has_heard(lane));
+            if open.is_empty() || self.is_called_off() {
                 return unsure;
             }
         }
-        unsure.extend(open.into_iter().map(|lane| self.controllers[lane].name.clone()));
+        unsure.extend(open);
         unsure
     }
 
     /// True if the last frame to a lane was acked, or asked for no ack.
     fn is_acked(&self, lane: usize) -> bool {
-        let last = self.lanes[lane].last_frame();
-        let acked = self.live.evidence(lane).and_then(|evidence| evidence.acked());
-        self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(last) >= 0)
+        let acked = self.control.live.evidence(lane).and_then(LaneEvidence::acked);
+        self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(self.last[lane]) >= 0)
     }
 
-    /// When it arrives; `None` if no Time that the controller executes is long enough.
-    fn send_to_park(&mut self, lane: usize, prepared: &mut Prepared) -> Option<MonoTime> {
-        let (time_ms, hurried) = slow_park_time(self.controllers[lane].seat.stroke_mm);
-        let time_ms = time_ms.min(self.lanes[lane].longest_ms);
-        let (park, at) = (self.lanes[lane].window.park(), self.clock.now());
-        if !self.places.belief(lane).allows(&park, time_ms, at) {
-            return None;
-        }
-        let mut buf = [0; MAX_LEN];
-        let (stamped, datagram) = self.lanes[lane].encode_slow_park(time_ms, &mut buf);
-        let of = u16::try_from(lane).expect("fewer controllers than ports");
-        self.acks.on_sent(Sent::Posted { lane: of, frame: stamped.frame, asked: stamped.asked, at });
-        if let Delivery::Failed(_) = self.sender.send(lane, datagram) {
-            self.acks.on_sent(Sent::Failed { lane: of, frame: stamped.frame });
-        } else {
-            let (frame, asked) = (stamped.frame, stamped.asked);
-            self.places.taken(lane, &Taken { frame, asked, pose: &park, lasts_ms: time_ms, shakes: 0.0, at });
-        }
-        prepared.park_frames[lane] += 1;
-        if hurried {
-            prepared.hurried.push(lane);
-        }
-        self.live.on_homing(time_ms);
-        Some(at + Duration::from_millis(u64::from(time_ms)) + SETTLE)
+    /// How long the slow frame of a lane takes, ms, and whether that may be faster than 50 mm/s.
+    fn slow_time(&self, lane: usize) -> (u32, bool) {
+        let (time_ms, hurried) = slow_park_time(self.config.controllers[lane].seat.stroke_mm);
+        (time_ms.min(self.lanes[lane].longest_ms), hurried)
     }
 
-    /// Drains replies until an instant, or until there is nothing left to wait for.
-    fn wait_until(&mut self, until: MonoTime, enough: impl Fn(&Self) -> bool) {
-        while self.clock.now() < until && !self.stopped() {
-            self.clock.sleep_until((self.clock.now() + LOOK).min(until));
-            self.acks.drain(&mut |_, _| false);
-            if enough(self) {
-                return;
-            }
+    /// Notes a slow frame, which takes so long.
+    fn on_slow_frame(&mut self, lane: usize) -> Duration {
+        let (time_ms, hurried) = self.slow_time(lane);
+        self.last[lane] = self.last[lane].next();
+        self.prepared.park_frames[lane] += 1;
+        if hurried && !self.prepared.hurried.contains(&lane) {
+            self.prepared.hurried.push(lane);
+        }
+        self.control.live.on_parking(time_ms);
+        Duration::from_millis(u64::from(time_ms))
+    }
+
+    /// Has engine and limiter lead the seats to park that told where they are; nothing else.
+    fn park(&mut self) {
+        let off_park = off_park(&self.lanes, &self.control.live, Monotonic.now());
+        if off_park.is_empty() {
+            return;
+        }
+        off_park.iter().for_each(|(_, time_ms)| self.control.live.on_parking(*time_ms));
+        self.ask(vec![Command::Request(Transition::Park)]);
+        while self.control.live.state() == State::Parking && !self.is_over() {
+            thread::park_timeout(LOOK);
         }
     }
 
-    fn stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+    /// Loads the show, lets it go, and waits for its end.
+    fn let_go(self, show: StagedShow, lead: impl FnOnce(PlayHandle) -> bool) -> ScriptEnd {
+        if self.is_called_off() {
+            return ScriptEnd { prepared: self.prepared, began: None, is_cut_short: true };
+        }
+        let Self { control: Control { live, leave, .. }, mut commands, news, prepared, end: _end, .. } = self;
+        let (began, sent) = (Monotonic.now(), live.ticks());
+        // At once, so that nothing comes between arming and going.
+        let ready = Command::Event(Event::Readiness(Readiness::Ready));
+        let [arm, go] = [Transition::Arm, Transition::Go].map(Command::Request);
+        for command in [ready, Command::Load(show.loaded()), arm, go] {
+            commands.push(command).expect("there is room where all were answered");
+        }
+        let attended = lead(PlayHandle { commands, news });
+        // A whole tick has begun since, and is over: it took them.
+        wait_for_ticks(&live, 2);
+        let goes = |state: State| state != State::Parked && (attended || !state.is_latched());
+        let mut state = live.state();
+        let is_begun = state.may_send_motion() || live.ticks() > sent;
+        while goes(state) && live.pulse().is_some() && !leave.load(Ordering::Relaxed) {
+            thread::park_timeout(NEWS);
+            state = live.state();
+        }
+        let is_cut_short = !is_begun || state.is_latched();
+        ScriptEnd { prepared, began: is_begun.then_some(began), is_cut_short }
     }
+}
+
+/// Waits for so many ticks: what was taken in one is seen after it.
+fn wait_for_ticks(live: &Live, ticks: u64) {
+    let then = live.beats() + ticks;
+    while live.beats() < then && live.pulse().is_some() {
+        thread::park_timeout(LOOK);
+    }
+}
+
+/// The seats that told of late that they are not at park, and how long their way there takes, ms.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a stroke is crossed in minutes at the most"
+)]
+pub(super) fn off_park(lanes: &[Lane], live: &Live, now: MonoTime) -> Vec<(usize, u32)> {
+    let way_ms = |lane: usize| {
+        let (_, Reading { pose, slots, at, .. }) = live.evidence(lane)?.reading()?;
+        let told = lanes[lane].window.moving().filter(|(slot, _)| slots >> slot & 1 == 1);
+        let ways = told.map(|(slot, axis)| ((pose[slot] - axis.park).abs(), axis.stroke_mm));
+        // What it told before says nothing of now.
+        let off = ways.filter(|(way, _)| *way > PARKED && now.since(at) <= FRESH);
+        let longest_mm = off.map(|(way, stroke_mm)| way * stroke_mm).reduce(f64::max)?;
+        Some((longest_mm / PARK_VELOCITY_MM_S * 1e3) as u32)
+    };
+    (0..lanes.len()).filter_map(|lane| Some((lane, way_ms(lane)?))).collect()
 }

@@ -1,9 +1,9 @@
 //! Sums up a play: the report, and notes for the person.
 
 use super::play::Played;
-use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
+use super::script::Prepared;
 use crate::config::Controller;
 use crate::control::model::Ending;
 use crate::control::{FORMAT, Percentiles};

@@ -10,6 +10,7 @@ use super::load::parse_rate;
 use super::play::{judge, leave_on_signals};
 use super::targets::Targets;
 use super::{Exit, Failure, OrExit as _, load, print};
+use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args};
 use crate::device::stand::stand;
@@ -221,7 +222,7 @@ fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
 /// The exit code of a measurement that did not begin.
 fn failed(error: PlayError) -> Failure {
     let exit = match &error {
-        PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
+        PlayError::Runtime(RuntimeError::Net(_) | RuntimeError::Thread(_)) => Exit::System,
         PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         _ => Exit::Internal,

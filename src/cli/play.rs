@@ -12,6 +12,7 @@ use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::film::{FilmArgs, FilmReader, FilmSource};
+use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
@@ -158,7 +159,7 @@ fn play(
     let control = play.control().clone();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Messages { control, ctrl_c, length, join: play.join(), names };
+    let said = Messages { control, ctrl_c, length, join: play.join(), chases: film.is_some(), names };
     let progress = Progress::start(said, for_ever);
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
@@ -197,7 +198,7 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
 /// The exit code of a play that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
     let exit = match error {
-        PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
+        PlayError::Runtime(RuntimeError::Net(_) | RuntimeError::Thread(_)) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,

@@ -8,11 +8,10 @@ use super::{Numbers, RuntimeError};
 use crate::config::Config;
 use crate::cue::{Cue, CueBuilder};
 use crate::drive::{Lane, Manner};
-use crate::engine::{Engine, Mix, Show};
+use crate::engine::{Engine, Show};
 use crate::motion::MAX_AXES;
 use crate::net::{Ports, Receiver, Sender};
 use crate::plan::Planner;
-use crate::rt::Desk;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
@@ -23,15 +22,6 @@ pub(super) struct Opened {
     pub(super) lanes: Vec<Lane>,
     pub(super) planner: Planner,
     pub(super) timeline: Arc<Timeline>,
-    pub(super) sender: Sender,
-    pub(super) receiver: Receiver,
-}
-
-impl Opened {
-    /// A desk of full levels.
-    pub(super) fn desk(&self) -> Desk {
-        Desk::new(self.lanes.iter().map(|_| Mix::FULL))
-    }
 }
 
 /// Binds the frame port.
@@ -40,20 +30,14 @@ pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> 
     Ok(Ports::open(config.show.bind, &peers).map_err(RuntimeError::Net)?.split())
 }
 
-/// Makes the engine, which sends and hears by these halves.
-pub(super) fn open(
-    config: &Config,
-    numbers: &Numbers,
-    (sender, receiver): (Sender, Receiver),
-) -> Result<Opened, RuntimeError> {
+/// Makes the engine, which has not been told anything of its lanes.
+pub(super) fn open(config: &Config, numbers: &Numbers, manner: Manner) -> Result<Opened, RuntimeError> {
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
         timing: config.show.timing,
         start: ShowTime::ZERO,
         plays: 1,
     };
-    // At level 0 the cue has no part in the pose.
-    let manner = Manner { level: 0.0, silent: false };
     let staged =
         StagedShow::new(config, Timeline::new(rest(config)), show, manner).map_err(RuntimeError::Plan)?;
     let (engine, mut lanes, planner, timeline) = staged.split();
@@ -62,7 +46,7 @@ pub(super) fn open(
             *lane = lane.clone().starting_at(*next);
         }
     }
-    Ok(Opened { engine: engine.unknown(), lanes, planner, timeline, sender, receiver })
+    Ok(Opened { engine, lanes, planner, timeline })
 }
 
 /// A cue that has every axis of the hall, and asks for nothing.

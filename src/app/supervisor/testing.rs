@@ -105,6 +105,7 @@ impl Ticks {
                     continue;
                 }
                 TickCommand::Load(_) => Ok(()),
+                TickCommand::ParkSlowly { .. } => panic!("a hall parks its seats by limiter and engine"),
             };
             self.tell(&machine);
             self.news.push((ticket, answer.map_or_else(News::Refused, |()| News::Taken))).unwrap();
