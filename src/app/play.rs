@@ -143,8 +143,7 @@ impl Play {
     pub fn new(config: Config, timeline: Timeline, show: Show, manner: Manner) -> Result<Self, PlayError> {
         fit(&config, &timeline)?;
         keeps_limits(&config, &timeline, show.rate, manner.level)?;
-        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
-        Self::of(config, staged, manner.silent, None)
+        Self::staged(config, timeline, show, manner, None)
     }
 
     /// A play that waits, parked, for a film, and follows that: proved at the greatest pace that the film may ask for.
@@ -161,8 +160,7 @@ impl Play {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
         keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
-        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
-        Self::of(config, staged, manner.silent, Some(ChasedFilm { source, rules }))
+        Self::staged(config, timeline, show, manner, Some(ChasedFilm { source, rules }))
     }
 
     /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin
@@ -173,17 +171,20 @@ impl Play {
     pub fn holding(config: Config, timeline: Timeline, show: Show, silent: bool) -> Result<Self, PlayError> {
         // At level 0 the cue has no part in the pose.
         let manner = Manner { level: 0.0, silent };
-        let mut staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
-        staged.lanes.iter_mut().for_each(Lane::hold);
-        Ok(Self { holds: true, ..Self::of(config, staged, silent, None)? })
+        let mut play = Self::staged(config, timeline, show, manner, None)?;
+        play.staged.lanes.iter_mut().for_each(Lane::hold);
+        Ok(Self { holds: true, ..play })
     }
 
-    fn of(
+    fn staged(
         config: Config,
-        staged: StagedShow,
-        silent: bool,
+        timeline: Timeline,
+        show: Show,
+        manner: Manner,
         film: Option<ChasedFilm>,
     ) -> Result<Self, PlayError> {
+        let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
+        let silent = manner.silent;
         let purpose = Purpose::Play { silent, film };
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         for (lane, mix) in staged.mixes.iter().enumerate() {
@@ -225,10 +226,11 @@ impl Play {
         let (end, led) = thread::scope(|scope| {
             let mut script = None;
             let end = runtime.run(|handle, _| {
-                let led = Script::new(handle, &staged, silent && !holds);
+                let led = Script::new(handle, &staged);
                 let thread = Builder::new().name("script".to_owned());
                 // A script that does not begin ends the runtime, too.
-                let thread = thread.spawn_scoped(scope, move || led.run(staged, holds, lead));
+                let thread =
+                    thread.spawn_scoped(scope, move || led.run(staged, holds, !silent || holds, lead));
                 script.insert(thread).as_ref().ok().map(|thread| thread.thread().clone())
             })?;
             let script = script.expect("whoever runs has somebody lead").map_err(RuntimeError::Thread)?;

@@ -9,17 +9,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use rtrb::Producer;
-
 use super::play::{PlayError, PlayHandle};
-use super::runtime::{Control, RuntimeHandle};
+use super::runtime::RuntimeHandle;
 use super::staged::StagedShow;
 use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
-use crate::config::Config;
 use crate::drive::Lane;
 use crate::motion::Slot;
 use crate::plan::{PARK_VELOCITY_MM_S, slow_park_time};
-use crate::rt::{Command, Live, News, NewsIn};
+use crate::rt::{Command, Live, News};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
@@ -70,16 +67,11 @@ pub(super) struct ScriptEnd {
 
 /// Whoever leads a play.
 pub(super) struct Script {
-    control: Control,
-    config: Arc<Config>,
-    commands: Producer<Command>,
-    news: NewsIn,
+    handle: RuntimeHandle,
     /// As the show has them.
     lanes: Vec<Lane>,
     /// The number of the last frame that each was sent.
     last: Vec<FrameNo>,
-    /// True if nobody reads what controllers say.
-    is_blind: bool,
     prepared: Prepared,
     end: EndOfPlay,
 }
@@ -94,18 +86,15 @@ impl Drop for EndOfPlay {
 }
 
 impl Script {
-    pub(super) fn new(handle: RuntimeHandle, show: &StagedShow, is_blind: bool) -> Self {
-        let RuntimeHandle { config, desk, live, leave, commands, news, .. } = handle;
-        let end = EndOfPlay(Arc::clone(&leave));
+    pub(super) fn new(handle: RuntimeHandle, show: &StagedShow) -> Self {
         let lanes = show.lanes.clone();
         let last = lanes.iter().map(Lane::last_frame).collect();
-        let prepared = Prepared::nothing(lanes.len());
-        let control = Control { desk, live, leave };
-        Self { control, config, commands, news, lanes, last, is_blind, prepared, end }
+        let (prepared, end) = (Prepared::nothing(lanes.len()), EndOfPlay(Arc::clone(&handle.leave)));
+        Self { handle, lanes, last, prepared, end }
     }
 
-    /// Leads the show from the first look at the seats to its end; `holds` says that nothing may move. As it is let go `lead` gets what
-    /// it is led with, and says whether somebody will.
+    /// Leads the show from the first look at the seats to its end; `holds` says that nothing may move, and `reads` that seats are asked
+    /// where they are. As it is let go `lead` gets what it is led with, and says whether somebody will.
     ///
     /// # Errors
     /// Why the show was not let go.
@@ -113,10 +102,11 @@ impl Script {
         mut self,
         show: StagedShow,
         holds: bool,
+        reads: bool,
         lead: impl FnOnce(PlayHandle) -> bool,
     ) -> Result<ScriptEnd, PlayError> {
         let _ = realtime::normal_priority();
-        if !self.is_blind {
+        if reads {
             self.read_positions();
         }
         if holds {
@@ -136,11 +126,11 @@ impl Script {
 
     /// True once somebody wants the play to end, or something keeps it from beginning.
     fn is_called_off(&self) -> bool {
-        self.control.leave.load(Ordering::Relaxed) || self.control.live.state().is_latched() || self.is_over()
+        self.handle.leave.load(Ordering::Relaxed) || self.handle.live.state().is_latched() || self.is_over()
     }
 
     fn is_over(&self) -> bool {
-        self.control.live.pulse().is_none()
+        self.handle.live.pulse().is_none()
     }
 
     /// Waits until an instant, or until there is nothing left to wait for.
@@ -155,27 +145,27 @@ impl Script {
         let (all, mut commands) = (commands.len(), commands.into_iter());
         let mut taken = Vec::with_capacity(all);
         while taken.len() < all && !self.is_over() {
-            while self.commands.slots() > 0
+            while self.handle.commands.slots() > 0
                 && let Some(command) = commands.next()
             {
-                let _ = self.commands.push(command); // there is room
+                let _ = self.handle.commands.push(command); // there is room
             }
             thread::park_timeout(LOOK);
-            while let Some((ticket, news)) = self.news.take() {
+            while let Some((ticket, news)) = self.handle.news.take() {
                 taken.extend(ticket.map(|_| matches!(news, News::Taken)));
             }
         }
-        wait_for_ticks(&self.control.live, 1);
+        wait_for_ticks(&self.handle.live, 1);
         taken
     }
 
     fn names(&self, which: impl Fn(usize) -> bool) -> Vec<String> {
         let lanes = (0..self.lanes.len()).filter(|&lane| which(lane));
-        lanes.map(|lane| self.config.controllers[lane].name.clone()).collect()
+        lanes.map(|lane| self.handle.config.controllers[lane].name.clone()).collect()
     }
 
     fn reading(&self, lane: usize) -> Option<Reading> {
-        self.control.live.evidence(lane)?.reading().map(|(_, reading)| reading)
+        self.handle.live.evidence(lane)?.reading().map(|(_, reading)| reading)
     }
 
     /// Where a seat is that told of all its axes, and was at rest.
@@ -188,7 +178,7 @@ impl Script {
         let rests = |lane| self.reading(lane).is_some_and(|reading| reading.rests);
         for _ in 0..READ_TRIES {
             let now = Monotonic.now();
-            self.control.live.want(now);
+            self.handle.live.want(now);
             self.wait_until(now + READ_WAIT, || (0..self.lanes.len()).all(rests));
         }
     }
@@ -248,7 +238,7 @@ impl Script {
             self.wait_until(now + ACK_WAIT.min(slowest), || open.iter().all(|&lane| self.is_acked(lane)));
             self.wait_until(now + slowest, || open.is_empty());
             // One that says nothing at all is left out.
-            open.retain(|&lane| !self.is_acked(lane) && self.control.live.has_heard(lane));
+            open.retain(|&lane| !self.is_acked(lane) && self.handle.live.has_heard(lane));
             if open.is_empty() || self.is_called_off() {
                 return unsure;
             }
@@ -259,13 +249,13 @@ impl Script {
 
     /// True if the last frame to a lane was acked, or asked for no ack.
     fn is_acked(&self, lane: usize) -> bool {
-        let acked = self.control.live.evidence(lane).and_then(LaneEvidence::acked);
+        let acked = self.handle.live.evidence(lane).and_then(LaneEvidence::acked);
         self.lanes[lane].ack_every == 0 || acked.is_some_and(|acked| acked.since(self.last[lane]) >= 0)
     }
 
     /// How long the slow frame of a lane takes, ms, and whether that may be faster than 50 mm/s.
     fn slow_time(&self, lane: usize) -> (u32, bool) {
-        let (time_ms, hurried) = slow_park_time(self.config.controllers[lane].seat.stroke_mm);
+        let (time_ms, hurried) = slow_park_time(self.handle.config.controllers[lane].seat.stroke_mm);
         (time_ms.min(self.lanes[lane].longest_ms), hurried)
     }
 
@@ -277,19 +267,19 @@ impl Script {
         if hurried && !self.prepared.hurried.contains(&lane) {
             self.prepared.hurried.push(lane);
         }
-        self.control.live.on_parking(time_ms);
+        self.handle.live.on_parking(time_ms);
         Duration::from_millis(u64::from(time_ms))
     }
 
     /// Has engine and limiter lead the seats to park that told where they are; nothing else.
     fn park(&mut self) {
-        let off_park = off_park(&self.lanes, &self.control.live, Monotonic.now());
+        let off_park = off_park(&self.lanes, &self.handle.live, Monotonic.now());
         if off_park.is_empty() {
             return;
         }
-        off_park.iter().for_each(|(_, time_ms)| self.control.live.on_parking(*time_ms));
+        off_park.iter().for_each(|(_, time_ms)| self.handle.live.on_parking(*time_ms));
         self.ask(vec![Command::Request(Transition::Park)]);
-        while self.control.live.state() == State::Parking && !self.is_over() {
+        while self.handle.live.state() == State::Parking && !self.is_over() {
             thread::park_timeout(LOOK);
         }
     }
@@ -299,7 +289,8 @@ impl Script {
         if self.is_called_off() {
             return ScriptEnd { prepared: self.prepared, began: None, is_cut_short: true };
         }
-        let Self { control: Control { live, leave, .. }, mut commands, news, prepared, end: _end, .. } = self;
+        let Self { handle, prepared, end: _end, .. } = self;
+        let RuntimeHandle { live, leave, mut commands, news, .. } = handle;
         let (began, sent) = (Monotonic.now(), live.ticks());
         // At once, so that nothing comes between arming and going.
         let ready = Command::Event(Event::Readiness(Readiness::Ready));

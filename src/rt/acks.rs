@@ -105,17 +105,9 @@ impl AckLoop {
 
     /// The same where frames were sent before: `firsts` are the numbers of the next.
     #[must_use]
-    pub fn going_on(
-        receiver: Receiver,
-        watched: Vec<Watched>,
-        firsts: &[FrameNo],
-        ack_every: u32,
-        sent: Consumer<Sent>,
-        ticks: Consumer<TickReport>,
-    ) -> Self {
-        let mut acks = Self::new(receiver, watched, ack_every, sent, ticks);
-        acks.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
-        acks
+    pub fn going_on(mut self, firsts: &[FrameNo], ack_every: u32) -> Self {
+        self.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
+        self
     }
 
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.

@@ -207,7 +207,7 @@ impl Runtime {
         };
         let watched = config.controllers.iter().map(Watched::of).collect();
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
-        let acks = AckLoop::going_on(receiver, watched, &firsts, ack_every, sent, ticks);
+        let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks).going_on(&firsts, ack_every);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
         Ok(Self {
             config,
