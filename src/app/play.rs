@@ -1,105 +1,23 @@
 //! One play in the foreground: from a cue and a configuration to the report.
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::{self, Builder};
 use std::time::Duration;
 
-use rtrb::Producer;
-
-use super::report::Report;
-use super::runtime::{ChasedFilm, Control, Numbers, Purpose, Runtime, RuntimeError};
-use super::script::{Script, off_park};
+use super::refused::PlayError;
+use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
+use super::script::{PlayHandle, PlayScript, off_park};
 use super::staged::StagedShow;
-use super::sum_up::{About, sum_up};
+use super::sum_up::{About, Played, sum_up};
 use crate::config::{Config, Misfit};
-use crate::cue::{CueFaults, Place};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
-use crate::plain;
-use crate::plan::PlanError;
-use crate::proof::{self, Digest, Proof, Terms, Violation};
-use crate::rt::{Command, NewsIn};
+use crate::proof::{self, Digest, Proof, Terms};
 use crate::time::Rate;
 use crate::timeline::Timeline;
-
-/// Why nothing was played. Nothing has moved then.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlayError {
-    /// The hall cannot do what the cue asks; each with its place in the file.
-    #[error("{}", list(cue, misfits))]
-    Misfit {
-        /// The cue's file.
-        cue: PathBuf,
-        /// Where the file asks for what.
-        misfits: Vec<(Place, Misfit)>,
-    },
-    /// The cue leaves the stroke of some seats.
-    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
-    Stroke(Vec<CueFaults>),
-    /// The cue breaks limits of the seats, the effects or the controllers.
-    #[error("{}", broken(cue, violations, *more))]
-    Limits {
-        /// The cue's file.
-        cue: PathBuf,
-        /// What is broken, each with its place in the file.
-        violations: Vec<Violation>,
-        /// How many more there are.
-        more: u64,
-    },
-    /// No move leads onto the cue.
-    #[error(transparent)]
-    Plan(PlanError),
-    /// The frame port cannot be had, or no thread.
-    #[error(transparent)]
-    Runtime(#[from] RuntimeError),
-    /// Somebody else sends to these controllers, so many datagrams within about a second.
-    #[error("{}; end whatever else sends to them: another kinocue, player or tool", others(.0))]
-    OtherMaster(Vec<(String, u16)>),
-    /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
-    #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
-    Unsure(Vec<String>),
-    /// Seats that move though nothing was sent to them from here.
-    #[error(
-        "{}: moves, though nothing was sent to it from here: another machine drives it, or it is being homed; nothing was sent",
-        .0.join(", ")
-    )]
-    Moving(Vec<String>),
-    /// Seats that do not tell where all of their axes are, and cannot be known to have come to park.
-    #[error(
-        "{}: does not tell where all of its axes are, and cannot be brought to park for certain: it does not ack, or its longest \
-         Time (PA0b, max_interval_ms) is too short for the stroke; home it, and try again",
-        .0.join(", ")
-    )]
-    Unplaced(Vec<String>),
-}
-
-fn others(found: &[(String, u16)]) -> String {
-    let one = |(name, more): &(String, u16)| {
-        format!("{name} got {more} datagrams (DP34) that were not sent from here")
-    };
-    found.iter().map(one).collect::<Vec<_>>().join(", ")
-}
-
-fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
-    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", plain::path(cue));
-    misfits.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
-fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
-    let cue = plain::path(cue);
-    let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
-    if more > 0 {
-        text += &format!("{cue}: and {more} more\n");
-    }
-    text + &format!(
-        "the limits proof failed, so nothing is played; `kinocue fit {cue} -o OUT` makes a cue that keeps the limits"
-    )
-}
 
 /// A play that fits: cue, controllers and the first move are proved, and the frame port is open; nothing was sent yet.
 #[derive(Debug)]
@@ -109,30 +27,6 @@ pub struct Play {
     silent: bool,
     /// True if nothing may move.
     holds: bool,
-}
-
-/// What a play is led with.
-#[derive(Debug)]
-pub struct PlayHandle {
-    /// What is asked of the hall.
-    pub commands: Producer<Command>,
-    /// What the hall does.
-    pub news: NewsIn,
-}
-
-/// What came of a play.
-#[derive(Debug)]
-pub struct Played {
-    /// Its report.
-    pub report: Report,
-    /// What the system refused, in words.
-    pub refusals: Vec<String>,
-    /// What else a person should know, in words.
-    pub notes: Vec<String>,
-    /// Controllers that acked nothing, or were lost at the end; `None` if no replies were asked for.
-    pub silent: Vec<String>,
-    /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
-    pub off_park: Vec<String>,
 }
 
 impl Play {
@@ -160,7 +54,7 @@ impl Play {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
         keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
-        Self::staged(config, timeline, show, manner, Some(ChasedFilm { source, rules }))
+        Self::staged(config, timeline, show, manner, Some(LeadingFilm { source, rules }))
     }
 
     /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin
@@ -177,25 +71,26 @@ impl Play {
     }
 
     fn staged(
-        config: Config,
+        mut config: Config,
         timeline: Timeline,
         show: Show,
         manner: Manner,
-        film: Option<ChasedFilm>,
+        film: Option<LeadingFilm>,
     ) -> Result<Self, PlayError> {
+        // The runtime ticks by its configuration.
+        (config.show.rate_hz, config.show.timing) = (show.rate.hz(), show.timing);
         let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
         let silent = manner.silent;
         let purpose = Purpose::Play { silent, film };
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
-        for (lane, mix) in staged.mixes.iter().enumerate() {
-            runtime.control().desk.set(lane, *mix);
-        }
+        let desk = runtime.control().desk;
+        staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
         Ok(Self { runtime, staged, silent, holds: false })
     }
 
     /// What it is led and watched by.
     #[must_use]
-    pub const fn control(&self) -> &Control {
+    pub fn control(&self) -> Control {
         self.runtime.control()
     }
 
@@ -222,11 +117,11 @@ impl Play {
         let Self { runtime, staged, silent, holds } = self;
         let config = Arc::clone(runtime.config());
         let (cue, rate) = (staged.timeline.cue().path().display().to_string(), staged.show.rate);
-        let (lanes, live) = (staged.lanes.clone(), Arc::clone(&runtime.control().live));
+        let (lanes, live) = (staged.lanes.clone(), runtime.control().live);
         let (end, led) = thread::scope(|scope| {
             let mut script = None;
             let end = runtime.run(|handle, _| {
-                let led = Script::new(handle, &staged);
+                let led = PlayScript::new(handle, &staged);
                 let thread = Builder::new().name("script".to_owned());
                 // A script that does not begin ends the runtime, too.
                 let thread =
@@ -291,4 +186,25 @@ fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) ->
     }
     let Proof { violations, more, .. } = proof;
     Err(PlayError::Limits { cue: timeline.cue().path().to_path_buf(), violations, more })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::from_to_args;
+    use crate::latency::cue;
+    use crate::time::ShowTime;
+    use crate::wire::Timing;
+
+    #[test]
+    fn a_play_ticks_as_its_show_says_whatever_its_configuration_had() {
+        let mut config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
+        config.show.bind = "127.0.0.1:0".parse().unwrap();
+        let (rate, start) = (Rate::from_hz(250.0), ShowTime::ZERO);
+        let show = Show { rate, timing: Timing::Absolute, start, plays: 1 };
+        let timeline = cue(&config.controllers, 1);
+        let play = Play::new(config, timeline, show, Manner { level: 1.0, silent: false }).unwrap();
+        let show = &play.runtime.config().show;
+        assert_eq!((Rate::from_hz(show.rate_hz).period(), show.timing), (rate.period(), Timing::Absolute));
+    }
 }

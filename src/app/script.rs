@@ -9,14 +9,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use super::play::{PlayError, PlayHandle};
+use rtrb::Producer;
+
+use super::refused::PlayError;
 use super::runtime::RuntimeHandle;
 use super::staged::StagedShow;
 use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
 use crate::drive::Lane;
 use crate::motion::Slot;
 use crate::plan::{PARK_VELOCITY_MM_S, slow_park_time};
-use crate::rt::{Command, Live, News};
+use crate::rt::{Command, Live, News, NewsIn};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::sys::clock::Monotonic;
 use crate::sys::realtime;
@@ -38,6 +40,15 @@ const NEWS: Duration = Duration::from_millis(100);
 const SETTLE: Duration = Duration::from_millis(20);
 /// How far from park a seat may be read that was brought there, in strokes: 0.3 mm of 150.
 const PARKED: f64 = 0.002;
+
+/// What a play is led with.
+#[derive(Debug)]
+pub struct PlayHandle {
+    /// What is asked of the hall.
+    pub commands: Producer<Command>,
+    /// What the hall does.
+    pub news: NewsIn,
+}
 
 /// What was done before the show.
 #[derive(Debug, Clone, Default)]
@@ -66,7 +77,7 @@ pub(super) struct ScriptEnd {
 }
 
 /// Whoever leads a play.
-pub(super) struct Script {
+pub(super) struct PlayScript {
     handle: RuntimeHandle,
     /// As the show has them.
     lanes: Vec<Lane>,
@@ -85,7 +96,7 @@ impl Drop for EndOfPlay {
     }
 }
 
-impl Script {
+impl PlayScript {
     pub(super) fn new(handle: RuntimeHandle, show: &StagedShow) -> Self {
         let lanes = show.lanes.clone();
         let last = lanes.iter().map(Lane::last_frame).collect();
@@ -176,10 +187,11 @@ impl Script {
     /// Reads where the seats stand, until each was seen at rest.
     fn read_positions(&self) {
         let rests = |lane| self.reading(lane).is_some_and(|reading| reading.rests);
-        for _ in 0..READ_TRIES {
+        let all_rest = || (0..self.lanes.len()).all(rests);
+        for _ in (0..READ_TRIES).take_while(|_| !all_rest()) {
             let now = Monotonic.now();
             self.handle.live.want(now);
-            self.wait_until(now + READ_WAIT, || (0..self.lanes.len()).all(rests));
+            self.wait_until(now + READ_WAIT, all_rest);
         }
     }
 
@@ -286,11 +298,13 @@ impl Script {
 
     /// Loads the show, lets it go, and waits for its end.
     fn let_go(self, show: StagedShow, lead: impl FnOnce(PlayHandle) -> bool) -> ScriptEnd {
-        if self.is_called_off() {
-            return ScriptEnd { prepared: self.prepared, began: None, is_cut_short: true };
-        }
+        let is_called_off = self.is_called_off();
         let Self { handle, prepared, end: _end, .. } = self;
         let RuntimeHandle { live, leave, mut commands, news, .. } = handle;
+        if is_called_off {
+            lead(PlayHandle { commands, news }); // there may be a reason to be told
+            return ScriptEnd { prepared, began: None, is_cut_short: true };
+        }
         let (began, sent) = (Monotonic.now(), live.ticks());
         // At once, so that nothing comes between arming and going.
         let ready = Command::Event(Event::Readiness(Readiness::Ready));

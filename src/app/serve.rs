@@ -16,10 +16,9 @@ use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use super::play::Played;
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
-use super::sum_up::{About, sum_up};
+use super::sum_up::{About, Played, sum_up};
 use super::supervisor::{Carryover, ServiceLog, Signals, Supervisor, SupervisorEnd, SupervisorPorts};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
@@ -189,8 +188,7 @@ fn serve_halls(
     let mut numbers = Numbers::new();
     let mut runtime =
         Runtime::open(Arc::clone(&config), Purpose::Hall { crashed }, &numbers, &signals.leave)?;
-    let (handle, inbox, source) =
-        handle(Arc::clone(&runtime.control().desk), Status::starting(&config.show.name));
+    let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let carryover = Carryover::of(kept);

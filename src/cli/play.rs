@@ -156,7 +156,7 @@ fn play(
         None => Play::new(config, timeline, show, manner),
     };
     let play = play.map_err(|error| refused(error, &cue))?;
-    let control = play.control().clone();
+    let control = play.control();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let said = Messages { control, ctrl_c, length, join: play.join(), chases: film.is_some(), names };
@@ -195,18 +195,22 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// The exit code of a play that did not begin.
+/// What a play ends with that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
-    let exit = match error {
+    let (exit, names_cue) = (exit_of(&error), !matches!(error, PlayError::Plan(_)));
+    let error = anyhow::Error::new(error);
+    Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
+}
+
+/// The exit code of that.
+pub(super) const fn exit_of(error: &PlayError) -> Exit {
+    match error {
         PlayError::Runtime(RuntimeError::Net(_) | RuntimeError::Thread(_)) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
         _ => Exit::BadCue,
-    };
-    let names_cue = !matches!(error, PlayError::Plan(_));
-    let error = anyhow::Error::new(error);
-    Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
+    }
 }
 
 /// What Ctrl-C does besides asking to leave.

@@ -9,7 +9,7 @@ use crate::time::ShowTime;
 
 /// A cue in the making, in fractions of strokes.
 #[derive(Debug)]
-pub struct CueBuilder {
+pub(crate) struct CueBuilder {
     cue: Cue,
     effects: Vec<String>,
     steps: Steps<u32>,
@@ -18,14 +18,14 @@ pub struct CueBuilder {
 impl CueBuilder {
     /// A cue of so many axes, which reports and faults know by that name.
     #[must_use]
-    pub fn new(name: &str, axes: usize) -> Self {
+    pub(crate) fn new(name: &str, axes: usize) -> Self {
         let cue = Cue { axes, origin: Origin::Messages, ..Cue::blank(Path::new(name)) };
         Self { cue, effects: Vec::new(), steps: Steps::default() }
     }
 
     /// The same with a title, curved between its rows, with effects of those names.
     #[must_use]
-    pub fn curved(mut self, title: &str, effects: Vec<String>) -> Self {
+    pub(crate) fn curved(mut self, title: &str, effects: Vec<String>) -> Self {
         self.cue.set_title(title.to_owned());
         self.cue.interpolation = Interpolation::Monotone;
         Self { effects, ..self }
@@ -35,7 +35,7 @@ impl CueBuilder {
     ///
     /// # Panics
     /// If there is not a position for each axis.
-    pub fn row(&mut self, at: ShowTime, positions: impl IntoIterator<Item = f64>, on: Option<usize>) {
+    pub(crate) fn row(&mut self, at: ShowTime, positions: impl IntoIterator<Item = f64>, on: Option<usize>) {
         self.cue.times.push(at);
         self.cue.positions.extend(positions);
         assert_eq!(
@@ -51,7 +51,7 @@ impl CueBuilder {
     ///
     /// # Errors
     /// Where it has more effects than a cue may name.
-    pub fn build(self) -> Result<Cue, CueFaults> {
+    pub(crate) fn build(self) -> Result<Cue, CueFaults> {
         let Self { mut cue, effects: names, steps } = self;
         if names.len() > MAX_EFFECTS {
             return Err(CueFaults::one(&cue.path, Problem::TooManyEffects));

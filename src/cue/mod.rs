@@ -23,7 +23,7 @@ mod tracks;
 mod unit;
 mod value;
 
-pub use builder::CueBuilder;
+pub(crate) use builder::CueBuilder;
 pub use csv_write::{CsvError, write as write_csv};
 pub(crate) use fault::Collector;
 pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place};

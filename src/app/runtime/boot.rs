@@ -1,28 +1,16 @@
 //! The hall as it opens: the frame port is bound, and an engine rests that knows of no seat where it stands. It can do one
 //! thing, bring seats that were found to their park poses.
 
-use std::sync::Arc;
-
 use super::super::StagedShow;
 use super::{Numbers, RuntimeError};
 use crate::config::Config;
 use crate::cue::{Cue, CueBuilder};
-use crate::drive::{Lane, Manner};
-use crate::engine::{Engine, Show};
+use crate::drive::Manner;
+use crate::engine::Show;
 use crate::motion::MAX_AXES;
 use crate::net::{Ports, Receiver, Sender};
-use crate::plan::Planner;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
-
-/// What the threads of a hall begin with.
-#[derive(Debug)]
-pub(super) struct Opened {
-    pub(super) engine: Engine,
-    pub(super) lanes: Vec<Lane>,
-    pub(super) planner: Planner,
-    pub(super) timeline: Arc<Timeline>,
-}
 
 /// Binds the frame port.
 pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> {
@@ -30,23 +18,22 @@ pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> 
     Ok(Ports::open(config.show.bind, &peers).map_err(RuntimeError::Net)?.split())
 }
 
-/// Makes the engine, which has not been told anything of its lanes.
-pub(super) fn open(config: &Config, numbers: &Numbers, manner: Manner) -> Result<Opened, RuntimeError> {
+/// A show of nothing, whose frames go on from these numbers.
+pub(super) fn open(config: &Config, numbers: &Numbers, manner: Manner) -> Result<StagedShow, RuntimeError> {
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
         timing: config.show.timing,
         start: ShowTime::ZERO,
         plays: 1,
     };
-    let staged =
+    let mut staged =
         StagedShow::new(config, Timeline::new(rest(config)), show, manner).map_err(RuntimeError::Plan)?;
-    let (engine, mut lanes, planner, timeline) = staged.split();
-    for (lane, controller) in lanes.iter_mut().zip(&config.controllers) {
+    for (lane, controller) in staged.lanes.iter_mut().zip(&config.controllers) {
         if let Some(next) = numbers.get(&controller.address) {
             *lane = lane.clone().starting_at(*next);
         }
     }
-    Ok(Opened { engine, lanes, planner, timeline })
+    Ok(staged)
 }
 
 /// A cue that has every axis of the hall, and asks for nothing.

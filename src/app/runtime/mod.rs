@@ -17,7 +17,7 @@ use std::time::Duration;
 use rtrb::{Producer, RingBuffer};
 
 use super::company::Company;
-use super::helpers::{EndFlags, Helpers};
+use super::helpers::Helpers;
 use super::run::Run;
 use crate::config::Config;
 use crate::drive::{Lane, Manner};
@@ -33,7 +33,7 @@ use crate::rt::{
     Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime::{self, Policy, RealTime};
+use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime, Rate, TickGrid};
 use crate::wire::FrameNo;
 
@@ -74,17 +74,17 @@ pub enum Purpose {
         /// True if no frame asks for a reply.
         silent: bool,
         /// The film that it chases.
-        film: Option<ChasedFilm>,
+        film: Option<LeadingFilm>,
     },
 }
 
 /// A film that a play chases.
 #[derive(Debug)]
-pub struct ChasedFilm {
+pub struct LeadingFilm {
     /// Where its source says where it is.
-    pub source: Arc<PublishedPoint>,
+    pub(super) source: Arc<PublishedPoint>,
     /// How it is followed.
-    pub rules: ChaseRules,
+    pub(super) rules: ChaseRules,
 }
 
 impl Purpose {
@@ -96,10 +96,10 @@ impl Purpose {
 /// A hall whose threads are about to start.
 #[derive(Debug)]
 pub struct Runtime {
-    config: Arc<Config>,
-    control: Control,
+    handle: RuntimeHandle,
+    line: Line,
     silent: bool,
-    film: Option<ChasedFilm>,
+    film: Option<LeadingFilm>,
     engine: Engine,
     lanes: Vec<Lane>,
     sender: Sender,
@@ -107,10 +107,6 @@ pub struct Runtime {
     acks: AckLoop,
     watch: Watch,
     plans: PlanLoop,
-    line: Line,
-    commands: Producer<Command>,
-    news: NewsIn,
-    orders: Producer<Order>,
 }
 
 /// What a hall or a play is led and watched by.
@@ -184,10 +180,9 @@ impl Runtime {
         (sender, receiver): (Sender, Receiver),
     ) -> Result<Self, RuntimeError> {
         let manner = Manner { level: 0.0, silent: purpose.is_silent() };
-        let boot::Opened { engine, lanes, planner, timeline } = boot::open(&config, numbers, manner)?;
-        let desk = Desk::new(lanes.iter().map(|_| Mix::FULL)).ended_by(Arc::clone(signals));
+        let (engine, lanes, planner, timeline) = boot::open(&config, numbers, manner)?.split();
+        let desk = Arc::new(Desk::new(lanes.iter().map(|_| Mix::FULL)).ended_by(Arc::clone(signals)));
         let live = Arc::new(Live::new(lanes.len()));
-        let control = Control { desk: Arc::new(desk), live: Arc::clone(&live), leave: Arc::default() };
         let rate = Rate::from_hz(config.show.rate_hz);
         let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
         let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;
@@ -196,10 +191,12 @@ impl Runtime {
         let groups = Groups::of(&config.controllers);
         let ack_every = manner.ack_every(&config);
         let health = HealthTable::new(groups, config.show.loss_policy, ack_every, rate.period());
-        let watch = |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live);
+        let live_end = Arc::clone(&live);
+        let watch =
+            |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live_end);
         let (engine, watch, film) = match purpose {
             Purpose::Hall { crashed } => {
-                let desk = Arc::clone(&control.desk);
+                let desk = Arc::clone(&desk);
                 let standby = Standby::new(&config.controllers, line_end, desk, orders_end, crashed);
                 (engine.unknown(), watch(health.of_a_hall()).of_a_hall(standby), None)
             }
@@ -209,43 +206,30 @@ impl Runtime {
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
         let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks).going_on(&firsts, ack_every);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
-        Ok(Self {
-            config,
-            control,
-            silent: manner.silent,
-            film,
-            engine,
-            lanes,
-            sender,
-            mail,
-            acks,
-            watch,
-            plans,
-            line,
-            commands,
-            news,
-            orders,
-        })
+        let (leave, granted) = (Arc::default(), RealTime::NOTHING);
+        let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
+        let silent = manner.silent;
+        Ok(Self { handle, line, silent, film, engine, lanes, sender, mail, acks, watch, plans })
     }
 
     /// What it is led and watched by.
     #[must_use]
-    pub const fn control(&self) -> &Control {
-        &self.control
+    pub fn control(&self) -> Control {
+        let RuntimeHandle { desk, live, leave, .. } = &self.handle;
+        Control { desk: Arc::clone(desk), live: Arc::clone(live), leave: Arc::clone(leave) }
     }
 
     /// Whose hall it is.
     #[must_use]
     pub const fn config(&self) -> &Arc<Config> {
-        &self.config
+        &self.handle.config
     }
 
     /// The controllers that somebody else sends to, and how many datagrams they got that were not sent from here. Takes about a
     /// second, in which it sends nothing else.
     pub(super) fn find_other_masters(&mut self) -> Vec<(usize, u16)> {
-        let Self { config, control, sender, acks, lanes, .. } = self;
-        let controllers = &*config.controllers;
-        Company { clock: &Monotonic, sender, acks, controllers, lanes, stop: &control.leave }.look()
+        let Self { handle: RuntimeHandle { config, leave: stop, .. }, sender, acks, lanes, .. } = self;
+        Company { sender, acks, controllers: &config.controllers, lanes, stop }.look()
     }
 
     /// Runs it on the calling thread, which becomes the tick thread, until it is told to leave. Before the first tick `lead`
@@ -257,15 +241,16 @@ impl Runtime {
     /// # Panics
     /// If one of its threads panicked.
     pub fn run(
-        self,
+        mut self,
         lead: impl FnOnce(RuntimeHandle, Line) -> Option<Thread>,
     ) -> Result<RuntimeEnd, RuntimeError> {
         let granted = realtime::request();
-        let (config, control, silent) = (Arc::clone(&self.config), self.control.clone(), self.silent);
-        let (runtime, line, Parts { acks, plans, mut ticks }) = self.part(granted.clone());
+        self.handle.granted = granted.clone();
+        let (config, control, silent) = (Arc::clone(self.config()), self.control(), self.silent);
+        let (runtime, line, Parts { acks, plans, mut ticks }) = self.part();
         let rate = Rate::from_hz(config.show.rate_hz);
         let spin = Duration::from_micros(u64::from(config.show.spin_us));
-        let over = EndFlags::default();
+        let over = AtomicBool::new(false);
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
             let grid_of_drains = if silent { DrainGrid::rare } else { DrainGrid::new };
@@ -291,25 +276,19 @@ impl Runtime {
         origin: MonoTime,
         drive: impl FnOnce(RuntimeHandle, Line, &mut Loops<'_, C>) -> T,
     ) -> (T, Numbers) {
-        let (policy, refusals) = (Policy::Other, Vec::new());
-        let nothing = RealTime { policy, priority: 0, memory_locked: false, refusals };
-        let (config, control) = (Arc::clone(&self.config), self.control.clone());
-        let (runtime, line, Parts { acks, plans, ticks }) = self.part(nothing);
+        let (config, control) = (Arc::clone(self.config()), self.control());
+        let (runtime, line, Parts { acks, plans, ticks }) = self.part();
         let grid = TickGrid::new(origin, Rate::from_hz(config.show.rate_hz));
         let mut loops = Loops { ticks: ticks.on(clock, grid, &control), acks, plans };
         let outcome = drive(runtime, line, &mut loops);
         (outcome, next_numbers(&config, &loops.ticks.lanes))
     }
 
-    fn part(self, granted: RealTime) -> (RuntimeHandle, Line, Parts) {
-        let Self { config, control, film, engine, lanes, sender, mail, mut acks, watch, plans, .. } = self;
-        acks.tell(Arc::clone(&control.live));
+    fn part(self) -> (RuntimeHandle, Line, Parts) {
+        let Self { handle, line, film, engine, lanes, sender, mail, mut acks, watch, plans, .. } = self;
+        acks.tell(Arc::clone(&handle.live));
         acks.watched_by(watch);
-        let Control { desk, live, leave } = control;
-        let (commands, news, orders) = (self.commands, self.news, self.orders);
-        let runtime = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
-        let ticks = Ticks { engine, lanes, film, sender, mail };
-        (runtime, self.line, Parts { acks, plans, ticks })
+        (handle, line, Parts { acks, plans, ticks: Ticks { engine, lanes, film, sender, mail } })
     }
 }
 
@@ -334,7 +313,7 @@ struct Parts {
 struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,
-    film: Option<ChasedFilm>,
+    film: Option<LeadingFilm>,
     sender: Sender,
     mail: Mail,
 }

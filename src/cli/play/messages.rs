@@ -46,7 +46,7 @@ impl Messages {
         };
         let mut text = match (state, cause) {
             // A play goes as soon as it is armed, and one that chases a film waits for that.
-            (State::Armed, _) => return None,
+            (State::Boot | State::Armed, _) => return None,
             (State::Playing(_), Cause::Asked(Transition::Go)) if self.chases => return None,
             (State::Playing(_), Cause::Asked(Transition::Go)) => {
                 format!("{state} ({:.2} s): {cause}", self.join.as_secs_f64())
