@@ -139,6 +139,16 @@ impl Engine {
         self.riders[lane].go_blind();
     }
 
+    /// The seat of that lane, which was cut off, vibrates on about that pose: slow frames lead it there, without vibration. It is looked at
+    /// then.
+    pub fn still(&mut self, lane: usize, pose: &Pose) {
+        if self.sends_nothing() {
+            return self.fall_out(lane, Fall::Gap);
+        }
+        self.riders[lane].still(pose);
+        self.stamps.break_off();
+    }
+
     /// Nobody knows any more where the seat of that lane is: nothing goes to it until it is found.
     pub fn lose_sight(&mut self, lane: usize) {
         self.riders[lane].lose_sight();

@@ -173,6 +173,12 @@ impl Rider {
         }
     }
 
+    /// Slow frames lead it to that pose, about which it vibrates on, and end that. Where it was led before says nothing any more.
+    pub(super) fn still(&mut self, pose: &Pose) {
+        self.trail.rest(*pose);
+        (self.part, self.leaving, self.ahead) = (Part::Blind(0), None, 0);
+    }
+
     /// Nobody knows any more where its seat is. One that was to leave, or of which nobody knew which frames reach it, is away.
     pub(super) const fn lose_sight(&mut self) {
         match self.part {

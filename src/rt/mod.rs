@@ -263,7 +263,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             self.mail.post(Sent::Joined { lane: places::number(lane) });
         }
         while let Some((lane, why)) = self.engine.take_fallen() {
-            self.mail.post(Sent::FellOut { lane: places::number(lane), why });
+            let shakes = self.places.belief(lane).shakes();
+            self.mail.post(Sent::FellOut { lane: places::number(lane), why, shakes });
         }
         while let Some(course) = self.engine.take_retired() {
             self.mail.task(Task::Retire(course));
