@@ -37,12 +37,14 @@ enum Deed {
     See(Alarm),
     /// A controller takes part again: its seat was read at rest in that pose.
     Found(Pose),
+    /// A script has the seat parked by one slow frame.
+    Slowly,
     Stop,
     /// Somebody hears what there is to hear.
     Hear,
 }
 
-use Deed::{Ask, Found, Hear, Load, LoadTrimmed, See, Stop, Tell, Trim};
+use Deed::{Ask, Found, Hear, Load, LoadTrimmed, See, Slowly, Stop, Tell, Trim};
 
 const PARKED: Pose = [0.0; MAX_AXES];
 const READY: Deed = Tell(Event::Readiness(Readiness::Ready));
@@ -120,6 +122,7 @@ impl Clock for Hands<'_> {
                 Load => command(Command::Load(show())),
                 LoadTrimmed(ms) => command(Command::Load(show_trimmed(*ms))),
                 Trim(ms) => self.desk.set_trim_ms(*ms),
+                Slowly => command(Command::ParkSlowly { lane: 0, time_ms: 3_000 }),
                 Ask(request) => command(Command::Request(*request)),
                 Tell(event) => command(Command::Event(*event)),
                 Found(pose) => {
@@ -219,6 +222,15 @@ fn assert_played(script: &[(u64, Deed)], go: u64) {
     let farthest = frames.iter().map(|(_, pulses)| *pulses).max();
     assert!(farthest > Some(150_000), "{farthest:?} pulses");
     assert!(frames.windows(2).all(|pair| (pair[1].1 - pair[0].1).abs() <= 4_800), "no step over 240 mm/s");
+}
+
+#[test]
+fn a_slow_frame_to_park_leaves_before_the_hall_knows_of_its_seats_and_never_after() {
+    let script = [(2, Slowly), (10, Found(PARKED)), (11, found(true, true)), (20, Slowly)];
+    let armed = [(30, Load), (31, READY), (32, Ask(Transition::Arm)), (40, Slowly), (50, Stop), (60, Slowly)];
+    let (frames, states) = live_through(&[&script[..], &armed[..]].concat(), 100);
+    assert_eq!(frames, [(3, 0)], "one frame, to park");
+    assert!(states.ends_with(&[State::Armed, State::Stopped]), "{states:?}");
 }
 
 #[test]

@@ -172,7 +172,7 @@ impl Real {
         let show = Show { rate, timing: self.timing, start: ShowTime::ZERO, plays: 1 };
         let manner = Manner { level: 1.0, silent: false };
         let play = Play::new(config, timeline, show, manner).expect("the show is gentle");
-        let control = play.control().clone();
+        let control = play.control();
         std::thread::scope(|scope| {
             let attend = |handle| {
                 let mut leader = Leader { control, handle, refused: Vec::new() };

@@ -1,14 +1,14 @@
 //! Before a play's first frame: whether somebody else sends to its controllers, by their count of datagrams (DP34).
 
-use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::config::Controller;
-use crate::drive::{Evidence, EvidenceList, Incoming, Lane, Need, Peer};
+use crate::drive::{Evidence, EvidenceList, Lane, Need, Peer};
 use crate::net::{Delivery, Sender};
 use crate::rt::AckLoop;
-use crate::time::{Clock, MonoTime};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
 
 /// From the first count to the second: whoever asks at rest does so four times a second.
 const BETWEEN: Duration = Duration::from_millis(800);
@@ -21,8 +21,7 @@ const LOOK: Duration = Duration::from_millis(2);
 const TOLERATED: u16 = 1;
 
 /// Everything that looking needs.
-pub(super) struct Company<'a, C> {
-    pub(super) clock: &'a C,
+pub(super) struct Company<'a> {
     pub(super) sender: &'a Sender,
     pub(super) acks: &'a mut AckLoop,
     pub(super) controllers: &'a [Controller],
@@ -39,12 +38,15 @@ struct Count {
     sent: u16,
 }
 
-impl<C: Clock> Company<'_, C> {
+impl Company<'_> {
     /// The controllers that got datagrams which were not sent from here, and how many. Nothing else may be sent meanwhile. One
     /// that does not tell its count, or has none, is none of them.
     pub(super) fn look(&mut self) -> Vec<(usize, u16)> {
         let first = self.counts();
-        self.wait_until(self.clock.now() + BETWEEN, &mut |_, _| false, &|| false);
+        let until = Monotonic.now() + BETWEEN;
+        while self.has_slept_before(until) {
+            self.acks.drain(&mut |_, _| false);
+        }
         let second = self.counts();
         let surplus = |lane: usize| {
             let grown = second[lane].told?.wrapping_sub(first[lane].told?);
@@ -56,47 +58,42 @@ impl<C: Clock> Company<'_, C> {
     }
 
     fn counts(&mut self) -> Vec<Count> {
-        let (ends, sender) = (self.controllers.iter().zip(self.lanes), self.sender);
-        let peers = ends.map(|(controller, lane)| (Peer::new(controller, lane), Count::default()));
-        let counts = RefCell::new(peers.collect::<Vec<_>>());
-        // Of one that has no counter nothing is asked.
-        let enough = || counts.borrow().iter().all(|(_, count)| count.told.is_some() || count.sent == 0);
+        let ends = self.controllers.iter().zip(self.lanes);
+        let mut peers: Vec<_> =
+            ends.map(|(controller, lane)| (Peer::new(controller, lane), Count::default())).collect();
         for _ in 0..TRIES {
-            let now = self.clock.now();
-            for (lane, (peer, count)) in counts.borrow_mut().iter_mut().enumerate() {
-                if count.told.is_none() && !self.is_stopped() {
+            let now = Monotonic.now();
+            for (lane, (peer, count)) in peers.iter_mut().enumerate() {
+                if count.told.is_none() && !self.stop.load(Ordering::Relaxed) {
                     let mut send =
-                        |datagram: &[u8]| !matches!(sender.send(lane, datagram), Delivery::Failed(_));
+                        |datagram: &[u8]| !matches!(self.sender.send(lane, datagram), Delivery::Failed(_));
                     count.sent += u16::from(peer.poll(Need::Count, now, &mut send) > 0);
                 }
             }
-            let mut take = |lane: usize, arrival: Incoming<'_>| {
-                let (peer, count) = &mut counts.borrow_mut()[lane];
-                let mut evidence = EvidenceList::new();
-                peer.receive(arrival, &mut evidence);
-                let is_answer = !evidence.is_empty();
-                let told = |one| if let Evidence::Count(packets) = one { Some(packets) } else { None };
-                count.told = count.told.or(evidence.into_iter().find_map(told));
-                is_answer
-            };
-            self.wait_until(now + WAIT, &mut take, &enough);
+            // Of one that has no counter nothing is asked.
+            let is_open = |(_, count): &(Peer, Count)| count.told.is_none() && count.sent > 0;
+            while peers.iter().any(is_open) && self.has_slept_before(now + WAIT) {
+                self.acks.drain(&mut |lane: usize, arrival| {
+                    let (peer, count) = &mut peers[lane];
+                    let mut evidence = EvidenceList::new();
+                    peer.receive(arrival, &mut evidence);
+                    let is_answer = !evidence.is_empty();
+                    let told = |one| if let Evidence::Count(packets) = one { Some(packets) } else { None };
+                    count.told = count.told.or(evidence.into_iter().find_map(told));
+                    is_answer
+                });
+            }
         }
-        counts.into_inner().into_iter().map(|(_, count)| count).collect()
+        peers.into_iter().map(|(_, count)| count).collect()
     }
 
-    fn wait_until(
-        &mut self,
-        until: MonoTime,
-        take: &mut dyn FnMut(usize, Incoming<'_>) -> bool,
-        enough: &dyn Fn() -> bool,
-    ) {
-        while self.clock.now() < until && !self.is_stopped() && !enough() {
-            self.clock.sleep_until((self.clock.now() + LOOK).min(until));
-            self.acks.drain(take);
+    /// Sleeps for a moment; false once it is too late for that, or somebody wants the show to stop.
+    fn has_slept_before(&self, until: MonoTime) -> bool {
+        let now = Monotonic.now();
+        let may_sleep = now < until && !self.stop.load(Ordering::Relaxed);
+        if may_sleep {
+            Monotonic.sleep_until((now + LOOK).min(until));
         }
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        may_sleep
     }
 }

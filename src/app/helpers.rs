@@ -16,29 +16,22 @@ use crate::time::{Clock as _, MonoTime};
 /// The tick loop on real time and real sockets.
 pub(super) type Ticks<'a> = TickLoop<'a, Spinning<'a, Monotonic>, Sender>;
 
-/// What ends the threads.
-#[derive(Debug, Default)]
-pub(super) struct EndFlags {
-    acks: AtomicBool,
-    plans: AtomicBool,
-}
-
 /// The ack thread and the planner's.
 #[derive(Debug)]
 pub(super) struct Helpers<'scope> {
-    over: &'scope EndFlags,
+    over: &'scope AtomicBool,
     acks: ScopedJoinHandle<'scope, Accounts>,
     planner: ScopedJoinHandle<'scope, Vec<PlanError>>,
 }
 
 impl<'scope> Helpers<'scope> {
-    /// Starts them: the ack thread below the calling one where that `granted` real-time service, the planner as an ordinary one.
+    /// Starts them, until it is `over`: the ack thread below the calling one where that `granted` real-time service, the planner as an ordinary one.
     ///
     /// # Errors
     /// That of the system where it starts no further thread; none is left then.
     pub(super) fn start(
         scope: &'scope Scope<'scope, '_>,
-        over: &'scope EndFlags,
+        over: &'scope AtomicBool,
         granted: &RealTime,
         mut acks: AckLoop,
         drains: DrainGrid,
@@ -49,13 +42,13 @@ impl<'scope> Helpers<'scope> {
             if !realtime::request_below(priority) {
                 acks.shares_the_machine();
             }
-            acks.run(&Monotonic, drains, || over.acks.load(Ordering::Acquire))
+            acks.run(&Monotonic, drains, || over.load(Ordering::Acquire))
         })?;
         let planner = Builder::new().name("planner".to_owned()).spawn_scoped(scope, move || {
             let _ = realtime::normal_priority();
-            plans.run(&over.plans)
+            plans.run(over)
         });
-        let planner = planner.inspect_err(|_| over.acks.store(true, Ordering::Release))?;
+        let planner = planner.inspect_err(|_| over.store(true, Ordering::Release))?;
         Ok(Self { over, acks, planner })
     }
 
@@ -69,8 +62,7 @@ impl<'scope> Helpers<'scope> {
     /// # Panics
     /// If one of them panicked.
     pub(super) fn end(self, ticks: &Ticks<'_>, ended: Ended, granted: RealTime, origin: MonoTime) -> Run {
-        self.over.acks.store(true, Ordering::Release);
-        self.over.plans.store(true, Ordering::Release);
+        self.over.store(true, Ordering::Release);
         self.planner.thread().unpark();
         let refusals = self.planner.join().expect("the planner does not panic");
         let mut accounts = self.acks.join().expect("the ack thread does not panic");

@@ -16,10 +16,9 @@ use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
-use super::play::Played;
-use super::prepare::Prepared;
-use super::runtime::{Numbers, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
-use super::sum_up::{About, sum_up};
+use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
+use super::script::Prepared;
+use super::sum_up::{About, Played, sum_up};
 use super::supervisor::{Carryover, ServiceLog, Signals, Supervisor, SupervisorEnd, SupervisorPorts};
 use super::surfaces::{Sockets, SurfaceError, Surfaces};
 use crate::api::Pages;
@@ -187,8 +186,9 @@ fn serve_halls(
     let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut numbers = Numbers::new();
-    let mut runtime = Runtime::open(Arc::clone(&config), crashed, &numbers, &signals.leave)?;
-    let (handle, inbox, source) = handle(runtime.desk(), Status::starting(&config.show.name));
+    let mut runtime =
+        Runtime::open(Arc::clone(&config), Purpose::Hall { crashed }, &numbers, &signals.leave)?;
+    let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
     let carryover = Carryover::of(kept);
@@ -232,13 +232,16 @@ fn reopen(
     leave: &Arc<AtomicBool>,
 ) -> Result<(Runtime, Arc<Config>), RuntimeError> {
     // The seats are parked or at rest, so nothing tells of a crash.
-    match Runtime::open(Arc::clone(&next), false, numbers, leave) {
+    let open = |config: &Arc<Config>| {
+        Runtime::open(Arc::clone(config), Purpose::Hall { crashed: false }, numbers, leave)
+    };
+    match open(&next) {
         Ok(runtime) => Ok((runtime, next)),
         Err(error) => {
             carryover.note(format!(
                 "the hall does not open with the new configuration, and has the old one: {error}"
             ));
-            Ok((Runtime::open(Arc::clone(&before), false, numbers, leave)?, before))
+            Ok((open(&before)?, before))
         }
     }
 }
@@ -253,7 +256,7 @@ fn keep(
 ) -> Result<SupervisorEnd, ServeError> {
     let (tell, closed) = channel();
     let mut supervisor = Err(io::ErrorKind::NotFound.into());
-    ports.carryover.set_desk(runtime.config(), &runtime.desk());
+    ports.carryover.set_desk(runtime.config(), &runtime.control().desk);
     let (leaves, left) = channel();
     let run = runtime.run(|handle, line| {
         let leave = Arc::clone(&handle.leave);

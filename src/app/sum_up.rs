@@ -1,9 +1,8 @@
 //! Sums up a play: the report, and notes for the person.
 
-use super::play::Played;
-use super::prepare::Prepared;
 use super::report::{ControllerReport, EventReport, RealTimeReport, Report, StateReport};
 use super::run::Run;
+use super::script::Prepared;
 use crate::config::Controller;
 use crate::control::model::Ending;
 use crate::control::{FORMAT, Percentiles};
@@ -41,6 +40,21 @@ impl From<engine::Ending> for Ending {
             engine::Ending::Fault => Self::Fault,
         }
     }
+}
+
+/// What came of a play.
+#[derive(Debug)]
+pub struct Played {
+    /// Its report.
+    pub report: Report,
+    /// What the system refused, in words.
+    pub refusals: Vec<String>,
+    /// What else a person should know, in words.
+    pub notes: Vec<String>,
+    /// Controllers that acked nothing, or were lost at the end; `None` if no replies were asked for.
+    pub silent: Vec<String>,
+    /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
+    pub off_park: Vec<String>,
 }
 
 /// What is summed up.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, anyhow};
 
 use super::load::parse_rate;
-use super::play::{judge, leave_on_signals};
+use super::play::{exit_of, judge, leave_on_signals};
 use super::targets::Targets;
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::{Play, PlayError, Played};
@@ -180,11 +180,11 @@ fn about(rate_hz: f64, controllers: usize, of_our_own: bool) -> String {
 
 /// Sends the frames that hold the seats, and gives the times of all.
 fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Failure> {
-    let timeline = cue(&config.controllers, args.seconds).or_exit(Exit::Internal)?;
+    let timeline = cue(&config.controllers, args.seconds);
     let rate = Rate::from_hz(config.show.rate_hz);
     let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
     let play = Play::holding(config, timeline, show, args.no_acks).map_err(failed)?;
-    let control = play.control().clone();
+    let control = play.control();
     leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let live = control.live;
     // Created before anything is measured, so that nobody measures for an hour and then cannot keep it.
@@ -218,13 +218,11 @@ fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
     Ok((held(&Config { controllers, ..config }, &places), refused))
 }
 
-/// The exit code of a measurement that did not begin.
+/// What a measurement ends with that did not begin: its cue is our own.
 fn failed(error: PlayError) -> Failure {
-    let exit = match &error {
-        PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
-        PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
-        PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
-        _ => Exit::Internal,
+    let exit = match exit_of(&error) {
+        Exit::BadCue | Exit::CheckFailed => Exit::Internal,
+        exit => exit,
     };
     Failure { exit, error: error.into() }
 }

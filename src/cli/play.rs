@@ -12,6 +12,7 @@ use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::film::{FilmArgs, FilmReader, FilmSource};
+use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
@@ -155,10 +156,10 @@ fn play(
         None => Play::new(config, timeline, show, manner),
     };
     let play = play.map_err(|error| refused(error, &cue))?;
-    let control = play.control().clone();
+    let control = play.control();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Messages { control, ctrl_c, length, join: play.join(), names };
+    let said = Messages { control, ctrl_c, length, join: play.join(), chases: film.is_some(), names };
     let progress = Progress::start(said, for_ever);
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();
@@ -194,18 +195,22 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     Ok(config)
 }
 
-/// The exit code of a play that did not begin.
+/// What a play ends with that did not begin.
 fn refused(error: PlayError, cue: &Path) -> Failure {
-    let exit = match error {
-        PlayError::Net(_) | PlayError::Thread(_) => Exit::System,
+    let (exit, names_cue) = (exit_of(&error), !matches!(error, PlayError::Plan(_)));
+    let error = anyhow::Error::new(error);
+    Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
+}
+
+/// The exit code of that.
+pub(super) const fn exit_of(error: &PlayError) -> Exit {
+    match error {
+        PlayError::Runtime(RuntimeError::Net(_) | RuntimeError::Thread(_)) => Exit::System,
         PlayError::Limits { .. } => Exit::CheckFailed,
         PlayError::Moving(_) | PlayError::OtherMaster(_) => Exit::OtherMaster,
         PlayError::Unsure(_) | PlayError::Unplaced(_) => Exit::TryAgain,
         _ => Exit::BadCue,
-    };
-    let names_cue = !matches!(error, PlayError::Plan(_));
-    let error = anyhow::Error::new(error);
-    Failure { exit, error: if names_cue { error } else { error.context(cue.display().to_string()) } }
+    }
 }
 
 /// What Ctrl-C does besides asking to leave.

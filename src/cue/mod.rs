@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+mod builder;
 mod bytes;
 mod csv;
 mod csv_write;
@@ -22,6 +23,7 @@ mod tracks;
 mod unit;
 mod value;
 
+pub(crate) use builder::CueBuilder;
 pub use csv_write::{CsvError, write as write_csv};
 pub(crate) use fault::Collector;
 pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place};

@@ -52,13 +52,17 @@ impl Lane {
         (stamped, datagram)
     }
 
-    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, effects and outputs off. For before the first tick: it
-    /// allocates.
+    /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, plain, effects and outputs off.
     pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
-        let mut held = self.clone();
-        held.hold();
-        self.stamp();
-        held.encode(&Beat::still(Timing::Relative, time_ms), &self.window.park(), Mix::STILL, buf)
+        let set_vibrates = |lane: &mut Self, vibrates| {
+            let Codec::Mbox(codec) = &mut lane.codec;
+            std::mem::replace(&mut codec.vibrates, vibrates)
+        };
+        let vibrates = set_vibrates(self, false);
+        let park = self.window.park();
+        let slow = self.encode(&Beat::still(Timing::Relative, time_ms), &park, Mix::STILL, buf);
+        set_vibrates(self, vibrates);
+        slow
     }
 
     /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.

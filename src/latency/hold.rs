@@ -1,12 +1,11 @@
 //! What a measurement plays: a flat cue, and seats whose park pose is where they stand, so that there is nowhere to go.
 
-use std::fmt::Write as _;
-use std::path::Path;
 use std::sync::Arc;
 
 use crate::config::{Config, Controller, FanOut};
-use crate::cue::{self, CueFaults, Source};
+use crate::cue::CueBuilder;
 use crate::motion::{Pulses, SeatType};
+use crate::time::ShowTime;
 use crate::timeline::Timeline;
 
 /// What the report calls the cue.
@@ -41,19 +40,16 @@ fn standing(seat: &SeatType, places: &[Pulses]) -> SeatType {
 
 /// A cue that lasts for `seconds` and asks for nothing, with as many axes as the controllers take.
 ///
-/// # Errors
-/// [`CueFaults`] where it would be longer than a cue can be.
-pub fn cue(controllers: &[Controller], seconds: u32) -> Result<Timeline, CueFaults> {
+/// # Panics
+/// Never: it has no effects.
+#[must_use]
+pub fn cue(controllers: &[Controller], seconds: u32) -> Timeline {
     let axes = controllers.iter().map(|one| one.window().end).max().unwrap_or(1);
-    let mut text = String::from("time_s");
-    let mut rows = [String::from("\n0"), format!("\n{seconds}")];
-    for axis in 1..=axes {
-        write!(text, ",a{axis}").expect("a String takes what is written to it");
-        rows.iter_mut().for_each(|row| row.push_str(",0"));
+    let mut cue = CueBuilder::new(NAME, axes);
+    for at in [0, seconds] {
+        cue.row(ShowTime::from_millis(i64::from(at) * 1_000), std::iter::repeat_n(0.0, axes), None);
     }
-    text.extend(rows);
-    text.push('\n');
-    Ok(Timeline::new(cue::read(Path::new(NAME), text.as_bytes(), &Source::Native)?))
+    Timeline::new(cue.build().expect("it has no effects"))
 }
 
 #[cfg(test)]
@@ -61,13 +57,12 @@ mod tests {
     use super::*;
     use crate::config::from_to_args;
     use crate::drive::{Manner, lanes};
-    use crate::time::ShowTime;
 
     /// The positions that frames to these controllers carry, which were read at `places`, whatever pose is asked for.
     fn sent(to: &[&str], places: &[Vec<Pulses>], asked: f64) -> Vec<Vec<i32>> {
         let to: Vec<String> = to.iter().map(ToString::to_string).collect();
         let config = held(&from_to_args(&to, &[], 12).unwrap(), places);
-        let timeline = cue(&config.controllers, 2).unwrap();
+        let timeline = cue(&config.controllers, 2);
         assert_eq!(timeline.duration(), ShowTime::from_secs_f64(2.0));
         let mut lanes = lanes(&config, &timeline, Manner { level: 0.0, silent: false });
         let pulses = |lane: &mut crate::drive::Lane| {

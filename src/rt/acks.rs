@@ -7,7 +7,7 @@ use hdrhistogram::Histogram;
 use rtrb::Consumer;
 
 use super::{Live, Sent, TickReport, Watch};
-use crate::drive::{Incoming, Need};
+use crate::drive::Incoming;
 use crate::health::Change;
 use crate::net::{DrainGrid, Origin, Receiver};
 use crate::observe::{Answer, Observer, Watched};
@@ -15,7 +15,7 @@ use crate::time::{Clock, MonoTime};
 use crate::tracker::{ACK_TIMEOUT, Books, Fate, Ledger, Reply, Tracker, histogram};
 use crate::wire::{FrameNo, FromController, MotionReply, ReplyCode};
 
-/// How often replies are looked for while a hall sends no frames.
+/// How often replies are looked for while no frames are sent.
 const IDLE: Duration = Duration::from_millis(5);
 /// A drain that is so much overdue says that this thread hangs: nobody hears of an emergency stop then.
 const HANGS_AFTER: Duration = Duration::from_millis(100);
@@ -74,8 +74,6 @@ pub struct AckLoop {
     ticks: Consumer<TickReport>,
     /// The newest instant at which a frame was sent.
     last_sent: MonoTime,
-    /// Which controllers have said anything at all.
-    heard: Vec<bool>,
     /// Who judges how the controllers stand.
     watch: Option<Watch>,
     /// Whom to tell which frames were acked, and the times so far.
@@ -94,7 +92,6 @@ impl AckLoop {
         ticks: Consumer<TickReport>,
     ) -> Self {
         Self {
-            heard: vec![false; watched.len()],
             receiver,
             accounts: Accounts::new(watched, ack_every),
             sent,
@@ -108,24 +105,9 @@ impl AckLoop {
 
     /// The same where frames were sent before: `firsts` are the numbers of the next.
     #[must_use]
-    pub fn going_on(
-        receiver: Receiver,
-        watched: Vec<Watched>,
-        firsts: &[FrameNo],
-        ack_every: u32,
-        sent: Consumer<Sent>,
-        ticks: Consumer<TickReport>,
-    ) -> Self {
-        let mut acks = Self::new(receiver, watched, ack_every, sent, ticks);
-        acks.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
-        acks
-    }
-
-    /// Asks a controller where its axes are, at `now`. What the kernel does not take is like what is lost: ask again.
-    pub fn ask_positions(&mut self, controller: usize, now: MonoTime) {
-        if let Some(watch) = &mut self.watch {
-            watch.ask(controller, Need::Position, now);
-        }
+    pub fn going_on(mut self, firsts: &[FrameNo], ack_every: u32) -> Self {
+        self.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
+        self
     }
 
     /// Tells `live` which frames were acked, and the times so far, again and again while it runs.
@@ -168,8 +150,8 @@ impl AckLoop {
         } else if self.watch.as_mut().is_some_and(Watch::take_untold) {
             self.tell_table();
         }
-        let next = drains.next_after(clock.now());
-        let next = if self.is_idle() { next.max(clock.now() + IDLE) } else { next };
+        let now = clock.now();
+        let next = if self.is_idle() { now + IDLE } else { drains.next_after(now) };
         // Without a watch nobody would hear of an emergency stop anyway.
         if let (Some(live), true) = (&self.live, self.watch.is_some()) {
             live.expect_by(next + self.hangs_after);
@@ -177,7 +159,7 @@ impl AckLoop {
         next
     }
 
-    /// Whether a hall has nothing on its way: then there is no hurry.
+    /// Whether no frame is on its way: then there is no hurry, and what a slow grid has of drains is too few.
     fn is_idle(&self) -> bool {
         self.watch.as_ref().is_some_and(Watch::is_idle)
     }
@@ -199,7 +181,7 @@ impl AckLoop {
     /// Reads all that came: replies to frames go to the books, reports to the observer, `other` may take what else a
     /// controller sent, and what it does not take is stray.
     pub fn drain(&mut self, other: &mut dyn FnMut(usize, Incoming<'_>) -> bool) {
-        let Self { receiver, accounts, sent, ticks, last_sent, heard, watch, live, .. } = self;
+        let Self { receiver, accounts, sent, ticks, last_sent, watch, live, .. } = self;
         let Accounts { books, lateness, observer, strangers, .. } = accounts;
         let began = receiver.drain(|origin, octets, at| {
             let controller = match origin {
@@ -209,7 +191,9 @@ impl AckLoop {
                     return;
                 }
             };
-            heard[controller] = true;
+            if let Some(live) = live {
+                live.on_heard(controller);
+            }
             let message = observer.read(controller, octets);
             if let FromController::Reply(reply) = message {
                 observer.on_reply(controller, &reply, at);
@@ -253,17 +237,6 @@ impl AckLoop {
     pub fn into_accounts(self) -> Accounts {
         let (changes, gone) = self.watch.map(Watch::into_outcome).unwrap_or_default();
         Accounts { changes, gone, ..self.accounts }
-    }
-
-    /// Whether a controller has said anything at all.
-    #[must_use]
-    pub fn has_heard(&self, controller: usize) -> bool {
-        self.heard[controller]
-    }
-
-    /// Notes a frame that is about to be sent before the tick loop runs.
-    pub fn on_sent(&mut self, sent: Sent) {
-        record(sent, self.accounts.books.tracker_mut(), &mut self.last_sent);
     }
 }
 

@@ -64,8 +64,8 @@ impl Default for Times {
 pub struct Live {
     times: Mutex<Times>,
     hall: HallWord,
-    homing: AtomicU32,
-    homing_ms: AtomicU32,
+    parking: AtomicU32,
+    parking_ms: AtomicU32,
     show_ns: AtomicI64,
     ticks: AtomicU64,
     missed: AtomicU64,
@@ -75,6 +75,8 @@ pub struct Live {
     clamps: Box<[AtomicU64]>,
     /// What the ack thread has seen of each lane.
     evidence: Box<[LaneEvidence]>,
+    /// Which controllers have said anything at all.
+    heard: Box<[AtomicBool]>,
     /// Up to when it has told all that arrived.
     told_ns: AtomicU64,
     /// Since when a reading of all seats is waited for, and whether anybody reads them.
@@ -92,6 +94,7 @@ impl Live {
         Self {
             clamps: (0..lanes).map(|_| AtomicU64::new(0)).collect(),
             evidence: (0..lanes).map(|_| LaneEvidence::default()).collect(),
+            heard: (0..lanes).map(|_| AtomicBool::new(false)).collect(),
             ..Self::default()
         }
     }
@@ -100,6 +103,18 @@ impl Live {
     #[must_use]
     pub fn evidence(&self, lane: usize) -> Option<&LaneEvidence> {
         self.evidence.get(lane)
+    }
+
+    /// True if a controller has said anything at all.
+    pub(crate) fn has_heard(&self, controller: usize) -> bool {
+        self.heard.get(controller).is_some_and(|heard| heard.load(Ordering::Relaxed))
+    }
+
+    /// Notes that it has.
+    pub(super) fn on_heard(&self, controller: usize) {
+        if let Some(heard) = self.heard.get(controller) {
+            heard.store(true, Ordering::Relaxed);
+        }
     }
 
     /// The instant up to which the ack thread has told all that arrived; the clock's zero before it did.
@@ -115,8 +130,8 @@ impl Live {
         MonoTime::from_nanos(self.wanted_ns.load(Ordering::Acquire))
     }
 
-    /// Asks for a reading of all seats, later than `since`. Tick thread.
-    pub(super) fn want(&self, since: MonoTime) {
+    /// Asks for a reading of all seats, later than `since`. Tick thread, and whoever leads before anything moves.
+    pub(crate) fn want(&self, since: MonoTime) {
         self.wanted_ns.store(since.as_nanos(), Ordering::Release);
     }
 
@@ -154,11 +169,11 @@ impl Live {
         self.hall.state()
     }
 
-    /// Seats that were not at park before tick 0, and how long the slowest of them takes to get there.
+    /// Seats that are brought to park before the show, and how long the slowest of them takes to get there.
     #[must_use]
-    pub fn homing(&self) -> (u32, Duration) {
-        let ms = self.homing_ms.load(Ordering::Relaxed);
-        (self.homing.load(Ordering::Relaxed), Duration::from_millis(u64::from(ms)))
+    pub fn parking(&self) -> (u32, Duration) {
+        let ms = self.parking_ms.load(Ordering::Relaxed);
+        (self.parking.load(Ordering::Relaxed), Duration::from_millis(u64::from(ms)))
     }
 
     /// Show time after the newest tick.
@@ -235,14 +250,15 @@ impl Live {
         self.times.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes one more seat that is on its slow way to park, `time_ms` long.
-    pub fn on_homing(&self, time_ms: u32) {
-        self.homing.fetch_add(1, Ordering::Relaxed);
-        self.homing_ms.fetch_max(time_ms, Ordering::Relaxed);
+    /// Notes one more seat that is on its slow way to park before the show, `time_ms` long.
+    pub(crate) fn on_parking(&self, time_ms: u32) {
+        self.parking_ms.fetch_max(time_ms, Ordering::Relaxed);
+        self.parking.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Notes where the hall stands before it plays.
-    pub fn enter(&self, state: State) {
+    /// Notes a state by itself.
+    #[cfg(test)]
+    pub(crate) fn enter(&self, state: State) {
         self.hall.set(state, self.is_moving(), self.clears());
     }
 
@@ -294,12 +310,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_state_that_is_entered_is_seen_beside_what_is_known_already() {
+    fn every_state_is_seen_beside_whether_frames_leave_and_how_often_it_was_cleared() {
         let live = Live::default();
         assert_eq!((live.state(), live.is_moving(), live.clears()), (State::Boot, false, 0));
-        live.hall.set(State::Paused, true, 7);
         for state in State::ALL {
-            live.enter(state);
+            live.hall.set(state, true, 7);
             assert_eq!((live.state(), live.is_moving(), live.clears()), (state, true, 7));
         }
     }
@@ -317,9 +332,9 @@ mod tests {
     }
 
     #[test]
-    fn the_slowest_seat_says_how_long_homing_takes() {
+    fn the_slowest_seat_says_how_long_all_take_to_park() {
         let live = Live::default();
-        [2_000, 3_000, 1_000].into_iter().for_each(|ms| live.on_homing(ms));
-        assert_eq!(live.homing(), (3, Duration::from_secs(3)));
+        [2_000, 3_000, 1_000].into_iter().for_each(|ms| live.on_parking(ms));
+        assert_eq!(live.parking(), (3, Duration::from_secs(3)));
     }
 }

@@ -96,6 +96,14 @@ pub enum Command {
     Event(Event),
     /// The show that is next. Not taken while the seats move.
     Load(Box<Loaded>),
+    /// One slow frame that leads a seat of which nobody has told where it is to park, from wherever it may be. Taken only before the
+    /// hall knows of any seat, and only where it is slow enough from everywhere.
+    ParkSlowly {
+        /// The controller.
+        lane: u16,
+        /// How long the frame takes.
+        time_ms: u32,
+    },
 }
 
 /// A show that is ready to be let go.

@@ -41,8 +41,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::belief::Taken;
 use crate::drive::{Lane, Stamped};
 use crate::engine::{Beat, Ending, Engine, Step};
+use crate::motion::Pose;
 use crate::net::{Delivery, Sender};
-use crate::state::{Refusal, State};
+use crate::state::{Refusal, State, Transition, Why};
 use crate::time::{Clock, MonoTime, Tick, TickGrid, nanos};
 use crate::wire::MAX_LEN;
 
@@ -151,7 +152,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     /// Bounded: so many commands and alarms a tick, and the planner answers one request at a time. The stop waits for none of
     /// them.
     fn take_mail(&mut self, now: MonoTime) {
-        let Self { conductor, engine, lanes, places, mail, desk, .. } = self;
+        let Self { conductor, engine, places, mail, desk, .. } = self;
         if desk.take_stop() {
             conductor.stop(engine, now);
         }
@@ -169,24 +170,13 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             conductor.alarm(alarm, engine, now);
         }
         for _ in 0..COMMANDS_PER_TICK {
-            let Some((ticket, command)) = mail.command() else { break };
-            let news = match command {
-                Command::Load(show) => {
-                    let news = load(show, conductor.machine().state(), engine, lanes, mail);
-                    conductor.steer(engine);
-                    news
-                }
-                Command::Request(request) => told(conductor.request(request, engine, now)),
-                Command::Seek(film) => told(conductor.seek(film, engine, now)),
-                Command::Event(event) => {
-                    conductor.event(event, engine, now);
-                    News::Taken
-                }
-            };
+            let Some((ticket, command)) = self.mail.command() else { break };
+            let news = self.obey(command, now);
             // What it led to goes before the answer, so that whoever hears the answer knows it.
-            tell_state(conductor, mail);
-            mail.reply(ticket, news);
+            tell_state(&mut self.conductor, &mut self.mail);
+            self.mail.reply(ticket, news);
         }
+        let Self { conductor, engine, mail, desk, .. } = self;
         let asked = desk.is_ended();
         if asked && conductor.hears_first_of_the_end() {
             mail.wake_leader();
@@ -202,6 +192,40 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
     }
 
+    fn obey(&mut self, command: Command, now: MonoTime) -> News {
+        let Self { conductor, engine, lanes, mail, .. } = self;
+        match command {
+            Command::Load(show) => {
+                let news = load(show, conductor.machine().state(), engine, lanes, mail);
+                conductor.steer(engine);
+                news
+            }
+            Command::Request(request) => told(conductor.request(request, engine, now)),
+            Command::Seek(film) => told(conductor.seek(film, engine, now)),
+            Command::Event(event) => {
+                conductor.event(event, engine, now);
+                News::Taken
+            }
+            Command::ParkSlowly { lane, time_ms } => told(self.park_slowly(usize::from(lane), time_ms)),
+        }
+    }
+
+    /// Leads a seat of which nobody knows where it is to park, by one frame.
+    fn park_slowly(&mut self, index: usize, time_ms: u32) -> Result<(), Refusal> {
+        let Self { conductor, lanes, places, mail, sink, clock, .. } = self;
+        let state = conductor.machine().state();
+        let (park, at) = (lanes[index].window.park(), clock.now());
+        // Later the engine leads whatever may move.
+        if state != State::Boot || !places.belief(index).allows(&park, time_ms, at) {
+            return Err(Refusal { state, asked: Transition::Park, why: Why::PositionUnknown });
+        }
+        let mut buf = [0; MAX_LEN];
+        let (stamped, datagram) = lanes[index].encode_slow_park(time_ms, &mut buf);
+        let sent = Outgoing { index, stamped, pose: &park, lasts_ms: time_ms, at };
+        sent.hand_over(datagram, places, mail, sink);
+        Ok(())
+    }
+
     fn send(&mut self, tick: Tick, beat: &Beat) {
         let mut buf = [0; MAX_LEN];
         let mut first = None;
@@ -213,17 +237,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             let at = clock.now();
             let Some(beat) = places.admit(index, engine, beat, at) else { continue };
             let pose = engine.pose(index);
-            let (Stamped { frame, asked, shakes }, datagram) =
-                lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
+            let (stamped, datagram) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
             first.get_or_insert(at);
-            // Posted before it is sent: a reply can overtake what is posted after.
-            mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
-            let delivery = sink.send(index, datagram);
-            let taken = Taken { frame, asked, pose, lasts_ms: beat.lasts_ms, shakes, at };
-            places.sent(index, &taken, delivery);
-            if let Delivery::Failed(_) = delivery {
-                mail.post(Sent::Failed { lane: places::number(index), frame });
-            }
+            let sent = Outgoing { index, stamped, pose, lasts_ms: beat.lasts_ms, at };
+            sent.hand_over(datagram, places, mail, sink);
             mail.clamps(index, engine.clamps(index).clamps);
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
@@ -251,6 +268,30 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         while let Some(course) = self.engine.take_retired() {
             self.mail.task(Task::Retire(course));
+        }
+    }
+}
+
+/// A frame that is written.
+struct Outgoing<'a> {
+    index: usize,
+    stamped: Stamped,
+    pose: &'a Pose,
+    lasts_ms: u32,
+    at: MonoTime,
+}
+
+impl Outgoing<'_> {
+    /// Hands it to the kernel, and notes what became of it.
+    #[inline]
+    fn hand_over(&self, datagram: &[u8], places: &mut Places, mail: &mut Mail, sink: &mut impl FrameSink) {
+        let Self { index, stamped: Stamped { frame, asked, shakes }, pose, lasts_ms, at } = *self;
+        // Posted before it is sent: a reply can overtake what is posted after.
+        mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
+        let delivery = sink.send(index, datagram);
+        places.sent(index, &Taken { frame, asked, pose, lasts_ms, shakes, at }, delivery);
+        if let Delivery::Failed(_) = delivery {
+            mail.post(Sent::Failed { lane: places::number(index), frame });
         }
     }
 }

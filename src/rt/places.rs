@@ -80,11 +80,6 @@ impl Places {
         self.lanes.iter().map(|place| *place.belief.tally())
     }
 
-    /// Notes a frame that was sent before the ticks begin.
-    pub fn taken(&mut self, lane: usize, taken: &Taken<'_>) {
-        self.lanes[lane].belief.taken(taken);
-    }
-
     /// Takes up what the ack thread has seen, once a tick; `moving` says whether frames go out.
     pub fn look(&mut self, engine: &mut Engine, mail: &Mail, now: MonoTime, moving: bool) {
         let since = std::mem::replace(&mut self.looked, now);

@@ -188,9 +188,9 @@ impl Watch {
         }
     }
 
-    /// Whether it is that of a hall that sends no frames.
+    /// Whether no frames are sent.
     pub(super) fn is_idle(&self) -> bool {
-        !self.silent && !self.live.is_moving()
+        !self.live.is_moving()
     }
 
     /// Notes how often a controller's port was found closed so far.

@@ -49,6 +49,12 @@ pub struct RealTime {
     pub refusals: Vec<String>,
 }
 
+impl RealTime {
+    /// That of a thread that did not ask.
+    pub(crate) const NOTHING: Self =
+        Self { policy: Policy::Other, priority: 0, memory_locked: false, refusals: Vec::new() };
+}
+
 /// Asks for real-time scheduling of the calling thread and for locked memory, and reads both back.
 ///
 /// A real-time policy that the thread already has, as systemd's `CPUSchedulingPolicy=fifo` gives it, is kept as it is.

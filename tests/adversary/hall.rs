@@ -1,7 +1,7 @@
 //! A hall in virtual time: the loops of the program, stepped by turns, and what a supervisor does beside them.
 
 use kinocue::app::StagedShow;
-use kinocue::app::runtime::{Loops, Numbers, Runtime, RuntimeHandle};
+use kinocue::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
 use kinocue::engine::{Mix, Show};
 use kinocue::net::{DrainGrid, over};
 use kinocue::rt::{Command, Line, News, Order, Ticked};
@@ -88,8 +88,9 @@ pub(crate) fn open<T>(
     let book = kind.book();
     ether.world().lines.iter_mut().for_each(|line| line.seat.settings.period_ms = kind.period_ms());
     let halves = over(Arc::new(ether.clone()));
-    let runtime = Runtime::over(Arc::clone(&book.config), crashed, numbers, &Arc::default(), halves)
-        .expect("the hall opens");
+    let runtime =
+        Runtime::over(Arc::clone(&book.config), Purpose::Hall { crashed }, numbers, &Arc::default(), halves)
+            .expect("the hall opens");
     let origin = MonoTime::from_nanos(ether.ns() + 20 * MS);
     let period = Rate::from_hz(kind.hz).period();
     runtime.stepped(ether, origin, |runtime, line, loops| {

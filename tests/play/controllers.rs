@@ -2,10 +2,12 @@
 
 use std::net::UdpSocket;
 
+use kinocue::motion::Pulses;
+use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing};
 use serde_json::Value;
 
 use super::Folder;
-use super::process::{Playing, Relay, Sim, kinocue, play};
+use super::process::{Playing, Relay, Row, Sim, kinocue, play};
 
 fn first(report: &Value) -> &Value {
     &report["controllers"][0]
@@ -25,6 +27,41 @@ fn a_dead_controller_costs_the_live_one_no_frame() {
     assert_eq!((&live["acked"], &live["port_closed"]), (&live["sent"], &0.into()), "{live}");
     assert!(run.stderr.contains("c1"), "{}", run.stderr);
     assert!(sim.end().rest_in_park());
+}
+
+#[test]
+fn a_seat_that_stands_elsewhere_is_led_to_park_and_then_rides_though_another_controller_is_dead() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let dead = UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port");
+    let hand = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+    let away = Motion {
+        timing: Timing::Relative,
+        channel: 0,
+        accept: Code::ALL,
+        reply: Code::NONE,
+        frame: FrameNo(1),
+        time_ms: 300,
+        positions: &[90_000, 0, 0].map(Pulses),
+        outputs: 0,
+        analogue: Analogue::OFF,
+        vibration: None,
+    };
+    hand.send_to(away.emit(&mut [0; MAX_LEN]), &sim.addresses[0]).expect("loopback takes it");
+    let run = play(&folder.nod(&[0.1]), &[sim.addresses[0].clone(), dead.to_string()], &["--json"]);
+    let report = run.report_of(69);
+    let one = first(&report);
+    assert_eq!((&one["acked"], &one["park_frames"]), (&one["sent"], &0.into()), "{one}");
+    let seen = sim.end();
+    let rows = &seen.rows[1..];
+    assert_eq!(rows[0].executed, [90_000, 0, 0], "it stood there: {:?}", rows[0]);
+    let parked = rows.iter().position(|row| row.commanded == [0; 3]).expect("it parks");
+    let is_slow = |pair: &[Row]| {
+        let pulses = pair[1].commanded[0].abs_diff(pair[0].commanded[0]);
+        pulses <= 101 * pair[1].time_ms // 50 mm/s are 100 a millisecond
+    };
+    assert!(rows[..=parked].windows(2).all(is_slow), "at 50 mm/s at the most");
+    assert!(rows[parked..].iter().any(|row| row.commanded[0] > 10_000), "the cue comes after that");
+    assert!(seen.rest_in_park());
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn a_second_sigterm_changes_nothing() {
 }
 
 #[test]
-fn a_second_ctrl_c_ends_at_once_and_the_next_play_joins_from_where_that_left_the_seat() {
+fn a_second_ctrl_c_ends_at_once_and_the_next_play_parks_the_seat_that_was_left_before_it_goes() {
     let (folder, sim) = (Folder::new(), Sim::one(&[]));
     let relay = Relay::start(&sim.addresses[0]);
     // From the middle of the stroke the way to park takes a second and a half.
@@ -84,6 +84,13 @@ fn a_second_ctrl_c_ends_at_once_and_the_next_play_joins_from_where_that_left_the
     assert!(first.executed[0] > pulses(0.02), "it was left in the air: {first:?}");
     let apart = first.commanded.iter().zip(&first.executed).map(|(to, at)| to.abs_diff(*at));
     assert!(apart.max() < Some(100), "it goes on from there: {first:?}");
+    let rows = &seen.rows[home..];
+    let parked = rows.iter().position(|row| row.commanded == [0; 3]).expect("it parks");
+    assert!(
+        rows[..=parked].windows(2).all(|pair| pair[1].commanded[0] <= pair[0].commanded[0]),
+        "downwards, and nowhere else"
+    );
+    assert!(rows[parked..].iter().any(|row| row.commanded[0] > pulses(0.05)), "the cue comes after that");
     assert!(seen.rest_in_park());
 }
 

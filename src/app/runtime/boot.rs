@@ -1,39 +1,16 @@
 //! The hall as it opens: the frame port is bound, and an engine rests that knows of no seat where it stands. It can do one
 //! thing, bring seats that were found to their park poses.
 
-use std::path::Path;
-use std::sync::Arc;
-
 use super::super::StagedShow;
 use super::{Numbers, RuntimeError};
 use crate::config::Config;
-use crate::cue::{self, Cue, Source};
-use crate::drive::{Lane, Manner};
-use crate::engine::{Engine, Mix, Show};
+use crate::cue::{Cue, CueBuilder};
+use crate::drive::Manner;
+use crate::engine::Show;
 use crate::motion::MAX_AXES;
 use crate::net::{Ports, Receiver, Sender};
-use crate::plan::Planner;
-use crate::rt::Desk;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
-
-/// What the threads of a hall begin with.
-#[derive(Debug)]
-pub(super) struct Opened {
-    pub(super) engine: Engine,
-    pub(super) lanes: Vec<Lane>,
-    pub(super) planner: Planner,
-    pub(super) timeline: Arc<Timeline>,
-    pub(super) sender: Sender,
-    pub(super) receiver: Receiver,
-}
-
-impl Opened {
-    /// A desk of full levels.
-    pub(super) fn desk(&self) -> Desk {
-        Desk::new(self.lanes.iter().map(|_| Mix::FULL))
-    }
-}
 
 /// Binds the frame port.
 pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> {
@@ -41,36 +18,30 @@ pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> 
     Ok(Ports::open(config.show.bind, &peers).map_err(RuntimeError::Net)?.split())
 }
 
-/// Makes the engine, which sends and hears by these halves.
-pub(super) fn open(
-    config: &Config,
-    numbers: &Numbers,
-    (sender, receiver): (Sender, Receiver),
-) -> Result<Opened, RuntimeError> {
+/// A show of nothing, whose frames go on from these numbers.
+pub(super) fn open(config: &Config, numbers: &Numbers, manner: Manner) -> Result<StagedShow, RuntimeError> {
     let show = Show {
         rate: Rate::from_hz(config.show.rate_hz),
         timing: config.show.timing,
         start: ShowTime::ZERO,
         plays: 1,
     };
-    // At level 0 the cue has no part in the pose.
-    let manner = Manner { level: 0.0, silent: false };
-    let staged =
+    let mut staged =
         StagedShow::new(config, Timeline::new(rest(config)), show, manner).map_err(RuntimeError::Plan)?;
-    let (engine, mut lanes, planner, timeline) = staged.split();
-    for (lane, controller) in lanes.iter_mut().zip(&config.controllers) {
+    for (lane, controller) in staged.lanes.iter_mut().zip(&config.controllers) {
         if let Some(next) = numbers.get(&controller.address) {
             *lane = lane.clone().starting_at(*next);
         }
     }
-    Ok(Opened { engine: engine.unknown(), lanes, planner, timeline, sender, receiver })
+    Ok(staged)
 }
 
 /// A cue that has every axis of the hall, and asks for nothing.
 fn rest(config: &Config) -> Cue {
     let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
-    let names: Vec<String> = (1..=axes).map(|axis| format!("a{axis}")).collect();
-    let zeros = vec!["0"; axes].join(",");
-    let text = format!("time_ms,{}\n0,{zeros}\n1000,{zeros}\n", names.join(","));
-    cue::read(Path::new("park"), text.as_bytes(), &Source::Native).expect("the cue is sound")
+    let mut cue = CueBuilder::new("park", axes);
+    for ms in [0, 1_000] {
+        cue.row(ShowTime::from_millis(ms), std::iter::repeat_n(0.0, axes), None);
+    }
+    cue.build().expect("it has no effects")
 }

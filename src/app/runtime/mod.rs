@@ -1,5 +1,5 @@
-//! A hall that lives on between shows: the sockets, the tick thread's loop and its helpers, opened once for a configuration.
-//! The main thread is the tick thread; whoever leads the hall holds the [`RuntimeHandle`].
+//! The sockets, the tick thread's loop and its helpers, opened once for a configuration: for a hall that lives on between shows
+//! as for one play. The main thread is the tick thread; whoever leads the hall holds the [`RuntimeHandle`].
 
 mod boot;
 mod device_job;
@@ -16,21 +16,24 @@ use std::time::Duration;
 
 use rtrb::{Producer, RingBuffer};
 
-use super::helpers::{EndFlags, Helpers};
+use super::company::Company;
+use super::helpers::Helpers;
 use super::run::Run;
 use crate::config::Config;
-use crate::drive::Lane;
-use crate::engine::Engine;
+use crate::drive::{Lane, Manner};
+use crate::engine::{Engine, Mix};
+use crate::film::chase::ChaseRules;
+use crate::film::point::PublishedPoint;
 use crate::health::{Groups, HealthTable};
 use crate::net::{DrainGrid, NetError, Receiver, Sender};
 use crate::observe::Watched;
 use crate::plan::PlanError;
 use crate::rt::{
-    AckLoop, Alarm, Command, Conductor, Desk, Line, Live, Mail, MailEnds, NewsIn, Order, Places, PlanLoop,
+    AckLoop, Command, Conductor, Desk, FilmLead, Line, Live, Mail, MailEnds, NewsIn, Order, Places, PlanLoop,
     Planning, Spinning, Standby, TickLoop, Watch, line, mailboxes,
 };
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime::{self, Policy, RealTime};
+use crate::sys::realtime::{self, RealTime};
 use crate::time::{Clock, MonoTime, Rate, TickGrid};
 use crate::wire::FrameNo;
 
@@ -50,30 +53,71 @@ pub enum RuntimeError {
     #[error(transparent)]
     Plan(PlanError),
     /// The system starts no further thread.
-    #[error("no thread could be started; allow more with TasksMax= in the unit, or `ulimit -u`")]
+    #[error("no thread could be started; allow more with `ulimit -u`, or TasksMax= in the unit")]
     Thread(#[source] io::Error),
 }
 
 /// The number of each controller's next frame, by its address: a number never comes twice within one process.
 pub type Numbers = BTreeMap<SocketAddrV4, FrameNo>;
 
+/// What a runtime is for.
+#[derive(Debug)]
+pub enum Purpose {
+    /// A hall that lives on between shows. It finds out by itself what its controllers are and where their seats stand, and what
+    /// does not know its zero is out.
+    Hall {
+        /// True if the mark of a crash was there.
+        crashed: bool,
+    },
+    /// One show. All axes are taken to be homed, and a script finds out where they are.
+    Play {
+        /// True if no frame asks for a reply.
+        silent: bool,
+        /// The film that it chases.
+        film: Option<LeadingFilm>,
+    },
+}
+
+/// A film that a play chases.
+#[derive(Debug)]
+pub struct LeadingFilm {
+    /// Where its source says where it is.
+    pub(super) source: Arc<PublishedPoint>,
+    /// How it is followed.
+    pub(super) rules: ChaseRules,
+}
+
+impl Purpose {
+    const fn is_silent(&self) -> bool {
+        matches!(self, Self::Play { silent: true, .. })
+    }
+}
+
 /// A hall whose threads are about to start.
 #[derive(Debug)]
 pub struct Runtime {
-    config: Arc<Config>,
-    desk: Arc<Desk>,
-    live: Arc<Live>,
-    leave: Arc<AtomicBool>,
+    handle: RuntimeHandle,
+    line: Line,
+    silent: bool,
+    film: Option<LeadingFilm>,
     engine: Engine,
     lanes: Vec<Lane>,
     sender: Sender,
     mail: Mail,
     acks: AckLoop,
+    watch: Watch,
     plans: PlanLoop,
-    line: Line,
-    commands: Producer<Command>,
-    news: NewsIn,
-    orders: Producer<Order>,
+}
+
+/// What a hall or a play is led and watched by.
+#[derive(Debug, Clone)]
+pub struct Control {
+    /// Where levels, effects, seats, trim and the stop are set.
+    pub desk: Arc<Desk>,
+    /// How far the show is, and how the controllers stand.
+    pub live: Arc<Live>,
+    /// Set to have the seats parked and the runtime end.
+    pub leave: Arc<AtomicBool>,
 }
 
 /// What a hall is led with and watched by.
@@ -107,21 +151,21 @@ pub struct RuntimeEnd {
 }
 
 impl Runtime {
-    /// Opens the frame port for a configuration; `crashed` says whether the mark of a crash was there. Where `signals` ask for
-    /// the end, the seats park and the hall closes, even if whoever leads it does not hear them.
+    /// Opens the frame port for a configuration. Where `signals` ask for the end, the seats park and the hall closes, even if
+    /// whoever leads it does not hear them.
     ///
     /// # Errors
     /// Why not.
     pub fn open(
         config: Arc<Config>,
-        crashed: bool,
+        purpose: Purpose,
         numbers: &Numbers,
         signals: &Arc<AtomicBool>,
     ) -> Result<Self, RuntimeError> {
         // Refused, the ports may still open; if not, their error says what to do.
         let _ = realtime::raise_open_files();
         let halves = boot::bind(&config)?;
-        Self::over(config, crashed, numbers, signals, halves)
+        Self::over(config, purpose, numbers, signals, halves)
     }
 
     /// The same by sockets, or another network, that are open.
@@ -130,58 +174,62 @@ impl Runtime {
     /// As [`Runtime::open`].
     pub fn over(
         config: Arc<Config>,
-        crashed: bool,
+        purpose: Purpose,
         numbers: &Numbers,
         signals: &Arc<AtomicBool>,
-        halves: (Sender, Receiver),
+        (sender, receiver): (Sender, Receiver),
     ) -> Result<Self, RuntimeError> {
+        let manner = Manner { level: 0.0, silent: purpose.is_silent() };
+        let (engine, lanes, planner, timeline) = boot::open(&config, numbers, manner)?.split();
+        let desk = Arc::new(Desk::new(lanes.iter().map(|_| Mix::FULL)).ended_by(Arc::clone(signals)));
+        let live = Arc::new(Live::new(lanes.len()));
         let rate = Rate::from_hz(config.show.rate_hz);
-        let opened = boot::open(&config, numbers, halves)?;
-        let desk = Arc::new(opened.desk().ended_by(Arc::clone(signals)));
-        let boot::Opened { engine, lanes, planner, timeline, sender, receiver } = opened;
-        let controllers = &config.controllers;
-        let live = Arc::new(Live::new(controllers.len()));
-        let (mail, ports) = mailboxes(controllers.len(), rate, Arc::clone(&live));
-        let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ports;
-        let (line, line_end) = line(sender.clone(), controllers.len());
+        let (mail, ends) = mailboxes(lanes.len(), rate, Arc::clone(&live));
+        let MailEnds { sent, ticks, tasks, answers, commands, alarms, news } = ends;
+        let (line, line_end) = line(sender.clone(), lanes.len());
         let (orders, orders_end) = RingBuffer::new(ORDERS);
-        let standby = Standby::new(controllers, line_end, Arc::clone(&desk), orders_end, crashed);
-        let watch = watch(&config, &lanes, &sender, alarms, &live).of_a_hall(standby);
-        let watched = controllers.iter().map(Watched::of).collect();
+        let groups = Groups::of(&config.controllers);
+        let ack_every = manner.ack_every(&config);
+        let health = HealthTable::new(groups, config.show.loss_policy, ack_every, rate.period());
+        let live_end = Arc::clone(&live);
+        let watch =
+            |health| Watch::new(health, &config.controllers, &lanes, sender.clone(), alarms, live_end);
+        let (engine, watch, film) = match purpose {
+            Purpose::Hall { crashed } => {
+                let desk = Arc::clone(&desk);
+                let standby = Standby::new(&config.controllers, line_end, desk, orders_end, crashed);
+                (engine.unknown(), watch(health.of_a_hall()).of_a_hall(standby), None)
+            }
+            Purpose::Play { film, .. } => (engine.waiting(), watch(health), film),
+        };
+        let watched = config.controllers.iter().map(Watched::of).collect();
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
-        let mut acks = AckLoop::going_on(receiver, watched, &firsts, config.show.ack_every, sent, ticks);
-        acks.tell(Arc::clone(&live));
-        acks.watched_by(watch);
+        let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks).going_on(&firsts, ack_every);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
-        let leave = Arc::default();
-        Ok(Self {
-            config,
-            desk,
-            live,
-            leave,
-            engine,
-            lanes,
-            sender,
-            mail,
-            acks,
-            plans,
-            line,
-            commands,
-            news,
-            orders,
-        })
+        let (leave, granted) = (Arc::default(), RealTime::NOTHING);
+        let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
+        let silent = manner.silent;
+        Ok(Self { handle, line, silent, film, engine, lanes, sender, mail, acks, watch, plans })
     }
 
-    /// Where levels and the stop are set.
+    /// What it is led and watched by.
     #[must_use]
-    pub fn desk(&self) -> Arc<Desk> {
-        Arc::clone(&self.desk)
+    pub fn control(&self) -> Control {
+        let RuntimeHandle { desk, live, leave, .. } = &self.handle;
+        Control { desk: Arc::clone(desk), live: Arc::clone(live), leave: Arc::clone(leave) }
     }
 
     /// Whose hall it is.
     #[must_use]
-    pub fn config(&self) -> &Config {
-        &self.config
+    pub const fn config(&self) -> &Arc<Config> {
+        &self.handle.config
+    }
+
+    /// The controllers that somebody else sends to, and how many datagrams they got that were not sent from here. Takes about a
+    /// second, in which it sends nothing else.
+    pub(super) fn find_other_masters(&mut self) -> Vec<(usize, u16)> {
+        let Self { handle: RuntimeHandle { config, leave: stop, .. }, sender, acks, lanes, .. } = self;
+        Company { sender, acks, controllers: &config.controllers, lanes, stop }.look()
     }
 
     /// Runs it on the calling thread, which becomes the tick thread, until it is told to leave. Before the first tick `lead`
@@ -193,27 +241,28 @@ impl Runtime {
     /// # Panics
     /// If one of its threads panicked.
     pub fn run(
-        self,
+        mut self,
         lead: impl FnOnce(RuntimeHandle, Line) -> Option<Thread>,
     ) -> Result<RuntimeEnd, RuntimeError> {
         let granted = realtime::request();
-        let (runtime, line, Parts { acks, plans, mut ticks }) = self.part(granted.clone());
-        let (config, desk) = (Arc::clone(&runtime.config), Arc::clone(&runtime.desk));
-        let (live, leave) = (Arc::clone(&runtime.live), Arc::clone(&runtime.leave));
+        self.handle.granted = granted.clone();
+        let (config, control, silent) = (Arc::clone(self.config()), self.control(), self.silent);
+        let (runtime, line, Parts { acks, plans, mut ticks }) = self.part();
         let rate = Rate::from_hz(config.show.rate_hz);
         let spin = Duration::from_micros(u64::from(config.show.spin_us));
-        let over = EndFlags::default();
+        let over = AtomicBool::new(false);
         thread::scope(|scope| {
             let origin = Monotonic.now() + RUN_UP;
-            let drains = DrainGrid::new(origin, rate.period());
+            let grid_of_drains = if silent { DrainGrid::rare } else { DrainGrid::new };
+            let drains = grid_of_drains(origin, rate.period());
             let helpers =
                 Helpers::start(scope, &over, &granted, acks, drains, plans).map_err(RuntimeError::Thread)?;
             ticks.mail.wakes(helpers.planner());
             let clock = Spinning::new(&Monotonic, spin, rate.period());
-            let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &desk, &leave);
+            let mut ticks = ticks.on(&clock, TickGrid::new(origin, rate), &control);
             ticks.mail.wakes_leader(lead(runtime, line));
             let ended = ticks.run();
-            live.close();
+            control.live.close();
             let run = helpers.end(&ticks, ended, granted, origin);
             Ok(RuntimeEnd { run, numbers: next_numbers(&config, &ticks.lanes) })
         })
@@ -227,23 +276,19 @@ impl Runtime {
         origin: MonoTime,
         drive: impl FnOnce(RuntimeHandle, Line, &mut Loops<'_, C>) -> T,
     ) -> (T, Numbers) {
-        let (policy, refusals) = (Policy::Other, Vec::new());
-        let nothing = RealTime { policy, priority: 0, memory_locked: false, refusals };
-        let (runtime, line, Parts { acks, plans, ticks }) = self.part(nothing);
-        let (config, desk, leave) =
-            (Arc::clone(&runtime.config), Arc::clone(&runtime.desk), Arc::clone(&runtime.leave));
+        let (config, control) = (Arc::clone(self.config()), self.control());
+        let (runtime, line, Parts { acks, plans, ticks }) = self.part();
         let grid = TickGrid::new(origin, Rate::from_hz(config.show.rate_hz));
-        let mut loops = Loops { ticks: ticks.on(clock, grid, &desk, &leave), acks, plans };
+        let mut loops = Loops { ticks: ticks.on(clock, grid, &control), acks, plans };
         let outcome = drive(runtime, line, &mut loops);
         (outcome, next_numbers(&config, &loops.ticks.lanes))
     }
 
-    fn part(self, granted: RealTime) -> (RuntimeHandle, Line, Parts) {
-        let Self { config, desk, live, leave, engine, lanes, sender, mail, acks, plans, .. } = self;
-        let (commands, news, orders) = (self.commands, self.news, self.orders);
-        let runtime = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
-        let ticks = Ticks { engine, lanes, sender, mail };
-        (runtime, self.line, Parts { acks, plans, ticks })
+    fn part(self) -> (RuntimeHandle, Line, Parts) {
+        let Self { handle, line, film, engine, lanes, sender, mail, mut acks, watch, plans, .. } = self;
+        acks.tell(Arc::clone(&handle.live));
+        acks.watched_by(watch);
+        (handle, line, Parts { acks, plans, ticks: Ticks { engine, lanes, film, sender, mail } })
     }
 }
 
@@ -268,38 +313,22 @@ struct Parts {
 struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,
+    film: Option<LeadingFilm>,
     sender: Sender,
     mail: Mail,
 }
 
 impl Ticks {
     /// The loop on that clock, from the grid's first tick on.
-    fn on<'a, C: Clock>(
-        self,
-        clock: &'a C,
-        grid: TickGrid,
-        desk: &'a Desk,
-        leave: &'a AtomicBool,
-    ) -> TickLoop<'a, C, Sender> {
-        let Self { engine, lanes, sender, mail } = self;
-        let conductor = Conductor::of_a_hall(grid.next_deadline());
+    fn on<'a, C: Clock>(self, clock: &'a C, grid: TickGrid, control: &'a Control) -> TickLoop<'a, C, Sender> {
+        let Self { engine, lanes, film, sender: sink, mail } = self;
+        let now = grid.next_deadline();
+        let film = film.map(|film| FilmLead::new(film.source, film.rules, now));
+        let conductor = Conductor::of_a_hall(now).chasing(film);
         let places = Places::new(&lanes, grid.rate());
-        TickLoop { clock, grid, engine, conductor, lanes, places, sink: sender, mail, desk, leave }
+        let Control { desk, leave, .. } = control;
+        TickLoop { clock, grid, engine, conductor, lanes, places, sink, mail, desk, leave }
     }
-}
-
-/// Who judges how the controllers of a hall stand.
-fn watch(
-    config: &Config,
-    lanes: &[Lane],
-    sender: &Sender,
-    alarms: Producer<Alarm>,
-    live: &Arc<Live>,
-) -> Watch {
-    let groups = Groups::of(&config.controllers);
-    let period = Rate::from_hz(config.show.rate_hz).period();
-    let health = HealthTable::new(groups, config.show.loss_policy, config.show.ack_every, period).of_a_hall();
-    Watch::new(health, &config.controllers, lanes, sender.clone(), alarms, Arc::clone(live))
 }
 
 /// From where the frame numbers of each controller go on.

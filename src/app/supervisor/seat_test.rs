@@ -1,14 +1,11 @@
 //! The test of empty seats: each axis in turn moves slowly there and back, then each effect is on for a second. It is a cue
 //! like any other, made here, proved and joined like any other.
 
-use std::fmt::Write as _;
-use std::path::Path;
-
 use super::show::ProvedShow;
 use crate::config::Config;
 use crate::control::model::us;
 use crate::control::{Code, Problem, TestRow, TestStatus};
-use crate::cue::{self, Source};
+use crate::cue::CueBuilder;
 use crate::motion::MAX_AXES;
 use crate::rt::Row;
 use crate::time::ShowTime;
@@ -42,31 +39,20 @@ struct TestPart {
     axis: Option<usize>,
 }
 
-/// The parts of a test of a hall, and its cue as CSV.
-fn script(config: &Config) -> (Vec<TestPart>, String) {
+/// The parts of a test of a hall, and its cue.
+fn script(config: &Config) -> (Vec<TestPart>, CueBuilder) {
     let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
-    let effects: Vec<&str> = config.effects.iter().map(|effect| effect.name.as_str()).collect();
+    let effects: Vec<String> = config.effects.iter().map(|effect| effect.name.clone()).collect();
     let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
-    let columns =
-        (1..=axes).map(|axis| format!("a{axis}")).chain(effects.iter().map(|name| format!("fx_{name}")));
-    let mut text = format!(
-        "# title: test of empty seats\n# interpolation: monotone\ntime_ms,{}\n",
-        columns.collect::<Vec<_>>().join(",")
-    );
+    let away = |park: f64| if park + REACH <= 1.0 { park + REACH } else { park - REACH };
+    let mut cue = CueBuilder::new("test", axes).curved("test of empty seats", effects.clone());
+    let time = |ms: u32| ShowTime::from_millis(i64::from(ms));
     let mut row = |at_ms: u32, moved: Option<usize>, on: Option<usize>| {
-        let _ = write!(text, "{at_ms}");
-        for (axis, park) in park.iter().enumerate() {
-            let away = if *park + REACH <= 1.0 { *park + REACH } else { *park - REACH };
-            let _ = write!(text, ",{}", if moved == Some(axis) { away } else { *park });
-        }
-        for effect in 0..effects.len() {
-            let _ = write!(text, ",{}", u8::from(on == Some(effect)));
-        }
-        text.push('\n');
+        let place = |(axis, park): (usize, &f64)| if moved == Some(axis) { away(*park) } else { *park };
+        cue.row(time(at_ms), park.iter().enumerate().map(place), on);
     };
     let (mut parts, mut at) = (Vec::new(), LEAD_MS);
     row(0, None, None);
-    let time = |ms: u32| ShowTime::from_millis(i64::from(ms));
     for axis in 0..axes {
         row(at, None, None);
         row(at + AXIS_MS * 5 / 12, Some(axis), None);
@@ -82,12 +68,7 @@ fn script(config: &Config) -> (Vec<TestPart>, String) {
     for (effect, name) in effects.iter().enumerate() {
         row(at, None, Some(effect));
         row(at + EFFECT_MS / 2, None, None);
-        parts.push(TestPart {
-            name: (*name).to_owned(),
-            from: time(at),
-            to: time(at + EFFECT_MS),
-            axis: None,
-        });
+        parts.push(TestPart { name: name.clone(), from: time(at), to: time(at + EFFECT_MS), axis: None });
         at += EFFECT_MS;
     }
     // It ends at rest: the last axis comes back before that.
@@ -95,7 +76,7 @@ fn script(config: &Config) -> (Vec<TestPart>, String) {
         row(at, None, None);
     }
     row(at + LEAD_MS, None, None);
-    (parts, text)
+    (parts, cue)
 }
 
 /// Where an axis of the cue rests: that of the first seat that takes it.
@@ -110,8 +91,8 @@ impl SeatTest {
     /// # Errors
     /// Where no such cue fits its seats.
     pub(super) fn make(config: &Config) -> Result<(Box<Self>, Box<ProvedShow>), Problem> {
-        let (parts, text) = script(config);
-        let cue = cue::read(Path::new("test"), text.as_bytes(), &Source::Native).map_err(|faults| {
+        let (parts, cue) = script(config);
+        let cue = cue.build().map_err(|faults| {
             Problem::new(Code::Check, "no test fits these seats", "look at their park poses")
                 .with(faults.to_string().lines().map(str::to_owned).collect())
         })?;

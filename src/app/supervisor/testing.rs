@@ -35,7 +35,7 @@ use crate::rt::{self, Command as TickCommand, Desk, Live, News, NewsOut, Row, Ti
 use crate::settings::SettingsFile;
 use crate::state::{Event, Finding, Machine, State};
 use crate::sys::clock::Monotonic;
-use crate::sys::realtime::{Policy, RealTime};
+use crate::sys::realtime::RealTime;
 use crate::time::{Clock as _, MonoTime};
 use crate::timeline::Timeline;
 use crate::tracker::Counts;
@@ -105,6 +105,7 @@ impl Ticks {
                     continue;
                 }
                 TickCommand::Load(_) => Ok(()),
+                TickCommand::ParkSlowly { .. } => panic!("a hall parks its seats by limiter and engine"),
             };
             self.tell(&machine);
             self.news.push((ticket, answer.map_or_else(News::Refused, |()| News::Taken))).unwrap();
@@ -200,7 +201,7 @@ fn runtime(config: &Arc<Config>) -> (RuntimeHandle, Consumer<TickCommand>, NewsO
         commands,
         news: news_end,
         orders: RingBuffer::new(16).0,
-        granted: RealTime { policy: Policy::Other, priority: 0, memory_locked: false, refusals: vec![] },
+        granted: RealTime::NOTHING,
     };
     (runtime, commands_end, news)
 }

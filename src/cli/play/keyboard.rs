@@ -192,7 +192,9 @@ mod tests {
         let command = |command| match command {
             Command::Request(request) => Ok(request),
             Command::Seek(film) => Err(film),
-            Command::Event(_) | Command::Load(_) => panic!("no key asks for {command:?}"),
+            Command::Event(_) | Command::Load(_) | Command::ParkSlowly { .. } => {
+                panic!("no key asks for {command:?}")
+            }
         };
         iter::from_fn(|| consumer.pop().ok()).map(command).collect()
     }

@@ -18,17 +18,19 @@ pub(super) struct Messages {
     pub(super) length: ShowTime,
     /// How long the first move onto the cue takes.
     pub(super) join: Duration,
+    /// True if a film leads the show.
+    pub(super) chases: bool,
     /// The controllers' names.
     pub(super) names: Vec<String>,
 }
 
 impl Messages {
     /// What goes on before the hall plays.
-    pub(super) fn preparing(&self, state: State) -> String {
-        if state != State::Homing {
+    pub(super) fn preparing(&self) -> String {
+        let (seats, time) = self.control.live.parking();
+        if seats == 0 {
             return "asking where the seats stand".to_owned();
         }
-        let (seats, time) = self.control.live.homing();
         let noun = if seats == 1 { "seat" } else { "seats" };
         format!("bringing {seats} {noun} to park (up to {:.1} s)", time.as_secs_f64())
     }
@@ -43,6 +45,9 @@ impl Messages {
             News::Taken | News::NotLoaded(_) => return None,
         };
         let mut text = match (state, cause) {
+            // A play goes as soon as it is armed, and one that chases a film waits for that.
+            (State::Boot | State::Armed, _) => return None,
+            (State::Playing(_), Cause::Asked(Transition::Go)) if self.chases => return None,
             (State::Playing(_), Cause::Asked(Transition::Go)) => {
                 format!("{state} ({:.2} s): {cause}", self.join.as_secs_f64())
             }
@@ -116,6 +121,7 @@ mod tests {
             ctrl_c: CtrlC::default(),
             length: ShowTime::from_secs_f64(8.0),
             join: Duration::from_millis(1_250),
+            chases: false,
             names: vec!["A1".to_owned(), "A2".to_owned()],
         }
     }
@@ -127,9 +133,9 @@ mod tests {
     #[test]
     fn before_the_play_it_says_what_the_seats_are_doing() {
         let said = said();
-        assert_eq!(said.preparing(State::Boot), "asking where the seats stand");
-        [2_000, 3_000].into_iter().for_each(|ms| said.control.live.on_homing(ms));
-        assert_eq!(said.preparing(State::Homing), "bringing 2 seats to park (up to 3.0 s)");
+        assert_eq!(said.preparing(), "asking where the seats stand");
+        [2_000, 3_000].into_iter().for_each(|ms| said.control.live.on_parking(ms));
+        assert_eq!(said.preparing(), "bringing 2 seats to park (up to 3.0 s)");
     }
 
     #[test]

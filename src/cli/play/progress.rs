@@ -57,7 +57,7 @@ impl Progress {
             notes: notes_end,
             news: None,
             pressed: 0,
-            prepared: State::Boot,
+            parks: false,
             now: None,
             standings: HealthMessages::default(),
         };
@@ -94,8 +94,8 @@ struct Teller {
     news: Option<NewsIn>,
     /// For how many looks Ctrl-C has been pressed.
     pressed: u32,
-    /// How far the preparation was when it was looked at last.
-    prepared: State,
+    /// True if seats are brought to park before the show, and that was said.
+    parks: bool,
     /// The state of the hall and the next action, once it plays.
     now: Option<(State, Next)>,
     /// How the controllers stood when they were looked at last.
@@ -116,12 +116,9 @@ impl Teller {
             }
             _ => {}
         }
-        if self.now.is_none()
-            && self.said.control.live.state() == State::Homing
-            && self.prepared != State::Homing
-        {
-            self.prepared = State::Homing;
-            lines.push(self.said.preparing(State::Homing));
+        if !self.parks && self.said.control.live.parking().0 > 0 {
+            self.parks = true;
+            lines.push(self.said.preparing());
         }
         self.news = self.news.take().or_else(|| self.news_end.try_recv().ok());
         while let Some(news) = self.news.as_mut().and_then(|news| news.pop().ok()) {
@@ -150,7 +147,7 @@ impl Teller {
             }
             let (figures, next) = match self.now {
                 Some((state, next)) => (self.said.figures(state), self.said.next(next)),
-                None => (self.said.preparing(self.prepared), self.said.next("wait")),
+                None => (self.said.preparing(), self.said.next("wait")),
             };
             bar.set_prefix(next);
             bar.set_message(figures);

@@ -28,10 +28,10 @@ impl Watch {
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
     }
 
-    /// A motion that begins waits for readings of where the seats are by now.
+    /// A motion that begins waits for readings of where the seats are by now, as does whoever leads a play before that.
     pub(super) fn read_all(&mut self) {
         let wanted = self.live.wanted();
-        if self.silent || std::mem::replace(&mut self.wanted, wanted) == wanted {
+        if std::mem::replace(&mut self.wanted, wanted) == wanted {
             return;
         }
         for controller in 0..self.peers.len() {
@@ -43,7 +43,7 @@ impl Watch {
     }
 
     /// Asks a controller for something; says in how many datagrams. What the kernel does not take is asked for again.
-    pub(in super::super) fn ask(&mut self, controller: usize, need: Need, now: MonoTime) -> u32 {
+    pub(super) fn ask(&mut self, controller: usize, need: Need, now: MonoTime) -> u32 {
         let Self { peers, sender, .. } = self;
         let mut send = |datagram: &[u8]| !matches!(sender.send(controller, datagram), Delivery::Failed(_));
         peers[controller].poll(need, now, &mut send)

@@ -1,0 +1,85 @@
+//! Why a play does not begin, in words.
+
+use std::path::{Path, PathBuf};
+
+use super::runtime::RuntimeError;
+use crate::config::Misfit;
+use crate::cue::{CueFaults, Place};
+use crate::plain;
+use crate::plan::PlanError;
+use crate::proof::Violation;
+
+/// Why nothing was played. Nothing has moved then.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlayError {
+    /// The hall cannot do what the cue asks; each with its place in the file.
+    #[error("{}", list(cue, misfits))]
+    Misfit {
+        /// The cue's file.
+        cue: PathBuf,
+        /// Where the file asks for what.
+        misfits: Vec<(Place, Misfit)>,
+    },
+    /// The cue leaves the stroke of some seats.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Stroke(Vec<CueFaults>),
+    /// The cue breaks limits of the seats, the effects or the controllers.
+    #[error("{}", broken(cue, violations, *more))]
+    Limits {
+        /// The cue's file.
+        cue: PathBuf,
+        /// What is broken, each with its place in the file.
+        violations: Vec<Violation>,
+        /// How many more there are.
+        more: u64,
+    },
+    /// No move leads onto the cue.
+    #[error(transparent)]
+    Plan(PlanError),
+    /// The frame port cannot be had, or no thread.
+    #[error(transparent)]
+    Runtime(#[from] RuntimeError),
+    /// Somebody else sends to these controllers, so many datagrams within about a second.
+    #[error("{}; end whatever else sends to them: another kinocue, player or tool", others(.0))]
+    OtherMaster(Vec<(String, u16)>),
+    /// Seats that were to be held did not all tell, just before the first frame, that they stand where they are held.
+    #[error("{}: cannot be held, as the seat did not tell that it still stands where it stood; try again", .0.join(", "))]
+    Unsure(Vec<String>),
+    /// Seats that move though nothing was sent to them from here.
+    #[error(
+        "{}: moves, though nothing was sent to it from here: another machine drives it, or it is being homed; nothing was sent",
+        .0.join(", ")
+    )]
+    Moving(Vec<String>),
+    /// Seats that do not tell where all of their axes are, and cannot be known to have come to park.
+    #[error(
+        "{}: does not tell where all of its axes are, and cannot be brought to park for certain: it does not ack, or its longest \
+         Time (PA0b, max_interval_ms) is too short for the stroke; home it, and try again",
+        .0.join(", ")
+    )]
+    Unplaced(Vec<String>),
+}
+
+fn others(found: &[(String, u16)]) -> String {
+    let one = |(name, more): &(String, u16)| {
+        format!("{name} got {more} datagrams (DP34) that were not sent from here")
+    };
+    found.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+fn list(cue: &Path, misfits: &[(Place, Misfit)]) -> String {
+    let line = |(place, misfit): &(Place, Misfit)| format!("{}:{place}{misfit}", plain::path(cue));
+    misfits.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn broken(cue: &Path, violations: &[Violation], more: u64) -> String {
+    let cue = plain::path(cue);
+    let mut text: String = violations.iter().map(|violation| format!("{cue}:{violation}\n")).collect();
+    if more > 0 {
+        text += &format!("{cue}: and {more} more\n");
+    }
+    text + &format!(
+        "the limits proof failed, so nothing is played; `kinocue fit {cue} -o OUT` makes a cue that keeps the limits"
+    )
+}
