@@ -81,9 +81,9 @@ impl Engine {
 
     /// The lanes on the course are at park. One that fell out on the way is waited for there, and led after them.
     fn arrive(&mut self) {
-        if self.lanes.any(LaneMotion::is_left_behind) {
+        if self.lanes.all.iter().any(LaneMotion::is_left_behind) {
             self.come_down(Rest::Ended);
-        } else if !self.lanes.any(LaneMotion::is_awaited) {
+        } else if !self.lanes.all.iter().any(LaneMotion::is_awaited) {
             let frames = hold_frames(self.show.rate);
             self.phase.carry(|course| Phase::Closing(course, frames));
         }
@@ -96,7 +96,7 @@ impl Engine {
 
     /// Once the cue is over the way to park waits for nobody: it leads those as well that are elsewhere.
     fn lanes_need_a_course(&self) -> bool {
-        self.playhead.at() < self.timeline.duration() && self.lanes.any(LaneMotion::needs_a_course)
+        self.playhead.at() < self.timeline.duration() && self.lanes.all.iter().any(LaneMotion::needs_a_course)
     }
 
     /// The show time at which the lanes have followed the cue to its end.
@@ -128,7 +128,7 @@ impl Engine {
             // The old course ends before another can begin on it: what is to come begins on the one that follows.
             || following.replans().any(turns)
             // A course is planned for levels that stand, and for show time that runs as the clock does.
-            || !self.lanes.faders_are_still()
+            || self.lanes.all.iter().any(|motion| !motion.fader.is_still())
             || (self.is_wanted_elsewhere() && !self.playhead.is_calm())
         {
             return None;
@@ -158,7 +158,7 @@ impl Engine {
     /// Asks for a course that takes over when show time, as it runs now, is `at`, and calls that instant `start`.
     fn ask(&mut self, goal: Goal, at: Option<ShowTime>, start: ShowTime) {
         // Without a scene the planner still has all of them: it will be asked once it has answered.
-        let Some(mut scene) = self.planner.scene() else { return };
+        let Some(mut scene) = self.planner.scenes.take() else { return };
         self.lanes.describe(&mut scene);
         // Given the time, the pace is brought back to the clock's; at short notice it is kept.
         let far = at.is_none_or(|at| at > self.playhead.at() + SLOWING);
@@ -169,7 +169,8 @@ impl Engine {
             }
             _ => From::Rest,
         };
-        let serial = self.planner.next_serial();
+        self.planner.serial = self.planner.serial.wrapping_add(1);
+        let serial = self.planner.serial;
         let planned = Planned::Asked(Request { from, to: goal.to(), start, serial, scene });
         let given_up = self.phase.set_next(Replan { goal, at, start, pace, serial, planned });
         given_up.into_iter().flatten().for_each(|replan| self.planner.give_up(replan));
@@ -192,16 +193,16 @@ impl Engine {
                 return;
             }
             *next = None; // asked again, with more time, at this tick's end
-            self.planner.count_late();
+            self.planner.late_answers += 1;
         }
-        self.planner.retire(course);
-        self.planner.served(scene);
+        self.planner.retired.put(course);
+        self.planner.scenes.put(scene);
     }
 
     /// Hears that the planner found no course for the request of that serial. A seek is not done then, and a lane stays out;
     /// without any other move the show cannot go on.
     pub fn refuse(&mut self, serial: u32, scene: Box<Scene>) {
-        self.planner.served(scene);
+        self.planner.scenes.put(scene);
         let next = self.phase.next().and_then(|next| next.take_if(|next| next.serial == serial));
         match next.map(|next| next.goal) {
             None => {}
@@ -218,30 +219,31 @@ impl Engine {
 
     /// A course that is to be freed on another thread.
     pub fn take_retired(&mut self) -> Option<Box<Course>> {
-        self.planner.take_retired()
+        self.planner.retired.take()
     }
 
     /// Takes up the new course when its time has come; `time` is that of this frame.
     pub(super) fn take_due(&mut self, time: Duration) {
         let now = self.playhead.at();
         let Some(replan) = self.phase.take_due(now) else { return };
-        let (goal, skips_s) = (replan.goal, replan.skips_s());
+        let (goal, nearer) = (replan.goal, replan.skips());
         let over = replan.at.map_or(time, |at| Duration::from_nanos(now.as_nanos().abs_diff(at.as_nanos())));
         let to = replan.start + over;
         let Planned::Ready(course, scene) = replan.planned else { return };
         self.lanes.take_up(&scene);
-        self.planner.taken_up(scene);
+        self.planner.scenes.put(scene);
+        self.planner.late_answers = 0;
         match goal {
             Goal::Lanes => self.playhead.set(to),
             Goal::Cue if self.planner.sought.take().is_some() => self.playhead.restart(to),
-            Goal::Cue => self.playhead.skip(to, skips_s),
+            Goal::Cue => self.playhead.skip(to, nearer),
             Goal::Again => {
-                self.playhead.skip(to, 0.0);
+                self.playhead.skip(to, ShowTime::ZERO);
                 self.plays_left = self.plays_left.map(|left| left.saturating_sub(1));
             }
-            Goal::Home | Goal::Park => self.playhead.skip(to, 0.0),
+            Goal::Home | Goal::Park => self.playhead.skip(to, ShowTime::ZERO),
         }
-        let stays = course.settled() <= course.start && !self.lanes.any(LaneMotion::is_missing);
+        let stays = course.settled() <= course.start && !self.lanes.all.iter().any(LaneMotion::is_missing);
         self.enter(match goal {
             Goal::Home | Goal::Park if stays => Phase::Closing(course, hold_frames(self.show.rate)),
             Goal::Home | Goal::Park => Phase::Parking(course),

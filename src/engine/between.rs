@@ -23,7 +23,7 @@ impl Engine {
     /// The same with nothing known of any lane, and at rest: nothing goes to a lane before it is said to be found.
     #[must_use]
     pub fn unknown(mut self) -> Self {
-        self.lanes.each().for_each(LaneMotion::cut);
+        self.lanes.all.iter_mut().for_each(LaneMotion::cut);
         self.rest_untold();
         self
     }
@@ -31,7 +31,9 @@ impl Engine {
     /// The same with what operators want of each lane from the first frame on.
     #[must_use]
     pub fn mixed(mut self, mixes: &[Mix]) -> Self {
-        self.lanes.mixed(mixes);
+        for (motion, mix) in self.lanes.all.iter_mut().zip(mixes) {
+            (motion.wanted, motion.out) = (*mix, !mix.on);
+        }
         self
     }
 
@@ -43,7 +45,8 @@ impl Engine {
 
     /// Takes over from the engine that is done: lanes to which nothing goes stay so, and the others are to be found.
     pub fn take_over(&mut self, before: &Self) {
-        self.lanes.take_over(&before.lanes);
+        let lanes = self.lanes.all.iter_mut().zip(&before.lanes.all);
+        lanes.for_each(|(motion, old)| motion.go_on_from(old));
     }
 
     /// Whether a lane that frames may go to is elsewhere than at park.
@@ -54,7 +57,7 @@ impl Engine {
 
     /// Whether lanes that are to park rest there already, and nobody is waited for.
     pub(super) fn is_parked_untold(&self) -> bool {
-        let is_awaited = self.lanes.any(LaneMotion::is_awaited);
+        let is_awaited = self.lanes.all.iter().any(LaneMotion::is_awaited);
         self.is_to_park() && self.sends_nothing() && !is_awaited && !self.lanes.is_any_off_park(&A_PULSE)
     }
 }

@@ -188,7 +188,7 @@ impl Engine {
     pub(super) fn enter(&mut self, phase: Phase) {
         self.give_up_replans();
         let left = std::mem::replace(&mut self.phase, phase);
-        left.into_course().into_iter().for_each(|course| self.planner.retire(course));
+        left.into_course().into_iter().for_each(|course| self.planner.retired.put(course));
     }
 
     /// What was to lead on does no more.

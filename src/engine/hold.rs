@@ -24,7 +24,7 @@ impl Engine {
             }
             return;
         }
-        (0..self.lanes.all().len()).for_each(|lane| self.brake(lane));
+        (0..self.lanes.all.len()).for_each(|lane| self.brake(lane));
         if matches!(self.phase, Phase::Following(_) | Phase::Settling(_)) {
             self.playhead.catch_up();
         }
@@ -39,7 +39,7 @@ impl Engine {
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };
         let (reached, pace) = (playhead.reached(), playhead.pace());
-        lanes.lane(lane).brake(|window| {
+        lanes.all[lane].brake(|window| {
             course.states_by_slot(lane, reached, window, &curve).map(|state| state.at_pace(pace))
         });
     }
@@ -73,7 +73,7 @@ impl Engine {
     /// Notices that the last lane rests.
     pub(super) fn come_to_rest(&mut self) {
         if let Phase::Braking(why) = self.phase
-            && !self.lanes.any(LaneMotion::is_braking)
+            && !self.lanes.all.iter().any(LaneMotion::is_braking)
         {
             self.rest(why, hold_frames(self.show.rate));
         }
@@ -97,7 +97,7 @@ impl Engine {
         match &self.phase {
             Phase::Waiting(_) | Phase::Done => true,
             Phase::Holding(Holding { why: Rest::Paused | Rest::Stopped, frames, .. }) => {
-                *frames == 0 && !self.lanes.any(LaneMotion::is_blind)
+                *frames == 0 && !self.lanes.all.iter().any(LaneMotion::is_blind)
             }
             _ => false,
         }

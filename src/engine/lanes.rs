@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use super::Mix;
 use super::events::{EngineEvent, Events, Unplanned};
 use super::headroom::Headroom;
 use super::lane::{LaneMode, LaneMotion};
@@ -30,7 +29,7 @@ pub enum LaneOrder {
 /// The lanes.
 #[derive(Debug)]
 pub(super) struct Lanes {
-    all: Box<[LaneMotion]>,
+    pub(super) all: Box<[LaneMotion]>,
     /// No level goes beyond it: the cue was proved at no higher one.
     greatest_level: f64,
     pub(super) events: Events,
@@ -43,22 +42,6 @@ impl Lanes {
         let events = Events::of(windows.len());
         let all = windows.into_iter().map(|window| LaneMotion::unseen(window, rate)).collect();
         Self { all, greatest_level, events }
-    }
-
-    pub(super) fn all(&self) -> &[LaneMotion] {
-        &self.all
-    }
-
-    pub(super) fn each(&mut self) -> impl Iterator<Item = &mut LaneMotion> {
-        self.all.iter_mut()
-    }
-
-    pub(super) fn any(&self, is: impl FnMut(&LaneMotion) -> bool) -> bool {
-        self.all.iter().any(is)
-    }
-
-    pub(super) fn lane(&mut self, lane: usize) -> &mut LaneMotion {
-        &mut self.all[lane]
     }
 
     /// Nothing goes to a lane from now on, and it is to be looked at.
@@ -174,31 +157,15 @@ impl Lanes {
         }
     }
 
-    pub(super) fn faders_are_still(&self) -> bool {
-        self.all.iter().all(|motion| motion.fader.is_still())
-    }
-
     /// The greatest level there is.
     pub(super) fn level(&self) -> f64 {
         self.all.iter().map(|motion| motion.fader.level()).fold(0.0, f64::max)
     }
 
-    pub(super) fn mixed(&mut self, mixes: &[Mix]) {
-        for (motion, mix) in self.all.iter_mut().zip(mixes) {
-            motion.wanted = *mix;
-            motion.out = !mix.on;
-        }
-    }
-
-    /// Takes over from those of the show before.
-    pub(super) fn take_over(&mut self, before: &Self) {
-        self.all.iter_mut().zip(&before.all).for_each(|(motion, old)| motion.go_on_from(old));
-    }
-
     /// Whether one that frames may go to is farther than that from park.
     pub(super) fn is_any_off_park(&self, near: &Pose) -> bool {
         let is_off = |motion: &LaneMotion| !is_at(&motion.window, motion.pose(), &motion.window.park(), near);
-        self.any(|motion| motion.is_there() && is_off(motion))
+        self.all.iter().any(|motion| motion.is_there() && is_off(motion))
     }
 }
 

@@ -11,6 +11,7 @@ mod fader;
 mod headroom;
 mod hold;
 mod lane;
+mod lane_plans;
 mod lanes;
 mod mix;
 mod orders;
@@ -188,7 +189,7 @@ impl Engine {
     /// this frame to lead to `target` in the cue, as often as it can be followed.
     pub fn tick(&mut self, missed: u64, target: Option<ShowTime>) -> Step {
         self.count_missed(missed);
-        self.lanes.each().for_each(|motion| motion.pass(missed));
+        self.lanes.all.iter_mut().for_each(|motion| motion.pass(missed));
         match self.phase {
             Phase::Closing(_, 0) | Phase::Done => {
                 self.enter(Phase::Done);

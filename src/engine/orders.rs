@@ -10,7 +10,7 @@ impl Engine {
     /// One of its lanes.
     #[must_use]
     pub fn lane(&self, lane: usize) -> &LaneMotion {
-        &self.lanes.all()[lane]
+        &self.lanes.all[lane]
     }
 
     /// Whether frames lead a lane, be it to rest.
@@ -33,7 +33,7 @@ impl Engine {
 
     /// Sets what a lane makes of the cue.
     pub fn mix(&mut self, lane: usize, mix: Mix) {
-        let is_put_back = self.lanes.lane(lane).want(mix);
+        let is_put_back = self.lanes.all[lane].want(mix);
         // While it was out nobody minded where it stands.
         if is_put_back && self.lane(lane).mode == LaneMode::Unseen && !self.sends_nothing() {
             self.lanes.fall_out(lane, Fall::PutBack);
@@ -45,17 +45,17 @@ impl Engine {
         match order {
             LaneOrder::Leave if self.sends_nothing() => {
                 if self.lane(lane).takes_part() {
-                    self.lanes.lane(lane).step_out();
+                    self.lanes.all[lane].step_out();
                 }
             }
             LaneOrder::Leave => {
                 self.brake(lane);
-                self.lanes.lane(lane).leave();
+                self.lanes.all[lane].leave();
             }
-            LaneOrder::Cut => self.lanes.lane(lane).cut(),
+            LaneOrder::Cut => self.lanes.all[lane].cut(),
             LaneOrder::FallOut(why) => self.lanes.fall_out(lane, why),
             LaneOrder::GoBlind if self.sends_nothing() => self.lanes.fall_out(lane, Fall::Gap),
-            LaneOrder::GoBlind => self.lanes.lane(lane).go_blind(),
+            LaneOrder::GoBlind => self.lanes.all[lane].go_blind(),
             LaneOrder::LoseSight => self.lanes.lose_sight(lane),
         }
     }
@@ -64,7 +64,7 @@ impl Engine {
     /// its present one. Says how long that takes, `longest_ms` at the most; none where nothing goes to the lane any more.
     pub fn slow_down(&mut self, lane: usize, longest_ms: u32, farthest: &Pose) -> Option<u32> {
         let (index, rate) = (self.playhead.frames() - 1, self.show.rate);
-        let lasts_ms = self.lanes.lane(lane).slow_down(index, rate, longest_ms, farthest);
+        let lasts_ms = self.lanes.all[lane].slow_down(index, rate, longest_ms, farthest);
         if lasts_ms.is_none() {
             self.lanes.fall_out(lane, Fall::Gap);
         }
@@ -77,7 +77,7 @@ impl Engine {
         let is_ready = matches!(self.directive, Directive::Wait | Directive::Play);
         let is_fresh = is_ready && self.playhead.frames() == 0 && self.phase.rest().is_none();
         let rests = self.is_at_rest() && self.phase.next().is_none_or(|next| next.is_none());
-        let motion = self.lanes.lane(lane);
+        let motion = &mut self.lanes.all[lane];
         let at_park = is_at(&motion.window, known.pose(), &motion.window.park(), near);
         match motion.mode {
             // One that is out is left where it stands.

@@ -82,10 +82,10 @@ impl Replan {
         matches!(self.planned, Planned::Ready(..)) && self.at.is_none_or(|at| now > at)
     }
 
-    /// What of the film's lead the change takes back, seconds.
-    pub(super) fn skips_s(&self) -> f64 {
-        let at = self.at.filter(|_| self.goal == Goal::Cue);
-        at.map_or(0.0, |at| ShowTime::from_nanos(self.start.as_nanos() - at.as_nanos()).as_secs_f64())
+    /// What of the film's lead the change takes back.
+    pub(super) fn skips(&self) -> ShowTime {
+        let at = self.at.filter(|_| self.goal == Goal::Cue).unwrap_or(self.start);
+        ShowTime::from_nanos(self.start.as_nanos() - at.as_nanos())
     }
 
     /// The request, if the planner has not seen it yet.
@@ -103,61 +103,29 @@ impl Replan {
 /// What crosses between engine and planner, and what they share: made before the show, so that nothing is freed while that plays.
 #[derive(Debug)]
 pub(super) struct Replanner {
-    scenes: Scenes,
-    retired: Retired,
+    /// To describe the lanes in: each is with a request, with the planner, or here. A request may be followed by a stop before it is
+    /// answered, and that by what the stop leads to.
+    pub(super) scenes: Pool<Scene, 4>,
+    /// Courses that are no longer followed, until another thread frees them: in one tick that of a phase that is left, with what was
+    /// to follow, and answers that came too late.
+    pub(super) retired: Pool<Course, 8>,
     /// The number of the newest course that was asked for.
-    serial: u32,
+    pub(super) serial: u32,
     /// Answers in a row that came too late.
-    late_answers: u32,
+    pub(super) late_answers: u32,
     /// Where in the cue somebody wants the show to go on, until a course leads there.
     pub(super) sought: Option<ShowTime>,
 }
 
 impl Replanner {
     pub(super) fn new(scene: &Scene, serial: u32) -> Self {
-        Self {
-            scenes: Scenes::like(scene),
-            retired: Retired::default(),
-            serial,
-            late_answers: 0,
-            sought: None,
-        }
-    }
-
-    /// A scene to describe the lanes in; without one the planner still has all of them.
-    pub(super) fn scene(&mut self) -> Option<Box<Scene>> {
-        self.scenes.take()
-    }
-
-    pub(super) fn next_serial(&mut self) -> u32 {
-        self.serial = self.serial.wrapping_add(1);
-        self.serial
-    }
-
-    /// An answer came too late.
-    pub(super) const fn count_late(&mut self) {
-        self.late_answers += 1;
-    }
-
-    /// A scene that served.
-    pub(super) fn served(&mut self, scene: Box<Scene>) {
-        self.scenes.put(scene);
-    }
-
-    /// A course was taken up; the scene it was made for served.
-    pub(super) fn taken_up(&mut self, scene: Box<Scene>) {
-        self.late_answers = 0;
-        self.scenes.put(scene);
+        let scenes = Pool(std::array::from_fn(|_| Some(Box::new(scene.clone()))));
+        Self { scenes, retired: Pool([const { None }; 8]), serial, late_answers: 0, sought: None }
     }
 
     /// The time a planner is given: at least two ticks and 20 ms, twice as long after each answer that came too late.
     pub(super) fn lead(&self, rate: Rate) -> Duration {
         LEAD.max(2 * rate.period()) * (1 << self.late_answers.min(6))
-    }
-
-    /// A course that nobody follows any more.
-    pub(super) fn retire(&mut self, course: Box<Course>) {
-        self.retired.put(course);
     }
 
     /// A change of course that nobody waits for any more.
@@ -171,47 +139,21 @@ impl Replanner {
             }
         }
     }
-
-    /// A course that is to be freed on another thread.
-    pub(super) fn take_retired(&mut self) -> Option<Box<Course>> {
-        self.retired.0.iter_mut().find_map(Option::take)
-    }
 }
 
-/// Courses that are no longer followed, until another thread frees them: in one tick that of a phase that is left, with what was to
-/// follow, and answers that came too late.
-#[derive(Debug, Default)]
-struct Retired([Option<Box<Course>>; 8]);
-
-impl Retired {
-    fn put(&mut self, course: Box<Course>) {
-        match self.0.iter_mut().find(|place| place.is_none()) {
-            Some(place) => *place = Some(course),
-            // Freeing memory here would be the lesser evil beside keeping none; the loop empties this every tick.
-            None => drop(course),
-        }
-    }
-}
-
-/// Scenes to describe the lanes with, made before the play; each is with a request, with the planner, or here.
+/// Places for boxes that go to and fro.
 #[derive(Debug)]
-struct Scenes([Option<Box<Scene>>; SCENES]);
+pub(super) struct Pool<T, const PLACES: usize>([Option<Box<T>>; PLACES]);
 
-/// A request that is followed by a stop before it is answered, and that by what the stop leads to.
-const SCENES: usize = 4;
-
-impl Scenes {
-    fn like(scene: &Scene) -> Self {
-        Self(std::array::from_fn(|_| Some(Box::new(scene.clone()))))
-    }
-
-    fn take(&mut self) -> Option<Box<Scene>> {
-        self.0.iter_mut().find_map(Option::take)
-    }
-
-    fn put(&mut self, scene: Box<Scene>) {
+impl<T, const PLACES: usize> Pool<T, PLACES> {
+    /// Freeing memory, where there is no place, would be the lesser evil beside keeping it; there is one.
+    pub(super) fn put(&mut self, kept: Box<T>) {
         if let Some(place) = self.0.iter_mut().find(|place| place.is_none()) {
-            *place = Some(scene);
+            *place = Some(kept);
         }
+    }
+
+    pub(super) fn take(&mut self) -> Option<Box<T>> {
+        self.0.iter_mut().find_map(Option::take)
     }
 }
