@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::events::{EngineEvent, Unplanned};
 use super::lane::LaneMotion;
 use super::phase::{Following, Phase, Rest, hold_frames};
-use super::playhead::Pace;
+use super::playhead::FramePace;
 use super::replan::{Goal, Planned, Replan};
 use super::{Directive, Ending, Engine};
 use crate::plan::{Course, From, Request, Scene};
@@ -48,17 +48,17 @@ impl Engine {
         let is_wanted_elsewhere = self.is_wanted_elsewhere();
         let Self { phase, playhead, headroom, lanes, .. } = self;
         playhead.pass(time, || match phase {
-            Phase::Following(Following { next: Some(next), .. }) if next.pace != 1.0 => Pace::Kept,
+            Phase::Following(Following { next: Some(next), .. }) if next.pace != 1.0 => FramePace::Kept,
             Phase::Following(Following { next: Some(next), .. }) if next.is_near(now + SLOWING) => {
-                Pace::Within(0.0)
+                FramePace::Within(0.0)
             }
             // A join may meet a cue that leaves nothing; what the cue leaves later on says nothing of the move before.
             Phase::Following(Following { course, .. })
                 if !is_wanted_elsewhere && reached >= course.settled() =>
             {
-                Pace::Within(headroom.pace(now, lanes.level()))
+                FramePace::Within(headroom.pace(now, lanes.level()))
             }
-            _ => Pace::Within(0.0),
+            _ => FramePace::Within(0.0),
         });
     }
 

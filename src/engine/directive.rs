@@ -25,7 +25,7 @@ pub enum Directive {
 
 /// What that makes of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Turn {
+enum PhaseTurn {
     /// Nothing.
     Stay,
     /// A show that waits begins.
@@ -42,34 +42,34 @@ enum Turn {
 
 impl Directive {
     #[rustfmt::skip] // As a table.
-    const fn turns(self, phase: &Phase) -> Turn {
+    const fn turns(self, phase: &Phase) -> PhaseTurn {
         use Phase::{Braking, Closing, Done, Following, Holding as Held, Parking, Settling, Waiting};
         use Rest::{Ended, Film, Late, Paused, Stopped};
         match (self, phase) {
             // One that waits goes on waiting through a stop.
-            (Self::Stop | Self::Hold | Self::Off | Self::Wait, Waiting(_) | Done) => Turn::Stay,
+            (Self::Stop | Self::Hold | Self::Off | Self::Wait, Waiting(_) | Done) => PhaseTurn::Stay,
             (Self::Off | Self::Wait,
-                Settling(_) | Following(_) | Braking(_) | Held(_) | Parking(_) | Closing(..)) => Turn::Stay,
+                Settling(_) | Following(_) | Braking(_) | Held(_) | Parking(_) | Closing(..)) => PhaseTurn::Stay,
 
-            (Self::Play, Waiting(_)) => Turn::Begin,
+            (Self::Play, Waiting(_)) => PhaseTurn::Begin,
             (Self::Play,
-                Settling(_) | Following(_) | Braking(_) | Held(_) | Parking(_) | Closing(..) | Done) => Turn::Stay,
+                Settling(_) | Following(_) | Braking(_) | Held(_) | Parking(_) | Closing(..) | Done) => PhaseTurn::Stay,
 
-            (Self::Hold, Settling(_) | Following(_) | Braking(Ended)) => Turn::ComeDown(Paused),
-            (Self::Hold, Held(Holding { why: Late | Film | Ended, .. })) => Turn::ComeDown(Paused),
-            (Self::Hold, Held(Holding { why: Paused, .. })) => Turn::StayDown,
-            (Self::Hold, Braking(Late | Film | Paused | Stopped)) => Turn::Stay,
-            (Self::Hold, Held(Holding { why: Stopped, .. }) | Parking(_) | Closing(..)) => Turn::Stay,
+            (Self::Hold, Settling(_) | Following(_) | Braking(Ended)) => PhaseTurn::ComeDown(Paused),
+            (Self::Hold, Held(Holding { why: Late | Film | Ended, .. })) => PhaseTurn::ComeDown(Paused),
+            (Self::Hold, Held(Holding { why: Paused, .. })) => PhaseTurn::StayDown,
+            (Self::Hold, Braking(Late | Film | Paused | Stopped)) => PhaseTurn::Stay,
+            (Self::Hold, Held(Holding { why: Stopped, .. }) | Parking(_) | Closing(..)) => PhaseTurn::Stay,
 
-            (Self::Stop, Braking(Stopped) | Held(Holding { why: Stopped, .. })) => Turn::StayDown,
-            (Self::Stop, Braking(Late | Film | Ended | Paused)) => Turn::ComeDown(Stopped),
-            (Self::Stop, Held(Holding { why: Late | Film | Ended | Paused, .. })) => Turn::ComeDown(Stopped),
-            (Self::Stop, Settling(_) | Following(_) | Parking(_) | Closing(..)) => Turn::ComeDown(Stopped),
+            (Self::Stop, Braking(Stopped) | Held(Holding { why: Stopped, .. })) => PhaseTurn::StayDown,
+            (Self::Stop, Braking(Late | Film | Ended | Paused)) => PhaseTurn::ComeDown(Stopped),
+            (Self::Stop, Held(Holding { why: Late | Film | Ended | Paused, .. })) => PhaseTurn::ComeDown(Stopped),
+            (Self::Stop, Settling(_) | Following(_) | Parking(_) | Closing(..)) => PhaseTurn::ComeDown(Stopped),
 
             // Before the first frame, and after the last.
-            (Self::Park, Waiting(_) | Done) => Turn::DepartUntold,
-            (Self::Park, Settling(_) | Following(_) | Braking(_) | Held(_)) => Turn::Depart,
-            (Self::Park, Parking(_) | Closing(..)) => Turn::Stay,
+            (Self::Park, Waiting(_) | Done) => PhaseTurn::DepartUntold,
+            (Self::Park, Settling(_) | Following(_) | Braking(_) | Held(_)) => PhaseTurn::Depart,
+            (Self::Park, Parking(_) | Closing(..)) => PhaseTurn::Stay,
         }
     }
 }
@@ -83,22 +83,22 @@ impl Engine {
             return;
         }
         let turn = directive.turns(&self.phase);
-        if turn != Turn::Stay && matches!(directive, Directive::Stop | Directive::Park) {
+        if turn != PhaseTurn::Stay && matches!(directive, Directive::Stop | Directive::Park) {
             self.ending = Ending::Stopped;
         }
-        if turn != Turn::Stay && directive == Directive::Stop {
+        if turn != PhaseTurn::Stay && directive == Directive::Stop {
             self.planner.sought = None;
         }
         match turn {
-            Turn::Stay => {}
-            Turn::Begin => {
+            PhaseTurn::Stay => {}
+            PhaseTurn::Begin => {
                 let Self { show, phase, .. } = self;
                 phase.carry(|course| Phase::first(show, course));
             }
-            Turn::ComeDown(why) => self.come_down(why),
-            Turn::StayDown => self.give_up_replans(),
-            Turn::Depart => self.depart(),
-            Turn::DepartUntold => self.rest_untold(),
+            PhaseTurn::ComeDown(why) => self.come_down(why),
+            PhaseTurn::StayDown => self.give_up_replans(),
+            PhaseTurn::Depart => self.depart(),
+            PhaseTurn::DepartUntold => self.rest_untold(),
         }
     }
 

@@ -55,13 +55,13 @@ impl EngineEvent {
 
 /// What has happened and was not taken yet, in room that was made before the show. Each lane has each of its events once at the most.
 #[derive(Debug)]
-pub struct Events(Vec<EngineEvent>);
+pub struct EngineEvents(Vec<EngineEvent>);
 
-/// Events that a lane can have at once, and that concern none.
+/// EngineEvents that a lane can have at once, and that concern none.
 const OF_A_LANE: usize = 3;
 const OF_NONE: usize = 3;
 
-impl Events {
+impl EngineEvents {
     pub(super) fn of(lanes: usize) -> Self {
         Self(Vec::with_capacity(OF_A_LANE * lanes + OF_NONE))
     }

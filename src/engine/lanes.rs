@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::events::{EngineEvent, Events, Unplanned};
+use super::events::{EngineEvent, EngineEvents, Unplanned};
 use super::headroom::Headroom;
 use super::lane::{LaneMode, LaneMotion};
 use crate::belief::Fall;
@@ -32,14 +32,14 @@ pub(super) struct Lanes {
     pub(super) all: Box<[LaneMotion]>,
     /// No level goes beyond it: the cue was proved at no higher one.
     greatest_level: f64,
-    pub(super) events: Events,
+    pub(super) events: EngineEvents,
 }
 
 impl Lanes {
     /// Lanes of which nobody has told where they stand, at the levels of their windows.
     pub(super) fn unseen(windows: Vec<Window>, proved_level: f64, rate: Rate) -> Self {
         let greatest_level = windows.iter().map(Window::level).fold(proved_level, f64::max);
-        let events = Events::of(windows.len());
+        let events = EngineEvents::of(windows.len());
         let all = windows.into_iter().map(|window| LaneMotion::unseen(window, rate)).collect();
         Self { all, greatest_level, events }
     }

@@ -24,7 +24,7 @@ mod trail;
 
 pub use beat::{Beat, Step};
 pub use directive::Directive;
-pub use events::{EngineEvent, Events, Unplanned};
+pub use events::{EngineEvent, EngineEvents, Unplanned};
 pub use headroom::Headroom;
 pub use lane::LaneMotion;
 pub use lanes::LaneOrder;
@@ -73,7 +73,7 @@ pub struct Show {
 
 /// How far a play is: a level, which nobody can miss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
+pub enum PlayProgress {
     /// Nobody has let it go.
     Waiting,
     /// The lanes are on their way onto the cue, or somebody waits for them elsewhere.
@@ -161,26 +161,26 @@ impl Engine {
 
     /// How far it is.
     #[must_use]
-    pub fn progress(&self) -> Progress {
+    pub fn progress(&self) -> PlayProgress {
         match &self.phase {
-            Phase::Waiting(_) => Progress::Waiting,
+            Phase::Waiting(_) => PlayProgress::Waiting,
             Phase::Following(Following { course, .. })
                 if self.playhead.reached() >= course.settled() && self.planner.sought.is_none() =>
             {
-                Progress::OnCue
+                PlayProgress::OnCue
             }
-            Phase::Settling(_) | Phase::Following(_) => Progress::Joining,
-            Phase::Braking(why) => Progress::Resting { why: *why, told: false },
+            Phase::Settling(_) | Phase::Following(_) => PlayProgress::Joining,
+            Phase::Braking(why) => PlayProgress::Resting { why: *why, told: false },
             Phase::Holding(Holding { why, .. }) => {
-                Progress::Resting { why: *why, told: self.sends_nothing() }
+                PlayProgress::Resting { why: *why, told: self.sends_nothing() }
             }
-            Phase::Parking(_) | Phase::Closing(..) => Progress::Homeward,
-            Phase::Done => Progress::Over(self.ending),
+            Phase::Parking(_) | Phase::Closing(..) => PlayProgress::Homeward,
+            Phase::Done => PlayProgress::Over(self.ending),
         }
     }
 
     /// What happened, to be taken every tick.
-    pub fn events(&mut self) -> &mut Events {
+    pub fn events(&mut self) -> &mut EngineEvents {
         self.lanes.note_arrivals(self.phase.course(), self.playhead.reached());
         &mut self.lanes.events
     }

@@ -189,13 +189,14 @@ impl Phase {
 
     /// The course that was followed, as the phase is left.
     pub(super) fn into_course(self) -> Option<Box<Course>> {
-        match self {
-            Self::Waiting(course)
-            | Self::Settling(course)
-            | Self::Following(Following { course, .. })
-            | Self::Parking(course)
-            | Self::Closing(course, _) => Some(course),
-            Self::Braking(_) | Self::Holding(_) | Self::Done => None,
-        }
+        let (Self::Following(Following { course, .. })
+        | Self::Waiting(course)
+        | Self::Settling(course)
+        | Self::Parking(course)
+        | Self::Closing(course, _)) = self
+        else {
+            return None;
+        };
+        Some(course)
     }
 }

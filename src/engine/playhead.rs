@@ -8,7 +8,7 @@ use crate::time::{Rate, ShowTime, TRIM_MS};
 
 /// How quickly show time may run in a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Pace {
+pub(super) enum FramePace {
     /// As in the frame before.
     Kept,
     /// Faster or slower than the clock by so much at the most.
@@ -142,14 +142,14 @@ impl Playhead {
     }
 
     /// Moves on by a frame, at a pace that is asked for where it may be another than the clock's.
-    pub(super) fn pass(&mut self, time: Duration, pace: impl FnOnce() -> Pace) {
+    pub(super) fn pass(&mut self, time: Duration, pace: impl FnOnce() -> FramePace) {
         if self.at == self.due && self.slew.is_calm() {
             return self.run(time);
         }
         let owed_s = self.owed_s();
         self.at += match pace() {
-            Pace::Kept => self.slew.coast(time),
-            Pace::Within(ceiling) => self.slew.advance(time, ceiling, owed_s),
+            FramePace::Kept => self.slew.coast(time),
+            FramePace::Within(ceiling) => self.slew.advance(time, ceiling, owed_s),
         };
         self.due += time;
         self.close_in(owed_s - self.owed_s());
@@ -213,7 +213,7 @@ mod tests {
         let mut playhead = Playhead::new(Rate::from_hz(100.0), ShowTime::ZERO);
         playhead.miss(3 * FRAME);
         assert_eq!((playhead.film(), playhead.lag()), (ShowTime::from_millis(30), 3 * FRAME));
-        (0..1_000).for_each(|_| playhead.pass(FRAME, || Pace::Within(0.01)));
+        (0..1_000).for_each(|_| playhead.pass(FRAME, || FramePace::Within(0.01)));
         assert_eq!((playhead.film(), playhead.at()), (ShowTime::from_millis(10_030), playhead.film()));
         assert_eq!(playhead.lag(), Duration::ZERO);
         playhead.set(ShowTime::from_millis(2_000)); // a seek in a pause

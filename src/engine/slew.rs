@@ -79,7 +79,7 @@ fn closing_speed(owed: f64, dt: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::playhead::{Pace, Playhead};
+    use super::super::playhead::{FramePace, Playhead};
     use super::*;
     use crate::time::ShowTime;
 
@@ -131,8 +131,9 @@ mod tests {
             playhead.trim(-1);
             let (mut frame, mut steady) = (0, 0);
             while frame == 0 || !playhead.is_calm() {
-                playhead
-                    .pass(Duration::from_millis(rate.time_ms(frame).into()), || Pace::Within(MAX_SPEED_UP));
+                playhead.pass(Duration::from_millis(rate.time_ms(frame).into()), || {
+                    FramePace::Within(MAX_SPEED_UP)
+                });
                 frame += 1;
                 steady = if playhead.pace() == 1.0 { steady + 1 } else { 0 };
             }

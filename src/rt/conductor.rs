@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::film::FilmLead;
 use super::mail::{Alarm, News};
-use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, Progress, Rest};
+use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
 use crate::state::{
     Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
 };
@@ -275,21 +275,16 @@ impl Conductor {
     }
 
     /// What it means for the hall how far the engine is.
-    fn what_it_means(&self, progress: Progress) -> Option<Event> {
+    #[rustfmt::skip] // As a table.
+    fn what_it_means(&self, progress: PlayProgress) -> Option<Event> {
+        use PlayProgress::{Homeward, Joining, OnCue, Over, Resting, Waiting};
         match (self.machine.state(), progress) {
-            (State::Playing(_), Progress::Homeward | Progress::Over(_)) => Some(Event::CueEnded),
-            (
-                State::Playing(PlayMode::Joining | PlayMode::Following),
-                Progress::Resting { why: Rest::Late, .. },
-            ) => Some(Event::Late),
-            (State::Playing(PlayMode::Holding), Progress::Waiting | Progress::Joining | Progress::OnCue) => {
-                Some(Event::JoinBegun)
-            }
-            (State::Playing(PlayMode::Joining), Progress::OnCue) => Some(Event::Joined),
-            (State::Stopping, Progress::Resting { why: Rest::Stopped, told: true } | Progress::Over(_)) => {
-                Some(Event::AtRest)
-            }
-            (State::Parking, Progress::Over(_)) => Some(Event::Parked),
+            (State::Playing(_), Homeward | Over(_)) => Some(Event::CueEnded),
+            (State::Playing(PlayMode::Joining | PlayMode::Following), Resting { why: Rest::Late, .. }) => Some(Event::Late),
+            (State::Playing(PlayMode::Holding), Waiting | Joining | OnCue) => Some(Event::JoinBegun),
+            (State::Playing(PlayMode::Joining), OnCue) => Some(Event::Joined),
+            (State::Stopping, Resting { why: Rest::Stopped, told: true } | Over(_)) => Some(Event::AtRest),
+            (State::Parking, Over(_)) => Some(Event::Parked),
             _ => None,
         }
     }
@@ -308,10 +303,10 @@ impl Conductor {
     #[must_use]
     pub fn ending(&self, engine: &Engine) -> Ending {
         match engine.progress() {
-            Progress::Over(Ending::Stopped) if self.film_is_over && self.machine.fault().is_none() => {
+            PlayProgress::Over(Ending::Stopped) if self.film_is_over && self.machine.fault().is_none() => {
                 Ending::Completed
             }
-            Progress::Over(ending) if self.machine.fault().is_none() => ending,
+            PlayProgress::Over(ending) if self.machine.fault().is_none() => ending,
             _ => Ending::Fault,
         }
     }
