@@ -33,6 +33,9 @@ pub struct Reading {
     pub rests: bool,
     /// Whether one found it elsewhere, not long ago.
     pub moves: bool,
+    /// How far from where it was read it may be, strokes, if it has swung about one place for long by no more than what it was told
+    /// to vibrate; else 0.
+    pub sways: f64,
     /// Where it comes from.
     pub by: Source,
 }
@@ -41,7 +44,7 @@ impl Reading {
     /// A seat that was read at rest, of all of its axes.
     #[must_use]
     pub const fn at_rest(pose: Pose, at: MonoTime) -> Self {
-        Self { pose, slots: u16::MAX, at, rests: true, moves: false, by: Source::Registers }
+        Self { pose, slots: u16::MAX, at, rests: true, moves: false, sways: 0.0, by: Source::Registers }
     }
 }
 
@@ -54,6 +57,7 @@ pub struct LaneEvidence {
     version: AtomicU32,
     pose: [AtomicU64; MAX_AXES],
     at: AtomicU64,
+    sways: AtomicU64,
     slots: AtomicU32,
 }
 
@@ -93,6 +97,7 @@ impl LaneEvidence {
         }
         let pose = std::array::from_fn(|slot| f64::from_bits(self.pose[slot].load(Ordering::Relaxed)));
         let (at, word) = (self.at.load(Ordering::Relaxed), self.slots.load(Ordering::Relaxed));
+        let sways = f64::from_bits(self.sways.load(Ordering::Relaxed));
         // What was loaded before this is of one version if the version is still the same after it.
         fence(Ordering::Acquire);
         let by = match word >> BY {
@@ -107,6 +112,7 @@ impl LaneEvidence {
             at: MonoTime::from_nanos(at),
             rests: word & RESTS != 0,
             moves: word & MOVES != 0,
+            sways,
             by,
         };
         (self.version.load(Ordering::Relaxed) == version).then_some((version, reading))
@@ -122,6 +128,7 @@ impl LaneEvidence {
             cell.store(place.to_bits(), Ordering::Relaxed);
         }
         self.at.store(reading.at.as_nanos(), Ordering::Relaxed);
+        self.sways.store(reading.sways.to_bits(), Ordering::Relaxed);
         let by = match reading.by {
             Source::Registers => 0,
             Source::Report => 1,

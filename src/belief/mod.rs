@@ -152,6 +152,12 @@ pub struct Belief {
     spans: Spans,
     history: History,
     acked: Option<FrameNo>,
+    /// The greatest amplitude of vibration, strokes, of the frames since the last that is known to have arrived without any; and the first
+    /// of those without any after it.
+    shakes: f64,
+    still_from: Option<FrameNo>,
+    /// How far from where its spans say a seat may be that was read while it vibrated, strokes.
+    sways: f64,
     /// The version of the reading that was taken last.
     reading: u32,
     /// Until when the controller is busy with what it was sent.
@@ -185,6 +191,9 @@ impl Belief {
             spans: Spans::default(),
             history: History::at([0.0; MAX_AXES]),
             acked: None,
+            shakes: 0.0,
+            still_from: None,
+            sways: 0.0,
             reading: 0,
             busy_until: MonoTime::default(),
             refused_since: None,
@@ -220,6 +229,9 @@ impl Belief {
         {
             self.acked = Some(acked);
             self.spans.confirm(acked);
+            if self.still_from.is_some_and(|still| acked.since(still) >= 0) {
+                self.shakes = 0.0;
+            }
         }
         if !self.spans.is_empty() {
             self.settle(now);
@@ -248,7 +260,10 @@ impl Belief {
             return;
         }
         self.spans.end_at_last();
-        self.within = self.own;
+        if self.still_from.is_some() {
+            self.shakes = 0.0;
+        }
+        (self.within, self.sways) = (self.own, 0.0);
         // Since then it may have been moved.
         let over = self.busy_until.min(now);
         self.known = if self.asks { Known::Confirmed(over) } else { Known::Commanded(over) };
@@ -264,12 +279,12 @@ impl Belief {
             return self.hold_against(reading, now);
         }
         let told = reading.slots & self.own;
-        let is_a_point = self.spans.is_a_point();
-        let agrees = is_a_point
+        let agrees = self.is_a_point()
             && !reading.moves
             && told & !self.within == 0
             && !self.is_elsewhere(told, &reading.pose);
-        if !agrees && !reading.rests {
+        let sways = !reading.rests && reading.sways > 0.0 && told == self.own;
+        if !agrees && !reading.rests && !sways {
             self.within &= !told;
             self.known = Known::Contradicted(now);
             return Found::Nothing;
@@ -278,8 +293,9 @@ impl Belief {
         slots_in(told).for_each(|slot| pose[slot] = reading.pose[slot]);
         self.within = told | if agrees { self.within } else { 0 };
         self.spans = Spans::at(pose);
+        self.sways = if sways { reading.sways } else { 0.0 };
         self.known = Known::Measured(reading.at, reading.by);
-        self.gap &= self.within != self.own;
+        self.gap &= self.within != self.own || sways;
         Found::Nothing
     }
 
@@ -317,8 +333,25 @@ impl Belief {
     /// known too long ago.
     #[must_use]
     pub fn pose(&self, now: MonoTime) -> Option<KnownPose> {
-        let is_known = self.within == self.own && self.spans.is_a_point() && self.is_fresh(now);
+        let is_known = self.within == self.own && self.is_a_point() && self.is_fresh(now);
         is_known.then(|| KnownPose(*self.spans.last()))
+    }
+
+    fn is_a_point(&self) -> bool {
+        self.sways == 0.0 && self.spans.is_a_point()
+    }
+
+    /// The pose about which a seat vibrates on that was cut off; none where it is not known to be there and to do nothing else.
+    #[must_use]
+    pub fn vibrates_about(&self, now: MonoTime) -> Option<&Pose> {
+        let is_known = self.within == self.own && self.sways > 0.0 && self.is_fresh(now);
+        is_known.then(|| self.spans.last())
+    }
+
+    /// The amplitude, strokes, with which a seat may vibrate by the frames that it was sent; 0 once one without is known to have arrived.
+    #[must_use]
+    pub const fn shakes(&self) -> f64 {
+        self.shakes
     }
 
     /// Whether the seat was read since then and is known to be at rest; where no acks are asked for, whether it is known at all.
@@ -343,7 +376,7 @@ impl Belief {
     fn is_elsewhere(&self, slots: u16, pose: &Pose) -> bool {
         slots_in(slots).any(|slot| {
             let (low, high) = self.spans.reach(slot);
-            (high - pose[slot]).abs().max((low - pose[slot]).abs()) > self.near[slot]
+            (high - pose[slot]).abs().max((low - pose[slot]).abs()) > self.near[slot].max(self.sways)
         })
     }
 
@@ -375,27 +408,35 @@ impl Belief {
         if self.is_quiet(now) && !self.is_fresh(now) && self.within != 0 {
             return false;
         }
-        let farthest = self.farthest(pose, now);
-        farthest.iter().zip(&self.speed).all(|(farthest, speed)| *farthest <= speed * time)
+        let from_all = self.may_be_anywhere_between(now);
+        slots_in(self.own).all(|slot| self.distance(slot, pose, from_all) <= self.speed[slot] * time)
     }
 
     /// How far from `pose` each axis may be at the most; 0 where the seat has no such axis.
     #[must_use]
     pub fn farthest(&self, pose: &Pose, now: MonoTime) -> Pose {
-        let from_all = self.gap || self.is_quiet(now);
-        let last = self.spans.last();
+        let from_all = self.may_be_anywhere_between(now);
         let mut farthest = [0.0; MAX_AXES];
-        for slot in slots_in(self.own) {
-            let (low, high) = if self.within >> slot & 1 == 0 {
-                (0.0, 1.0)
-            } else if from_all {
-                self.spans.reach(slot)
-            } else {
-                (last[slot], last[slot])
-            };
-            farthest[slot] = (pose[slot] - low).abs().max((pose[slot] - high).abs());
-        }
+        slots_in(self.own).for_each(|slot| farthest[slot] = self.distance(slot, pose, from_all));
         farthest
+    }
+
+    /// True if a seat may be at any place that its open frames lead through, not at the last alone.
+    fn may_be_anywhere_between(&self, now: MonoTime) -> bool {
+        self.gap || self.is_quiet(now)
+    }
+
+    /// How far a slot may be from where `pose` has it, at the most.
+    #[inline]
+    fn distance(&self, slot: usize, pose: &Pose, from_all: bool) -> f64 {
+        let (low, high) = if self.within >> slot & 1 == 0 {
+            (0.0, 1.0)
+        } else if from_all {
+            self.spans.reach(slot)
+        } else {
+            (self.spans.last()[slot], self.spans.last()[slot])
+        };
+        (pose[slot] - low).abs().max((pose[slot] - high).abs()) + self.sways
     }
 
     /// Notes a frame that the kernel took.
@@ -406,7 +447,13 @@ impl Belief {
         self.tally.late += u64::from(behind > lasts.max(self.period));
         self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
         self.busy_until = self.busy_until.max(at) + lasts;
-        self.history.push(self.spans.last(), pose, shakes, (at, self.busy_until));
+        if shakes > 0.0 {
+            (self.shakes, self.still_from) = (self.shakes.max(shakes), None);
+        } else {
+            self.still_from.get_or_insert(frame);
+        }
+        // One that vibrates on does so until this frame arrives.
+        self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));
         // What was refused before it is missing as well, until it is acked.
         let since = self.refused_since.take().unwrap_or(at);
         self.spans.push(frame, asked, pose, since);
@@ -422,7 +469,7 @@ impl Belief {
 
     /// The seat may have been moved unseen: what was known of it is known no more.
     pub fn forget(&mut self) {
-        (self.known, self.within) = (Known::Nothing, 0);
+        (self.known, self.within, self.sways) = (Known::Nothing, 0, 0.0);
         self.spans = Spans::at(*self.spans.last());
     }
 
@@ -433,6 +480,7 @@ impl Belief {
 }
 
 /// The slots of a set, a bit each.
+#[inline]
 fn slots_in(set: u16) -> impl Iterator<Item = usize> {
-    (0..MAX_AXES).filter(move |slot| set >> slot & 1 == 1)
+    (0..MAX_AXES).take_while(move |slot| set >> slot != 0).filter(move |slot| set >> slot & 1 == 1)
 }

@@ -35,10 +35,12 @@ impl Reach {
         Self { low: pose, high: pose }
     }
 
+    /// Makes room for a pose as well. Poses are numbers: a comparison that asks for no more is half the work of `min` and `max`.
+    #[inline]
     pub(super) fn widen(&mut self, pose: &Pose) {
-        for (slot, place) in pose.iter().enumerate() {
-            self.low[slot] = self.low[slot].min(*place);
-            self.high[slot] = self.high[slot].max(*place);
+        for ((low, high), place) in self.low.iter_mut().zip(&mut self.high).zip(pose) {
+            *low = if *place < *low { *place } else { *low };
+            *high = if *place > *high { *place } else { *high };
         }
     }
 }
@@ -78,12 +80,14 @@ impl Spans {
     }
 
     /// A frame was sent at `at`, or was to be sent since then.
+    #[inline]
     pub(super) fn push(&mut self, frame: FrameNo, asked: bool, pose: &Pose, at: MonoTime) {
         let is_full = self.count == SPANS;
         if self.count == 0 || (!is_full && at.since(self.spans[self.count - 1].at) >= SPAN) {
+            let span = &mut self.spans[self.count];
+            (span.first, span.at, span.asked) = (frame, at, None);
             // What is on its way to the first frame's pose is still between that and the one before.
-            let reach = Reach::at(self.last);
-            self.spans[self.count] = Span { first: frame, at, asked: None, reach };
+            (span.reach.low, span.reach.high) = (self.last, self.last);
             self.count += 1;
         }
         let span = &mut self.spans[self.count - 1];

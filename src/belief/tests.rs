@@ -329,3 +329,41 @@ fn what_one_answer_tells_in_passing_confirms_nothing_of_a_seat_at_rest() {
     assert_eq!(passes(&mut bench, 0.2, 900, 900), Found::Nothing);
     assert_eq!(bench.belief.known(), Known::Measured(ms(0), Source::Registers));
 }
+
+#[test]
+fn a_seat_that_vibrates_on_may_be_anywhere_in_its_swing_and_no_motion_begins_before_a_frame_has_ended_that() {
+    let mut bench = Bench::found(0.2);
+    let send = |bench: &mut Bench, frame: u32, shakes: f64, lasts_ms: u32, when: u64| {
+        let pose = at(0.2);
+        bench.belief.taken(&Taken {
+            frame: FrameNo(frame),
+            asked: true,
+            pose: &pose,
+            lasts_ms,
+            shakes,
+            at: ms(when),
+        });
+    };
+    (0..10).for_each(|tick| send(&mut bench, tick + 1, 0.02, 10, 10 * u64::from(tick)));
+    assert_eq!(bench.look(100), Found::Gap);
+    assert!((bench.belief.shakes() - 0.02).abs() < 1e-12);
+    let sways = Reading { rests: false, moves: true, sways: 0.041, ..Reading::at_rest(at(0.21), ms(900)) };
+    bench.evidence.on_reading(&sways);
+    bench.look(1_000);
+    assert_eq!(
+        (bench.belief.pose(ms(1_000)), bench.belief.vibrates_about(ms(1_000))),
+        (None, Some(&at(0.21)))
+    );
+    // The greatest speed is 1.6 strokes a second: 0.041 takes it 25.6 ms.
+    assert!(!bench.allows(0.21, 25, 1_000) && bench.allows(0.21, 26, 1_000));
+    send(&mut bench, 11, 0.0, 100, 1_000);
+    bench.ack(11);
+    bench.look(1_020);
+    assert!(bench.belief.shakes() == 0.0, "it was told to stop");
+    assert_eq!(passes(&mut bench, 0.25, 1_010, 1_030), Found::Nothing, "until then it swung");
+    bench.look(1_100);
+    assert_eq!(
+        (bench.belief.vibrates_about(ms(1_100)), bench.belief.known()),
+        (None, Known::Confirmed(ms(1_100)))
+    );
+}

@@ -111,6 +111,8 @@ pub(crate) struct Seen {
     pub(crate) sighting: Sighting,
     /// Its seat was found in the same place more than once.
     pub(crate) rests: bool,
+    /// Its seat vibrates about one place, and does nothing else.
+    pub(crate) sways: bool,
     /// It stands at park, to a pulse.
     pub(crate) at_park: bool,
     /// Frames would lead axes that nobody here reads.
@@ -153,6 +155,11 @@ impl Peer {
     /// A frame went to it.
     pub(crate) fn on_sent(&mut self, at: MonoTime) {
         self.mbox().position.on_sent(at);
+    }
+
+    /// No frame goes to it any more, and its seat may vibrate on by so much, strokes.
+    pub(crate) fn on_cut_off(&mut self, shakes: f64) {
+        self.mbox().position.on_cut_off(shakes);
     }
 
     /// It is home, as it was asked to be.

@@ -176,6 +176,12 @@ impl LaneMotion {
         }
     }
 
+    /// Slow frames lead it to that pose, about which it vibrates on, and end that. Where it was led before says nothing any more.
+    pub(super) fn still(&mut self, pose: &Pose) {
+        self.trail.rest(*pose);
+        (self.mode, self.leaving, self.ahead) = (LaneMode::Blind(0), None, 0);
+    }
+
     /// Nobody knows any more where its seat is. One that was to leave, or of which nobody knew which frames reach it, falls out: says
     /// whether it does.
     pub(super) const fn lose_sight(&mut self) -> bool {

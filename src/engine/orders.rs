@@ -60,6 +60,16 @@ impl Engine {
         }
     }
 
+    /// The seat of that lane, which was cut off, vibrates on about that pose: slow frames lead it there, without vibration. It is looked at
+    /// then.
+    pub fn still(&mut self, lane: usize, pose: &Pose) {
+        if self.sends_nothing() {
+            return self.lanes.fall_out(lane, Fall::Gap);
+        }
+        self.lanes.all[lane].still(pose);
+        self.stamps.break_off();
+    }
+
     /// Sets the pose of a lane that is blind one step further towards its rest, `farthest` being how far each slot may be from
     /// its present one. Says how long that takes, `longest_ms` at the most; none where nothing goes to the lane any more.
     pub fn slow_down(&mut self, lane: usize, longest_ms: u32, farthest: &Pose) -> Option<u32> {

@@ -13,19 +13,38 @@ use crate::motion::{MAX_AXES, Pose, Spacing};
 /// Shares of the acceleration and of the jerk up to which frames are calm, and with which an axis is thought to brake.
 pub(super) const LEVEL: (f64, f64) = (0.9, 0.8);
 
-/// Limits of all axes, each in a row of its own; none for axes that a lane does not have.
-#[derive(Debug, Clone)]
+/// Axes that are judged together: what one instruction of the processor takes.
+const WIDTH: usize = 2;
+/// Groups of so many that a lane has at the most.
+const GROUPS: usize = MAX_AXES / WIDTH;
+
+/// A number for each axis of a group.
+type Row = [f64; WIDTH];
+
+/// Limits of a group of axes, each in a row of its own; none for axes that a lane does not have.
+#[derive(Debug, Clone, Copy)]
 struct Rows {
-    velocity: Pose,
-    step: Pose,
-    acceleration: Pose,
-    jerk: Pose,
+    velocity: Row,
+    step: Row,
+    acceleration: Row,
+    jerk: Row,
     /// What sums of acceleration and of jerk beyond the level may come to.
-    rest: [Pose; 2],
+    rest: [Row; 2],
     /// For the way to rest: half of 1 / jerk, half of 1 / acceleration, half of acceleration / jerk, at the level.
-    half_per_jerk: Pose,
-    half_per_acceleration: Pose,
-    half_rise: Pose,
+    half_per_jerk: Row,
+    half_per_acceleration: Row,
+    half_rise: Row,
+}
+
+/// A group of axes: what it may do, and what is known of it from frame to frame. What one frame needs of it lies together.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    rows: Rows,
+    position: Row,
+    velocity: Row,
+    acceleration: Row,
+    /// Sums beyond the level in the present stretch of frames and in the one before: acceleration, jerk.
+    sums: [[Row; 2]; 2],
 }
 
 /// What one more frame makes of an axis, frame to frame.
@@ -53,12 +72,9 @@ struct Spans {
 /// What is known from frame to frame of all axes of a lane.
 #[derive(Debug, Clone)]
 pub(super) struct FastPath {
-    rows: Rows,
-    position: Pose,
-    velocity: Pose,
-    acceleration: Pose,
-    /// Sums beyond the level in the present stretch of frames and in the one before: acceleration, jerk.
-    sums: [[Pose; 2]; 2],
+    groups: [Group; GROUPS],
+    /// How many of them the lane has.
+    used: usize,
     /// Frames of a stretch, no less than the measure looks back on; and those left of the present one.
     stretch: usize,
     left: usize,
@@ -75,38 +91,17 @@ impl FastPath {
         pose: Pose,
         usual: f64,
     ) -> Self {
-        let (none, any) = ([0.0; MAX_AXES], [f64::INFINITY; MAX_AXES]);
-        let mut rows = Rows {
-            velocity: any,
-            step: any,
-            acceleration: any,
-            jerk: any,
-            rest: [any; 2],
-            half_per_jerk: none,
-            half_per_acceleration: none,
-            half_rise: none,
-        };
+        let mut groups = [Group::WITHOUT_AXES; GROUPS];
+        let mut axes = 0;
         for (axis, limits) in limits.enumerate() {
-            let (acceleration, jerk) = (LEVEL.0 * limits.acceleration, LEVEL.1 * limits.jerk);
-            rows.velocity[axis] = limits.velocity;
-            rows.step[axis] = limits.step;
-            rows.acceleration[axis] = acceleration;
-            rows.jerk[axis] = jerk;
-            // No frame weighs more than 2/n in a difference, Times of 1 and 2 ms in turns included (docs/limiter.md, section 2).
-            rows.rest[0][axis] = (limits.acceleration - acceleration) * spacing.n as f64 / 2.0;
-            rows.rest[1][axis] = (limits.jerk - jerk) * spacing.n as f64 / 2.0;
-            rows.half_per_jerk[axis] = 0.5 / jerk;
-            rows.half_per_acceleration[axis] = 0.5 / acceleration;
-            rows.half_rise[axis] = 0.5 * acceleration / jerk;
+            groups[axis / WIDTH].rows.limit(axis % WIDTH, limits, spacing.n as f64);
+            axes = axis + 1;
         }
         // The present stretch and the one before are summed, so at least one whole one: more than a difference spans.
         let stretch = 3 * spacing.m + 1;
         let mut calm = Self {
-            rows,
-            position: pose,
-            velocity: none,
-            acceleration: none,
-            sums: [[none; 2]; 2],
+            groups,
+            used: axes.div_ceil(WIDTH),
             stretch,
             left: stretch,
             times: [usual; 2],
@@ -118,10 +113,9 @@ impl FastPath {
 
     /// All stand in `pose`, and have for long.
     pub(super) fn rest(&mut self, pose: Pose, usual: f64) {
-        self.position = pose;
-        self.velocity = [0.0; MAX_AXES];
-        self.acceleration = [0.0; MAX_AXES];
-        self.sums = [[[0.0; MAX_AXES]; 2]; 2];
+        for (group, position) in self.groups.iter_mut().zip(in_groups(&pose)) {
+            *group = Group { rows: group.rows, position: *position, ..Group::WITHOUT_AXES };
+        }
         self.left = self.stretch;
         self.times = [usual; 2];
         self.look_at_times(usual);
@@ -151,13 +145,10 @@ impl FastPath {
     /// Takes `pose` if it is calm on all axes; says whether it was taken.
     #[inline]
     pub(super) fn take_calm(&mut self, pose: &Pose) -> bool {
-        let mut seen = Seen::default();
+        let mut seen = [Seen::NOTHING; GROUPS];
         let mut calm = true;
-        // All rows are as long: the loop is one that a compiler turns into vectors.
-        for (axis, &position) in pose.iter().enumerate() {
-            let glance = self.glance(axis, position);
-            seen.keep(axis, &glance);
-            calm &= glance.calm;
+        for ((seen, group), position) in seen.iter_mut().zip(&self.groups[..self.used]).zip(in_groups(pose)) {
+            calm &= group.see(position, &self.spans, seen);
         }
         if calm {
             self.keep(pose, &seen);
@@ -167,40 +158,116 @@ impl FastPath {
 
     /// True if an axis is calm at that position.
     pub(super) fn is_calm(&self, axis: usize, position: f64) -> bool {
-        self.glance(axis, position).calm
+        self.groups[axis / WIDTH].glance(axis % WIDTH, position, &self.spans).calm
     }
 
     /// Takes what is sent, calm or not.
     pub(super) fn take(&mut self, pose: &Pose) {
-        let mut seen = Seen::default();
-        for (axis, &position) in pose.iter().enumerate() {
-            seen.keep(axis, &self.glance(axis, position));
+        let mut seen = [Seen::NOTHING; GROUPS];
+        for ((seen, group), position) in seen.iter_mut().zip(&self.groups[..self.used]).zip(in_groups(pose)) {
+            group.see(position, &self.spans, seen);
         }
         self.keep(pose, &seen);
     }
 
     #[inline]
-    fn keep(&mut self, pose: &Pose, seen: &Seen) {
-        self.position = *pose;
-        self.velocity = seen.velocity;
-        self.acceleration = seen.acceleration;
-        for (sum, beyond) in self.sums[0].iter_mut().zip(&seen.beyond) {
-            for (sum, beyond) in sum.iter_mut().zip(beyond) {
-                *sum += beyond;
-            }
-        }
+    fn keep(&mut self, pose: &Pose, seen: &[Seen; GROUPS]) {
         self.left -= 1;
-        if self.left == 0 {
+        let ends = self.left == 0;
+        if ends {
             self.left = self.stretch;
-            self.sums = [[[0.0; MAX_AXES]; 2], self.sums[0]];
+        }
+        for ((group, seen), position) in self.groups[..self.used].iter_mut().zip(seen).zip(in_groups(pose)) {
+            group.position = *position;
+            group.keep(seen, ends);
         }
         self.times = [self.spans.frame, self.times[0]];
+    }
+}
+
+fn in_groups(pose: &Pose) -> &[Row] {
+    pose.as_chunks().0
+}
+
+impl Rows {
+    /// Nothing is asked of an axis that there is not.
+    const ANY: Self = {
+        let (none, any) = ([0.0; WIDTH], [f64::INFINITY; WIDTH]);
+        Self {
+            velocity: any,
+            step: any,
+            acceleration: any,
+            jerk: any,
+            rest: [any; 2],
+            half_per_jerk: none,
+            half_per_acceleration: none,
+            half_rise: none,
+        }
+    };
+
+    fn limit(&mut self, axis: usize, limits: &AxisLimits, apart: f64) {
+        let (acceleration, jerk) = (LEVEL.0 * limits.acceleration, LEVEL.1 * limits.jerk);
+        self.velocity[axis] = limits.velocity;
+        self.step[axis] = limits.step;
+        self.acceleration[axis] = acceleration;
+        self.jerk[axis] = jerk;
+        // No frame weighs more than 2/n in a difference, Times of 1 and 2 ms in turns included (docs/limiter.md, section 2).
+        self.rest[0][axis] = (limits.acceleration - acceleration) * apart / 2.0;
+        self.rest[1][axis] = (limits.jerk - jerk) * apart / 2.0;
+        self.half_per_jerk[axis] = 0.5 / jerk;
+        self.half_per_acceleration[axis] = 0.5 / acceleration;
+        self.half_rise[axis] = 0.5 * acceleration / jerk;
+    }
+
+    /// At least the way to rest from the speed that is left when an acceleration is gone.
+    #[inline(always)]
+    fn way(&self, axis: usize, speed: f64, acceleration: f64) -> f64 {
+        // Let go at full speed, then stop: exact with a hold, more than the way without one (docs/limiter.md, section 3).
+        speed
+            * (2.0 * acceleration * self.half_per_jerk[axis]
+                + speed * self.half_per_acceleration[axis]
+                + self.half_rise[axis])
+    }
+}
+
+impl Group {
+    const WITHOUT_AXES: Self = {
+        let none = [0.0; WIDTH];
+        Self { rows: Rows::ANY, position: none, velocity: none, acceleration: none, sums: [[none; 2]; 2] }
+    };
+
+    /// What one more frame makes of its axes; says whether they are calm.
+    #[inline(always)]
+    fn see(&self, position: &Row, spans: &Spans, seen: &mut Seen) -> bool {
+        let mut calm = true;
+        for (axis, &position) in position.iter().enumerate() {
+            let glance = self.glance(axis, position, spans);
+            seen.velocity[axis] = glance.velocity;
+            seen.acceleration[axis] = glance.acceleration;
+            seen.beyond[0][axis] = glance.beyond[0];
+            seen.beyond[1][axis] = glance.beyond[1];
+            calm &= glance.calm;
+        }
+        calm
+    }
+
+    /// Takes what was seen; a stretch ends with it, or not.
+    #[inline(always)]
+    fn keep(&mut self, seen: &Seen, ends: bool) {
+        self.velocity = seen.velocity;
+        self.acceleration = seen.acceleration;
+        for (sum, beyond) in self.sums[0].iter_mut().flatten().zip(seen.beyond.iter().flatten()) {
+            *sum += beyond;
+        }
+        if ends {
+            self.sums = [[[0.0; WIDTH]; 2], self.sums[0]];
+        }
     }
 
     #[inline(always)]
     #[expect(clippy::manual_range_contains, reason = "without a branch the loops around it become vectors")]
-    fn glance(&self, axis: usize, position: f64) -> Glance {
-        let (rows, spans) = (&self.rows, &self.spans);
+    fn glance(&self, axis: usize, position: f64, spans: &Spans) -> Glance {
+        let rows = &self.rows;
         let velocity = (position - self.position[axis]) * spans.per_frame;
         let change = velocity - self.velocity[axis];
         let acceleration = change * spans.double_per_two;
@@ -225,39 +292,23 @@ impl FastPath {
             & (up.max(down) <= rows.velocity[axis])
             & (position >= 0.0)
             & (position <= 1.0)
-            & (position + self.way(axis, up, rising) <= 1.0 + 1e-9)
-            & (position - self.way(axis, down, falling) >= -1e-9);
+            & (position + rows.way(axis, up, rising) <= 1.0 + 1e-9)
+            & (position - rows.way(axis, down, falling) >= -1e-9);
         Glance { velocity, acceleration, beyond, calm }
-    }
-
-    /// At least the way to rest from the speed that is left when an acceleration is gone.
-    #[inline(always)]
-    fn way(&self, axis: usize, speed: f64, acceleration: f64) -> f64 {
-        let rows = &self.rows;
-        // Let go at full speed, then stop: exact with a hold, more than the way without one (docs/limiter.md, section 3).
-        speed
-            * (2.0 * acceleration * rows.half_per_jerk[axis]
-                + speed * rows.half_per_acceleration[axis]
-                + rows.half_rise[axis])
     }
 }
 
-/// What was seen of all axes.
-#[derive(Default)]
+/// What was seen of a group of axes.
+#[derive(Clone, Copy)]
 struct Seen {
-    velocity: Pose,
-    acceleration: Pose,
-    beyond: [Pose; 2],
+    velocity: Row,
+    acceleration: Row,
+    beyond: [Row; 2],
 }
 
 impl Seen {
-    #[inline(always)]
-    fn keep(&mut self, axis: usize, glance: &Glance) {
-        self.velocity[axis] = glance.velocity;
-        self.acceleration[axis] = glance.acceleration;
-        self.beyond[0][axis] = glance.beyond[0];
-        self.beyond[1][axis] = glance.beyond[1];
-    }
+    const NOTHING: Self =
+        Self { velocity: [0.0; WIDTH], acceleration: [0.0; WIDTH], beyond: [[0.0; WIDTH]; 2] };
 }
 
 #[cfg(test)]

@@ -98,10 +98,15 @@ impl Slot {
 
     /// Where the motor is sent for `fraction` of the stroke, held inside it, or where the slot is held: nearest pulse,
     /// ties away from zero.
+    #[inline]
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32, checked with the seat type")]
     pub fn pulses(&self, fraction: f64) -> Pulses {
-        Pulses((fraction.clamp(self.reach.0, self.reach.1) * self.stroke_pulses).round() as i32)
+        let exact = fraction.clamp(self.reach.0, self.reach.1) * self.stroke_pulses;
+        // What `round` says, without a call into the mathematical library for each slot of each frame.
+        let whole = exact as i32;
+        let left = exact - f64::from(whole);
+        Pulses(whole.saturating_add(i32::from(left >= 0.5) - i32::from(left <= -0.5)))
     }
 }
 

@@ -26,7 +26,7 @@ const COMMANDS: usize = 64;
 const NEWS: usize = 256;
 
 /// What the tick thread says about one frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sent {
     /// It is about to be sent.
     Posted {
@@ -57,6 +57,8 @@ pub enum Sent {
         lane: u16,
         /// Why.
         why: Fall,
+        /// The amplitude with which the seat may vibrate on, strokes.
+        shakes: f64,
     },
     /// A seat was found, but not all of its axes tell where they are: it has to be homed.
     Unread {

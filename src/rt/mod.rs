@@ -237,13 +237,14 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         if let Some(request) = self.engine.take_request() {
             self.mail.task(Task::Plan(request));
         }
-        let mail = &mut self.mail;
-        self.engine.events().take(|event| {
+        let Self { engine, mail, places, .. } = self;
+        engine.events().take(|event| {
             match event {
                 EngineEvent::Unplanned(what) if mail.has_room_for_news() => mail.tell(News::Unplanned(what)),
                 EngineEvent::Joined(lane) => mail.post(Sent::Joined { lane: places::number(lane) }),
                 EngineEvent::FellOut(lane, why) => {
-                    mail.post(Sent::FellOut { lane: places::number(lane), why });
+                    let shakes = places.belief(lane).shakes();
+                    mail.post(Sent::FellOut { lane: places::number(lane), why, shakes });
                 }
                 // What is the conductor's waits for that.
                 EngineEvent::Unplanned(_) | EngineEvent::NoMove | EngineEvent::LimiterFault => return false,

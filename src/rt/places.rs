@@ -2,6 +2,7 @@
 //! which nobody knows which frames arrive go blind, and each frame is held against what is known before it leaves. Tick
 //! thread; allocates nothing.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
@@ -171,6 +172,7 @@ impl Places {
         let belief = &self.lanes[lane].belief;
         match belief.pose(now) {
             Some(known) => engine.found(lane, &known, belief.near()),
+            None if let Some(pose) = belief.vibrates_about(now) => engine.still(lane, pose),
             None if belief.is_measured_in_part() => {
                 engine.order(lane, LaneOrder::Cut);
                 mail.post(Sent::Unread { lane: number(lane) });
@@ -188,8 +190,18 @@ impl Places {
     /// the seat may be, the lane is held: nothing is sent to it, and it is looked at. One that is blind gets a frame of its own.
     #[inline]
     #[must_use]
-    pub fn admit(&mut self, lane: usize, engine: &mut Engine, beat: &Beat, at: MonoTime) -> Option<Beat> {
-        let beat = if engine.lane(lane).is_blind() { self.slow_down(lane, engine, at)? } else { *beat };
+    pub fn admit<'b>(
+        &mut self,
+        lane: usize,
+        engine: &mut Engine,
+        beat: &'b Beat,
+        at: MonoTime,
+    ) -> Option<Cow<'b, Beat>> {
+        let beat = if engine.lane(lane).is_blind() {
+            Cow::Owned(self.slow_down(lane, engine, at)?)
+        } else {
+            Cow::Borrowed(beat)
+        };
         let belief = &mut self.lanes[lane].belief;
         if belief.allows(engine.lane(lane).pose(), beat.lasts_ms, at) {
             return Some(beat);

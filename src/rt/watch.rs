@@ -149,7 +149,10 @@ impl Watch {
             Sent::Joined { lane } => {
                 self.on_joined(self.health.groups().group_of(usize::from(lane)));
             }
-            Sent::FellOut { lane, why } => self.health.on_fell_out(usize::from(lane), why),
+            Sent::FellOut { lane, why, shakes } => {
+                self.health.on_fell_out(usize::from(lane), why);
+                self.peers[usize::from(lane)].on_cut_off(shakes);
+            }
             Sent::Unread { lane } => self.health.on_unread(usize::from(lane)),
         }
     }

@@ -16,16 +16,19 @@ pub(super) fn i32_at(bytes: &[u8], at: usize) -> i32 {
 }
 
 /// Writes a u16 at `at`.
+#[inline]
 pub(super) fn put_u16(bytes: &mut [u8], at: usize, value: u16) {
     bytes[at..at + 2].copy_from_slice(&value.to_be_bytes());
 }
 
 /// Writes a u32 at `at`.
+#[inline]
 pub(super) fn put_u32(bytes: &mut [u8], at: usize, value: u32) {
     bytes[at..at + 4].copy_from_slice(&value.to_be_bytes());
 }
 
 /// Writes an i32 at `at`.
+#[inline]
 pub(super) fn put_i32(bytes: &mut [u8], at: usize, value: i32) {
     bytes[at..at + 4].copy_from_slice(&value.to_be_bytes());
 }

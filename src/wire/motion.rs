@@ -372,8 +372,9 @@ impl Body<'_> {
         put_u32(buf, field::FRAME, self.frame.0);
         put_u32(buf, field::TIME, self.time_ms);
         let axes = self.positions.len().min(MAX_AXES);
-        for (axis, position) in self.positions.iter().take(axes).enumerate() {
-            put_i32(buf, field::POSITIONS + 4 * axis, position.0);
+        let fields = buf[field::POSITIONS..].chunks_exact_mut(4);
+        for (bytes, position) in fields.zip(&self.positions[..axes]) {
+            put_i32(bytes, 0, position.0);
         }
         let port = field::POSITIONS + 4 * axes;
         let tail = port + port_len(vibrating);

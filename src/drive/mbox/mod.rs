@@ -191,6 +191,7 @@ impl MboxPeer {
         Some(Seen {
             sighting,
             rests: reading.rests,
+            sways: reading.sways > 0.0,
             at_park: self.is_parked(&reading.pose),
             leads_more_axes: self.leads_more_axes(sighting.identity.axes),
         })

@@ -25,18 +25,45 @@ const APART: Duration = Duration::from_millis(1_200);
 /// How far outside its stroke an axis may be told and be at the end of it: rounding, and what a drive at rest swings by.
 const OUTSIDE: f64 = 0.002;
 
+/// For how long an axis has to be seen about one place to vibrate there and do nothing else.
+const SWAY: Duration = Duration::from_millis(500);
+
 /// What one axis told.
 #[derive(Debug, Clone, Copy)]
 struct Told {
     fraction: f64,
     /// When it was read at the earliest.
     at: MonoTime,
-    /// In which place it has been, and when it was read there first, at the latest.
-    since: (f64, MonoTime),
+    /// Where it rests, if it does, and about where it vibrates.
+    rest: Stay,
+    sway: Stay,
     /// Whether it was elsewhere before.
     moved: bool,
-    /// How many answers have found it there.
+}
+
+/// A place in which an axis has been, since when, at the latest, and how many answers have found it there.
+#[derive(Debug, Clone, Copy)]
+struct Stay {
+    place: f64,
+    since: MonoTime,
     times: u32,
+}
+
+impl Stay {
+    const fn begin(place: f64, since: MonoTime) -> Self {
+        Self { place, since, times: 1 }
+    }
+
+    /// The same with one more answer, if that is no farther away than `within`.
+    fn go_on(self, fraction: f64, within: f64) -> Option<Self> {
+        let stays = (self.place - fraction).abs() <= within;
+        stays.then_some(Self { times: self.times.saturating_add(1), ..self })
+    }
+
+    /// True if it was seen often enough, and for as long, up to `at`.
+    fn has_lasted(&self, at: MonoTime, long: Duration) -> bool {
+        self.times >= TIMES && at.since(self.since) >= long
+    }
 }
 
 /// The axes of one controller.
@@ -64,6 +91,8 @@ pub(in crate::drive) struct Positions {
     sent: MonoTime,
     /// Until when answers may be repeated.
     repeats_until: MonoTime,
+    /// The amplitude, strokes, with which it may vibrate though no frame goes to it.
+    shakes: f64,
 }
 
 impl Positions {
@@ -77,6 +106,7 @@ impl Positions {
             answered: MonoTime::default(),
             sent: MonoTime::default(),
             repeats_until: MonoTime::default(),
+            shakes: 0.0,
             outside: None,
             ordered: false,
             ambiguous: 0,
@@ -161,14 +191,25 @@ impl Positions {
             }
             let fraction = fraction.clamp(0.0, 1.0);
             self.home &= fraction <= STILL;
-            let stays = |told: Told| made.since(told.at) <= APART && (told.since.0 - fraction).abs() <= STILL;
             let before = self.told[axis];
-            let (since, moved, times) = match before {
-                Some(told) if stays(told) => (told.since, told.moved, told.times.saturating_add(1)),
-                _ => ((fraction, at), before.is_some(), 1),
-            };
-            self.told[axis] = Some(Told { fraction, at: made, since, moved, times });
+            let recent = before.filter(|told| made.since(told.at) <= APART);
+            let rest = recent.and_then(|told| told.rest.go_on(fraction, STILL));
+            let sway = recent.and_then(|told| told.sway.go_on(fraction, self.sways()));
+            let moved = if rest.is_some() { before.is_some_and(|told| told.moved) } else { before.is_some() };
+            let begin = Stay::begin(fraction, at);
+            let (rest, sway) = (rest.unwrap_or(begin), sway.unwrap_or(begin));
+            self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
         }
+    }
+
+    /// How far apart two answers of an axis may be that vibrates on, strokes.
+    fn sways(&self) -> f64 {
+        2.0 * self.shakes + STILL
+    }
+
+    /// No frame goes to it any more, and it may vibrate on by so much.
+    pub(in crate::drive) const fn on_cut_off(&mut self, shakes: f64) {
+        self.shakes = shakes;
     }
 
     /// A position that only its own order puts inside the stroke settles the order for the whole controller; so does a seat that is
@@ -222,7 +263,8 @@ impl Positions {
     /// The seat as it was told last; none while an axis that tells its position has not.
     pub(super) fn reading(&self, now: MonoTime) -> Option<Reading> {
         let (pose, by) = ([0.0; MAX_AXES], self.by);
-        let mut reading = Reading { pose, slots: 0, at: now, rests: true, moves: false, by };
+        let mut reading = Reading { pose, slots: 0, at: now, rests: true, moves: false, sways: 0.0, by };
+        let mut sways = self.shakes > 0.0;
         let is_beyond = self.outside.is_some_and(|(axis, _)| axis >= self.seat.axes);
         if self.is_ambiguous() || is_beyond {
             return None;
@@ -234,7 +276,8 @@ impl Positions {
                 Some(told) => {
                     reading.pose[slot] = told.fraction;
                     reading.at = reading.at.min(told.at);
-                    let rests = told.times >= TIMES && told.at.since(told.since.1) >= rest;
+                    let rests = told.rest.has_lasted(told.at, rest);
+                    sways &= told.sway.has_lasted(told.at, rest.max(SWAY));
                     reading.rests &= rests;
                     reading.moves |= told.moved && !rests;
                 }
@@ -245,6 +288,7 @@ impl Positions {
             }
             reading.slots |= 1 << slot;
         }
+        reading.sways = if sways && !reading.rests { self.sways() } else { 0.0 };
         Some(reading)
     }
 }

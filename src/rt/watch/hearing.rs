@@ -68,11 +68,12 @@ impl Watch {
     }
 
     fn on_seen(&mut self, controller: usize, seen: Seen, at: MonoTime) {
-        let Seen { sighting, rests, leads_more_axes, .. } = seen;
+        let Seen { sighting, rests, sways, leads_more_axes, .. } = seen;
         if leads_more_axes {
             self.health.on_more_axes(controller, sighting.identity.axes);
         }
-        if rests || !self.stands(controller).is_looked_at() {
+        // A vibration ends with the next frame, and none goes to a seat while the hall sends none.
+        if rests || (sways && self.live.is_moving()) || !self.stands(controller).is_looked_at() {
             self.health.on_sighting(controller, &sighting, at);
             if let Some(standby) = &mut self.standby {
                 standby.on_seen(controller, seen);

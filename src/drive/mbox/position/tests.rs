@@ -42,6 +42,26 @@ fn a_seat_rests_where_three_answers_over_a_tenth_of_a_second_see_it() {
 }
 
 #[test]
+fn a_seat_that_was_cut_off_sways_if_it_swings_about_one_place_for_half_a_second_by_no_more_than_it_was_told_to()
+ {
+    let swings = |shakes: f64, places: [i32; 5]| {
+        let mut positions = seat(1);
+        positions.on_cut_off(shakes);
+        for (at, pulses) in (0..).step_by(150).zip(places) {
+            look(&mut positions, 0, &[Pulses(pulses)], at);
+        }
+        let reading = positions.reading(ms(600)).unwrap();
+        (reading.rests, reading.sways)
+    };
+    let (swinging, standing) = ([30_000, 35_500, 24_500, 31_000, 27_000], [30_000; 5]);
+    assert_eq!(swings(0.01, swinging), (false, 2.0 * 0.01 + STILL));
+    assert_eq!(swings(0.008, swinging), (false, 0.0), "it swings farther than that");
+    assert_eq!(swings(0.0, swinging), (false, 0.0), "no frame told it to");
+    assert_eq!(swings(0.01, [30_000, 32_000, 34_000, 36_500, 39_000]), (false, 0.0), "somebody jogs it");
+    assert_eq!(swings(0.01, standing), (true, 0.0), "it rests");
+}
+
+#[test]
 fn a_seat_of_six_axes_is_read_once_both_halves_are_and_is_as_old_as_the_older() {
     let mut positions = seat(6);
     look(&mut positions, 3, &[Pulses(4), Pulses(5), Pulses(6)], 10);
