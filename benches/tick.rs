@@ -117,15 +117,15 @@ fn round(links: &[Link]) -> Round {
     let mut places = Places::new(&lanes, rate);
     let (mut round, mut buf) = (Round::default(), [0; MAX_LEN]);
     for tick in 0..TICKS {
-        let joining = engine.playhead() < settled;
+        let joining = engine.playhead().at() < settled;
         let at = MonoTime::default() + rate.offset(tick);
         let tick_us = timed(|| {
             places.look(&mut engine, &mail, at, true);
-            let Step::Send(beat) = engine.tick(0) else { unreachable!("the ride is longer") };
+            let Step::Send(beat) = engine.tick(0, None) else { unreachable!("the ride is longer") };
             for (index, lane) in lanes.iter_mut().enumerate() {
                 let beat = places.admit(index, &mut engine, &beat, at).expect("every lane takes part");
-                let pose = engine.pose(index);
-                let (stamped, bytes) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
+                let pose = engine.lane(index).pose();
+                let (stamped, bytes) = lane.encode(&beat, pose, engine.lane(index).mix(), &mut buf);
                 black_box(bytes);
                 let taken = Taken {
                     frame: stamped.frame,

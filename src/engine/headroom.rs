@@ -301,15 +301,17 @@ mod tests {
             let (mut slew, mut measure, mut hint) = (Slew::new(rate), Measure::new(Spacing::at_rate(hz)), Hint::default());
             let (mut playhead, mut sent, mut frame) = (ShowTime::ZERO, ShowTime::ZERO, 0);
             let mut owed = owed.into_iter();
-            let mut next_s = 0.0;
+            let (mut next_s, mut owed_s) = (0.0, 0.0);
             while playhead < ShowTime::from_millis(7_700) {
                 if sent.as_secs_f64() >= next_s && let Some((wait, seconds)) = owed.next() {
                     next_s += wait;
-                    slew.owe(seconds);
+                    owed_s += seconds;
                 }
                 let time = Duration::from_millis(rate.time_ms(frame).into());
                 (frame, sent) = (frame + 1, sent + time);
-                playhead += slew.advance(time, headroom.pace(playhead, 1.0));
+                let passed = slew.advance(time, headroom.pace(playhead, 1.0), owed_s);
+                playhead += passed;
+                owed_s -= passed.as_secs_f64() - time.as_secs_f64();
                 let worst = worst_of(limits, measure.push(sent, timeline.sample(playhead, &mut hint)[0]));
                 prop_assert!(worst <= 1.001, "{hz} Hz, {playhead:?}: {worst} at pace {}", slew.pace());
             }

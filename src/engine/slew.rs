@@ -14,13 +14,9 @@ pub(super) const CHANGE_PER_S: f64 = 0.2;
 /// Sums of some hundred Times are off by less, seconds.
 const ROUNDING_S: f64 = 1e-9;
 
-/// How far the show is from where it should be, and how fast that is being taken back.
+/// How fast show time runs.
 #[derive(Debug, Clone)]
 pub(super) struct Slew {
-    /// What the show owes the film, seconds; below zero it is ahead.
-    owed_s: f64,
-    /// How much of that is due to missed ticks.
-    missed_s: f64,
     speed_up: f64,
     /// For how long show time has run as the clock does, seconds.
     calm_s: f64,
@@ -34,51 +30,17 @@ impl Slew {
         // The longest window of the measure: three of its longer distances, 81 ms at 1,000 Hz (docs/limiter.md, section 1).
         let periods = u32::try_from(3 * Spacing::at_rate(rate.hz()).m).unwrap_or(u32::MAX);
         let seen_s = f64::from(periods) / rate.hz() - ROUNDING_S;
-        Self { owed_s: 0.0, missed_s: 0.0, speed_up: 0.0, calm_s: seen_s, seen_s }
+        Self { speed_up: 0.0, calm_s: seen_s, seen_s }
     }
 
-    /// Show time falls behind by `span`.
-    pub(super) fn fall_behind(&mut self, span: Duration) {
-        self.owed_s += span.as_secs_f64();
-        self.missed_s += span.as_secs_f64();
+    /// Show time was set anew: it runs as the clock does, and has for long.
+    pub(super) const fn reset(&mut self) {
+        (self.speed_up, self.calm_s) = (0.0, self.seen_s);
     }
 
-    /// The show is to be `seconds` further on than it was to be so far.
-    pub(super) fn owe(&mut self, seconds: f64) {
-        self.owed_s += seconds;
-    }
-
-    /// The show is to be `seconds` further on than it is, by a film that is chased.
-    pub(super) const fn set_owed_s(&mut self, seconds: f64) {
-        (self.owed_s, self.missed_s) = (seconds, seconds.max(0.0));
-    }
-
-    /// What the show owes the film, seconds; below zero it is ahead.
-    pub(super) const fn owed_s(&self) -> f64 {
-        self.owed_s
-    }
-
-    /// How far missed ticks have put the show behind.
-    #[must_use]
-    pub(super) fn lag(&self) -> Duration {
-        Duration::from_secs_f64(self.missed_s.max(0.0))
-    }
-
-    /// Forgets lag and speed: show time was set anew.
-    pub(super) fn reset(&mut self) {
-        *self = Self { owed_s: 0.0, missed_s: 0.0, speed_up: 0.0, calm_s: self.seen_s, ..*self };
-    }
-
-    /// Show time was moved on by `seconds`, and runs no faster than the clock from here on.
-    pub(super) fn skip(&mut self, seconds: f64) {
-        self.owed_s -= seconds;
-        self.missed_s = (self.missed_s - seconds).clamp(0.0, self.owed_s.max(0.0));
+    /// Show time runs no faster than the clock from here on.
+    pub(super) const fn end(&mut self) {
         self.speed_up = 0.0;
-    }
-
-    /// Whether show time runs as the clock does, and nothing is owed.
-    pub(super) fn is_done(&self) -> bool {
-        self.owed_s == 0.0 && self.speed_up == 0.0
     }
 
     /// Whether no change of pace is left in what the measure sees.
@@ -92,101 +54,88 @@ impl Slew {
     }
 
     /// How much show time passes in a frame of that Time at the present pace.
-    pub(super) fn coast(&mut self, time: Duration) -> Duration {
-        self.gain(self.speed_up * time.as_secs_f64());
+    pub(super) fn coast(&self, time: Duration) -> Duration {
         time.mul_f64(self.pace())
     }
 
-    /// How much show time passes in a frame of that Time, at most `ceiling` (0 to [`MAX_SPEED_UP`]) faster or slower than
-    /// it.
-    pub(super) fn advance(&mut self, time: Duration, ceiling: f64) -> Duration {
+    /// How much show time passes in a frame of that Time where it owes the film so many seconds, at most `ceiling` (0 to
+    /// [`MAX_SPEED_UP`]) faster or slower than the clock; it is ahead of the film where it owes less than none.
+    pub(super) fn advance(&mut self, time: Duration, ceiling: f64, owed_s: f64) -> Duration {
         let dt = time.as_secs_f64();
         let change = CHANGE_PER_S * dt;
-        let wanted = self.closing_speed(dt).min(ceiling).min(MAX_SPEED_UP) * self.owed_s.signum();
+        let wanted = closing_speed(owed_s.abs(), dt).min(ceiling).min(MAX_SPEED_UP) * owed_s.signum();
         self.speed_up = wanted.clamp(self.speed_up - change, self.speed_up + change);
         self.calm_s = if self.speed_up == 0.0 { self.calm_s + dt } else { 0.0 };
-        self.gain(self.speed_up * dt);
         Duration::from_secs_f64(dt * (1.0 + self.speed_up))
     }
+}
 
-    fn gain(&mut self, seconds: f64) {
-        self.owed_s -= seconds;
-        self.missed_s = (self.missed_s - seconds).clamp(0.0, self.owed_s.max(0.0));
-        if self.owed_s.abs() < 1e-12 {
-            self.owed_s = 0.0;
-        }
-    }
-
-    /// The greatest speed from which what is owed is just closed while slowing down gently.
-    fn closing_speed(&self, dt: f64) -> f64 {
-        // Slowing by c dt a frame from k c dt covers c dt^2 k (k + 1) / 2; solved for k c dt (docs/limiter.md, section 6).
-        let owed = self.owed_s.abs();
-        let from_rest = (dt * dt / 4.0 + 2.0 * owed / CHANGE_PER_S).sqrt() - dt / 2.0;
-        (CHANGE_PER_S * from_rest).min(owed / dt)
-    }
+/// The greatest speed from which what is owed is just closed while slowing down gently.
+fn closing_speed(owed: f64, dt: f64) -> f64 {
+    // Slowing by c dt a frame from k c dt covers c dt^2 k (k + 1) / 2; solved for k c dt (docs/limiter.md, section 6).
+    let from_rest = (dt * dt / 4.0 + 2.0 * owed / CHANGE_PER_S).sqrt() - dt / 2.0;
+    (CHANGE_PER_S * from_rest).min(owed / dt)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::playhead::{FramePace, Playhead};
     use super::*;
+    use crate::time::ShowTime;
 
     #[test]
     fn a_lag_is_closed_without_passing_the_speed_its_change_or_the_goal() {
         for (hz, lag_ms) in [(100, 10), (100, 30), (1000, 1), (1000, 45), (50, 40), (10, 50), (20, 50)] {
             let period = Duration::from_secs(1) / hz;
             let mut slew = Slew::new(Rate::from_hz(f64::from(hz)));
-            slew.fall_behind(Duration::from_millis(lag_ms));
-            let (mut gained, mut before) = (0.0, 0.0);
+            let (mut owed_s, mut before) = (1e-3 * f64::from(lag_ms), 0.0);
             for _ in 0..10 * hz {
-                let speed = slew.advance(period, MAX_SPEED_UP).as_secs_f64() / period.as_secs_f64() - 1.0;
+                let passed = slew.advance(period, MAX_SPEED_UP, owed_s).as_secs_f64();
+                let speed = passed / period.as_secs_f64() - 1.0;
                 let change = CHANGE_PER_S * period.as_secs_f64();
                 assert!(speed <= MAX_SPEED_UP + 1e-6, "{hz} Hz: {speed}");
                 assert!((speed - before).abs() <= change + 1e-6, "{hz} Hz: {before} to {speed}");
-                gained += speed * period.as_secs_f64() * 1e3;
+                owed_s -= passed - period.as_secs_f64();
                 before = speed;
             }
-            #[expect(clippy::cast_precision_loss, reason = "a few milliseconds")]
-            let lag = lag_ms as f64;
-            assert!((gained - lag).abs() < 0.02, "{hz} Hz: {gained} of {lag} ms");
+            assert!(owed_s.abs() < 2e-5, "{hz} Hz: {owed_s} of {lag_ms} ms are left");
         }
     }
 
     #[test]
     fn a_show_that_is_ahead_waits_for_the_film_as_gently() {
         let mut slew = Slew::new(Rate::from_hz(100.0));
-        slew.owe(-0.5);
-        let period = Duration::from_millis(10);
-        let mut passed = 0.0;
+        let (mut owed_s, mut passed) = (-0.5, 0.0);
         for _ in 0..3_000 {
-            let step = slew.advance(period, MAX_SPEED_UP).as_secs_f64();
+            let step = slew.advance(Duration::from_millis(10), MAX_SPEED_UP, owed_s).as_secs_f64();
             assert!(step >= 0.010 * (1.0 - MAX_SPEED_UP) - 1e-9, "{step}");
+            owed_s -= step - 0.010;
             passed += step;
         }
         assert!((passed - 29.5).abs() < 1e-4, "{passed}");
-        assert_eq!(slew.lag(), Duration::ZERO, "no tick was missed");
     }
 
     #[test]
     fn without_head_room_the_lag_stays() {
         let mut slew = Slew::new(Rate::from_hz(100.0));
-        slew.fall_behind(Duration::from_millis(20));
         for _ in 0..1000 {
-            assert_eq!(slew.advance(Duration::from_millis(10), 0.0), Duration::from_millis(10));
+            assert_eq!(slew.advance(Duration::from_millis(10), 0.0, 0.02), Duration::from_millis(10));
         }
-        assert_eq!(slew.lag(), Duration::from_millis(20));
     }
 
     #[test]
     fn no_window_of_the_measure_has_a_change_of_pace_in_it_once_the_pace_is_calm() {
         for hz in [10.0, 24.0, 50.0, 60.0, 72.0, 100.0, 1000.0] {
             let rate = Rate::from_hz(hz);
-            let mut slew = Slew::new(rate);
-            slew.owe(0.001);
+            let mut playhead = Playhead::new(rate, ShowTime::ZERO);
+            playhead.trim(-1);
             let (mut frame, mut steady) = (0, 0);
-            while frame == 0 || !slew.is_calm() {
-                slew.advance(Duration::from_millis(rate.time_ms(frame).into()), MAX_SPEED_UP);
+            while frame == 0 || !playhead.is_calm() {
+                playhead.pass(Duration::from_millis(rate.time_ms(frame).into()), || {
+                    FramePace::Within(MAX_SPEED_UP)
+                });
                 frame += 1;
-                steady = if slew.pace() == 1.0 { steady + 1 } else { 0 };
+                steady = if playhead.pace() == 1.0 { steady + 1 } else { 0 };
             }
             let seen = 3 * Spacing::at_rate(hz).m;
             assert!((seen..=seen + 1).contains(&steady), "{hz} Hz: {steady} frames of {seen}");

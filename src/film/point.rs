@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 use std::time::Duration;
 
-use crate::time::{MonoTime, Rate, ShowTime, Tick};
+use crate::time::{MonoTime, ShowTime, Tick};
 
 /// A point older than this speaks for nobody. Whoever publishes does so ten times a second, whatever the source does; if that
 /// thread hangs, seats must not follow its last word for ever. A loaded machine may hold it up for some of these.
@@ -151,14 +151,6 @@ impl PublishedPoint {
     }
 }
 
-/// A film that runs by the ticks: where nobody is chased.
-#[derive(Debug, Clone)]
-pub struct OwnFilm {
-    rate: Rate,
-    media: ShowTime,
-    runs: bool,
-}
-
 /// The newest point of a film that is chased.
 #[derive(Debug)]
 pub struct ChasedFilm {
@@ -166,61 +158,15 @@ pub struct ChasedFilm {
     last: Option<FilmPoint>,
 }
 
-/// Who says where the film is: the ticks or a source. Read once a tick.
-#[derive(Debug)]
-pub enum FilmClock {
-    /// The ticks themselves.
-    FreeRunning(OwnFilm),
-    /// A source.
-    Chase(ChasedFilm),
-}
-
-impl FilmClock {
-    /// A film that starts there and runs by the ticks.
-    #[must_use]
-    pub const fn free_running(rate: Rate, start: ShowTime) -> Self {
-        Self::FreeRunning(OwnFilm { rate, media: start, runs: true })
-    }
-
+impl ChasedFilm {
     /// A film that somebody else shows.
     #[must_use]
-    pub const fn chase(source: Arc<PublishedPoint>) -> Self {
-        Self::Chase(ChasedFilm { source, last: None })
+    pub const fn new(source: Arc<PublishedPoint>) -> Self {
+        Self { source, last: None }
     }
 
-    /// Lets a film that runs by the ticks wait, or go on; one that is chased asks nobody here.
-    pub const fn run(&mut self, runs: bool) {
-        if let Self::FreeRunning(film) = self {
-            film.runs = runs;
-        }
-    }
-
-    /// Where the film is at the deadline of a tick whose frame takes so long; `None` if nobody has ever told.
-    pub fn at(&mut self, tick: &Tick, frame: Duration) -> Option<FilmPoint> {
-        match self {
-            Self::FreeRunning(film) => Some(film.at(tick, frame)),
-            Self::Chase(film) => film.at(tick),
-        }
-    }
-}
-
-impl OwnFilm {
-    /// It counts the frames' Times, not the clock: an undisturbed grid leaves no error to take back.
-    fn at(&mut self, tick: &Tick, frame: Duration) -> FilmPoint {
-        let rate = if self.runs { 1.0 } else { 0.0 };
-        if self.runs {
-            self.media += self.rate.offset(tick.missed);
-        }
-        let media = self.media;
-        if self.runs {
-            self.media += frame;
-        }
-        FilmPoint { at: tick.deadline, media, rate, epoch: 0, state: FilmState::FreeRunning }
-    }
-}
-
-impl ChasedFilm {
-    fn at(&mut self, tick: &Tick) -> Option<FilmPoint> {
+    /// Where the film is at the deadline of a tick; `None` if nobody has ever told.
+    pub fn at(&mut self, tick: &Tick) -> Option<FilmPoint> {
         // While a point is being written the one before does: it is a few milliseconds old.
         self.last = self.source.read().or(self.last);
         let mut point = self.last?;

@@ -8,7 +8,7 @@ use super::chooser::{Chooser, SourceView};
 use super::follower::PaceLimits;
 use super::follower::tests::tries;
 use super::observation::{FilmWord, Observation};
-use super::point::{FilmClock, PublishedPoint};
+use super::point::{ChasedFilm, PublishedPoint};
 use super::tracker::SourceTracker;
 use crate::harness::film::{Luck, SOURCES, Told, TrueFilm, mono};
 use crate::time::{ShowTime, Tick};
@@ -21,7 +21,7 @@ struct Chain {
     trackers: Vec<SourceTracker>,
     chooser: Chooser,
     published: Arc<PublishedPoint>,
-    clock: FilmClock,
+    clock: ChasedFilm,
     chase: Chase,
     ticks: u64,
     limits: PaceLimits,
@@ -39,7 +39,7 @@ impl Chain {
                 .map(|told| SourceTracker::new(told.kind, limits.band, mono(0.0)))
                 .collect(),
             chooser: Chooser::default(),
-            clock: FilmClock::chase(Arc::clone(&published)),
+            clock: ChasedFilm::new(Arc::clone(&published)),
             published,
             chase: Chase::new(rules, mono(0.0)),
             ticks: 0,
@@ -67,7 +67,7 @@ impl Chain {
         let views: Vec<SourceView> = self.trackers.iter_mut().map(view).collect();
         self.published.publish(&self.chooser.choose(&views, now).point);
         let tick = Tick { index: self.ticks, deadline: now, late: Duration::ZERO, missed: 0 };
-        let point = self.clock.at(&tick, FRAME);
+        let point = self.clock.at(&tick);
         let verdict = self.chase.tick(&ChaseInput { tick: &tick, frame: FRAME, point, trim_ms: 0, may_lead });
         if let ChaseVerdict::Follow { .. } = verdict {
             let state = point.expect("somebody has told").state;

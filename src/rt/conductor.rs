@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::film::FilmLead;
 use super::mail::{Alarm, News};
-use crate::engine::{Directive, Ending, Engine, Rest};
+use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
 use crate::state::{
     Cause, Event, Finding, Machine, Next, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
 };
@@ -126,17 +126,24 @@ impl Conductor {
         Self { film, ..self }
     }
 
-    /// Has the film lead a show that chases one; to be told every tick, before the engine's.
-    pub(super) fn mind_film(&mut self, tick: &Tick, engine: &mut Engine, trim_ms: i32, now: MonoTime) {
-        let Some(film) = &mut self.film else { return };
+    /// Has the film lead a show that chases one; to be told every tick, before the engine's. Says where in the cue that wants its
+    /// frame to lead, if anywhere.
+    pub(super) fn mind_film(
+        &mut self,
+        tick: &Tick,
+        engine: &mut Engine,
+        trim_ms: i32,
+        now: MonoTime,
+    ) -> Option<ShowTime> {
+        let film = self.film.as_mut()?;
         let rides = matches!(self.machine.state(), State::Playing(_));
-        let (event, target) = film.tick(tick, engine.frame_time(), trim_ms, rides);
+        let (event, target) = film.tick(tick, engine.playhead().frame_time(), trim_ms, rides);
         if rides {
             self.machine.event(event, now);
             self.film_is_over = matches!(event, Event::FilmOver(_));
             self.steer(engine);
-            target.into_iter().for_each(|target| engine.chase(target));
         }
+        target.filter(|_| rides)
     }
 
     /// Where the hall stands, and why.
@@ -186,8 +193,8 @@ impl Conductor {
     pub fn alarm(&mut self, alarm: Alarm, engine: &mut Engine, now: MonoTime) {
         match alarm {
             Alarm::Event(event) => self.machine.event(event, now),
-            Alarm::Leave(lane) => engine.leave(usize::from(lane)),
-            Alarm::Cut(lane) => engine.cut(usize::from(lane)),
+            Alarm::Leave(lane) => engine.order(usize::from(lane), LaneOrder::Leave),
+            Alarm::Cut(lane) => engine.order(usize::from(lane), LaneOrder::Cut),
             // Where it was found is looked up by whoever knows what the lane was sent.
             Alarm::Found(_) => {}
         }
@@ -234,9 +241,23 @@ impl Conductor {
         });
     }
 
-    /// Tells the machine what the engine does; to be called every tick, after the engine's.
+    /// Tells the machine what the engine does; to be called every tick, after the engine's. What happened comes before how far it is.
     pub fn watch(&mut self, engine: &mut Engine, now: MonoTime) {
-        if let Some(event) = self.what_happened(engine) {
+        let mut trouble = None;
+        engine.events().take(|event| {
+            match event {
+                EngineEvent::NoMove if !self.machine.state().is_latched() => {
+                    trouble = Some(Trouble::Planner);
+                }
+                EngineEvent::LimiterFault => trouble = trouble.or(Some(Trouble::Limiter)),
+                EngineEvent::NoMove => {}
+                EngineEvent::Unplanned(_) | EngineEvent::Joined(_) | EngineEvent::FellOut(..) => {
+                    return false;
+                }
+            }
+            true
+        });
+        if let Some(event) = trouble.map(Event::Trouble).or_else(|| self.what_it_means(engine.progress())) {
             self.machine.event(event, now);
             self.steer(engine);
         }
@@ -253,24 +274,17 @@ impl Conductor {
         }
     }
 
-    fn what_happened(&self, engine: &mut Engine) -> Option<Event> {
-        let planless = engine.take_planless();
-        if planless && !self.machine.state().is_latched() {
-            return Some(Event::Trouble(Trouble::Planner));
-        }
-        if engine.take_gate_fault() {
-            return Some(Event::Trouble(Trouble::Limiter));
-        }
-        match self.machine.state() {
-            State::Playing(_) if engine.is_homeward() => Some(Event::CueEnded),
-            State::Playing(ride) => match (ride, engine.rest()) {
-                (PlayMode::Joining | PlayMode::Following, Some(Rest::Late)) => Some(Event::Late),
-                (PlayMode::Holding, None) => Some(Event::JoinBegun),
-                (PlayMode::Joining, None) if engine.is_on_cue() => Some(Event::Joined),
-                _ => None,
-            },
-            State::Stopping if engine.is_told_to_rest() => Some(Event::AtRest),
-            State::Parking if engine.ending().is_some() => Some(Event::Parked),
+    /// What it means for the hall how far the engine is.
+    #[rustfmt::skip] // As a table.
+    fn what_it_means(&self, progress: PlayProgress) -> Option<Event> {
+        use PlayProgress::{Homeward, Joining, OnCue, Over, Resting, Waiting};
+        match (self.machine.state(), progress) {
+            (State::Playing(_), Homeward | Over(_)) => Some(Event::CueEnded),
+            (State::Playing(PlayMode::Joining | PlayMode::Following), Resting { why: Rest::Late, .. }) => Some(Event::Late),
+            (State::Playing(PlayMode::Holding), Waiting | Joining | OnCue) => Some(Event::JoinBegun),
+            (State::Playing(PlayMode::Joining), OnCue) => Some(Event::Joined),
+            (State::Stopping, Resting { why: Rest::Stopped, told: true } | Over(_)) => Some(Event::AtRest),
+            (State::Parking, Over(_)) => Some(Event::Parked),
             _ => None,
         }
     }
@@ -288,9 +302,11 @@ impl Conductor {
     /// How the play ended.
     #[must_use]
     pub fn ending(&self, engine: &Engine) -> Ending {
-        match engine.ending() {
-            Some(Ending::Stopped) if self.film_is_over && self.machine.fault().is_none() => Ending::Completed,
-            Some(ending) if self.machine.fault().is_none() => ending,
+        match engine.progress() {
+            PlayProgress::Over(Ending::Stopped) if self.film_is_over && self.machine.fault().is_none() => {
+                Ending::Completed
+            }
+            PlayProgress::Over(ending) if self.machine.fault().is_none() => ending,
             _ => Ending::Fault,
         }
     }

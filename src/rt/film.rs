@@ -4,14 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, HoldCause};
-use crate::film::point::{FilmClock, FilmState, PublishedPoint};
+use crate::film::point::{ChasedFilm, FilmState, PublishedPoint};
 use crate::state::Event;
 use crate::time::{MonoTime, ShowTime, Tick};
 
 /// A film that leads a show.
 #[derive(Debug)]
 pub struct FilmLead {
-    clock: FilmClock,
+    clock: ChasedFilm,
     chase: Chase,
 }
 
@@ -19,7 +19,7 @@ impl FilmLead {
     /// Chases whatever is published there, from `now` on.
     #[must_use]
     pub const fn new(source: Arc<PublishedPoint>, rules: ChaseRules, now: MonoTime) -> Self {
-        Self { clock: FilmClock::chase(source), chase: Chase::new(rules, now) }
+        Self { clock: ChasedFilm::new(source), chase: Chase::new(rules, now) }
     }
 
     /// Whether seats may follow it.
@@ -35,7 +35,7 @@ impl FilmLead {
         trim_ms: i32,
         may_lead: bool,
     ) -> (Event, Option<ShowTime>) {
-        let point = self.clock.at(tick, frame);
+        let point = self.clock.at(tick);
         let state = point.map_or(FilmState::Absent, |point| point.state);
         match self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead }) {
             ChaseVerdict::Wait => (Event::FilmAwaited(HoldCause::Film(state)), None),

@@ -266,7 +266,7 @@ impl Live {
     pub(super) fn on_hall(&self, machine: &Machine, engine: &Engine) {
         let moving = machine.may_send_motion();
         if moving {
-            self.on_show(engine.film());
+            self.on_show(engine.playhead().film());
         }
         self.hall.set(machine.state(), moving && !engine.waits(), machine.clears());
     }

@@ -40,7 +40,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::belief::Taken;
 use crate::drive::{Lane, Stamped};
-use crate::engine::{Beat, Ending, Engine, Step};
+use crate::engine::{Beat, Ending, Engine, EngineEvent, Step};
 use crate::motion::Pose;
 use crate::net::{Delivery, Sender};
 use crate::state::{Refusal, State, Transition, Why};
@@ -127,12 +127,12 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let tick = self.grid.take(now);
         self.conductor.mind_gap(tick.missed, &mut self.engine, now);
         self.take_mail(now);
-        self.conductor.mind_film(&tick, &mut self.engine, self.desk.trim_ms(), now);
+        let film = self.conductor.mind_film(&tick, &mut self.engine, self.desk.trim_ms(), now);
         // In a pause nothing is sent: what follows begins as any motion does.
         let moving = self.conductor.machine().may_send_motion() && !self.engine.waits();
         self.places.look(&mut self.engine, &self.mail, now, moving);
         let goes_on = self.places.may_go_on(&mut self.engine, &self.mail, now, moving);
-        let step = if goes_on { self.engine.tick(tick.missed) } else { Step::Quiet };
+        let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
         match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
             Step::Send(beat) if self.conductor.machine().may_send_motion() => {
@@ -231,17 +231,17 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let mut first = None;
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
         for (index, lane) in lanes.iter_mut().enumerate() {
-            if !engine.gets_a_frame(index) {
+            if !engine.lane(index).gets_a_frame() {
                 continue;
             }
             let at = clock.now();
             let Some(beat) = places.admit(index, engine, beat, at) else { continue };
-            let pose = engine.pose(index);
-            let (stamped, datagram) = lane.encode(&beat, pose, engine.mix_of(index), &mut buf);
+            let (motion, pose) = (engine.lane(index), engine.lane(index).pose());
+            let (stamped, datagram) = lane.encode(&beat, pose, motion.mix(), &mut buf);
             first.get_or_insert(at);
             let sent = Outgoing { index, stamped, pose, lasts_ms: beat.lasts_ms, at };
             sent.hand_over(datagram, places, mail, sink);
-            mail.clamps(index, engine.clamps(index).clamps);
+            mail.clamps(index, motion.clamps().clamps);
         }
         let late_ns = nanos(first.unwrap_or(tick.deadline).since(tick.deadline));
         let report = TickReport { late_ns, missed: tick.missed };
@@ -251,21 +251,23 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
     fn hand_on(&mut self) {
         self.mail.look(self.conductor.machine(), &self.engine);
         tell_state(&mut self.conductor, &mut self.mail);
-        while self.mail.has_room_for_news()
-            && let Some(what) = self.engine.take_unplanned()
-        {
-            self.mail.tell(News::Unplanned(what));
-        }
         if let Some(request) = self.engine.take_request() {
             self.mail.task(Task::Plan(request));
         }
-        while let Some(lane) = self.engine.take_joined() {
-            self.mail.post(Sent::Joined { lane: places::number(lane) });
-        }
-        while let Some((lane, why)) = self.engine.take_fallen() {
-            let shakes = self.places.belief(lane).shakes();
-            self.mail.post(Sent::FellOut { lane: places::number(lane), why, shakes });
-        }
+        let Self { engine, mail, places, .. } = self;
+        engine.events().take(|event| {
+            match event {
+                EngineEvent::Unplanned(what) if mail.has_room_for_news() => mail.tell(News::Unplanned(what)),
+                EngineEvent::Joined(lane) => mail.post(Sent::Joined { lane: places::number(lane) }),
+                EngineEvent::FellOut(lane, why) => {
+                    let shakes = places.belief(lane).shakes();
+                    mail.post(Sent::FellOut { lane: places::number(lane), why, shakes });
+                }
+                // What is the conductor's waits for that.
+                EngineEvent::Unplanned(_) | EngineEvent::NoMove | EngineEvent::LimiterFault => return false,
+            }
+            true
+        });
         while let Some(course) = self.engine.take_retired() {
             self.mail.task(Task::Retire(course));
         }

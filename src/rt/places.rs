@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::mail::{Mail, Sent};
 use crate::belief::{Belief, Fall, Found, Taken, Tally};
 use crate::drive::Lane;
-use crate::engine::{Beat, Engine};
+use crate::engine::{Beat, Engine, LaneOrder};
 use crate::net::Delivery;
 use crate::time::{MonoTime, Rate};
 use crate::wire::Timing;
@@ -89,18 +89,18 @@ impl Places {
         for lane in 0..self.lanes.len() {
             match self.take_evidence(lane, mail, now) {
                 Found::Nothing => {}
-                Found::Gap => engine.go_blind(lane),
-                Found::Astray => engine.fall_out(lane, Fall::Astray),
+                Found::Gap => engine.order(lane, LaneOrder::GoBlind),
+                Found::Astray => engine.order(lane, LaneOrder::FallOut(Fall::Astray)),
             }
             let Place { belief, .. } = &self.lanes[lane];
-            let is_unseen = engine.is_unseen(lane);
+            let is_unseen = engine.lane(lane).is_unseen();
             if !is_unseen && !engine.rests_at(lane).is_some_and(|pose| belief.contradicts(pose)) {
                 continue;
             }
             if let Some(known) = belief.pose(now) {
                 engine.found(lane, &known, belief.near());
             } else if is_unseen && moving && self.waits.is_none() {
-                engine.fall_out(lane, Fall::Gap);
+                engine.order(lane, LaneOrder::FallOut(Fall::Gap));
             }
         }
     }
@@ -111,7 +111,7 @@ impl Places {
     fn lose_sight(&mut self, engine: &mut Engine, mail: &Mail, now: MonoTime) {
         for (lane, place) in self.lanes.iter_mut().enumerate() {
             place.belief.forget();
-            engine.lose_sight(lane);
+            engine.order(lane, LaneOrder::LoseSight);
         }
         self.wait(mail, now, false);
     }
@@ -139,7 +139,7 @@ impl Places {
             return true;
         };
         let is_open = |(lane, place): (usize, &Place)| {
-            engine.takes_part(lane) && !place.belief.is_known_since(since, now)
+            engine.lane(lane).takes_part() && !place.belief.is_known_since(since, now)
         };
         if now.since(since) < WAITS_FOR && self.lanes.iter().enumerate().any(is_open) {
             if now.since(asked) >= READ_EVERY {
@@ -150,8 +150,8 @@ impl Places {
         }
         self.waits = None;
         for (lane, Place { belief, .. }) in self.lanes.iter().enumerate() {
-            if engine.takes_part(lane) && !belief.is_known_since(since, now) {
-                engine.fall_out(lane, Fall::Gap);
+            if engine.lane(lane).takes_part() && !belief.is_known_since(since, now) {
+                engine.order(lane, LaneOrder::FallOut(Fall::Gap));
             }
         }
         true
@@ -169,10 +169,10 @@ impl Places {
             Some(known) => engine.found(lane, &known, belief.near()),
             None if let Some(pose) = belief.vibrates_about(now) => engine.still(lane, pose),
             None if belief.is_measured_in_part() => {
-                engine.cut(lane);
+                engine.order(lane, LaneOrder::Cut);
                 mail.post(Sent::Unread { lane: number(lane) });
             }
-            None => engine.fall_out(lane, Fall::Gap),
+            None => engine.order(lane, LaneOrder::FallOut(Fall::Gap)),
         }
     }
 
@@ -192,24 +192,24 @@ impl Places {
         beat: &'b Beat,
         at: MonoTime,
     ) -> Option<Cow<'b, Beat>> {
-        let beat = if engine.is_blind(lane) {
+        let beat = if engine.lane(lane).is_blind() {
             Cow::Owned(self.slow_down(lane, engine, at)?)
         } else {
             Cow::Borrowed(beat)
         };
         let belief = &mut self.lanes[lane].belief;
-        if belief.allows(engine.pose(lane), beat.lasts_ms, at) {
+        if belief.allows(engine.lane(lane).pose(), beat.lasts_ms, at) {
             return Some(beat);
         }
         belief.withheld();
-        engine.fall_out(lane, Fall::Gap);
+        engine.order(lane, LaneOrder::FallOut(Fall::Gap));
         None
     }
 
     #[cold]
     fn slow_down(&self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<Beat> {
         let Place { belief, longest_ms } = &self.lanes[lane];
-        let farthest = belief.farthest(engine.pose(lane), at);
+        let farthest = belief.farthest(engine.lane(lane).pose(), at);
         let lasts_ms = engine.slow_down(lane, *longest_ms, &farthest)?;
         Some(Beat::still(Timing::Relative, lasts_ms))
     }

@@ -45,7 +45,8 @@ impl PlanLoop {
         }
     }
 
-    fn plan(&mut self, request: Request, refusals: &mut Vec<PlanError>) {
+    /// Plans one course.
+    pub fn plan(&mut self, request: Request, refusals: &mut Vec<PlanError>) {
         let Planning { planner, timeline } = &mut *self.planning;
         let pose = |at| timeline.sample(at, &mut Hint::default());
         let curve = Curve { pose: &pose, end: timeline.duration() };

@@ -13,7 +13,7 @@ use counting::Calls;
 use kinocue::config::LossPolicy;
 use kinocue::engine::{Ending, Mix};
 use kinocue::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
-use kinocue::film::point::{FilmClock, FilmPoint, FilmState, PublishedPoint};
+use kinocue::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use kinocue::health::{Groups, HealthTable, Notice};
 use kinocue::motion::MAX_AXES;
 use kinocue::rt::{Alarm, News};
@@ -169,7 +169,7 @@ fn the_state_of_the_hall_and_the_health_of_its_groups_need_no_memory_after_the_s
 #[test]
 fn what_leads_seats_by_a_film_allocates_nothing() {
     let published = Arc::new(PublishedPoint::default());
-    let mut clock = FilmClock::chase(Arc::clone(&published));
+    let mut clock = ChasedFilm::new(Arc::clone(&published));
     let frame = Duration::from_millis(10);
     let mut chase = Chase::new(ChaseRules::until(ShowTime::from_millis(600_000)), MonoTime::default());
     let (mut followed, mut held) = (0, 0);
@@ -181,7 +181,7 @@ fn what_leads_seats_by_a_film_allocates_nothing() {
         let media = ShowTime::ZERO + frame * index + Duration::from_millis(u64::from(index % 30));
         published.publish(&FilmPoint { at: deadline, media, rate: 1.000_3, epoch: index / 2_000, state });
         let tick = Tick { index: index.into(), deadline, late: Duration::ZERO, missed: 0 };
-        let point = clock.at(&tick, frame);
+        let point = clock.at(&tick);
         match chase.tick(&ChaseInput { tick: &tick, frame, point, trim_ms: 40, may_lead: true }) {
             ChaseVerdict::Follow { .. } => followed += 1,
             ChaseVerdict::Hold(_) => held += 1,

@@ -54,29 +54,13 @@ fn a_reader_never_sees_two_points_mixed() {
 }
 
 #[test]
-fn a_film_of_its_own_advances_by_the_frames_and_by_what_was_slept_through_and_waits_in_a_pause() {
-    let mut clock = FilmClock::free_running(Rate::from_hz(100.0), ShowTime::from_millis(500));
-    let frame = Duration::from_millis(10);
-    let at = |clock: &mut FilmClock, missed| clock.at(&tick(0, missed), frame).expect("it knows").media;
-    assert_eq!(at(&mut clock, 0), ShowTime::from_millis(500));
-    assert_eq!(at(&mut clock, 0), ShowTime::from_millis(510));
-    assert_eq!(at(&mut clock, 2), ShowTime::from_millis(540));
-    clock.run(false);
-    assert_eq!(at(&mut clock, 3), ShowTime::from_millis(550));
-    assert_eq!(at(&mut clock, 0), ShowTime::from_millis(550));
-    clock.run(true);
-    assert_eq!(at(&mut clock, 0), ShowTime::from_millis(550));
-}
-
-#[test]
 fn a_point_that_nobody_renews_is_lost_after_half_a_second() {
     let published = Arc::new(PublishedPoint::default());
-    let mut clock = FilmClock::chase(Arc::clone(&published));
-    let frame = Duration::from_millis(10);
-    assert_eq!(clock.at(&tick(0, 0), frame), None);
+    let mut clock = ChasedFilm::new(Arc::clone(&published));
+    assert_eq!(clock.at(&tick(0, 0)), None);
     published.publish(&point(1_000, 60_000, 1.0, 0, FilmState::Locked));
-    assert_eq!(clock.at(&tick(1_500, 0), frame).map(|point| point.state), Some(FilmState::Locked));
-    assert_eq!(clock.at(&tick(1_501, 0), frame).map(|point| point.state), Some(FilmState::Lost));
+    assert_eq!(clock.at(&tick(1_500, 0)).map(|point| point.state), Some(FilmState::Locked));
+    assert_eq!(clock.at(&tick(1_501, 0)).map(|point| point.state), Some(FilmState::Lost));
     published.publish(&point(1_490, 60_490, 1.0, 0, FilmState::Locked));
-    assert_eq!(clock.at(&tick(1_501, 0), frame).map(|point| point.state), Some(FilmState::Locked));
+    assert_eq!(clock.at(&tick(1_501, 0)).map(|point| point.state), Some(FilmState::Locked));
 }

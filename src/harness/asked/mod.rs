@@ -6,7 +6,7 @@ pub mod sound;
 mod trial;
 pub mod wild;
 
-pub(crate) use chance::Chance;
+pub use chance::Chance;
 pub use sound::Sound;
 pub use trial::{Trial, read, standing, window};
 pub use wild::Wild;

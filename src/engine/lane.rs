@@ -1,26 +1,17 @@
-//! One lane as it rides: on the course that all follow, on its own way to rest, at rest, or away.
+//! One lane as it moves: on the course that all follow, on its own way to rest, at rest, or away.
 
 use std::time::Duration;
 
 use super::blind::{self, Axis, Grid, LONGEST_WAY_MS};
 use super::fader::Fader;
 use super::mix::Mix;
+use super::phase::hold_frames;
 use super::trail::Trail;
-use crate::belief::{Fall, KnownPose};
+use crate::belief::KnownPose;
 use crate::limiter::{Admitted, Counts, Limiter, Provenance};
 use crate::motion::{AxisState, Brake, MAX_AXES, Pose, Window};
-use crate::plan::{Course, LaneScene, Place};
+use crate::plan::Course;
 use crate::time::{Rate, ShowTime};
-
-/// For how long frames hold a lane that has come to rest, and three at the least: if none of them arrives, that is known by then, and
-/// what it has on does not stay on.
-const HOLD: Duration = Duration::from_millis(70);
-
-/// Hold frames that end a motion.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "70 of a thousand a second")]
-pub(super) fn hold_frames(rate: Rate) -> u8 {
-    (HOLD.as_secs_f64() * rate.hz()).round().clamp(3.0, 255.0) as u8
-}
 
 /// One that falls out is read at rest after a second or two, if it answers at all.
 const AWAITED_FOR: Duration = Duration::from_secs(3);
@@ -30,9 +21,9 @@ const VIBRATION_RATE: f64 = 4.0;
 
 /// What a lane does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Part {
+pub(super) enum LaneMode {
     /// Follows the course.
-    With,
+    Following,
     /// Comes to rest, for that long by now.
     Braking(Duration),
     /// Nobody knows which frames reach it: it is brought to rest by slow ones ([`blind`]), for so many milliseconds by now, and is away
@@ -48,10 +39,10 @@ pub(super) enum Part {
 
 /// One lane.
 #[derive(Debug, Clone)]
-pub(super) struct Rider {
+pub struct LaneMotion {
     /// Its slots, at its present level.
     pub(super) window: Window,
-    pub(super) part: Part,
+    pub(super) mode: LaneMode,
     /// What the operator wants of it.
     pub(super) wanted: Mix,
     /// Whether it is out on the course that is followed.
@@ -60,24 +51,17 @@ pub(super) struct Rider {
     holds: u8,
     /// Hold frames after which it is away; none where it stays.
     pub(super) leaving: Option<u8>,
-    /// Whether it has just come to be away, and is to be looked at before it can come back.
-    fallen: Option<Fall>,
     /// Ticks for which whoever parks still waits for it to come back.
-    awaited: u32,
+    pub(super) awaited: u32,
     /// Ticks for which that is so once it has stepped out.
     patience: u32,
     /// Ticks for which its last frame leads it, this one included.
     ahead: u32,
     /// Whether it was away, and is not where the others are yet.
-    returning: bool,
+    pub(super) returning: bool,
     /// Whether no way in or out could be planned for it; it stays as it is until something else is wanted.
     pub(super) refused: bool,
-    /// The same, as long as nobody was told.
-    refusal_untold: bool,
-    is_at_fault: bool,
     pub(super) fader: Fader,
-    /// Whether its pose is the cue's.
-    on_cue: bool,
     /// The level of its vibration; 0 until it is on the cue.
     vibration: f64,
     trail: Trail,
@@ -86,27 +70,23 @@ pub(super) struct Rider {
     limiter: Limiter,
 }
 
-impl Rider {
+impl LaneMotion {
     /// A lane of which nobody has told where it stands; motion at its window's level.
     pub(super) fn unseen(window: Window, rate: Rate) -> Self {
         let level = window.level();
         let nowhere = Trail::at_rest([0.0; MAX_AXES]);
         Self {
-            part: Part::Unseen,
+            mode: LaneMode::Unseen,
             wanted: Mix { motion: level, vibration: level, ..Mix::FULL },
             out: false,
             holds: hold_frames(rate),
             leaving: None,
-            fallen: None,
             awaited: 0,
             patience: ticks(AWAITED_FOR, rate),
             ahead: 0,
             returning: false,
             refused: false,
-            refusal_untold: false,
-            is_at_fault: false,
             fader: Fader::at(level),
-            on_cue: true,
             vibration: level,
             brake: Brake::new(&window, &nowhere.states()),
             trail: nowhere,
@@ -115,9 +95,29 @@ impl Rider {
         }
     }
 
+    /// True if it is led, or would be if it were seen.
+    #[must_use]
+    pub const fn takes_part(&self) -> bool {
+        self.is_there() || self.is_unseen()
+    }
+
+    /// True if it is to take part, and nobody has told where it stands.
+    #[must_use]
+    pub const fn is_unseen(&self) -> bool {
+        matches!(self.mode, LaneMode::Unseen) && self.wanted.on
+    }
+
+    /// Takes what operators want of it; says whether it is put back.
+    pub(super) fn want(&mut self, mix: Mix) -> bool {
+        self.refused &= self.wanted.on == mix.on;
+        let is_put_back = mix.on && !self.wanted.on;
+        self.wanted = mix;
+        is_put_back
+    }
+
     /// Whether frames go to it.
     pub(super) const fn is_there(&self) -> bool {
-        !matches!(self.part, Part::Unseen | Part::Away)
+        !matches!(self.mode, LaneMode::Unseen | LaneMode::Away)
     }
 
     /// Another tick begins, after so many that were missed.
@@ -128,17 +128,20 @@ impl Rider {
     }
 
     /// Whether a frame goes to it in this tick.
-    pub(super) const fn gets_a_frame(&self) -> bool {
+    #[must_use]
+    pub const fn gets_a_frame(&self) -> bool {
         self.is_there() && self.ahead == 0
     }
 
     /// Whether nobody knows which frames reach it.
-    pub(super) const fn is_blind(&self) -> bool {
-        matches!(self.part, Part::Blind(_))
+    #[must_use]
+    pub const fn is_blind(&self) -> bool {
+        matches!(self.mode, LaneMode::Blind(_))
     }
 
     /// The pose sent last.
-    pub(super) const fn pose(&self) -> &Pose {
+    #[must_use]
+    pub const fn pose(&self) -> &Pose {
         self.trail.pose()
     }
 
@@ -146,7 +149,7 @@ impl Rider {
     ///
     /// The course knows that best; while the level changes, it is only seen in what was sent.
     pub(super) fn brake(&mut self, on_course: impl FnOnce(&Window) -> [AxisState; MAX_AXES]) {
-        if self.part != Part::With {
+        if self.mode != LaneMode::Following {
             return;
         }
         let mut states = if self.fader.is_still() { on_course(&self.window) } else { self.trail.states() };
@@ -155,10 +158,10 @@ impl Rider {
         }
         self.brake = Brake::new(&self.window, &states);
         // One that was on its way out is told so by whatever course leads on.
-        (self.part, self.leaving) = (Part::Braking(Duration::ZERO), None);
+        (self.mode, self.leaving) = (LaneMode::Braking(Duration::ZERO), None);
     }
 
-    /// Is away once it rests and has been told so; to be called after [`Rider::brake`].
+    /// Is away once it rests and has been told so; to be called after [`LaneMotion::brake`].
     pub(super) fn leave(&mut self) {
         if self.is_there() {
             self.leaving.get_or_insert(self.holds);
@@ -167,56 +170,51 @@ impl Rider {
 
     /// Nobody knows which frames reach it. One that rests is told so on: it may not have heard of it, and vibrate.
     pub(super) fn go_blind(&mut self) {
-        match self.part {
-            Part::With | Part::Braking(_) | Part::Still => self.part = Part::Blind(0),
-            Part::Blind(_) | Part::Unseen | Part::Away => {}
+        match self.mode {
+            LaneMode::Following | LaneMode::Braking(_) | LaneMode::Still => self.mode = LaneMode::Blind(0),
+            LaneMode::Blind(_) | LaneMode::Unseen | LaneMode::Away => {}
         }
     }
 
     /// Slow frames lead it to that pose, about which it vibrates on, and end that. Where it was led before says nothing any more.
     pub(super) fn still(&mut self, pose: &Pose) {
         self.trail.rest(*pose);
-        (self.part, self.leaving, self.ahead) = (Part::Blind(0), None, 0);
+        (self.mode, self.leaving, self.ahead) = (LaneMode::Blind(0), None, 0);
     }
 
-    /// Nobody knows any more where its seat is. One that was to leave, or of which nobody knew which frames reach it, is away.
-    pub(super) const fn lose_sight(&mut self) {
-        match self.part {
-            Part::With | Part::Braking(_) | Part::Still if self.leaving.is_none() => {
-                (self.part, self.ahead) = (Part::Unseen, 0);
+    /// Nobody knows any more where its seat is. One that was to leave, or of which nobody knew which frames reach it, falls out: says
+    /// whether it does.
+    pub(super) const fn lose_sight(&mut self) -> bool {
+        match self.mode {
+            LaneMode::Following | LaneMode::Braking(_) | LaneMode::Still if self.leaving.is_none() => {
+                (self.mode, self.ahead) = (LaneMode::Unseen, 0);
+                false
             }
-            Part::Unseen | Part::Away => {}
-            Part::With | Part::Braking(_) | Part::Still | Part::Blind(_) => self.fall_out(Fall::Gap),
+            LaneMode::Unseen | LaneMode::Away => false,
+            LaneMode::Following | LaneMode::Braking(_) | LaneMode::Still | LaneMode::Blind(_) => {
+                self.step_out();
+                true
+            }
         }
     }
 
     /// Nothing goes to it from now on.
     pub(super) const fn cut(&mut self) {
-        (self.part, self.leaving, self.ahead, self.awaited) = (Part::Away, None, 0, 0);
+        (self.mode, self.leaving, self.ahead, self.awaited) = (LaneMode::Away, None, 0, 0);
     }
 
-    /// The same, and it is looked at: it may be back soon.
+    /// The same, and it is looked at: it may be back soon. One that falls out is looked at before it can come back: what was seen so
+    /// far is from before its last frame.
     pub(super) const fn step_out(&mut self) {
         self.cut();
         self.awaited = self.patience;
-    }
-
-    /// The same, and it has to be looked at before it can come back: what was seen so far is from before its last frame.
-    pub(super) const fn fall_out(&mut self, why: Fall) {
-        self.step_out();
-        self.fallen = Some(why);
-    }
-
-    /// Why it has just fallen out; said once.
-    pub(super) const fn take_fall(&mut self) -> Option<Fall> {
-        self.fallen.take()
     }
 
     /// It is there (again), at rest in that pose.
     pub(super) fn come_back(&mut self, known: &KnownPose) {
         self.trail.rest(*known.pose());
         self.limiter.restart(known);
-        (self.part, self.leaving, self.ahead, self.awaited) = (Part::Still, None, 0, 0);
+        (self.mode, self.leaving, self.ahead, self.awaited) = (LaneMode::Still, None, 0, 0);
         (self.refused, self.returning) = (false, true);
     }
 
@@ -225,73 +223,74 @@ impl Rider {
         self.come_back(known);
         self.trail.rest(self.window.park());
         self.limiter.restart_at_park(known, &self.window);
-        (self.part, self.returning) = (Part::With, false);
+        (self.mode, self.returning) = (LaneMode::Following, false);
     }
 
-    /// Frames stopped: none leads elsewhere than to the last pose, and the way goes on from there.
-    pub(super) fn halt(&mut self) {
+    /// Frames stopped: none leads elsewhere than to the last pose, and the way goes on from there. One of which nobody knew which
+    /// frames reach it falls out: says whether it does.
+    pub(super) fn halt(&mut self) -> bool {
         self.trail.rest(*self.pose());
         self.limiter.rest();
-        if self.is_blind() {
-            self.fall_out(Fall::Gap);
+        let falls_out = self.is_blind();
+        if falls_out {
+            self.step_out();
         } else if self.is_there() {
             // One that was being told that it is out is told so anew by whatever course leads on.
-            self.leaving = self.leaving.filter(|_| self.part != Part::With);
-            self.part = Part::Still;
+            self.leaving = self.leaving.filter(|_| self.mode != LaneMode::Following);
+            self.mode = LaneMode::Still;
         }
+        falls_out
     }
 
     /// Goes on where another left off: with what the limiter had to do, and away where that was.
     pub(super) fn go_on_from(&mut self, before: &Self) {
         self.limiter.count_on(before.limiter.counts());
-        if before.part == Part::Away {
+        if before.mode == LaneMode::Away {
             self.cut();
             self.awaited = before.awaited;
         }
     }
 
     /// What the limiter had to do.
-    pub(super) const fn clamps(&self) -> &Counts {
+    #[must_use]
+    pub const fn clamps(&self) -> &Counts {
         self.limiter.counts()
-    }
-
-    /// Whether the limiter has held it back too often; said once.
-    pub(super) const fn take_fault(&mut self) -> bool {
-        std::mem::replace(&mut self.is_at_fault, false)
     }
 
     /// Whether it moves on its own way to rest.
     pub(super) const fn is_braking(&self) -> bool {
-        matches!(self.part, Part::Braking(_) | Part::Blind(_))
+        matches!(self.mode, LaneMode::Braking(_) | LaneMode::Blind(_))
     }
 
-    /// Where it is to be `time` after the frame before; `at` on its course, and `cue` there.
-    pub(super) fn next(
+    /// Has it sent where it is to be `time` after the frame before, in frame `index`, counted from 0; `at` on its course, if there is
+    /// one, and `cue` there. One whose last hold frame that would be is away instead. False if the limiter has held it back too often.
+    pub(super) fn advance(
         &mut self,
-        lane: usize,
-        time: Duration,
-        course: &mut Course,
+        (index, time): (u64, Duration),
+        course: Option<(&mut Course, usize)>,
         at: ShowTime,
         cue: &Pose,
-    ) -> Pose {
-        self.on_cue = self.part == Part::With && course.is_on_cue(lane, at);
-        match self.part {
-            Part::With => {
+    ) -> bool {
+        let mut on_cue = false;
+        let pose = match (self.mode, course) {
+            (LaneMode::Following, Some((course, lane))) => {
+                on_cue = course.is_on_cue(lane, at);
                 self.count_stowed(course.is_settled(lane, at));
                 course.pose(lane, at, &self.window, cue)
             }
-            Part::Braking(since) => self.brake_on(since + time),
-            Part::Still => {
+            (LaneMode::Braking(since), _) => self.brake_on(since + time),
+            (LaneMode::Still, _) => {
                 self.count_holds();
                 *self.pose()
             }
-            Part::Blind(_) | Part::Unseen | Part::Away => *self.pose(),
-        }
+            (LaneMode::Following | LaneMode::Blind(_) | LaneMode::Unseen | LaneMode::Away, _) => *self.pose(),
+        };
+        self.send(index, time, pose, on_cue)
     }
 
     fn brake_on(&mut self, since: Duration) -> Pose {
         let seconds = since.as_secs_f64();
-        self.part = if seconds >= self.brake.seconds() { Part::Still } else { Part::Braking(since) };
+        self.mode = if seconds >= self.brake.seconds() { LaneMode::Still } else { LaneMode::Braking(since) };
         self.brake.pose(seconds)
     }
 
@@ -300,7 +299,7 @@ impl Rider {
         if let Some(left) = &mut self.leaving {
             *left -= 1;
             if *left == 0 {
-                self.fall_out(Fall::Gap);
+                self.step_out();
             }
         }
     }
@@ -314,7 +313,7 @@ impl Rider {
         let left = self.leaving.get_or_insert(self.holds);
         match left.checked_sub(1) {
             Some(fewer) => *left = fewer,
-            None => (self.part, self.leaving) = (Part::Unseen, None),
+            None => (self.mode, self.leaving) = (LaneMode::Unseen, None),
         }
     }
 
@@ -328,7 +327,7 @@ impl Rider {
         longest_ms: u32,
         farthest: &Pose,
     ) -> Option<u32> {
-        let Part::Blind(since_ms) = self.part else { return None };
+        let LaneMode::Blind(since_ms) = self.mode else { return None };
         let (pose, speed) = (*self.pose(), self.trail.speed(blind::sight_s(rate)));
         let mut axes = [Axis::PADDING; MAX_AXES];
         for (slot, own) in self.window.slots().iter().enumerate().filter(|(_, own)| own.is_own) {
@@ -336,11 +335,11 @@ impl Rider {
         }
         let grid = Grid { rate, index, longest_ms, left_ms: LONGEST_WAY_MS.saturating_sub(since_ms) };
         let Some(leg) = blind::next_leg(&axes, grid) else {
-            self.fall_out(Fall::Gap);
+            self.step_out();
             return None;
         };
         self.trail.push(Duration::from_millis(u64::from(leg.lasts_ms)), leg.to);
-        (self.part, self.ahead) = (Part::Blind(since_ms + leg.lasts_ms), leg.ticks);
+        (self.mode, self.ahead) = (LaneMode::Blind(since_ms + leg.lasts_ms), leg.ticks);
         Some(leg.lasts_ms)
     }
 
@@ -348,92 +347,23 @@ impl Rider {
     ///
     /// Following its course at a level that stands its way out is part of the proof: course and cue are within the limits to
     /// their ends, and from there to rest.
-    pub(super) fn send(&mut self, index: u64, time: Duration, mut pose: Pose) {
-        let proved = self.part == Part::With && self.fader.is_still();
+    fn send(&mut self, index: u64, time: Duration, mut pose: Pose, on_cue: bool) -> bool {
+        let proved = self.mode == LaneMode::Following && self.fader.is_still();
         let asked = if proved { Provenance::Proved } else { Provenance::Anyhow };
-        self.is_at_fault |= self.limiter.admit(&mut pose, index, asked) == Admitted::Fault;
+        let is_at_fault = self.limiter.admit(&mut pose, index, asked) == Admitted::Fault;
         self.trail.push(time, pose);
         let step = VIBRATION_RATE * time.as_secs_f64();
         self.vibration += (self.wanted.vibration - self.vibration).clamp(-step, step);
-        if !self.on_cue {
+        if !on_cue {
             self.vibration = 0.0; // its room was proved for the cue's poses alone
         }
-    }
-
-    /// How it is as a course is asked for.
-    pub(super) fn scene(&self) -> LaneScene {
-        let place = match self.part {
-            Part::With => Place::OnCourse,
-            Part::Blind(_) | Part::Unseen | Part::Away => Place::Away,
-            Part::Braking(_) | Part::Still if self.leaving.is_some() => Place::Away,
-            Part::Braking(_) | Part::Still => Place::Still(*self.pose()),
-        };
-        LaneScene { place, level: self.fader.level(), out: self.wants_out() }
-    }
-
-    /// Whether it is to be out on the next course.
-    pub(super) const fn wants_out(&self) -> bool {
-        !self.wanted.on
-    }
-
-    /// Whether it is not where it is to be, and only a new course can bring it there.
-    pub(super) fn needs_a_course(&self) -> bool {
-        let apart = match self.part {
-            Part::With => self.out != self.wants_out(),
-            Part::Still => self.leaving.is_none(),
-            Part::Braking(_) | Part::Blind(_) | Part::Unseen | Part::Away => false,
-        };
-        apart && !self.refused
-    }
-
-    /// Whether it may still come to park: it has just stepped out and is looked at, or is about to.
-    pub(super) const fn is_awaited(&self) -> bool {
-        self.wanted.on && (self.awaited > 0 || self.is_blind())
-    }
-
-    /// Whether it is there again, and the others left for park without it.
-    pub(super) fn is_left_behind(&self) -> bool {
-        self.part == Part::Still && self.needs_a_course()
-    }
-
-    /// Whether a park is not over without it.
-    pub(super) fn is_missing(&self) -> bool {
-        self.is_awaited() || self.is_left_behind()
-    }
-
-    /// Hears that no such course could be planned.
-    pub(super) fn refuse(&mut self) {
-        self.refused = self.needs_a_course();
-        self.refusal_untold |= self.refused;
-    }
-
-    /// Whether no way in or out could be planned for it; said once.
-    pub(super) const fn take_refusal(&mut self) -> bool {
-        std::mem::replace(&mut self.refusal_untold, false)
-    }
-
-    /// Takes up the course that was asked for with `scene`.
-    pub(super) fn take_up(&mut self, scene: &LaneScene) {
-        let as_planned = match (self.part, scene.place) {
-            (Part::With, Place::OnCourse) => true,
-            (Part::Still, Place::Still(pose)) => self.leaving.is_none() && pose == *self.pose(),
-            _ => false,
-        };
-        if as_planned {
-            (self.part, self.out) = (Part::With, scene.out);
-        }
-    }
-
-    /// Whether it has just arrived where the others are; said once.
-    pub(super) fn take_arrival(&mut self, is_settled: bool) -> bool {
-        let arrives = self.returning && self.part == Part::With && is_settled;
-        self.returning &= !arrives;
-        arrives
+        !is_at_fault
     }
 
     /// What it makes of the cue's vibration and effects; its motion is in the poses.
-    pub(super) fn mix(&self) -> Mix {
-        if self.part == Part::With && !self.out {
+    #[must_use]
+    pub fn mix(&self) -> Mix {
+        if self.mode == LaneMode::Following && !self.out {
             Mix { vibration: self.vibration, ..self.wanted }
         } else {
             Mix::STILL

@@ -1,0 +1,47 @@
+//! What a tick does, and what its frames have in common.
+
+use crate::channel::Samples;
+use crate::timeline::EffectSet;
+use crate::wire::Timing;
+
+/// What the frames of one tick have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beat {
+    /// Which kind of Time they carry.
+    pub timing: Timing,
+    /// The Time field.
+    pub time_ms: u32,
+    /// How long the frame takes, ms: what a relative one says, and the difference to the one before of an absolute one.
+    pub lasts_ms: u32,
+    /// What the cue's channels say, in its unit.
+    pub samples: Samples,
+    /// The effects that are on.
+    pub effects: EffectSet,
+}
+
+impl Beat {
+    /// Frames with all channels and effects off.
+    #[must_use]
+    pub fn still(timing: Timing, time_ms: u32) -> Self {
+        let (samples, effects) = (Samples::REST, EffectSet::Named(0));
+        Self { timing, time_ms, lasts_ms: time_ms, samples, effects }
+    }
+
+    /// The same for a frame that takes so many milliseconds, whatever its Time says.
+    #[must_use]
+    pub const fn lasting(self, lasts_ms: u32) -> Self {
+        Self { lasts_ms, ..self }
+    }
+}
+
+/// What a tick does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "it is made and used up on one stack, every tick")]
+pub enum Step {
+    /// Frames go out.
+    Send(Beat),
+    /// None does: the lanes rest, and have been told so.
+    Quiet,
+    /// The play has ended.
+    Over,
+}

@@ -1,0 +1,124 @@
+//! Coming to rest and resting: brakes that need no planner, hold frames, and what may be set at once meanwhile.
+
+use std::time::Duration;
+
+use super::lane::LaneMotion;
+use super::phase::{Following, Holding, Phase, Rest, hold_frames};
+use super::{Beat, Engine, Step};
+use crate::plan::Curve;
+use crate::timeline::Hint;
+
+/// Before the end of the cue levels stand, so that there is time to plan what follows.
+const FADE_CLEAR: Duration = Duration::from_millis(1_000);
+
+impl Engine {
+    /// Brings all lanes to rest as quickly as is gentle, from however they move.
+    pub(super) fn come_down(&mut self, why: Rest) {
+        if matches!(self.phase, Phase::Holding(_)) {
+            self.give_up_replans();
+            // Lanes that have been told so are left alone.
+            let is_told = self.sends_nothing();
+            if let Phase::Holding(holding) = &mut self.phase {
+                holding.frames = if is_told { holding.frames } else { hold_frames(self.show.rate) };
+                holding.why = why;
+            }
+            return;
+        }
+        (0..self.lanes.all.len()).for_each(|lane| self.brake(lane));
+        if matches!(self.phase, Phase::Following(_) | Phase::Settling(_)) {
+            self.playhead.catch_up();
+        }
+        self.enter(Phase::Braking(why));
+    }
+
+    /// Brings one lane to rest from however it moves.
+    pub(super) fn brake(&mut self, lane: usize) {
+        let Self { phase, timeline, lanes, playhead, .. } = self;
+        // Where there is none, no lane is on it.
+        let Some(course) = phase.course() else { return };
+        let pose = |at| timeline.sample(at, &mut Hint::default());
+        let curve = Curve { pose: &pose, end: timeline.duration() };
+        let (reached, pace) = (playhead.reached(), playhead.pace());
+        lanes.all[lane].brake(|window| {
+            course.states_by_slot(lane, reached, window, &curve).map(|state| state.at_pace(pace))
+        });
+    }
+
+    /// The controllers reached the last poses and stand there.
+    pub(super) fn halt(&mut self, why: Rest) {
+        self.stamps.break_off();
+        self.lanes.halt();
+        self.rest(why, hold_frames(self.show.rate));
+    }
+
+    /// At rest, and no frame says so: the seats have not moved.
+    pub(super) fn rest_untold(&mut self) {
+        self.lanes.halt();
+        self.rest(Rest::Stopped, 0);
+    }
+
+    fn rest(&mut self, why: Rest, frames: u8) {
+        self.enter(Phase::Holding(Holding { why, next: None, frames }));
+    }
+
+    /// The cue is over before it is known how to go on: the lanes come to rest meanwhile.
+    pub(super) fn end_the_cue(&mut self) {
+        if let Phase::Following(following) = &self.phase
+            && self.playhead.at() > self.end_of_cue(following)
+        {
+            self.come_down(Rest::Ended);
+        }
+    }
+
+    /// Notices that the last lane rests.
+    pub(super) fn come_to_rest(&mut self) {
+        if let Phase::Braking(why) = self.phase
+            && !self.lanes.all.iter().any(LaneMotion::is_braking)
+        {
+            self.rest(why, hold_frames(self.show.rate));
+        }
+    }
+
+    /// What a tick at rest sends; none where the lanes have been told so.
+    pub(super) fn hold(&mut self, why: Rest, time_ms: u32) -> Step {
+        if let Phase::Holding(holding) = &mut self.phase {
+            holding.frames = holding.frames.saturating_sub(1);
+        }
+        if matches!(why, Rest::Paused | Rest::Stopped) {
+            self.stamps.hold();
+        }
+        let (timing, stamp_ms) = self.stamps.next(time_ms);
+        Step::Send(Beat::still(timing, stamp_ms).lasting(time_ms))
+    }
+
+    /// True if no frame tells a lane that it is to rest: lanes in a lasting rest were told so, or so often that it is known which of
+    /// them have not heard of it.
+    pub(super) fn sends_nothing(&self) -> bool {
+        match &self.phase {
+            Phase::Waiting(_) | Phase::Done => true,
+            Phase::Holding(Holding { why: Rest::Paused | Rest::Stopped, frames, .. }) => {
+                *frames == 0 && !self.lanes.all.iter().any(LaneMotion::is_blind)
+            }
+            _ => false,
+        }
+    }
+
+    /// Moves the levels on while the lanes follow the cue.
+    pub(super) fn fade(&mut self, time: Duration) {
+        let may_fade = self.may_fade();
+        let Phase::Following(Following { course, next, .. }) = &self.phase else { return };
+        let of = (&**course, self.playhead.reached());
+        let moved = self.lanes.fade(time, may_fade, of, &self.headroom);
+        if moved && next.as_ref().is_some_and(|next| next.goal.is_after_the_end()) {
+            self.give_up_replans(); // it was planned for other levels
+        }
+    }
+
+    /// Whether levels may change: no other course is to begin soon.
+    fn may_fade(&self) -> bool {
+        let Phase::Following(following) = &self.phase else { return false };
+        !self.is_wanted_elsewhere()
+            && !self.phase.is_to_change()
+            && self.playhead.at() + FADE_CLEAR < self.end_of_cue(following)
+    }
+}
