@@ -35,6 +35,15 @@ impl Reach {
         Self { low: pose, high: pose }
     }
 
+    /// Between two poses and nowhere else.
+    #[inline]
+    fn put_between(&mut self, one: &Pose, other: &Pose) {
+        let places = self.low.iter_mut().zip(&mut self.high).zip(one.iter().zip(other));
+        for ((low, high), (one, other)) in places {
+            (*low, *high) = if *one < *other { (*one, *other) } else { (*other, *one) };
+        }
+    }
+
     /// Makes room for a pose as well. Poses are numbers: a comparison that asks for no more is half the work of `min` and `max`.
     #[inline]
     pub(super) fn widen(&mut self, pose: &Pose) {
@@ -87,11 +96,12 @@ impl Spans {
             let span = &mut self.spans[self.count];
             (span.first, span.at, span.asked) = (frame, at, None);
             // What is on its way to the first frame's pose is still between that and the one before.
-            (span.reach.low, span.reach.high) = (self.last, self.last);
+            span.reach.put_between(&self.last, pose);
             self.count += 1;
+        } else {
+            self.spans[self.count - 1].reach.widen(pose);
         }
         let span = &mut self.spans[self.count - 1];
-        span.reach.widen(pose);
         if asked {
             span.asked = Some((span.asked.map_or(at, |(since, _)| since), frame));
         }
