@@ -25,7 +25,8 @@ pub(super) struct Helpers<'scope> {
 }
 
 impl<'scope> Helpers<'scope> {
-    /// Starts them, until it is `over`: the ack thread below the calling one where that `granted` real-time service, the planner as an ordinary one.
+    /// Starts them, until it is `over`: the ack thread below the calling one where that `granted` real-time service, the planner as
+    /// an ordinary one.
     ///
     /// # Errors
     /// That of the system where it starts no further thread; none is left then.
@@ -68,7 +69,7 @@ impl<'scope> Helpers<'scope> {
         let mut accounts = self.acks.join().expect("the ack thread does not panic");
         let closed_at = Monotonic.now();
         accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-        let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.clamps(lane)).collect();
+        let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.lane(lane).clamps()).collect();
         let (spun, tallies) = (ticks.clock.spun(), ticks.places.tallies().collect());
         Run { ended, accounts, granted, spun, refusals, clamps, tallies, origin, closed_at }
     }

@@ -24,7 +24,6 @@ use crate::timeline::Timeline;
 pub struct Play {
     runtime: Runtime,
     staged: StagedShow,
-    silent: bool,
     /// True if nothing may move.
     holds: bool,
 }
@@ -80,12 +79,11 @@ impl Play {
         // The runtime ticks by its configuration.
         (config.show.rate_hz, config.show.timing) = (show.rate.hz(), show.timing);
         let staged = StagedShow::new(&config, timeline, show, manner).map_err(PlayError::Plan)?;
-        let silent = manner.silent;
-        let purpose = Purpose::Play { silent, film };
+        let purpose = Purpose::Play { silent: manner.silent, film };
         let runtime = Runtime::open(Arc::new(config), purpose, &Numbers::new(), &Arc::default())?;
         let desk = runtime.control().desk;
         staged.mixes.iter().enumerate().for_each(|(lane, mix)| desk.set(lane, *mix));
-        Ok(Self { runtime, staged, silent, holds: false })
+        Ok(Self { runtime, staged, holds: false })
     }
 
     /// What it is led and watched by.
@@ -111,10 +109,11 @@ impl Play {
     /// # Panics
     /// If one of its threads panicked.
     pub fn run(mut self, lead: impl FnOnce(PlayHandle) -> bool + Send) -> Result<Played, PlayError> {
-        if !self.silent {
+        let silent = self.runtime.is_silent();
+        if !silent {
             self.look_for_others()?;
         }
-        let Self { runtime, staged, silent, holds } = self;
+        let Self { runtime, staged, holds } = self;
         let config = Arc::clone(runtime.config());
         let (cue, rate) = (staged.timeline.cue().path().display().to_string(), staged.show.rate);
         let (lanes, live) = (staged.lanes.clone(), runtime.control().live);

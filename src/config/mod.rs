@@ -306,6 +306,12 @@ impl Config {
     }
 }
 
+/// Axes of a cue that has every axis of these controllers.
+#[must_use]
+pub(crate) fn cue_axes(controllers: &[Controller]) -> usize {
+    controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES)
+}
+
 impl Controller {
     /// Axes that its frames have to carry of a cue of `cue_axes` axes: just its own, or all up to its last.
     #[must_use]

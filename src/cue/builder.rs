@@ -23,6 +23,16 @@ impl CueBuilder {
         Self { cue, effects: Vec::new(), steps: Steps::default() }
     }
 
+    /// A cue of so many axes that asks for nothing, for so long.
+    #[must_use]
+    pub(crate) fn flat(name: &str, axes: usize, lasts: ShowTime) -> Cue {
+        let mut flat = Self::new(name, axes);
+        for at in [ShowTime::ZERO, lasts] {
+            flat.row(at, std::iter::repeat_n(0.0, axes), None);
+        }
+        flat.cue // it has no effects
+    }
+
     /// The same with a title, curved between its rows, with effects of those names.
     #[must_use]
     pub(crate) fn curved(mut self, title: &str, effects: Vec<String>) -> Self {

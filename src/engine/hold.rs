@@ -80,12 +80,12 @@ impl Engine {
     }
 
     /// What a tick at rest sends; none where the lanes have been told so.
-    pub(super) fn hold(&mut self, why: Rest, time_ms: u32) -> Step {
-        if let Phase::Holding(holding) = &mut self.phase {
-            holding.frames = holding.frames.saturating_sub(1);
-        }
-        if matches!(why, Rest::Paused | Rest::Stopped) {
-            self.stamps.hold();
+    pub(super) fn hold(&mut self, time_ms: u32) -> Step {
+        if let Phase::Holding(Holding { why, frames, .. }) = &mut self.phase {
+            *frames = frames.saturating_sub(1);
+            if matches!(why, Rest::Paused | Rest::Stopped) {
+                self.stamps.hold();
+            }
         }
         let (timing, stamp_ms) = self.stamps.next(time_ms);
         Step::Send(Beat::still(timing, stamp_ms).lasting(time_ms))

@@ -36,7 +36,6 @@ pub use slew::MAX_SPEED_UP;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::limiter::Counts;
 use crate::motion::Window;
 use crate::plan::{Course, Scene};
 use crate::time::{Rate, ShowTime};
@@ -153,12 +152,6 @@ impl Engine {
         &self.playhead
     }
 
-    /// What the limiter had to do for a lane.
-    #[must_use]
-    pub fn clamps(&self, lane: usize) -> &Counts {
-        self.lane(lane).clamps()
-    }
-
     /// How far it is.
     #[must_use]
     pub fn progress(&self) -> PlayProgress {
@@ -204,10 +197,10 @@ impl Engine {
         target.into_iter().for_each(|target| self.chase(target, time));
         let show = self.playhead.at();
         self.move_on(time);
-        if let Phase::Holding(Holding { why, .. }) = self.phase {
+        if let Phase::Holding(_) = self.phase {
             let is_quiet = self.sends_nothing();
             self.look_ahead();
-            return if is_quiet { Step::Quiet } else { self.hold(why, time_ms) };
+            return if is_quiet { Step::Quiet } else { self.hold(time_ms) };
         }
         let (timing, stamp_ms) = self.stamps.next(time_ms);
         let mut beat = Beat::still(timing, stamp_ms).lasting(time_ms);

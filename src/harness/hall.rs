@@ -175,7 +175,7 @@ impl Virtual {
             leave: &leave,
         };
         let ended = tick_loop.run();
-        let clamps = (0..tick_loop.lanes.len()).map(|lane| *tick_loop.engine.clamps(lane)).collect();
+        let clamps = (0..tick_loop.lanes.len()).map(|lane| *tick_loop.engine.lane(lane).clamps()).collect();
         let frames = tick_loop.sink.frames;
         let mut news = news;
         let news = std::iter::from_fn(|| news.pop().ok()).collect();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::config::{Config, Controller, FanOut};
+use crate::config::{Config, Controller, FanOut, cue_axes};
 use crate::cue::CueBuilder;
 use crate::motion::{Pulses, SeatType};
 use crate::time::ShowTime;
@@ -39,17 +39,10 @@ fn standing(seat: &SeatType, places: &[Pulses]) -> SeatType {
 }
 
 /// A cue that lasts for `seconds` and asks for nothing, with as many axes as the controllers take.
-///
-/// # Panics
-/// Never: it has no effects.
 #[must_use]
 pub fn cue(controllers: &[Controller], seconds: u32) -> Timeline {
-    let axes = controllers.iter().map(|one| one.window().end).max().unwrap_or(1);
-    let mut cue = CueBuilder::new(NAME, axes);
-    for at in [0, seconds] {
-        cue.row(ShowTime::from_millis(i64::from(at) * 1_000), std::iter::repeat_n(0.0, axes), None);
-    }
-    Timeline::new(cue.build().expect("it has no effects"))
+    let lasts = ShowTime::from_millis(i64::from(seconds) * 1_000);
+    Timeline::new(CueBuilder::flat(NAME, cue_axes(controllers), lasts))
 }
 
 #[cfg(test)]

@@ -145,11 +145,7 @@ impl FastPath {
     /// Takes `pose` if it is calm on all axes; says whether it was taken.
     #[inline]
     pub(super) fn take_calm(&mut self, pose: &Pose) -> bool {
-        let mut seen = [Seen::NOTHING; GROUPS];
-        let mut calm = true;
-        for ((seen, group), position) in seen.iter_mut().zip(&self.groups[..self.used]).zip(in_groups(pose)) {
-            calm &= group.see(position, &self.spans, seen);
-        }
+        let (seen, calm) = self.see(pose);
         if calm {
             self.keep(pose, &seen);
         }
@@ -163,11 +159,19 @@ impl FastPath {
 
     /// Takes what is sent, calm or not.
     pub(super) fn take(&mut self, pose: &Pose) {
-        let mut seen = [Seen::NOTHING; GROUPS];
-        for ((seen, group), position) in seen.iter_mut().zip(&self.groups[..self.used]).zip(in_groups(pose)) {
-            group.see(position, &self.spans, seen);
-        }
+        let (seen, _) = self.see(pose);
         self.keep(pose, &seen);
+    }
+
+    /// What that pose makes of all axes, and whether they are calm.
+    #[inline(always)]
+    fn see(&self, pose: &Pose) -> ([Seen; GROUPS], bool) {
+        let mut seen = [Seen::NOTHING; GROUPS];
+        let mut calm = true;
+        for ((seen, group), position) in seen.iter_mut().zip(&self.groups[..self.used]).zip(in_groups(pose)) {
+            calm &= group.see(position, &self.spans, seen);
+        }
+        (seen, calm)
     }
 
     #[inline]

@@ -3,11 +3,10 @@
 
 use super::super::StagedShow;
 use super::{Numbers, RuntimeError};
-use crate::config::Config;
-use crate::cue::{Cue, CueBuilder};
+use crate::config::{Config, cue_axes};
+use crate::cue::CueBuilder;
 use crate::drive::Manner;
 use crate::engine::Show;
-use crate::motion::MAX_AXES;
 use crate::net::{Ports, Receiver, Sender};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -26,22 +25,13 @@ pub(super) fn open(config: &Config, numbers: &Numbers, manner: Manner) -> Result
         start: ShowTime::ZERO,
         plays: 1,
     };
+    let rest = CueBuilder::flat("park", cue_axes(&config.controllers), ShowTime::from_millis(1_000));
     let mut staged =
-        StagedShow::new(config, Timeline::new(rest(config)), show, manner).map_err(RuntimeError::Plan)?;
+        StagedShow::new(config, Timeline::new(rest), show, manner).map_err(RuntimeError::Plan)?;
     for (lane, controller) in staged.lanes.iter_mut().zip(&config.controllers) {
         if let Some(next) = numbers.get(&controller.address) {
             *lane = lane.clone().starting_at(*next);
         }
     }
     Ok(staged)
-}
-
-/// A cue that has every axis of the hall, and asks for nothing.
-fn rest(config: &Config) -> Cue {
-    let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
-    let mut cue = CueBuilder::new("park", axes);
-    for ms in [0, 1_000] {
-        cue.row(ShowTime::from_millis(ms), std::iter::repeat_n(0.0, axes), None);
-    }
-    cue.build().expect("it has no effects")
 }

@@ -99,14 +99,10 @@ pub struct Runtime {
     handle: RuntimeHandle,
     line: Line,
     silent: bool,
-    film: Option<LeadingFilm>,
-    engine: Engine,
-    lanes: Vec<Lane>,
-    sender: Sender,
-    mail: Mail,
     acks: AckLoop,
     watch: Watch,
     plans: PlanLoop,
+    ticks: Ticks,
 }
 
 /// What a hall or a play is led and watched by.
@@ -209,7 +205,8 @@ impl Runtime {
         let (leave, granted) = (Arc::default(), RealTime::NOTHING);
         let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
         let silent = manner.silent;
-        Ok(Self { handle, line, silent, film, engine, lanes, sender, mail, acks, watch, plans })
+        let ticks = Ticks { engine, lanes, film, sender, mail };
+        Ok(Self { handle, line, silent, acks, watch, plans, ticks })
     }
 
     /// What it is led and watched by.
@@ -225,10 +222,16 @@ impl Runtime {
         &self.handle.config
     }
 
+    /// True if no frame asks for a reply.
+    pub(super) const fn is_silent(&self) -> bool {
+        self.silent
+    }
+
     /// The controllers that somebody else sends to, and how many datagrams they got that were not sent from here. Takes about a
     /// second, in which it sends nothing else.
     pub(super) fn find_other_masters(&mut self) -> Vec<(usize, u16)> {
-        let Self { handle: RuntimeHandle { config, leave: stop, .. }, sender, acks, lanes, .. } = self;
+        let Self { handle: RuntimeHandle { config, leave: stop, .. }, acks, ticks, .. } = self;
+        let Ticks { sender, lanes, .. } = ticks;
         Company { sender, acks, controllers: &config.controllers, lanes, stop }.look()
     }
 
@@ -285,10 +288,10 @@ impl Runtime {
     }
 
     fn part(self) -> (RuntimeHandle, Line, Parts) {
-        let Self { handle, line, film, engine, lanes, sender, mail, mut acks, watch, plans, .. } = self;
+        let Self { handle, line, mut acks, watch, plans, ticks, .. } = self;
         acks.tell(Arc::clone(&handle.live));
         acks.watched_by(watch);
-        (handle, line, Parts { acks, plans, ticks: Ticks { engine, lanes, film, sender, mail } })
+        (handle, line, Parts { acks, plans, ticks })
     }
 }
 
@@ -310,6 +313,7 @@ struct Parts {
 }
 
 /// What becomes the tick thread's.
+#[derive(Debug)]
 struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,

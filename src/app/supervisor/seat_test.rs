@@ -2,11 +2,10 @@
 //! like any other, made here, proved and joined like any other.
 
 use super::show::ProvedShow;
-use crate::config::Config;
+use crate::config::{Config, cue_axes};
 use crate::control::model::us;
 use crate::control::{Code, Problem, TestRow, TestStatus};
 use crate::cue::CueBuilder;
-use crate::motion::MAX_AXES;
 use crate::rt::Row;
 use crate::time::ShowTime;
 use crate::timeline::Timeline;
@@ -41,7 +40,7 @@ struct TestPart {
 
 /// The parts of a test of a hall, and its cue.
 fn script(config: &Config) -> (Vec<TestPart>, CueBuilder) {
-    let axes = config.controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES);
+    let axes = cue_axes(&config.controllers);
     let effects: Vec<String> = config.effects.iter().map(|effect| effect.name.clone()).collect();
     let park: Vec<f64> = (0..axes).map(|axis| park_of(config, axis)).collect();
     let away = |park: f64| if park + REACH <= 1.0 { park + REACH } else { park - REACH };

@@ -195,7 +195,7 @@ impl Positions {
             let recent = before.filter(|told| made.since(told.at) <= APART);
             let rest = recent.and_then(|told| told.rest.go_on(fraction, STILL));
             let sway = recent.and_then(|told| told.sway.go_on(fraction, self.sways()));
-            let moved = if rest.is_some() { before.is_some_and(|told| told.moved) } else { before.is_some() };
+            let moved = before.is_some_and(|told| told.moved || rest.is_none());
             let begin = Stay::begin(fraction, at);
             let (rest, sway) = (rest.unwrap_or(begin), sway.unwrap_or(begin));
             self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
