@@ -1,7 +1,7 @@
 //! Wiring: opens everything, starts and stops the threads, and sums up. Knows every room; no room knows it.
 
 mod company;
-pub mod film;
+pub(crate) mod film;
 mod helpers;
 mod play;
 mod refused;

@@ -15,8 +15,18 @@ impl FilmState {
             Self::Jumped => "the film has jumped",
             Self::Reverse => "the film runs backwards",
             Self::Shuttle => "the film runs at a speed that the seats may not follow",
-            Self::Unusable => "what is heard of the film makes no sense",
+            Self::Unusable => "what is heard of the film makes no sense, or is too coarse",
             Self::Lost => "nothing is heard of the film any more",
+        }
+    }
+}
+
+impl FilmState {
+    /// What a source says of the film, for somebody who looks at that source alone.
+    pub(crate) const fn of_a_source(self) -> &'static str {
+        match self {
+            Self::FreeRunning | Self::Locked => "the film runs",
+            _ => self.words(),
         }
     }
 }
