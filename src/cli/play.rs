@@ -11,13 +11,15 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
-use crate::app::film::{ClockStart, FilmArgs, FilmReader, FilmSource};
+use crate::app::film::{FilmReader, SourceRules};
 use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
 use crate::drive::Manner;
 use crate::engine::Show;
+use crate::film::follower::PaceLimits;
+use crate::film::source::{ClockStart, FilmArgs, FilmSource};
 use crate::health::ACKS_OFF;
 use crate::sys::{signal, terminal};
 use crate::time::{Rate, ShowTime, parse_time};
@@ -139,7 +141,8 @@ fn film(args: &Args) -> Result<Option<FilmReader>, Failure> {
     if sources.is_empty() {
         return Ok(None);
     }
-    FilmReader::start(&sources, args.allow_coarse).map(Some).or_exit(Exit::System)
+    let rules = SourceRules { allows_coarse: args.allow_coarse, band: PaceLimits::default().band };
+    FilmReader::start(&sources, rules).map(Some).or_exit(Exit::System)
 }
 
 /// Plays what is proved to fit, and prints the report.

@@ -23,6 +23,7 @@ mod osc;
 mod preset;
 mod read;
 mod section;
+mod sync;
 mod target;
 #[cfg(test)]
 mod tests;
@@ -42,6 +43,7 @@ pub use log::{Hours, Log};
 pub use osc::OscPort;
 pub use preset::Preset;
 pub(crate) use section::{Entry, Section, did_you_mean};
+pub(crate) use sync::FilmSync;
 pub use target::{TargetError, from_to_args};
 pub use text::TextPort;
 
@@ -78,6 +80,8 @@ pub struct Config {
     pub text: Option<TextPort>,
     /// HTTP over TCP.
     pub api: Api,
+    /// The film that leads the shows, where one does.
+    pub(crate) sync: Option<FilmSync>,
 }
 
 /// How cues are played.

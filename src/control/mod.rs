@@ -17,7 +17,7 @@ pub use model::{FrameCounts, Health, Histogram, Percentiles, Severity, Then, Tim
 pub use places::{Place, Places, network};
 pub use problem::{Code, Problem};
 pub use status::{
-    ControllerStatus, EntryStatus, FORMAT, HallFacts, JournalLine, PlaylistStatus, PreflightStatus,
-    RealTimeStatus, ShowStatus, Status, TestRow, TestStatus, Warning,
+    ControllerStatus, EntryStatus, FORMAT, FilmSourceStatus, FilmStatus, HallFacts, JournalLine,
+    PlaylistStatus, PreflightStatus, RealTimeStatus, ShowStatus, Status, TestRow, TestStatus, Warning,
 };
 pub use who::{Surface, Who};

@@ -33,6 +33,7 @@ pub(crate) mod mpv;
 pub(crate) mod mtc;
 pub(crate) mod observation;
 pub mod point;
+pub(crate) mod source;
 #[cfg(test)]
 mod tests;
 pub(crate) mod timecode;

@@ -7,8 +7,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
 use std::time::Duration;
 
-use serde::Serialize;
-
 use crate::time::{MonoTime, ShowTime, Tick};
 
 /// A point older than this speaks for nobody. Whoever publishes does so ten times a second, whatever the source does; if that
@@ -19,8 +17,7 @@ pub const STALE: Duration = Duration::from_millis(500);
 pub const FILM_FRAME: Duration = Duration::from_nanos(41_666_667);
 
 /// What may be said of where the film is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FilmState {
     /// The show is its own film: there is nobody to chase.
     FreeRunning,

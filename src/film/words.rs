@@ -31,6 +31,39 @@ impl FilmState {
     }
 }
 
+impl FilmState {
+    /// The word of it for programs.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::FreeRunning => "free-running",
+            Self::Absent => "absent",
+            Self::Acquiring => "acquiring",
+            Self::Locked => "locked",
+            Self::Freewheeling => "freewheeling",
+            Self::Stopped => "stopped",
+            Self::Ended => "ended",
+            Self::Jumped => "jumped",
+            Self::Reverse => "reverse",
+            Self::Shuttle => "shuttle",
+            Self::Unusable => "unusable",
+            Self::Lost => "lost",
+        }
+    }
+
+    /// What a person does next about the film.
+    pub(crate) const fn next(self) -> &'static str {
+        match self {
+            Self::FreeRunning | Self::Locked => "nothing; seats follow it once a person has let the show go",
+            Self::Freewheeling | Self::Acquiring | Self::Jumped => "wait a moment",
+            Self::Absent | Self::Lost => "start the film; see that its source is connected",
+            Self::Stopped => "let the film go on",
+            Self::Ended => "nothing; let the next show go",
+            Self::Reverse | Self::Shuttle => "let the film run forward at its speed",
+            Self::Unusable => "see what its source sends; allow_coarse allows one that is merely coarse",
+        }
+    }
+}
+
 impl HoldCause {
     /// Why the seats wait.
     #[must_use]

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use super::source::ClockStart;
 use super::{FilmError, WordSink, start};
+use crate::film::source::ClockStart;
 use crate::film::wall::{ClockReading, WallFilm};
 use crate::sys::adjusted::wall_error;
-use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::sys::clock::{Monotonic, local_now, wall_now_ns};
 use crate::time::Clock as _;
 
 const READ_EVERY: Duration = Duration::from_millis(100);
@@ -19,7 +19,8 @@ pub(super) fn start_reading(from: &ClockStart, told: WordSink) -> Result<(), Fil
     if error.most > from.max_error {
         return Err(FilmError::Clock { most: error.most, likely: error.likely, allowed: from.max_error });
     }
-    let mut film = WallFilm::new(from.at_ns);
+    let Some(at_ns) = from.at_ns(&local_now()) else { return Err(FilmError::NoSuchTime) };
+    let mut film = WallFilm::new(at_ns);
     start("clock", move || {
         let mut next = Monotonic.now();
         while told.tell(film.read(&read())) {

@@ -8,10 +8,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::riff::SampleStream;
-use super::source::{FilmArgs, LtcInput};
 use super::{ChildSlot, FilmError, WordSink, read_some, start};
 use crate::film::ltc::LtcReader;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::source::{FilmArgs, LtcInput};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -106,7 +106,7 @@ impl LtcLine {
     /// Reads to the end of a stream; one that is `paced`, at the speed of its sound.
     fn read(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
         let (mut samples, mut block, mut octets) = (SampleStream::default(), Vec::new(), [0; BLOCK]);
-        let FilmArgs { rate, start, .. } = self.args;
+        let FilmArgs { rate, start, latency, .. } = self.args;
         let (begun, mut heard) = (Monotonic.now(), 0_u64);
         let mut reader: Option<LtcReader> = None;
         loop {
@@ -123,7 +123,7 @@ impl LtcLine {
                 at = begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s));
                 Monotonic.sleep_until(at);
             }
-            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, Duration::ZERO, rate, start));
+            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
             reader.hear(&block, at, &mut |what| {
                 self.told.tell(what); // without a listener the program ends
             });

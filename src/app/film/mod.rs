@@ -3,6 +3,7 @@
 
 mod clock;
 mod datagrams;
+mod hall;
 mod ltc;
 mod mpv;
 mod mtc;
@@ -10,7 +11,6 @@ mod network;
 mod riff;
 mod sent;
 mod sound;
-mod source;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -24,13 +24,14 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
+pub(crate) use hall::HallFilm;
 pub(crate) use sent::TimecodeSent;
 pub(crate) use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
-pub(crate) use source::{ClockStart, FilmArgs, FilmSource};
 pub(crate) use table::{FilmTable, SharedTable, SourceRow};
 
 use crate::film::chooser::MOST_SOURCES;
 use crate::film::point::PublishedPoint;
+use crate::film::source::{FilmArgs, FilmSource};
 use table::Ranking;
 use told::{Notes, WordSink};
 
@@ -71,12 +72,26 @@ pub(crate) enum FilmError {
         /// What is allowed.
         allowed: Duration,
     },
+    /// The day has no such time, as where clocks are set forward.
+    #[error(
+        "there is no such time in this machine's time zone; write it with its offset, as 2026-11-21T19:00:00+01:00"
+    )]
+    NoSuchTime,
     /// There are too many of them.
     #[error("{0} sources are too many; {MOST_SOURCES} can be ranked")]
     Many(usize),
     /// The system starts no further thread.
     #[error("no thread could be started; allow more with `ulimit -u`")]
     Thread(#[from] io::Error),
+}
+
+/// What holds for all sources of a show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SourceRules {
+    /// True if those may lead as well that have not proved themselves.
+    pub(crate) allows_coarse: bool,
+    /// How far from 1 a film's rate is followed.
+    pub(crate) band: f64,
 }
 
 /// The command that gives the sound of a source, if it has one.
@@ -96,19 +111,40 @@ impl FilmReader {
     ///
     /// # Errors
     /// [`FilmError`] where one cannot be had at all. One that ends later is looked for again.
-    pub(crate) fn start(sources: &[FilmArgs], allows_coarse: bool) -> Result<Self, FilmError> {
+    pub(crate) fn start(sources: &[FilmArgs], rules: SourceRules) -> Result<Self, FilmError> {
+        Self::each(sources, rules, &mut Err)
+    }
+
+    /// The same in a hall, which opens whatever its sources are: what is wrong with one is noted beside it.
+    ///
+    /// # Errors
+    /// [`FilmError::Thread`].
+    pub(crate) fn open(sources: &[FilmArgs], rules: SourceRules) -> Result<Self, FilmError> {
+        Self::each(sources, rules, &mut |_| Ok(()))
+    }
+
+    fn each(
+        sources: &[FilmArgs],
+        rules: SourceRules,
+        on_error: &mut dyn FnMut(FilmError) -> Result<(), FilmError>,
+    ) -> Result<Self, FilmError> {
         if sources.len() > MOST_SOURCES {
             return Err(FilmError::Many(sources.len()));
         }
         let (to, heard) = sync_channel(WAITING);
         let notes: Vec<Notes> = sources.iter().map(|_| Notes::default()).collect();
-        let ranking = Ranking::new(sources, &notes, allows_coarse);
+        let ranking = Ranking::new(sources, &notes, rules);
         let (point, table) = (ranking.point(), ranking.table());
         let mut reader = Self { point, table, children: Vec::new(), over: Arc::default() };
         start("film", move || ranking.run(&heard))?;
         for (place, (args, notes)) in sources.iter().zip(notes).enumerate() {
             let told = WordSink { place, to: to.clone(), notes, over: Arc::clone(&reader.over) };
-            reader.read(args, told)?;
+            let noted = told.clone();
+            if let Err(error) = reader.read(args, told) {
+                let why = std::error::Error::source(&error).map(|why| format!(": {why}")).unwrap_or_default();
+                noted.note(|notes| notes.trouble = Some(format!("{error}{why}")));
+                on_error(error)?;
+            }
         }
         Ok(reader)
     }

@@ -6,10 +6,10 @@ use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::source::FilmArgs;
 use super::{FilmError, WordSink, read_some, start};
 use crate::film::mtc::MtcReader;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::source::FilmArgs;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 

@@ -15,10 +15,10 @@ use rosc::{OscPacket, decoder};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 
-use super::source::{FilmArgs, NamedSender};
 use super::{FilmError, WordSink, datagrams, start};
 use crate::film::artnet::ArtNetReader;
 use crate::film::message::{FilmPosition, PositionReader};
+use crate::film::source::{FilmArgs, NamedSender};
 use crate::sys::clock::{Monotonic, wall_now_ns};
 use crate::time::Clock as _;
 

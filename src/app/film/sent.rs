@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use super::source::FilmArgError;
 use crate::film::artnet::ArtTimecode;
 use crate::film::mtc::quarter_frames;
+use crate::film::source::FilmArgError;
 use crate::film::timecode::{FrameRate, Timecode, TimecodeError};
 
 /// Timecode of a film that runs.

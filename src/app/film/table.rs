@@ -4,14 +4,14 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::source::FilmArgs;
+use super::SourceRules;
 use super::told::{Notes, SourceNotes, noted};
 use crate::film::chooser::{Chooser, SourceView};
-use crate::film::follower::PaceLimits;
 use crate::film::observation::Observation;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
+use crate::film::source::FilmArgs;
 use crate::film::tracker::{SourceGrade, SourceTracker};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -43,6 +43,7 @@ pub(crate) struct Disagreement {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct SourceRow {
     pub(crate) source: String,
+    #[serde(serialize_with = "word")]
     pub(crate) state: FilmState,
     /// What that means.
     pub(crate) words: &'static str,
@@ -60,6 +61,10 @@ pub(crate) struct SourceRow {
     pub(crate) dropouts: u64,
     #[serde(flatten)]
     pub(crate) notes: SourceNotes,
+}
+
+fn word<S: Serializer>(state: &FilmState, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(state.word())
 }
 
 /// The newest table, for whoever looks.
@@ -126,8 +131,8 @@ pub(super) struct Ranking {
 
 impl Ranking {
     /// Those sources, of which nothing was heard yet, with the notes of each.
-    pub(super) fn new(args: &[FilmArgs], notes: &[Notes], allows_coarse: bool) -> Self {
-        let (now, band) = (Monotonic.now(), PaceLimits::default().band);
+    pub(super) fn new(args: &[FilmArgs], notes: &[Notes], rules: SourceRules) -> Self {
+        let (now, SourceRules { allows_coarse, band }) = (Monotonic.now(), rules);
         let of = |(args, notes): (&FilmArgs, &Notes)| TrackedSource {
             name: args.source.to_string(),
             tracker: SourceTracker::new(args.source.kind(), band, now),
@@ -161,7 +166,10 @@ impl Ranking {
             match heard.recv_timeout(PUBLISH_EVERY) {
                 Ok((place, told)) => self.sources[place].tracker.hear(&told),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.next = Monotonic.now();
+                    return self.publish(self.next);
+                }
             }
             self.publish(Monotonic.now());
         }

@@ -18,6 +18,8 @@ use crate::time::Clock as _;
 /// How long a source may take to be where it is expected, on a machine that has much to do.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+const RULES: SourceRules = SourceRules { allows_coarse: false, band: 0.0015 };
+
 /// An address that no other test and no other run of them has.
 fn address() -> Ipv4Addr {
     static NEXT: AtomicU8 = AtomicU8::new(1);
@@ -28,7 +30,7 @@ fn address() -> Ipv4Addr {
 fn listen(sources: &[String]) -> FilmReader {
     let of = |text: &String| FilmArgs::new(text.parse().expect("it is a source"), Some("25"), None);
     let args: Vec<FilmArgs> = sources.iter().map(|text| of(text).expect("it is whole")).collect();
-    FilmReader::start(&args, false).expect("it can be read")
+    FilmReader::start(&args, RULES).expect("it can be read")
 }
 
 /// Waits until the table is so, and gives it.
@@ -168,7 +170,7 @@ fn a_file_is_no_line_of_midi() {
     let path = folder.path().join("song.mid");
     std::fs::write(&path, b"MThd").expect("there is room");
     let args = FilmArgs::new(FilmSource::Mtc(path), None, None).expect("it is whole");
-    let error = anyhow::Error::new(FilmReader::start(&[args], false).expect_err("it is none"));
+    let error = anyhow::Error::new(FilmReader::start(&[args], RULES).expect_err("it is none"));
     assert!(format!("{error:#}").contains("nor a FIFO"), "{error:#}");
 }
 
@@ -257,7 +259,7 @@ fn the_clock_of_the_day_leads_where_it_is_steered_and_is_refused_with_its_error_
     assert!(row.media_s.is_some_and(|at| (60.0..80.0).contains(&at)) && row.may_lead, "{row:?}");
     assert!(row.rate_ppm.is_some_and(|ppm| ppm.abs() < 1_500.0), "{row:?}");
     let args = FilmArgs::new(text(",max_error=0ms").parse().expect("it is a time"), None, None);
-    let error = FilmReader::start(&[args.expect("it is whole")], false).expect_err("no clock is that good");
+    let error = FilmReader::start(&[args.expect("it is whole")], RULES).expect_err("no clock is that good");
     assert!(error.to_string().contains("chrony") && error.to_string().contains("max_error="), "{error}");
 }
 

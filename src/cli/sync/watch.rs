@@ -2,8 +2,10 @@ use std::fmt::Write as _;
 use std::io::{self, IsTerminal as _};
 use std::time::Duration;
 
-use crate::app::film::{FilmArgs, FilmReader, FilmSource, FilmTable, SourceRow};
+use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::film::follower::PaceLimits;
+use crate::film::source::{FilmArgs, FilmSource};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
@@ -39,7 +41,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     };
     let sources: Vec<FilmArgs> =
         args.sources.iter().map(of).collect::<Result<_, _>>().or_exit(Exit::Usage)?;
-    let reader = FilmReader::start(&sources, args.allow_coarse).or_exit(Exit::System)?;
+    let rules = SourceRules { allows_coarse: args.allow_coarse, band: PaceLimits::default().band };
+    let reader = FilmReader::start(&sources, rules).or_exit(Exit::System)?;
     let (table, draws) = (reader.table(), io::stdout().is_terminal() && !args.json);
     let mut drawn = 0;
     let mut at = Monotonic.now();

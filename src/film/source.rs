@@ -6,12 +6,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use jiff::Timestamp;
 use jiff::civil::{DateTime, Time};
+use jiff::{Timestamp, Zoned};
 
-use crate::film::timecode::{FrameRate, Label, Timecode, TimecodeError};
-use crate::film::tracker::SourceKind;
-use crate::sys::clock::local_now;
+use super::timecode::{FrameRate, Label, Timecode, TimecodeError};
+use super::tracker::SourceKind;
 use crate::time::ShowTime;
 
 /// Where LTC comes from: sound, the first channel of it, 16 bits, raw at 48,000 samples a second or behind a RIFF header.
@@ -51,17 +50,25 @@ pub(crate) enum FilmSource {
 /// The one sender that is heard, and where.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NamedSender {
-    pub(super) from: Ipv4Addr,
-    pub(super) bind: SocketAddrV4,
+    pub(crate) from: Ipv4Addr,
+    pub(crate) bind: SocketAddrV4,
 }
 
 /// A film that begins at an hour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ClockStart {
-    /// Nanoseconds since 1970.
-    pub(super) at_ns: i64,
+    at: ClockTime,
     /// How far off the clock may be by its own account.
-    pub(super) max_error: Duration,
+    pub(crate) max_error: Duration,
+}
+
+/// A time as people write it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ClockTime {
+    Instant(Timestamp),
+    /// Of the zone that this machine is in.
+    Here(DateTime),
+    Today(Time),
 }
 
 /// Where each is heard unless it is said otherwise; Art-Net has a port of its own.
@@ -75,7 +82,7 @@ const FORMS: &str = "take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:
                      artnet:FROM, osc:FROM, http:FROM or clock:TIME";
 
 /// How a film is read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct FilmArgs {
     /// Its source.
     pub(crate) source: FilmSource,
@@ -83,6 +90,8 @@ pub(crate) struct FilmArgs {
     pub(crate) rate: Option<FrameRate>,
     /// The timecode of the cue's beginning.
     pub(crate) start: Label,
+    /// How long sound takes from the line to a block.
+    pub(crate) latency: Duration,
 }
 
 /// Why something that was written is none of this.
@@ -91,14 +100,14 @@ pub(crate) struct FilmArgs {
 pub(crate) struct FilmArgError(String);
 
 impl FilmArgError {
-    pub(super) fn of(error: &TimecodeError) -> Self {
+    pub(crate) fn of(error: &TimecodeError) -> Self {
         Self(error.to_string())
     }
 }
 
 impl FilmArgs {
     /// Where a film is whose first frame is labelled 00:00:00:00 when the cue begins.
-    pub(super) fn begin(&self) -> ShowTime {
+    pub(crate) fn begin(&self) -> ShowTime {
         let rate = self.rate.unwrap_or(FrameRate::F24);
         let of = |label| Timecode::of(label, rate).map(|code| rate.quarters(4 * i64::from(code.index())));
         of(self.start).unwrap_or(ShowTime::ZERO)
@@ -118,12 +127,12 @@ impl FilmArgs {
         if let (Some(start), Some(rate)) = (start, rate) {
             Timecode::of(start, rate).map_err(|error| FilmArgError::of(&error))?;
         }
-        Ok(Self { source, rate, start: start.unwrap_or_default() })
+        Ok(Self { source, rate, start: start.unwrap_or_default(), latency: Duration::ZERO })
     }
 }
 
 impl FilmSource {
-    pub(super) const fn kind(&self) -> SourceKind {
+    pub(crate) const fn kind(&self) -> SourceKind {
         match self {
             Self::Ltc(_) => SourceKind::Ltc,
             Self::Mpv(_) => SourceKind::Mpv,
@@ -202,7 +211,7 @@ impl FromStr for ClockStart {
             None => (text, None),
             Some((time, more)) => (time, Some(more.strip_prefix("max_error=").unwrap_or(""))),
         };
-        let at = instant(time).ok_or_else(|| {
+        let at = ClockTime::of(time).ok_or_else(|| {
             FilmArgError(format!(
                 "{time} is no time; write 2026-11-21T19:00:00+01:00, 2026-11-21T19:00 or 19:00"
             ))
@@ -213,21 +222,33 @@ impl FromStr for ClockStart {
                 FilmArgError(format!("{text} is no error of a clock; write max_error=1ms, up to 20000ms"))
             })?,
         };
-        let at_ns = i64::try_from(at.as_nanosecond()).unwrap_or(i64::MAX);
-        Ok(Self { at_ns, max_error })
+        Ok(Self { at, max_error })
     }
 }
 
-fn instant(text: &str) -> Option<Timestamp> {
-    let here = local_now();
-    let civil = || -> Option<DateTime> {
-        let today = || text.parse::<Time>().ok().map(|time| here.date().to_datetime(time));
-        text.parse::<DateTime>().ok().filter(|_| text.contains(['T', ' '])).or_else(today)
-    };
-    text.parse().ok().or_else(|| Some(civil()?.to_zoned(here.time_zone().clone()).ok()?.timestamp()))
+impl ClockStart {
+    /// Nanoseconds since 1970; `None` if the day has no such time.
+    pub(crate) fn at_ns(self, now: &Zoned) -> Option<i64> {
+        let of = |civil: DateTime| civil.to_zoned(now.time_zone().clone()).ok().map(|at| at.timestamp());
+        let at = match self.at {
+            ClockTime::Instant(at) => Some(at),
+            ClockTime::Here(civil) => of(civil),
+            ClockTime::Today(time) => of(now.date().to_datetime(time)),
+        };
+        i64::try_from(at?.as_nanosecond()).ok()
+    }
 }
 
-fn milliseconds(text: &str) -> Option<Duration> {
+impl ClockTime {
+    fn of(text: &str) -> Option<Self> {
+        let here = || text.parse().ok().filter(|_| text.contains(['T', ' '])).map(Self::Here);
+        let today = || text.parse().ok().map(Self::Today);
+        text.parse().ok().map(Self::Instant).or_else(here).or_else(today)
+    }
+}
+
+/// A time as it is written in a configuration, `10.6ms`.
+pub(crate) fn milliseconds(text: &str) -> Option<Duration> {
     let ms = text.strip_suffix("ms")?.parse::<f64>().ok().filter(|ms| (0.0..=20_000.0).contains(ms))?;
     Some(Duration::from_secs_f64(ms / 1e3))
 }
@@ -290,11 +311,15 @@ mod tests {
             let error = text.parse::<FilmSource>().expect_err(text).to_string();
             assert!(error.contains(says), "{text}: {error}");
         }
-        let start = |text: &str| text.parse::<ClockStart>().expect(text);
-        let named = start("2026-11-21T19:00:00+01:00,max_error=2.5ms");
-        assert_eq!((named.at_ns, named.max_error), (1_795_284_000_000_000_000, Duration::from_micros(2_500)));
-        let today = start("19:00").at_ns - start("18:59:30").at_ns;
-        assert_eq!((today, start("19:00").max_error), (30_000_000_000, CLOCK_ERROR));
+        let now = "2026-11-21T12:00[Europe/Berlin]".parse().expect("a time");
+        let read = |text: &str| text.parse::<ClockStart>().expect(text);
+        let at_ns = |text: &str| read(text).at_ns(&now);
+        let evening = Some(1_795_284_000_000_000_000);
+        for text in ["2026-11-21T19:00:00+01:00", "2026-11-21T18:00Z", "2026-11-21T19:00", "19:00"] {
+            assert_eq!(at_ns(text), evening, "{text}");
+        }
+        assert_eq!(read("19:00,max_error=2.5ms").max_error, Duration::from_micros(2_500));
+        assert_eq!(read("19:00").max_error, CLOCK_ERROR);
     }
 
     #[test]
