@@ -8,6 +8,7 @@ use super::section::{Entry, Section};
 use crate::film::chooser::MOST_SOURCES;
 use crate::film::follower::PaceLimits;
 use crate::film::source::{FilmArgs, FilmSource, milliseconds};
+use crate::film::timecode::{Label, Timecode};
 use crate::time::ShowTime;
 
 /// How far from 1 a film's rate may be, and how much the seats may add to it: 25/24 is 4.2 %.
@@ -27,6 +28,23 @@ pub(crate) struct FilmSync {
     pub(crate) pace: PaceLimits,
     /// True if those may lead as well that have not proved themselves.
     pub(crate) allows_coarse: bool,
+}
+
+impl FilmSync {
+    /// Where the film is when a cue begins that an entry of a playlist may name the timecode of; `None` if no film leads it.
+    ///
+    /// # Errors
+    /// Why the timecode is none of the film, for a person.
+    pub(crate) fn begin(&self, named: Option<Label>) -> Result<Option<ShowTime>, String> {
+        let Some(label) = named else { return Ok(self.leads.then_some(self.offset)) };
+        let (rate, start) =
+            self.sources.first().map_or((None, Label::default()), |args| (args.rate, args.start));
+        // Without it a label says how many frames there were, and not how long they took.
+        let rate = rate.ok_or_else(|| format!("film = \"{label}\" needs film_fps in [sync]"))?;
+        let of = |label: Label| Timecode::of(label, rate).map_err(|error| error.to_string());
+        let since = of(label)?.media_since(of(Label { drops: label.drops, ..start })?);
+        Ok(Some(ShowTime::from_nanos(since.as_nanos().saturating_add(self.offset.as_nanos()))))
+    }
 }
 
 /// Reads the table.
@@ -170,6 +188,22 @@ mod tests {
         assert!(sync.leads && sync.allows_coarse && sync.offset.as_nanos() == -40_000_000);
         let bare = hall_with("[sync]\nsources = [\"mpv:/run/hall.sock\"]").sync.unwrap();
         assert!(!bare.leads && !bare.allows_coarse, "nobody follows what begins nowhere");
+    }
+
+    #[test]
+    fn an_entry_of_a_playlist_may_begin_elsewhere_in_the_film() {
+        let sync = |more: &str| {
+            hall_with(&format!("[sync]\nsources = [\"mpv:/s\"]\noffset = \"40ms\"\n{more}")).sync.unwrap()
+        };
+        let reel = sync("film_fps = \"25\"\nstart = \"01:00:00:00\"");
+        let at =
+            |text: &str| reel.begin(Some(text.parse().unwrap())).map(|at| at.unwrap().as_nanos() / 1_000_000);
+        assert_eq!((at("01:10:00:05"), at("00:59:59:00")), (Ok(600_240), Ok(-960)));
+        assert!(at("01:00:00:25").unwrap_err().contains("outside 0..=24"));
+        assert_eq!(reel.begin(None).unwrap().map(|at| at.as_nanos()), Some(40_000_000));
+        let loose = sync("");
+        assert_eq!(loose.begin(None), Ok(None), "no film leads it");
+        assert!(loose.begin(Some("01:00:00:00".parse().unwrap())).unwrap_err().contains("needs film_fps"));
     }
 
     #[test]

@@ -262,7 +262,6 @@ impl Timecode {
     }
 
     /// The media time of its first instant in a film that starts with the frame `start`; half a day before to half a day after.
-    #[cfg(test)]
     pub(crate) fn media_since(self, start: Self) -> ShowTime {
         self.rate.quarters(4 * self.since(start))
     }

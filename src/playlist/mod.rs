@@ -23,6 +23,7 @@ use jiff::tz::TimeZone;
 use crate::config::{Config, Preset};
 use crate::control::LevelsChange;
 pub use crate::control::Then;
+use crate::film::timecode::Label;
 use crate::library::{CueId, Id};
 
 /// The name of a playlist.
@@ -54,6 +55,8 @@ pub struct Entry {
     pub vibration: Option<f64>,
     /// How much later than the film the motion is, ms, -500 to 500.
     pub trim_ms: Option<i32>,
+    /// The film's timecode when the cue begins; `None` if the hall's configuration says it, or no film leads.
+    pub(crate) film: Option<Label>,
     /// True if an effect may be on, by its name.
     pub effects: BTreeMap<String, bool>,
     /// What follows its end.

@@ -9,6 +9,7 @@ use crate::config::Config;
 use crate::control::{Code, Problem, ShowStatus};
 use crate::engine::{Headroom, Show};
 use crate::film::chase::ChaseRules;
+use crate::film::timecode::Label;
 use crate::library::{CueId, IdError, Library};
 use crate::proof::{self, Digest, Terms};
 use crate::rt::{FilmStart, Loaded};
@@ -148,15 +149,26 @@ const fn motion_at(film: ShowTime, trim_ms: i32) -> ShowTime {
     ShowTime::from_nanos(film.as_nanos() - trim_ms as i64 * 1_000_000)
 }
 
-/// How a cue that ends there follows the film of a hall, if one leads.
-fn film_of(config: &Config, end: ShowTime) -> Option<FilmStart> {
-    let sync = config.sync.as_ref().filter(|sync| sync.leads)?;
+/// How a cue that ends there follows the film of a hall, if one leads; an entry of a playlist may name the timecode of its beginning.
+fn film_of(config: &Config, named: Option<Label>, end: ShowTime) -> Result<Option<FilmStart>, Problem> {
+    let refused =
+        |why: String| Problem::new(Code::Check, why, "correct the playlist, or [sync], and load it again");
+    let Some(sync) = &config.sync else {
+        let why =
+            named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
+        return why.map_or(Ok(None), Err);
+    };
     let rules = ChaseRules { pace: sync.pace, ..ChaseRules::until(end) };
-    Some(FilmStart { begin: sync.offset, rules })
+    Ok(sync.begin(named).map_err(refused)?.map(|begin| FilmStart { begin, rules }))
 }
 
-pub(super) fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<ProvedShow>, Problem> {
+pub(super) fn read(
+    library: &Library,
+    config: &Config,
+    id: &CueId,
+    film: Option<Label>,
+) -> Result<Box<ProvedShow>, Problem> {
     let (timeline, sha256) = library.read(id)?;
-    let film = film_of(config, timeline.duration());
+    let film = film_of(config, film, timeline.duration())?;
     ProvedShow::prove_for(id.to_string(), config, timeline, sha256, film).map(Box::new)
 }
