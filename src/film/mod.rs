@@ -21,10 +21,10 @@
 )]
 
 pub(crate) mod artnet;
-pub mod chase;
+pub(crate) mod chase;
 pub(crate) mod chooser;
 mod estimate;
-pub mod follower;
+pub(crate) mod follower;
 pub(crate) mod labels;
 mod late;
 pub(crate) mod ltc;
@@ -32,7 +32,7 @@ pub(crate) mod message;
 pub(crate) mod mpv;
 pub(crate) mod mtc;
 pub(crate) mod observation;
-pub mod point;
+pub(crate) mod point;
 pub(crate) mod source;
 #[cfg(test)]
 mod tests;

@@ -3,12 +3,12 @@
 //! control plane.
 
 pub(crate) mod adjusted;
-pub mod batch;
-pub mod clock;
+pub(crate) mod batch;
+pub(crate) mod clock;
 pub(crate) mod file;
 pub(crate) mod folder;
-pub mod humble;
-pub mod machine;
-pub mod realtime;
-pub mod signal;
-pub mod terminal;
+pub(crate) mod humble;
+pub(crate) mod machine;
+pub(crate) mod realtime;
+pub(crate) mod signal;
+pub(crate) mod terminal;
