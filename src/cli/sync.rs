@@ -29,8 +29,8 @@ enum Command {
     Watch(watch::Args),
 }
 
-pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    match &args.command {
+pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
+    match command {
         Command::Send(args) => send::run(args),
         Command::Check(args) => check::run(args),
         Command::Watch(args) => watch::run(args),

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::fault::Faults;
 use super::section::{Entry, Section};
+use crate::film::chase::Rejoin;
 use crate::film::chooser::MOST_SOURCES;
 use crate::film::follower::PaceLimits;
 use crate::film::source::{FilmArgs, FilmSource, milliseconds};
@@ -14,6 +15,9 @@ use crate::time::ShowTime;
 /// How far from 1 a film's rate may be, and how much the seats may add to it: 25/24 is 4.2 %.
 const BAND_MOST: f64 = 0.05;
 const SLEW: std::ops::RangeInclusive<f64> = 0.005..=0.02;
+
+/// Kinds of sources; each has a table of its name.
+const KINDS: [&str; 7] = ["ltc", "mpv", "mtc", "artnet", "osc", "http", "clock"];
 
 /// The film that leads.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +30,8 @@ pub(crate) struct FilmSync {
     pub(crate) offset: ShowTime,
     /// The paces that shows are proved at.
     pub(crate) pace: PaceLimits,
+    /// When seats that hold may join again.
+    pub(crate) rejoin: Rejoin,
     /// True if those may lead as well that have not proved themselves.
     pub(crate) allows_coarse: bool,
 }
@@ -72,15 +78,12 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
         slew: share(&mut section, "slew", SLEW).unwrap_or(default.slew),
     };
     let offset = section.get("offset").and_then(|entry| signed_ms(entry, section.faults)).unwrap_or_default();
+    let rejoin =
+        section.choice("rejoin", &[("auto", Rejoin::Auto), ("ask", Rejoin::Ask)]).unwrap_or(Rejoin::Auto);
     let allows_coarse = section.get("allow_coarse").and_then(|entry| entry.switch(section.faults));
     section.finish();
-    Some(FilmSync {
-        sources,
-        leads: start.is_some(),
-        offset,
-        pace,
-        allows_coarse: allows_coarse.unwrap_or(false),
-    })
+    let (leads, allows_coarse) = (start.is_some(), allows_coarse.unwrap_or(false));
+    Some(FilmSync { sources, leads, offset, pace, rejoin, allows_coarse })
 }
 
 /// A source: by the name of its table, or whole, as `play --chase` takes it.
@@ -93,20 +96,17 @@ fn source<'t>(name: Entry<'t>, section: &mut Section<'t, '_, '_>) -> Option<(Ent
 
 /// What a table says, as `play --chase` takes it.
 fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) -> Option<String> {
+    let Some(kind) = KINDS.into_iter().find(|kind| *kind == text) else {
+        name.fault(section.faults, &format!("{text:?} is none of {}", KINDS.join(", ")));
+        return None;
+    };
     // The key that says who, and the one that may be beside it.
-    let (kind, needed, more) = match text {
-        "ltc" => ("ltc", "input", "latency"),
-        "mpv" => ("mpv", "socket", ""),
-        "mtc" => ("mtc", "device", ""),
-        "artnet" => ("artnet", "from", "bind"),
-        "osc" => ("osc", "from", "bind"),
-        "http" => ("http", "from", "bind"),
-        "clock" => ("clock", "at", "max_error"),
-        _ => {
-            let why = format!("{text:?} is none of ltc, mpv, mtc, artnet, osc, http, clock");
-            name.fault(section.faults, &why);
-            return None;
-        }
+    let (needed, more) = match kind {
+        "ltc" => ("input", "latency"),
+        "mpv" => ("socket", ""),
+        "mtc" => ("device", ""),
+        "clock" => ("at", "max_error"),
+        _ => ("from", "bind"),
     };
     let Some(entry) = section.get(kind) else {
         name.fault(section.faults, &format!("there is no [sync.{kind}]; it has to say {needed}"));

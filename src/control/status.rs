@@ -47,7 +47,7 @@ pub struct Status {
     /// The playlist that is loaded.
     pub playlist: Option<PlaylistStatus>,
     /// The film that leads shows; null where each show is its own film.
-    pub film: Option<FilmStatus>,
+    pub(crate) film: Option<FilmStatus>,
     /// How much later than the film the motion is, ms.
     pub trim_ms: i32,
     /// Levels and effects as they are set.
@@ -149,48 +149,48 @@ pub struct ShowStatus {
 /// The film of a hall, by the best of its sources.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub struct FilmStatus {
+pub(crate) struct FilmStatus {
     /// One word: `absent`, `acquiring`, `locked`, `freewheeling`, `stopped`, `ended`, `jumped`, `reverse`, `shuttle`, `unusable` or
     /// `lost`.
-    pub state: String,
+    pub(crate) state: String,
     /// What that means.
-    pub cause: String,
+    pub(crate) cause: String,
     /// What a person does next about it.
-    pub next: String,
+    pub(crate) next: String,
     /// True if the show that is loaded follows it.
-    pub leads: bool,
+    pub(crate) leads: bool,
     /// The source that leads, as it is configured; null while none can.
-    pub source: Option<String>,
+    pub(crate) source: Option<String>,
     /// Where the film is in the cue, s; null while nobody knows.
-    pub position_s: Option<f64>,
+    pub(crate) position_s: Option<f64>,
     /// How much faster than the clock it runs, millionths.
-    pub rate_ppm: Option<f64>,
+    pub(crate) rate_ppm: Option<f64>,
     /// All sources, in their ranking.
-    pub sources: Vec<FilmSourceStatus>,
+    pub(crate) sources: Vec<FilmSourceStatus>,
 }
 
 /// A source that tells where the film is.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub struct FilmSourceStatus {
+pub(crate) struct FilmSourceStatus {
     /// As it is configured.
-    pub source: String,
+    pub(crate) source: String,
     /// One word, as of the film.
-    pub state: String,
+    pub(crate) state: String,
     /// What that means, and what is wrong with the source.
-    pub cause: String,
+    pub(crate) cause: String,
     /// Where the film is in the cue by this source, s.
-    pub position_s: Option<f64>,
+    pub(crate) position_s: Option<f64>,
     /// How much faster than the clock it runs, millionths.
-    pub rate_ppm: Option<f64>,
+    pub(crate) rate_ppm: Option<f64>,
     /// Deviation of where it is, ms.
-    pub sigma_ms: Option<f64>,
+    pub(crate) sigma_ms: Option<f64>,
     /// True if it is good enough to lead.
-    pub may_lead: bool,
+    pub(crate) may_lead: bool,
     /// How often nothing was heard of it.
-    pub dropouts: u64,
+    pub(crate) dropouts: u64,
     /// What others sent in its place, and was not heard.
-    pub foreign: u64,
+    pub(crate) foreign: u64,
 }
 
 /// A playlist, and where in it the hall is.

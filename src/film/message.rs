@@ -88,6 +88,7 @@ impl PositionReader {
         let age_s = told.age_ms / 1e3;
         let age_s = if (0.0..=OLDEST_S).contains(&age_s) { age_s } else { 0.0 };
         let at = at.before(Duration::from_secs_f64(age_s));
+        // Before the position: from here on the estimate runs at that rate, and need not find it out.
         if told.rate.is_finite() && told.rate != self.rate {
             self.rate = told.rate;
             out(Observation::new(at, FilmWord::Speed(told.rate)));

@@ -169,6 +169,7 @@ impl FromStr for FilmSource {
         let refuse = || FilmArgError(format!("{text} is no source; {FORMS}"));
         let (kind, input) = text.split_once(':').filter(|(_, input)| !input.is_empty()).ok_or_else(refuse)?;
         match kind {
+            // Paths and commands are taken as they are: a comma in one is no option.
             "ltc" => Ok(Self::Ltc(LtcInput::of(input))),
             "mpv" => Ok(Self::Mpv(input.into())),
             "mtc" => Ok(Self::Mtc(input.into())),
@@ -193,6 +194,7 @@ impl NamedSender {
             ))
         };
         let from: Ipv4Addr = from.parse().map_err(|_| refuse())?;
+        // Of these nobody sends: who writes one wants to hear everybody, and a stranger's timecode moves seats.
         if from.is_unspecified() || from.is_multicast() || from.is_broadcast() {
             return Err(refuse());
         }
@@ -241,6 +243,7 @@ impl ClockStart {
 
 impl ClockTime {
     fn of(text: &str) -> Option<Self> {
+        // A date alone would be midnight, which nobody means who writes no time.
         let here = || text.parse().ok().filter(|_| text.contains(['T', ' '])).map(Self::Here);
         let today = || text.parse().ok().map(Self::Today);
         text.parse().ok().map(Self::Instant).or_else(here).or_else(today)

@@ -49,6 +49,7 @@ impl WallFilm {
         let since_ns = |stepped_ns: i64| wall_ns.saturating_sub(self.begin_ns).saturating_sub(stepped_ns);
         let before = self.ahead_ns.replace(ahead_ns).unwrap_or(ahead_ns);
         let step = ahead_ns.saturating_sub(before);
+        // By the clock as it is now: one that was wrong until now, and past the begin, has begun a film that nobody saw begin.
         let runs = since_ns(self.stepped_ns.saturating_add(step)) >= 0;
         let error_ns = STEP_NS.saturating_add(signed(crate::time::nanos(reading.bound)));
         if runs && step.saturating_abs() > error_ns {

@@ -71,10 +71,8 @@ impl HoldCause {
         match self {
             Self::Film(state) => state.words(),
             Self::Apart => "the film was more than 40 ms away from the seats",
-            Self::Unstable => {
-                "the seats had to join five times in a minute: its source is not to be relied on"
-            }
-            Self::Asks => "each join waits for a person",
+            Self::Unstable => "the seats had to join five times in a minute: see to its source, and resume",
+            Self::Asks => "each join waits for a person: resume",
         }
     }
 }

@@ -177,6 +177,9 @@ impl Conductor {
     ) -> Result<(), Refusal> {
         self.look_for_stray(engine, now);
         self.machine.request(request, now)?;
+        if let (Transition::Resume, Some(film)) = (request, &mut self.film) {
+            film.let_join();
+        }
         self.steer(engine);
         Ok(())
     }

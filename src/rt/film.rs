@@ -57,6 +57,13 @@ impl FilmLead {
         self.is_followed
     }
 
+    /// A person lets seats join that hold until one does.
+    pub(super) const fn let_join(&mut self) {
+        if matches!(self.chase.state(), ChaseState::Holding) {
+            self.chase.let_join();
+        }
+    }
+
     /// Whether seats may follow it.
     pub(super) fn leads(&self) -> bool {
         self.chase.state() == ChaseState::Following

@@ -134,7 +134,7 @@ impl FilmReader {
         let (to, heard) = sync_channel(WAITING);
         let notes: Vec<Notes> = sources.iter().map(|_| Notes::default()).collect();
         let ranking = Ranking::new(sources, &notes, rules);
-        let (point, table) = (ranking.point(), ranking.table());
+        let (point, table) = (Arc::clone(&ranking.point), ranking.table.clone());
         let mut reader = Self { point, table, children: Vec::new(), over: Arc::default() };
         start("film", move || ranking.run(&heard))?;
         for (place, (args, notes)) in sources.iter().zip(notes).enumerate() {

@@ -124,8 +124,8 @@ pub(super) struct Ranking {
     allows_coarse: bool,
     chooser: Chooser,
     views: Vec<SourceView>,
-    point: Arc<PublishedPoint>,
-    table: SharedTable,
+    pub(super) point: Arc<PublishedPoint>,
+    pub(super) table: SharedTable,
     next: MonoTime,
 }
 
@@ -150,14 +150,6 @@ impl Ranking {
         };
         ranking.publish(now);
         ranking
-    }
-
-    pub(super) fn point(&self) -> Arc<PublishedPoint> {
-        Arc::clone(&self.point)
-    }
-
-    pub(super) fn table(&self) -> SharedTable {
-        self.table.clone()
     }
 
     /// Makes of observations where the film is, until nobody can tell any more: then the newest point grows stale.

@@ -158,7 +158,7 @@ fn film_of(config: &Config, named: Option<Label>, end: ShowTime) -> Result<Optio
             named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
         return why.map_or(Ok(None), Err);
     };
-    let rules = ChaseRules { pace: sync.pace, ..ChaseRules::until(end) };
+    let rules = ChaseRules { pace: sync.pace, rejoin: sync.rejoin, ..ChaseRules::until(end) };
     Ok(sync.begin(named).map_err(refused)?.map(|begin| FilmStart { begin, rules }))
 }
 

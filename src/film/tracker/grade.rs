@@ -16,6 +16,7 @@ impl SourceGrade {
         let is_within = |limit_s: f64| tracker.sigma_s(now).is_some_and(|sigma| 3.0 * sigma < limit_s);
         // One that tells once a second may have been stopped for that long.
         let is_slow = tracker.newest.is_some_and(|newest| newest.period > super::WINDOW);
+        // What was locked is within the wider limit by the rule of the lock, so that fine kinds lead as soon as they lock.
         let needed = if tracker.traits.coarse && !self.is_fine { SURE_S } else { DOUBT * SURE_S };
         self.is_fine = is_within(needed) && !(tracker.traits.coarse && is_slow);
         self.is_fine || allows_coarse
