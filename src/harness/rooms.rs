@@ -100,7 +100,7 @@ pub mod sim {
 }
 pub mod state {
     pub use crate::state::{
-        Cause, Event, Finding, Machine, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
+        Cause, Event, Finding, Latch, Machine, PlayMode, Readiness, Refusal, State, Transition, Trouble, Why,
     };
 }
 pub mod sys {

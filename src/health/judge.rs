@@ -111,11 +111,6 @@ impl HealthTable {
             self.stop_told = false;
             on(Notice::Hall(state::Event::AllReleased));
         }
-        let ailing = self.members.iter().any(|member| member.ails() && !member.out);
-        if self.errors_told && !ailing {
-            on(Notice::Hall(state::Event::ErrorsGone));
-        }
-        self.errors_told = ailing;
     }
 
     /// Tells the hall whether groups that take part wait to be cleared.

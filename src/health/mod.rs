@@ -48,8 +48,6 @@ pub struct HealthTable {
     watched: bool,
     /// The hall was told of an emergency stop, and not yet that it is over.
     stop_told: bool,
-    /// The same for errors.
-    errors_told: bool,
     /// What the hall was told of controllers that are held.
     latch_told: Latch,
 }
@@ -74,16 +72,7 @@ impl HealthTable {
         let (standing, why) = well(watched);
         let place = Place { standing, why, poor: MonoTime::default() };
         let places = vec![place; groups.len()];
-        Self {
-            groups,
-            members,
-            places,
-            policy,
-            watched,
-            stop_told: false,
-            errors_told: false,
-            latch_told: Latch::Free,
-        }
+        Self { groups, members, places, policy, watched, stop_told: false, latch_told: Latch::Free }
     }
 
     /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.

@@ -168,7 +168,6 @@ impl Machine {
             State::Stopped | State::Fault if self.facts.pressed => Err(Why::StillPressed),
             // Before every controller has told, one of them may be in an emergency stop.
             State::Stopped | State::Fault if !self.facts.identified => Err(Why::NotIdentified),
-            State::Stopped | State::Fault if self.facts.errors => Err(Why::StillWrong),
             State::Stopped | State::Fault => {
                 self.stop = None;
                 self.fault = None;

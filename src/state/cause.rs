@@ -60,20 +60,6 @@ pub enum Cause {
 /// Something that no play goes on with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Trouble {
-    /// A controller has an error, or refuses frames (x = 3, 5).
-    Controller {
-        /// Which, counted from 0.
-        controller: usize,
-        /// Its error number; 0 if it gave none.
-        error: u16,
-    },
-    /// A drive has an alarm.
-    Drive {
-        /// Its controller, counted from 0.
-        controller: usize,
-        /// Its error number.
-        error: u16,
-    },
     /// The limiter held motion back three times in a second.
     Limiter,
     /// A move could not be planned.
@@ -117,17 +103,8 @@ impl Cause {
 impl Trouble {
     const fn whose(self) -> Option<Whose> {
         match self {
-            Self::Controller { controller, .. }
-            | Self::Drive { controller, .. }
-            | Self::Homing(controller)
-            | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
+            Self::Homing(controller) | Self::OtherMaster(controller) => Some(Whose::Controller(controller)),
             Self::Limiter | Self::Planner | Self::Deaf | Self::HomingTime | Self::ParkingTime => None,
         }
-    }
-
-    /// True if it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
-    #[must_use]
-    pub(crate) const fn lasts(self) -> bool {
-        matches!(self, Self::Controller { .. } | Self::Drive { .. })
     }
 }

@@ -201,8 +201,6 @@ pub enum Event {
     Slept(Duration),
     /// Something is wrong.
     Trouble(Trouble),
-    /// No controller and no drive reports an error any more.
-    ErrorsGone,
     /// True if controllers that take part stand stopped or in error, and wait for a person to clear them.
     Latched(Latch),
     /// Every controller that takes part knows its position again: the one that did not was homed, or is out.

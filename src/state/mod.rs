@@ -25,8 +25,8 @@ use std::time::Duration;
 
 pub(crate) use cause::Whose;
 pub use cause::{Cause, Trouble};
-pub(crate) use kinds::{Demand, Latch};
-pub use kinds::{Event, Finding, PlayMode, Readiness, State, Transition};
+pub(crate) use kinds::Demand;
+pub use kinds::{Event, Finding, Latch, PlayMode, Readiness, State, Transition};
 pub(crate) use next::Next;
 pub use refusal::{Refusal, Why};
 
@@ -78,8 +78,6 @@ struct Facts {
     astray: bool,
     /// An emergency stop is in effect.
     pressed: bool,
-    /// A controller or a drive has an error.
-    errors: bool,
     /// What holds controllers that take part.
     latch: Latch,
     readiness: Readiness,
@@ -105,7 +103,6 @@ impl Machine {
                 measured: false,
                 astray: false,
                 pressed: false,
-                errors: false,
                 latch: Latch::Free,
                 readiness: Readiness::NoCue,
             },
@@ -195,7 +192,6 @@ impl Machine {
 
     /// Latches that something is wrong.
     fn trouble(&mut self, trouble: Trouble, now: MonoTime) {
-        self.facts.errors |= trouble.lasts();
         let first = *self.fault.get_or_insert(trouble);
         match self.state {
             State::Stopped | State::Stopping | State::Fault => {}

@@ -139,9 +139,6 @@ impl Machine {
         if self.facts.pressed {
             return Next::Release;
         }
-        if self.facts.errors {
-            return Next::PutRight;
-        }
         if !self.facts.identified {
             return Next::AwaitAnswers;
         }

@@ -41,7 +41,6 @@ impl Machine {
             Event::AllReleased => self.facts.pressed = false,
             Event::Slept(span) => self.slept(span, now),
             Event::Trouble(trouble) => self.trouble(trouble, now),
-            Event::ErrorsGone => self.facts.errors = false,
             Event::Latched(latch) => self.facts.latch = latch,
             // Before, and while they home, others say so.
             Event::ZerosKnown => self.facts.homed |= self.facts.identified && self.state != State::Homing,

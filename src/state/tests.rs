@@ -11,7 +11,7 @@ const fn s(seconds: u64) -> MonoTime {
 }
 
 const PARKED: Finding = Finding { homed: true, at_park: true, crashed: false };
-const DRIVE: Trouble = Trouble::Drive { controller: 3, error: 10 };
+const MASTER: Trouble = Trouble::OtherMaster(3);
 
 /// What leads from the start of the program to a state.
 fn way_to(state: State) -> (Vec<Step>, State) {
@@ -377,10 +377,10 @@ fn a_seat_of_unknown_position_is_homed_and_not_parked() {
 #[test]
 fn a_fault_while_the_seats_move_decelerates_them_first() {
     for state in State::ALL.into_iter().filter(|state| state.may_send_motion() && *state != State::Stopping) {
-        let mut hall = told(state, Event::Trouble(DRIVE));
-        assert_eq!((hall.state(), hall.fault()), (State::Stopping, Some(DRIVE)), "from {state}");
+        let mut hall = told(state, Event::Trouble(MASTER));
+        assert_eq!((hall.state(), hall.fault()), (State::Stopping, Some(MASTER)), "from {state}");
         hall.event(Event::AtRest, s(2));
-        assert_eq!((hall.state(), hall.cause()), (State::Fault, Cause::Trouble(DRIVE)));
+        assert_eq!((hall.state(), hall.cause()), (State::Fault, Cause::Trouble(MASTER)));
     }
     for state in [State::Boot, State::Recovering, State::Parked, State::Homing, State::Armed] {
         assert_eq!(told(state, Event::Trouble(Trouble::Planner)).state(), State::Fault, "from {state}");
@@ -389,13 +389,11 @@ fn a_fault_while_the_seats_move_decelerates_them_first() {
 
 #[test]
 fn stopped_goes_before_fault_and_keeps_it_known() {
-    let mut hall = told(State::Playing(PlayMode::Following), Event::Trouble(DRIVE));
+    let mut hall = told(State::Playing(PlayMode::Following), Event::Trouble(MASTER));
     hall.request(Transition::Stop, s(2)).unwrap();
     hall.event(Event::AtRest, s(2));
     assert_eq!((hall.state(), hall.cause()), (State::Stopped, Cause::Asked(Transition::Stop)));
-    assert_eq!(hall.fault(), Some(DRIVE));
-    assert_eq!(hall.request(Transition::Clear, s(3)).unwrap_err().why, Why::StillWrong);
-    hall.event(Event::ErrorsGone, s(4));
+    assert_eq!(hall.fault(), Some(MASTER));
     hall.request(Transition::Clear, s(5)).unwrap();
     assert_eq!(hall.fault(), None);
     assert_eq!(asked(State::Fault, Transition::Stop).state(), State::Stopped);
@@ -403,9 +401,9 @@ fn stopped_goes_before_fault_and_keeps_it_known() {
 
 #[test]
 fn the_first_thing_that_went_wrong_is_the_one_named() {
-    let mut hall = told(State::Parked, Event::Trouble(DRIVE));
+    let mut hall = told(State::Parked, Event::Trouble(MASTER));
     hall.event(Event::Trouble(Trouble::Limiter), s(2));
-    assert_eq!((hall.cause(), hall.since()), (Cause::Trouble(DRIVE), s(1)));
+    assert_eq!((hall.cause(), hall.since()), (Cause::Trouble(MASTER), s(1)));
 }
 
 #[test]
@@ -469,7 +467,7 @@ fn every_state_says_what_comes_next() {
         told(State::Parked, Event::Readiness(Readiness::NoCue)).next().to_string(),
         "load a cue, then arm"
     );
-    assert_eq!(told(State::Armed, Event::Trouble(DRIVE)).next(), Next::PutRight);
+    assert_eq!(told(State::Armed, Event::Trouble(MASTER)).next(), Next::StopOtherMaster);
     assert_eq!(asked(State::Homing, Transition::Stop).next(), Next::AwaitStandstill);
 }
 

@@ -146,8 +146,6 @@ impl Refusal {
 impl Trouble {
     const fn words(self) -> &'static str {
         match self {
-            Self::Controller { .. } => "a controller has an error",
-            Self::Drive { .. } => "a drive has an alarm",
             Self::Limiter => "the limits held motion back three times in a second",
             Self::Planner => "a move could not be planned",
             Self::Deaf => "replies were not read for too long; an emergency stop would have gone unnoticed",

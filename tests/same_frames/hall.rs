@@ -17,7 +17,7 @@ use kinocue::harness::rt::{
     Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, NewsIn, Places, PlanLoop,
     Planning, Sent, Task, TickLoop, Ticked, mailboxes,
 };
-use kinocue::harness::state::{Event, Finding, Readiness, State, Transition};
+use kinocue::harness::state::{Event, Finding, Latch, Readiness, State, Transition};
 use kinocue::harness::time::{Clock, MonoTime, ShowTime, TickGrid};
 use kinocue::wire::MotionRequest;
 use rtrb::{Consumer, Producer};
@@ -232,7 +232,7 @@ impl Hall<'_> {
             }
             State::Stopped | State::Fault => {
                 self.command(Command::Event(Event::AllReleased));
-                self.command(Command::Event(Event::ErrorsGone));
+                self.command(Command::Event(Event::Latched(Latch::Free)));
                 self.ask(Transition::Clear);
             }
             State::Recovering => {
@@ -307,7 +307,7 @@ impl Hall<'_> {
                 let event = chance.one_of(&[
                     Event::EmergencyStop(0),
                     Event::AllReleased,
-                    Event::ErrorsGone,
+                    Event::Latched(Latch::Free),
                     Event::Readiness(Readiness::Ready),
                     Event::Homed,
                     Event::PositionsRead,

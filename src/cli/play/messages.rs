@@ -152,11 +152,11 @@ mod tests {
             said.news(&pressed).unwrap(),
             "stopped: emergency stop (A2); next: release the emergency-stop button, then clear"
         );
-        let broken = Trouble::Controller { controller: 0, error: 7 };
-        let fault = entered(State::Fault, Cause::Trouble(broken), Next::PutRight);
+        let broken = Trouble::Homing(0);
+        let fault = entered(State::Fault, Cause::Trouble(broken), Next::LookAtSeat);
         assert_eq!(
             said.news(&fault).unwrap(),
-            "fault: a controller has an error (A1); next: clear the error at the controller, then clear the hall"
+            "fault: a seat failed to home (A1); next: inspect the seat, then clear and home again"
         );
         let parked = entered(State::Parked, Cause::ArrivedAtPark, Next::Arm);
         assert_eq!(said.news(&parked).unwrap(), "parked: the seats have parked", "the play is over");

@@ -73,7 +73,7 @@ fn an_error_stops_its_group_and_the_others_go_by_the_configuration() {
     assert_eq!(hall.told_hall(), [Event::Policy(Demand::Pause, 0), Event::Latched(Latch::Held)]);
     hall.observed(0, What::Error(0));
     hall.look();
-    assert_eq!((hall.health.standing(0), hall.told_hall()[2]), (HealthState::Error, Event::ErrorsGone));
+    assert_eq!(hall.health.standing(0), HealthState::Error);
     hall.health.look_anew(0);
     hall.run(2);
     assert_eq!(hall.health.standing(0), HealthState::Rejoining);
@@ -113,7 +113,7 @@ fn a_controller_that_refuses_frames_is_in_error_until_a_read_finds_none() {
     hall.answers_reads = true;
     hall.run(30);
     assert_eq!(hall.health.standing(1), HealthState::Error);
-    assert_eq!(hall.told_hall()[1..], [Event::ErrorsGone, Event::Latched(Latch::Over)]);
+    assert_eq!(hall.told_hall()[1..], [Event::Latched(Latch::Over)]);
 }
 
 #[test]

@@ -118,7 +118,7 @@ fn an_alarm_of_the_drives_that_is_reported_or_read_parks_the_hall_until_it_is_ov
         assert!(hall.told_hall().contains(&Event::Policy(Demand::Park, 1)), "{:?}", hall.told_hall());
         hall.alarm = 0;
         hall.run(30);
-        assert!(hall.told_hall().ends_with(&[Event::ErrorsGone, Event::Latched(Latch::Over)]));
+        assert!(hall.told_hall().ends_with(&[Event::Latched(Latch::Over)]));
         assert_eq!(hall.health.standing(1), HealthState::Error, "latched");
         hall.health.look_anew(1);
         hall.run(30);
@@ -152,7 +152,7 @@ fn whatever_else_is_reported_unasked_is_an_error_until_a_look_finds_none() {
     assert_eq!(hall.told_hall(), [Event::Latched(Latch::Held)]);
     hall.answers_reads = true;
     hall.run(30);
-    assert_eq!(hall.told_hall()[1..], [Event::ErrorsGone, Event::Latched(Latch::Over)]);
+    assert_eq!(hall.told_hall()[1..], [Event::Latched(Latch::Over)]);
 }
 
 #[test]

@@ -15,25 +15,18 @@ enum Turn {
 }
 
 fn trouble() -> impl Strategy<Value = Trouble> {
-    select(vec![
-        DRIVE,
-        Trouble::Controller { controller: 1, error: 21 },
-        Trouble::Limiter,
-        Trouble::Planner,
-        Trouble::Homing(2),
-        Trouble::OtherMaster(0),
-    ])
+    select(vec![Trouble::Limiter, Trouble::Planner, Trouble::Homing(2), Trouble::OtherMaster(0)])
 }
 
 fn event() -> impl Strategy<Value = Event> {
     use Event::{
-        AllReleased, AtRest, CueEnded, EmergencyStop, ErrorsGone, Homed, Identified, JoinBegun, Joined, Late,
-        Parked, Policy, PositionsRead, Rebooted,
+        AllReleased, AtRest, CueEnded, EmergencyStop, Homed, Identified, JoinBegun, Joined, Late, Parked,
+        Policy, PositionsRead, Rebooted,
     };
     let readiness = [Readiness::NoCue, Readiness::NotProved, Readiness::NotPreflighted];
     prop_oneof![
         8 => select(vec![PositionsRead, Homed, JoinBegun, Joined, Late, CueEnded, AtRest, Parked]),
-        4 => select(vec![AllReleased, ErrorsGone, Event::Readiness(Readiness::Ready)]),
+        4 => select(vec![AllReleased, Event::Readiness(Readiness::Ready)]),
         2 => any::<[bool; 3]>().prop_map(|[homed, at_park, crashed]| Identified(Finding { homed, at_park, crashed })),
         1 => Just(Identified(PARKED)),
         1 => any::<bool>().prop_map(Event::Astray),
@@ -79,7 +72,6 @@ const fn height(state: State) -> u8 {
 #[derive(Debug, Default)]
 struct Model {
     pressed: bool,
-    errors: bool,
     /// The last taken request to home was one to arm, and it was not taken back.
     homes_to_arm: bool,
     astray: bool,
@@ -98,10 +90,6 @@ impl Model {
         assert_eq!(after.may_send_motion(), five);
         let stops = matches!(to, State::Stopping | State::Stopped);
         assert!(!self.pressed || stops, "{to} under an emergency stop");
-        assert!(
-            !self.errors || matches!(to, State::Stopping | State::Stopped | State::Fault),
-            "{to} with an error"
-        );
     }
 
     fn on_request(&mut self, before: &Machine, request: Transition, taken: bool, after: &Machine) {
@@ -147,8 +135,6 @@ impl Model {
         match event {
             Event::EmergencyStop(_) => self.pressed = true,
             Event::AllReleased => self.pressed = false,
-            Event::Trouble(trouble) => self.errors |= trouble.lasts(),
-            Event::ErrorsGone => self.errors = false,
             Event::Astray(astray) => self.astray = astray,
             Event::Latched(latch) => self.latch = latch,
             Event::Readiness(readiness) => self.homes_to_arm &= readiness == Readiness::Ready,
@@ -165,12 +151,7 @@ impl Model {
 
 /// What a patient operator and sound controllers do, until the hall plays.
 fn to_the_show(hall: &mut Machine, mut now: MonoTime) {
-    let tell = [
-        Event::AllReleased,
-        Event::ErrorsGone,
-        Event::Identified(PARKED),
-        Event::Readiness(Readiness::Ready),
-    ];
+    let tell = [Event::AllReleased, Event::Identified(PARKED), Event::Readiness(Readiness::Ready)];
     tell.into_iter().for_each(|event| hall.event(event, now));
     for _ in 0..10 {
         now = now + Duration::from_secs(1);

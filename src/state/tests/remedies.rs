@@ -25,10 +25,7 @@ fn follow(hall: &mut Machine, now: MonoTime) {
             hall.event(Event::Latched(Latch::Free), now);
         }
         Next::Release => hall.event(Event::AllReleased, now),
-        Next::PutRight => {
-            hall.event(Event::ErrorsGone, now);
-            hall.event(Event::Latched(Latch::Over), now);
-        }
+        Next::PutRight => hall.event(Event::Latched(Latch::Over), now),
         Next::Load | Next::Prove | Next::Preflight => hall.event(Event::Readiness(Readiness::Ready), now),
         Next::AwaitAnswers => hall.event(Event::Identified(PARKED), now),
         Next::AwaitPositions => hall.event(Event::PositionsRead, now),
@@ -59,8 +56,6 @@ pub(super) fn follow_to_the_show(hall: &mut Machine, mut now: MonoTime) {
 #[test]
 fn whatever_goes_wrong_wherever_what_is_named_next_can_be_done_and_leads_to_a_show() {
     let troubles = [
-        DRIVE,
-        Trouble::Controller { controller: 1, error: 21 },
         Trouble::Limiter,
         Trouble::Planner,
         Trouble::Deaf,
