@@ -47,7 +47,7 @@ pub struct Status {
     /// The playlist that is loaded.
     pub playlist: Option<PlaylistStatus>,
     /// The film that leads shows; null where each show is its own film.
-    pub(crate) film: Option<FilmStatus>,
+    pub film: Option<FilmStatus>,
     /// How much later than the film the motion is, ms.
     pub trim_ms: i32,
     /// Levels and effects as they are set.
@@ -149,7 +149,7 @@ pub struct ShowStatus {
 /// The film of a hall, by the best of its sources.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub(crate) struct FilmStatus {
+pub struct FilmStatus {
     /// One word: `absent`, `acquiring`, `locked`, `freewheeling`, `stopped`, `ended`, `jumped`, `reverse`, `shuttle`, `unusable` or
     /// `lost`.
     pub(crate) state: String,
