@@ -24,6 +24,8 @@ pub struct FilmLead {
     begin: ShowTime,
     /// True if the show that is loaded follows it.
     is_followed: bool,
+    /// True if shows say how they follow it; a play has one show, which does.
+    is_of_a_hall: bool,
 }
 
 impl FilmLead {
@@ -35,17 +37,27 @@ impl FilmLead {
             chase: Chase::new(rules, now),
             begin: ShowTime::ZERO,
             is_followed: true,
+            is_of_a_hall: false,
         }
     }
 
     /// The film of a hall in which no show follows it yet.
     pub(crate) fn of_a_hall(source: Arc<PublishedPoint>, now: MonoTime) -> Self {
         let chase = Chase::new(ChaseRules::until(ShowTime::ZERO), now);
-        Self { clock: ChasedFilm::new(source), chase, begin: ShowTime::ZERO, is_followed: false }
+        Self {
+            clock: ChasedFilm::new(source),
+            chase,
+            begin: ShowTime::ZERO,
+            is_followed: false,
+            is_of_a_hall: true,
+        }
     }
 
     /// Another show is loaded, which follows the film so, or not at all.
     pub(super) fn load(&mut self, start: Option<FilmStart>, now: MonoTime) {
+        if !self.is_of_a_hall {
+            return;
+        }
         self.is_followed = start.is_some();
         if let Some(FilmStart { begin, rules }) = start {
             (self.begin, self.chase) = (begin, Chase::new(rules, now));
