@@ -39,7 +39,7 @@ const ROWS: &[Row] = &[
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 240 for an engine
     // whose phases hold what is theirs, with types of their own for show time, lanes and what crosses to the planner; 150 for a limiter
     // that judges axes in groups, and for seats that vibrate on.
-    ("lines of code", counts::lines_of_code, Less, 53_684.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 53_691.0, 39_800.0),
     ("public items and fields", counts::public_items, Less, 1_145.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 469.0, 390.0),
