@@ -51,6 +51,13 @@ impl Why {
             Self::Moved(_) => {
                 Some("find out what moved it; then park, or start a show: it joins slowly from where it is")
             }
+            Self::Outside { .. } => Some(
+                "put its word order or PA02 right, or home it with nobody on the seat (`kinocue home --config`, with the service \
+                 stopped); it rejoins by itself once it is inside",
+            ),
+            Self::Ambiguous(_) => {
+                Some("home it with nobody on the seat (`kinocue home --config`, with the service stopped)")
+            }
             Self::OtherMaster(_) => {
                 Some("stop the other machine; then park, and home it with nobody on the seat")
             }
@@ -148,5 +155,20 @@ impl Why {
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.to, self.why)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::Pulses;
+
+    #[test]
+    fn a_seat_that_says_it_is_where_it_cannot_be_is_homed_and_nobody_is_sent_to_its_cables() {
+        let outside = Why::Outside { controller: 0, axis: 1, pulses: Pulses(-92_000) };
+        for why in [outside, Why::Ambiguous(0)] {
+            let next = why.next().expect("it is no matter of the network");
+            assert!(next.contains("kinocue home --config") && !next.contains("network"), "{next}");
+        }
     }
 }

@@ -76,7 +76,10 @@ impl Hall {
     fn serve(&mut self) {
         let serving = Serving::start(self.dir.path());
         let begun = |line: &str| {
-            ["parked: ", "recovering: ", "stopped: ", "fault: "].iter().any(|state| line.contains(state))
+            // A hall of which no seat takes part is in no state but boot.
+            ["parked: ", "recovering: ", "stopped: ", "fault: ", "no seat takes part"]
+                .iter()
+                .any(|state| line.contains(state))
         };
         serving.heard(|line| begun(line).then_some(()));
         self.serving = Some(serving);
