@@ -113,6 +113,20 @@ fn a_film_that_is_a_frame_off_is_slewed_and_one_that_jumps_is_joined() {
 }
 
 #[test]
+fn a_film_that_jumps_about_is_joined_no_sixth_time_before_a_person_resumes() {
+    let jumps = [(0.5, 0.5), (3.0, 5.0), (5.0, 3.0), (7.0, 9.0), (9.0, 7.0), (11.0, 13.0)];
+    let about = || jumps.map(|(at_s, media_s)| film(at_s, media_s, 1.0, FilmState::Locked)).to_vec();
+    let left = play([about(), vec![(2_500, Event::Leave)]].concat());
+    let waits = |(state, cause): &(State, Cause)| {
+        *state == State::Playing(PlayMode::Waiting) && cause.to_string().contains("resume")
+    };
+    assert!(states(&left).iter().any(waits), "{:?}", states(&left));
+    assert!(left.frames.iter().all(|frame| !(13.0..25.0).contains(&frame.at.since(ORIGIN).as_secs_f64())));
+    let resumed = play([about(), vec![(1_600, Event::Ask(Transition::Resume))]].concat());
+    assert!(errors_mm(&resumed, 20.0, 26.0, |at| at + 2.0) < 0.05);
+}
+
+#[test]
 fn the_seat_rests_while_the_film_stands_and_joins_it_where_it_goes_on() {
     let played = play(vec![
         film(0.5, 0.5, 1.0, FilmState::Locked),

@@ -7,13 +7,12 @@ use std::time::Duration;
 use super::refused::PlayError;
 use super::runtime::{Control, LeadingFilm, Numbers, Purpose, Runtime, RuntimeError};
 use super::script::{PlayHandle, PlayScript, off_park};
-use super::staged::StagedShow;
+use super::staged::{StagedShow, at_any_pace};
 use super::sum_up::{About, Played, sum_up};
 use crate::config::{Config, Misfit};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Ending, Show};
 use crate::film::chase::ChaseRules;
-use crate::film::follower::PaceLimits;
 use crate::film::point::PublishedPoint;
 use crate::proof::{self, Digest, Proof, Terms};
 use crate::time::Rate;
@@ -169,17 +168,6 @@ fn fit(config: &Config, timeline: &Timeline) -> Result<(), PlayError> {
         return Err(PlayError::Misfit { cue: timeline.cue().path().to_path_buf(), misfits });
     }
     if strokes.is_empty() { Ok(()) } else { Err(PlayError::Stroke(strokes)) }
-}
-
-/// The hall with what is left of its seats' limits at those paces.
-fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
-    let mut config = config.clone();
-    for controller in &mut config.controllers {
-        let seat = Arc::make_mut(&mut controller.seat);
-        [seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3] =
-            pace.leave(seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3);
-    }
-    config
 }
 
 fn keeps_limits(config: &Config, timeline: &Timeline, rate: Rate, level: f64) -> Result<(), PlayError> {

@@ -16,6 +16,7 @@ use jiff::Zoned;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 
+use super::film::HallFilm;
 use super::runtime::{Numbers, Purpose, Runtime, RuntimeEnd, RuntimeError, RuntimeHandle};
 use super::script::Prepared;
 use super::sum_up::{About, Played, sum_up};
@@ -186,8 +187,8 @@ fn serve_halls(
     let mut config = Arc::new(config);
     let library = Library::open(&config.show.library, library::Hall::new(&places.config, &config.store))?;
     let mut numbers = Numbers::new();
-    let mut runtime =
-        Runtime::open(Arc::clone(&config), Purpose::Hall { crashed }, &numbers, &signals.leave)?;
+    let mut film = HallFilm::default();
+    let mut runtime = open(&config, crashed, &numbers, &signals.leave, &mut film)?;
     let (handle, inbox, source) = handle(runtime.control().desk, Status::starting(&config.show.name));
     let service_log = ServiceLog::new(log.clone());
     let (settings_file, kept) = SettingsFile::open(&places.state);
@@ -201,6 +202,7 @@ fn serve_halls(
         service_log,
         carryover,
         settings_file,
+        film: None,
     };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
@@ -209,6 +211,7 @@ fn serve_halls(
     up(handle, surfaces.addresses());
     let mut feeder = None;
     let served = loop {
+        ports.film = film.table();
         let left = keep(runtime, ports, library.clone(), journal, &mut feeder)?;
         (ports, journal) = (left.ports, left.journal);
         let Some(next) = left.reload else {
@@ -216,11 +219,25 @@ fn serve_halls(
         };
         // Also of controllers that come back with a later configuration.
         numbers.extend(&left.closed.numbers);
-        (runtime, config) = reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave)?;
+        (runtime, config) =
+            reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave, &mut film)?;
     };
     surfaces.close();
     log.close();
     Ok(served)
+}
+
+/// Opens the hall, and reads what tells of its film.
+fn open(
+    config: &Arc<Config>,
+    crashed: bool,
+    numbers: &Numbers,
+    leave: &Arc<AtomicBool>,
+    film: &mut HallFilm,
+) -> Result<Runtime, RuntimeError> {
+    let runtime = Runtime::open(Arc::clone(config), Purpose::Hall { crashed }, numbers, leave)?;
+    let point = film.follow(config.sync.as_ref()).map_err(RuntimeError::Thread)?;
+    Ok(runtime.with_film(point))
 }
 
 /// Opens the hall with another configuration; where it does not open so, with the one before, which did.
@@ -230,11 +247,10 @@ fn reopen(
     numbers: &Numbers,
     carryover: &mut Carryover,
     leave: &Arc<AtomicBool>,
+    film: &mut HallFilm,
 ) -> Result<(Runtime, Arc<Config>), RuntimeError> {
     // The seats are parked or at rest, so nothing tells of a crash.
-    let open = |config: &Arc<Config>| {
-        Runtime::open(Arc::clone(config), Purpose::Hall { crashed: false }, numbers, leave)
-    };
+    let mut open = |config: &Arc<Config>| open(config, false, numbers, leave, film);
     match open(&next) {
         Ok(runtime) => Ok((runtime, next)),
         Err(error) => {
@@ -319,8 +335,10 @@ mod tests {
         // An address of documentation, which no machine has (RFC 5737).
         let (next, before) = (hall("192.0.2.1:0"), hall("127.0.0.1:0"));
         let mut carryover = Carryover::default();
+        let mut film = HallFilm::default();
         let (_house, config) =
-            reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &Arc::default()).unwrap();
+            reopen(next, Arc::clone(&before), &Numbers::new(), &mut carryover, &Arc::default(), &mut film)
+                .unwrap();
         assert!(Arc::ptr_eq(&config, &before));
         assert!(
             format!("{carryover:?}").contains("does not open with the new configuration"),
@@ -328,7 +346,8 @@ mod tests {
         );
         let next = hall("127.0.0.1:0");
         let (_house, config) =
-            reopen(Arc::clone(&next), before, &Numbers::new(), &mut carryover, &Arc::default()).unwrap();
+            reopen(Arc::clone(&next), before, &Numbers::new(), &mut carryover, &Arc::default(), &mut film)
+                .unwrap();
         assert!(Arc::ptr_eq(&config, &next));
     }
 }

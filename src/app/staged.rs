@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::config::Config;
 use crate::drive::{Lane, Manner, lanes};
 use crate::engine::{Engine, Headroom, Mix, Show};
+use crate::film::follower::PaceLimits;
 use crate::motion::Window;
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
 use crate::rt::{Desk, Loaded, Planning};
@@ -36,6 +37,17 @@ pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
     let lanes = lanes(config, timeline, Manner { level: 1.0, silent: false });
     let windows: Vec<Window> = lanes.into_iter().map(|lane| lane.window).collect();
     Headroom::measure(&windows, timeline, rate)
+}
+
+/// The hall with what is left of its seats' limits at those paces.
+pub(super) fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
+    let mut config = config.clone();
+    for controller in &mut config.controllers {
+        let seat = Arc::make_mut(&mut controller.seat);
+        [seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3] =
+            pace.leave(seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3);
+    }
+    config
 }
 
 impl StagedShow {
@@ -100,6 +112,6 @@ impl StagedShow {
     pub fn loaded(self) -> Box<Loaded> {
         let (engine, lanes, planner, timeline) = self.split();
         let planning = Some(Box::new(Planning { planner, timeline }));
-        Box::new(Loaded { engine: engine.waiting(), lanes, planning })
+        Box::new(Loaded { engine: engine.waiting(), lanes, planning, film: None })
     }
 }

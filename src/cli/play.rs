@@ -11,13 +11,15 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use super::load::{self, SourceArgs, after_help, parse_rate};
 use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
-use crate::app::film::{FilmArgs, FilmReader, FilmSource};
+use crate::app::film::{FilmReader, SourceRules};
 use crate::app::runtime::RuntimeError;
 use crate::app::{Play, PlayError, Played};
 use crate::config::{Config, from_to_args, parse_level};
 use crate::control::model::Ending;
 use crate::drive::Manner;
 use crate::engine::Show;
+use crate::film::follower::PaceLimits;
+use crate::film::source::{ClockStart, FilmArgs, FilmSource};
 use crate::health::ACKS_OFF;
 use crate::sys::{signal, terminal};
 use crate::time::{Rate, ShowTime, parse_time};
@@ -91,9 +93,15 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
     spin_us: Option<u32>,
     /// Follow a film: the seats wait at park, join, and hold while it stands. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
-    /// ltc:alsa:DEVICE, ltc:- or ltc:FILE.wav.
+    /// ltc:alsa:DEVICE, ltc:-, ltc:FILE.wav, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or clock:TIME; repeatable, the best first.
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["start", "plays"])]
-    chase: Option<FilmSource>,
+    chase: Vec<FilmSource>,
+    /// Follow a film that begins at that time, the same as --chase clock:TIME: 2026-11-21T19:00 or 19:00.
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["start", "plays", "chase"])]
+    at: Option<ClockStart>,
+    /// Follow a coarse source as well: positions by OSC or HTTP that may be tens of milliseconds off.
+    #[arg(long, requires = "chase")]
+    allow_coarse: bool,
     /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
     #[arg(long, value_name = "N", requires = "chase")]
     film_fps: Option<String>,
@@ -120,14 +128,21 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
         return Err(why).or_exit(Exit::Usage);
     }
     let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.no_acks };
-    let film = args.chase.as_ref().map(|source| film(source, args)).transpose()?;
+    let film = film(args)?;
     play(config, timeline, show, manner, film.as_ref(), args.json)
 }
 
-/// Begins to listen to the film that leads.
-fn film(source: &FilmSource, args: &Args) -> Result<FilmReader, Failure> {
-    let film = FilmArgs::new(source.clone(), args.film_fps.as_deref(), args.tc_start.as_deref());
-    FilmReader::start(&film.or_exit(Exit::Usage)?).or_exit(Exit::System)
+/// Begins to listen to the film that leads, if one does.
+fn film(args: &Args) -> Result<Option<FilmReader>, Failure> {
+    let clock = args.at.map(FilmSource::Clock);
+    let of = |source: FilmSource| FilmArgs::new(source, args.film_fps.as_deref(), args.tc_start.as_deref());
+    let sources = args.chase.iter().cloned().chain(clock).map(of);
+    let sources: Vec<FilmArgs> = sources.collect::<Result<_, _>>().or_exit(Exit::Usage)?;
+    if sources.is_empty() {
+        return Ok(None);
+    }
+    let rules = SourceRules { allows_coarse: args.allow_coarse, band: PaceLimits::default().band };
+    FilmReader::start(&sources, rules).map(Some).or_exit(Exit::System)
 }
 
 /// Plays what is proved to fit, and prints the report.
@@ -159,7 +174,8 @@ fn play(
     let control = play.control();
     let ctrl_c =
         leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
-    let said = Messages { control, ctrl_c, length, join: play.join(), chases: film.is_some(), names };
+    let film = film.map(FilmReader::table);
+    let said = Messages { control, ctrl_c, length, join: play.join(), film, names };
     let progress = Progress::start(said, for_ever);
     let played = play.run(|handle| progress.lead(handle)).map_err(|error| refused(error, &cue));
     progress.finish();

@@ -23,6 +23,7 @@ mod osc;
 mod preset;
 mod read;
 mod section;
+mod sync;
 mod target;
 #[cfg(test)]
 mod tests;
@@ -40,6 +41,7 @@ pub(crate) use log::Log;
 pub(crate) use osc::OscPort;
 pub(crate) use preset::Preset;
 pub(crate) use section::{Entry, Section, did_you_mean};
+pub(crate) use sync::FilmSync;
 pub use target::from_to_args;
 pub(crate) use text::TextPort;
 
@@ -76,6 +78,8 @@ pub struct Config {
     pub(crate) text: Option<TextPort>,
     /// HTTP over TCP.
     pub(crate) api: Api,
+    /// The film that leads the shows, where one does.
+    pub(crate) sync: Option<FilmSync>,
 }
 
 /// How cues are played.

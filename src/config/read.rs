@@ -20,6 +20,7 @@ use super::log::log;
 use super::osc::osc;
 use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
+use super::sync::sync;
 use super::text::text;
 use super::{
     Absent, Accept, Api, Belts, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN,
@@ -75,8 +76,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
-    let [preset_at, library_at, log_at, osc_at, text_at] =
-        ["preset", "library", "log", "osc", "text"].map(|key| section.get(key));
+    let [preset_at, library_at, log_at, osc_at, text_at, sync_at] =
+        ["preset", "library", "log", "osc", "text", "sync"].map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
@@ -91,6 +92,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
+    let sync = sync_at.and_then(|entry| sync(entry, faults));
     Some(Config {
         show: show?,
         seats,
@@ -104,6 +106,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         osc,
         text,
         api: api?,
+        sync,
     })
 }
 

@@ -97,6 +97,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         osc: None,
         text: None,
         api: Api::default(),
+        sync: None,
     })
 }
 

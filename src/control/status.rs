@@ -46,6 +46,8 @@ pub struct Status {
     pub show: Option<ShowStatus>,
     /// The playlist that is loaded.
     pub playlist: Option<PlaylistStatus>,
+    /// The film that leads shows; null where each show is its own film.
+    pub film: Option<FilmStatus>,
     /// How much later than the film the motion is, ms.
     pub trim_ms: i32,
     /// Levels and effects as they are set.
@@ -142,6 +144,53 @@ pub struct ShowStatus {
     pub(crate) axes: usize,
     /// The effects and outputs that it uses, by the names of their switches.
     pub(crate) effects: Vec<String>,
+}
+
+/// The film of a hall, by the best of its sources.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub struct FilmStatus {
+    /// One word: `absent`, `acquiring`, `locked`, `freewheeling`, `stopped`, `ended`, `jumped`, `reverse`, `shuttle`, `unusable` or
+    /// `lost`.
+    pub(crate) state: String,
+    /// What that means.
+    pub(crate) cause: String,
+    /// What a person does next about it.
+    pub(crate) next: String,
+    /// True if the show that is loaded follows it.
+    pub(crate) leads: bool,
+    /// The source that leads, as it is configured; null while none can.
+    pub(crate) source: Option<String>,
+    /// Where the film is in the cue, s; null while nobody knows.
+    pub(crate) position_s: Option<f64>,
+    /// How much faster than the clock it runs, millionths.
+    pub(crate) rate_ppm: Option<f64>,
+    /// All sources, in their ranking.
+    pub(crate) sources: Vec<FilmSourceStatus>,
+}
+
+/// A source that tells where the film is.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub(crate) struct FilmSourceStatus {
+    /// As it is configured.
+    pub(crate) source: String,
+    /// One word, as of the film.
+    pub(crate) state: String,
+    /// What that means, and what is wrong with the source.
+    pub(crate) cause: String,
+    /// Where the film is in the cue by this source, s.
+    pub(crate) position_s: Option<f64>,
+    /// How much faster than the clock it runs, millionths.
+    pub(crate) rate_ppm: Option<f64>,
+    /// Deviation of where it is, ms.
+    pub(crate) sigma_ms: Option<f64>,
+    /// True if it is good enough to lead.
+    pub(crate) may_lead: bool,
+    /// How often nothing was heard of it.
+    pub(crate) dropouts: u64,
+    /// What others sent in its place, and was not heard.
+    pub(crate) foreign: u64,
 }
 
 /// A playlist, and where in it the hall is.

@@ -8,7 +8,7 @@ use std::net::IpAddr;
 
 use super::labels::LabelClock;
 use super::observation::{FilmWord, Observation};
-use super::timecode::{FrameRate, Label, TimecodeError};
+use super::timecode::{FrameRate, Label};
 use crate::time::MonoTime;
 
 const HEAD: [u8; 10] = *b"Art-Net\0\x00\x97";
@@ -79,9 +79,9 @@ impl ArtNetReader {
         (self.foreign, self.garbage)
     }
 
-    /// Why the labels are none that can be used.
-    pub(crate) const fn refused(&self) -> Option<&TimecodeError> {
-        self.labels.refused()
+    /// Its labels.
+    pub(crate) const fn labels(&self) -> &LabelClock {
+        &self.labels
     }
 
     /// Takes a datagram that came at an instant.

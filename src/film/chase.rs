@@ -274,6 +274,10 @@ impl Chase {
         if let Some(cause) = self.waits_for_a_person(now) {
             return self.held(cause, now);
         }
+        // Seats at rest do not join the end of a cue for a film that is somewhere else.
+        if self.outside_since.is_some() && self.state == ChaseState::Holding {
+            return self.held(HoldCause::Film(state), now);
+        }
         let since = *self.ready_since.get_or_insert(now);
         let is_ready = now.since(since) >= READY_FOR || state == FilmState::FreeRunning;
         // Seats that are parked wait for a film that is before the cue, and for one that is behind it.

@@ -70,6 +70,7 @@ impl Chooser {
     }
 
     /// A person chooses; it stays so until that source is lost.
+    #[cfg(test)]
     pub(crate) fn choose_by_hand(&mut self, source: usize, views: &[SourceView]) {
         if source < views.len().min(MOST_SOURCES) {
             self.switch(source, views);

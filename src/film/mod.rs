@@ -9,7 +9,6 @@
 //!
 //! All of it is told the time and asks nobody. Nothing in here can arm, home, clear, or move a seat that nobody armed: [`chase::Chase`]
 //! says what a hall that is armed may do, and no more.
-#![expect(dead_code, reason = "readers of further sources come next")]
 #![cfg_attr(
     test,
     expect(
@@ -26,15 +25,18 @@ pub(crate) mod chase;
 pub(crate) mod chooser;
 mod estimate;
 pub(crate) mod follower;
-mod labels;
+pub(crate) mod labels;
 mod late;
 pub(crate) mod ltc;
+pub(crate) mod message;
 pub(crate) mod mpv;
 pub(crate) mod mtc;
 pub(crate) mod observation;
 pub(crate) mod point;
+pub(crate) mod source;
 #[cfg(test)]
 mod tests;
 pub(crate) mod timecode;
 pub(crate) mod tracker;
+pub(crate) mod wall;
 mod words;

@@ -113,6 +113,7 @@ impl MpvClient {
     }
 
     /// When [`Self::poll`] has something to ask next.
+    #[cfg(test)]
     pub(crate) const fn next_at(&self) -> MonoTime {
         self.next_at
     }

@@ -6,7 +6,7 @@ mod tests;
 
 use super::labels::LabelClock;
 use super::observation::{FilmWord, Observation};
-use super::timecode::{FrameRate, Label, Timecode, TimecodeError};
+use super::timecode::{FrameRate, Label, Timecode};
 use crate::time::MonoTime;
 
 const QUARTER: u8 = 0xf1;
@@ -123,9 +123,9 @@ impl MtcReader {
         }
     }
 
-    /// Why the labels are none that can be used.
-    pub(crate) const fn refused(&self) -> Option<&TimecodeError> {
-        self.labels.refused()
+    /// Its labels.
+    pub(crate) const fn labels(&self) -> &LabelClock {
+        &self.labels
     }
 
     /// Takes a byte that came at an instant.

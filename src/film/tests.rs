@@ -9,7 +9,7 @@ use super::follower::PaceLimits;
 use super::follower::tests::tries;
 use super::observation::{FilmWord, Observation};
 use super::point::{ChasedFilm, PublishedPoint};
-use super::tracker::SourceTracker;
+use super::tracker::{SourceGrade, SourceTracker};
 use crate::harness::shown::{Luck, SOURCES, Told, TrueFilm, mono};
 use crate::time::{ShowTime, Tick};
 
@@ -19,6 +19,7 @@ const FRAME: Duration = Duration::from_millis(20);
 /// From two sources to the verdict about the seats, as the program puts it together.
 struct Chain {
     trackers: Vec<SourceTracker>,
+    grades: Vec<SourceGrade>,
     chooser: Chooser,
     published: Arc<PublishedPoint>,
     clock: ChasedFilm,
@@ -38,6 +39,7 @@ impl Chain {
                 .iter()
                 .map(|told| SourceTracker::new(told.kind, limits.band, mono(0.0)))
                 .collect(),
+            grades: vec![SourceGrade::default(); sources.len()],
             chooser: Chooser::default(),
             clock: ChasedFilm::new(Arc::clone(&published)),
             published,
@@ -60,11 +62,12 @@ impl Chain {
     fn tick(&mut self, may_lead: bool) -> ChaseVerdict {
         self.ticks += 1;
         let now = mono(self.now_s());
-        let view = |tracker: &mut SourceTracker| {
+        let view = |(tracker, grade): (&mut SourceTracker, &mut SourceGrade)| {
             tracker.poll(now);
-            SourceView { point: tracker.point(now), may_lead: tracker.is_fine(now) }
+            let may_lead = grade.may_lead(tracker, false, now);
+            SourceView { point: tracker.point(now), may_lead }
         };
-        let views: Vec<SourceView> = self.trackers.iter_mut().map(view).collect();
+        let views: Vec<SourceView> = self.trackers.iter_mut().zip(&mut self.grades).map(view).collect();
         self.published.publish(&self.chooser.choose(&views, now).point);
         let tick = Tick { index: self.ticks, deadline: now, late: Duration::ZERO, missed: 0 };
         let point = self.clock.at(&tick);

@@ -1,6 +1,7 @@
 //! One source: its observations in, its state and where the film is by it out. The place is an estimate, which may jump; the
 //! seats' place is the [`super::follower`]'s, which may not.
 
+mod grade;
 mod kind;
 mod recent;
 mod states;
@@ -9,6 +10,7 @@ mod tests;
 
 use std::time::Duration;
 
+pub(crate) use grade::SourceGrade;
 pub(crate) use kind::SourceKind;
 
 use super::estimate::{Estimate, RATE_SIGMA};
@@ -161,11 +163,6 @@ impl SourceTracker {
     /// Deviation of the estimate, seconds; `None` before the first position.
     pub(crate) fn sigma_s(&self, now: MonoTime) -> Option<f64> {
         self.estimate.as_ref().map(|estimate| estimate.sigma_s(now))
-    }
-
-    /// True if it is good enough to lead seats without anybody having allowed coarse sources.
-    pub(crate) fn is_fine(&self, now: MonoTime) -> bool {
-        self.sigma_s(now).is_some_and(|sigma| 3.0 * sigma < DOUBT * SURE_S) && !self.traits.coarse
     }
 
     /// Where the film is by this source.

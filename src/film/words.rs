@@ -15,8 +15,51 @@ impl FilmState {
             Self::Jumped => "the film has jumped",
             Self::Reverse => "the film runs backwards",
             Self::Shuttle => "the film runs at a speed that the seats may not follow",
-            Self::Unusable => "what is heard of the film makes no sense",
+            Self::Unusable => "what is heard of the film makes no sense, or is too coarse",
             Self::Lost => "nothing is heard of the film any more",
+        }
+    }
+}
+
+impl FilmState {
+    /// What a source says of the film, for somebody who looks at that source alone.
+    pub(crate) const fn of_a_source(self) -> &'static str {
+        match self {
+            Self::FreeRunning | Self::Locked => "the film runs",
+            _ => self.words(),
+        }
+    }
+}
+
+impl FilmState {
+    /// The word of it for programs.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::FreeRunning => "free-running",
+            Self::Absent => "absent",
+            Self::Acquiring => "acquiring",
+            Self::Locked => "locked",
+            Self::Freewheeling => "freewheeling",
+            Self::Stopped => "stopped",
+            Self::Ended => "ended",
+            Self::Jumped => "jumped",
+            Self::Reverse => "reverse",
+            Self::Shuttle => "shuttle",
+            Self::Unusable => "unusable",
+            Self::Lost => "lost",
+        }
+    }
+
+    /// What a person does next about the film.
+    pub(crate) const fn next(self) -> &'static str {
+        match self {
+            Self::FreeRunning | Self::Locked => "nothing; seats follow it once a person has let the show go",
+            Self::Freewheeling | Self::Acquiring | Self::Jumped => "wait a moment",
+            Self::Absent | Self::Lost => "start the film; see that its source is connected",
+            Self::Stopped => "let the film go on",
+            Self::Ended => "nothing; let the next show go",
+            Self::Reverse | Self::Shuttle => "let the film run forward at its speed",
+            Self::Unusable => "see what its source sends; allow_coarse allows one that is merely coarse",
         }
     }
 }
@@ -28,10 +71,8 @@ impl HoldCause {
         match self {
             Self::Film(state) => state.words(),
             Self::Apart => "the film was more than 40 ms away from the seats",
-            Self::Unstable => {
-                "the seats had to join five times in a minute: its source is not to be relied on"
-            }
-            Self::Asks => "each join waits for a person",
+            Self::Unstable => "the seats had to join five times in a minute: see to its source, and resume",
+            Self::Asks => "each join waits for a person: resume",
         }
     }
 }

@@ -101,8 +101,8 @@ pub(crate) const SOURCES: [(&str, Told); 6] = {
     }
     [
         ("LTC", told(SourceKind::Ltc, 24.0, 0.02, 0.0)),
-        ("mpv sound", told(SourceKind::MpvSound, 20.0, 0.05, 0.0)),
-        ("mpv picture", told(SourceKind::MpvPicture, 24.0, 0.5, 0.0)),
+        ("mpv sound", told(SourceKind::Mpv, 20.0, 0.05, 0.0)),
+        ("mpv picture", told(SourceKind::Mpv, 24.0, 0.5, 0.0)),
         ("MTC", told(SourceKind::Mtc, 96.0, 0.05, 1.0)),
         ("Art-Net", told(SourceKind::ArtNet, 24.0, 0.0, 10.0)),
         ("HTTP", told(SourceKind::Message, 1.0, 3.0, 0.0)),

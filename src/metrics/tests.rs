@@ -71,6 +71,7 @@ fn playing() -> Status {
         since_s: 5.0,
         lapses_s: None,
         moving: true,
+        film: None,
         show: Some(ShowStatus {
             cue: "storm".to_owned(),
             title: None,

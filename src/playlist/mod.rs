@@ -24,6 +24,7 @@ use jiff::tz::TimeZone;
 use crate::config::{Config, Preset};
 use crate::control::LevelsChange;
 pub(crate) use crate::control::Then;
+use crate::film::timecode::Label;
 use crate::library::{CueId, Id};
 
 /// The name of a playlist.
@@ -55,6 +56,8 @@ pub(crate) struct Entry {
     pub(crate) vibration: Option<f64>,
     /// How much later than the film the motion is, ms, -500 to 500.
     pub(crate) trim_ms: Option<i32>,
+    /// The film's timecode when the cue begins; `None` if the hall's configuration says it, or no film leads.
+    pub(crate) film: Option<Label>,
     /// True if an effect may be on, by its name.
     pub(crate) effects: BTreeMap<String, bool>,
     /// What follows its end.

@@ -9,6 +9,7 @@ use toml::de::DeTable;
 
 use super::{At, Entry as PlaylistEntry, Places, Playlist, Then};
 use crate::config::{ConfigFaults, Entry, Faults, Section, level, switches, trim};
+use crate::film::timecode::Label;
 use crate::library::CueId;
 
 /// More than any day has.
@@ -107,6 +108,7 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
     let motion = level(&mut section, "level");
     let vibration = level(&mut section, "vibration");
     let trim_ms = trim(&mut section, "trim_ms");
+    let film = film(&mut section);
     let effects_at = section.get("effects");
     let then = section.choice("then", &[("hold", Then::Hold), ("go", Then::Go)]);
     let at = at(&mut section);
@@ -119,11 +121,18 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
         level: motion,
         vibration,
         trim_ms,
+        film,
         effects,
         then: then.unwrap_or_default(),
         at,
         places: Places { cue: place("cue"), preset: place("preset"), effects: place("effects") },
     })
+}
+
+fn film(section: &mut Section<'_, '_, '_>) -> Option<Label> {
+    let entry = section.get("film")?;
+    let label = entry.text(section.faults)?.parse::<Label>();
+    label.map_err(|error| entry.fault(section.faults, &error.to_string())).ok()
 }
 
 fn cue(section: &mut Section<'_, '_, '_>) -> Option<CueId> {

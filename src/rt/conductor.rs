@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::film::FilmLead;
+use super::film::{FilmLead, FilmStart};
 use super::mail::{Alarm, News};
 use crate::engine::{Directive, Ending, Engine, EngineEvent, LaneOrder, PlayProgress, Rest};
 use crate::state::{
@@ -126,6 +126,19 @@ impl Conductor {
         Self { film, ..self }
     }
 
+    /// Another show is loaded, which follows the film so, or not at all.
+    pub(super) fn load_film(&mut self, start: Option<FilmStart>, now: MonoTime) {
+        if let Some(film) = &mut self.film {
+            film.load(start, now);
+        }
+        self.film_is_over = false;
+    }
+
+    /// The film that leads the show, if one does.
+    fn film(&self) -> Option<&FilmLead> {
+        self.film.as_ref().filter(|film| film.is_followed())
+    }
+
     /// Has the film lead a show that chases one; to be told every tick, before the engine's. Says where in the cue that wants its
     /// frame to lead, if anywhere.
     pub(super) fn mind_film(
@@ -135,7 +148,7 @@ impl Conductor {
         trim_ms: i32,
         now: MonoTime,
     ) -> Option<ShowTime> {
-        let film = self.film.as_mut()?;
+        let film = self.film.as_mut().filter(|film| film.is_followed())?;
         let rides = matches!(self.machine.state(), State::Playing(_));
         let (event, target) = film.tick(tick, engine.playhead().frame_time(), trim_ms, rides);
         if rides {
@@ -164,6 +177,9 @@ impl Conductor {
     ) -> Result<(), Refusal> {
         self.look_for_stray(engine, now);
         self.machine.request(request, now)?;
+        if let (Transition::Resume, Some(film)) = (request, &mut self.film) {
+            film.let_join();
+        }
         self.steer(engine);
         Ok(())
     }
@@ -173,7 +189,7 @@ impl Conductor {
     /// # Errors
     /// As [`Conductor::request`].
     pub(crate) fn seek(&mut self, film: ShowTime, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
-        if self.film.is_some() {
+        if self.film().is_some() {
             let (state, asked, why) = (self.machine.state(), Transition::Seek, Why::FilmLeads);
             return Err(Refusal { state, asked, why });
         }
@@ -234,7 +250,7 @@ impl Conductor {
         engine.obey(match self.machine.state() {
             State::Boot | State::Recovering => Directive::Off,
             State::Homing | State::Parked | State::Armed => Directive::Wait,
-            State::Playing(_) if self.film.as_ref().is_none_or(FilmLead::leads) => Directive::Play,
+            State::Playing(_) if self.film().is_none_or(FilmLead::leads) => Directive::Play,
             State::Playing(_) | State::Paused => Directive::Hold,
             State::Stopping | State::Stopped | State::Fault => Directive::Stop,
             State::Parking => Directive::Park,

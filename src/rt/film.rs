@@ -4,22 +4,76 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::film::chase::{Chase, ChaseInput, ChaseRules, ChaseState, ChaseVerdict, HoldCause};
-use crate::film::point::{ChasedFilm, FilmState, PublishedPoint};
+use crate::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use crate::state::Event;
 use crate::time::{MonoTime, ShowTime, Tick};
 
-/// A film that leads a show.
+/// How a show follows the film.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FilmStart {
+    /// Where the film is when the cue begins.
+    pub(crate) begin: ShowTime,
+    pub(crate) rules: ChaseRules,
+}
+
+/// A film that leads shows.
 #[derive(Debug)]
 pub struct FilmLead {
     clock: ChasedFilm,
     chase: Chase,
+    begin: ShowTime,
+    /// True if the show that is loaded follows it.
+    is_followed: bool,
+    /// True if shows say how they follow it; a play has one show, which does.
+    is_of_a_hall: bool,
 }
 
 impl FilmLead {
     /// Chases whatever is published there, from `now` on.
     #[must_use]
     pub const fn new(source: Arc<PublishedPoint>, rules: ChaseRules, now: MonoTime) -> Self {
-        Self { clock: ChasedFilm::new(source), chase: Chase::new(rules, now) }
+        Self {
+            clock: ChasedFilm::new(source),
+            chase: Chase::new(rules, now),
+            begin: ShowTime::ZERO,
+            is_followed: true,
+            is_of_a_hall: false,
+        }
+    }
+
+    /// The film of a hall in which no show follows it yet.
+    pub(crate) fn of_a_hall(source: Arc<PublishedPoint>, now: MonoTime) -> Self {
+        let chase = Chase::new(ChaseRules::until(ShowTime::ZERO), now);
+        Self {
+            clock: ChasedFilm::new(source),
+            chase,
+            begin: ShowTime::ZERO,
+            is_followed: false,
+            is_of_a_hall: true,
+        }
+    }
+
+    /// Another show is loaded, which follows the film so, or not at all.
+    pub(super) fn load(&mut self, start: Option<FilmStart>, now: MonoTime) {
+        if !self.is_of_a_hall {
+            return;
+        }
+        self.is_followed = start.is_some();
+        if let Some(FilmStart { begin, rules }) = start {
+            (self.begin, self.chase) = (begin, Chase::new(rules, now));
+        }
+    }
+
+    /// True if the show that is loaded follows it.
+    pub(super) const fn is_followed(&self) -> bool {
+        self.is_followed
+    }
+
+    /// A person lets seats join that hold until one does.
+    pub(super) const fn let_join(&mut self) {
+        if matches!(self.chase.state(), ChaseState::Holding) {
+            self.chase.let_join();
+        }
     }
 
     /// Whether seats may follow it.
@@ -35,7 +89,11 @@ impl FilmLead {
         trim_ms: i32,
         may_lead: bool,
     ) -> (Event, Option<ShowTime>) {
-        let point = self.clock.at(tick);
+        let begin = self.begin.as_nanos();
+        let point = self.clock.at(tick).map(|point| FilmPoint {
+            media: ShowTime::from_nanos(point.media.as_nanos().saturating_sub(begin)),
+            ..point
+        });
         let state = point.map_or(FilmState::Absent, |point| point.state);
         match self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead }) {
             ChaseVerdict::Wait => (Event::FilmAwaited(HoldCause::Film(state)), None),

@@ -5,6 +5,7 @@ use std::thread::Thread;
 
 use rtrb::{Consumer, PopError, Producer, RingBuffer};
 
+use super::film::FilmStart;
 use super::live::Live;
 use crate::belief::Fall;
 use crate::belief::LaneEvidence;
@@ -115,6 +116,8 @@ pub struct Loaded {
     pub(crate) lanes: Vec<Lane>,
     /// What the planner plans with from then on; none once it has it.
     pub(crate) planning: Option<Box<Planning>>,
+    /// How it follows the film of the hall, if it does.
+    pub(crate) film: Option<FilmStart>,
 }
 
 /// What the planner plans with.

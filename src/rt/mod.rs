@@ -21,6 +21,7 @@ pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use film::FilmLead;
+pub(crate) use film::FilmStart;
 pub use line::Line;
 pub(crate) use line::line;
 pub use live::Live;
@@ -200,7 +201,11 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let Self { conductor, engine, lanes, mail, .. } = self;
         match command {
             Command::Load(show) => {
+                let film = show.film;
                 let news = load(show, conductor.machine().state(), engine, lanes, mail);
+                if matches!(news, News::Taken) {
+                    conductor.load_film(film, now);
+                }
                 conductor.steer(engine);
                 news
             }

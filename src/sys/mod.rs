@@ -2,6 +2,7 @@
 //! Linux only. Any thread; nothing here allocates except where a refusal is put into words, and in `file` and `folder`, which are of the
 //! control plane.
 
+pub(crate) mod adjusted;
 pub(crate) mod batch;
 pub(crate) mod clock;
 pub(crate) mod file;

@@ -17,6 +17,7 @@ mod process;
 mod serving;
 
 mod begin;
+mod film;
 mod hall;
 mod lasting;
 mod library;

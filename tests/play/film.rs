@@ -9,9 +9,10 @@ use std::time::Duration;
 use kinocue::harness::sys::clock::Monotonic;
 use kinocue::harness::time::{Clock as _, MonoTime};
 
+use rustix::process::Signal;
 use serde_json::{Value, json};
 
-use super::process::{Playing, Sim, kinocue};
+use super::process::{Guarded, Playing, Sim, kinocue};
 use super::{Folder, STROKE, pulses};
 
 /// A cue that rises a third of the stroke in so many seconds, from rest to rest, and stays there for one more.
@@ -162,10 +163,75 @@ fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
         (&["--chase", "ltc:-", "--film-fps", "26"], 64, "is no frame rate; take"),
         (&["--chase", "ltc:-", "--film-fps", "25", "--tc-start", "01:00:00:25"], 64, "outside 0..=24"),
         (&["--film-fps", "25"], 64, "--chase"),
+        (&["--chase", "artnet:anybody"], 64, "names no sender"),
+        (&["--chase", "mtc:/nowhere/midi"], 71, "/nowhere/midi cannot be opened"),
+        (&["--at", "soon"], 64, "is no time; write"),
+        (&["--at", "19:00", "--chase", "ltc:-"], 64, "cannot be used with"),
+        (&["--at", "19:00,max_error=0ms"], 71, "have chrony or"),
     ];
     for (args, code, says) in refused {
         let run = Playing::start(&cue, &to, args).finish();
         assert_eq!(run.code, Some(code), "{args:?}: {}", run.stderr);
         assert!(run.stderr.contains(says), "{args:?}: {}", run.stderr);
     }
+}
+
+/// Addresses of this machine that no other test and no other run of them has.
+fn addresses(test: u8) -> [String; 3] {
+    let [_, _, high, low] = std::process::id().to_be_bytes();
+    [0, 1, 2].map(|n| format!("127.{}.{high}.{}", 128 + 3 * test + n, low.max(1)))
+}
+
+/// Sends timecode until it is dropped.
+fn sent(args: &[&str]) -> Guarded {
+    Guarded::start(&[&["sync", "send", "--seconds", "600"], args].concat())
+}
+
+#[test]
+fn artnet_of_the_named_sender_leads_the_seat_and_whoever_else_sends_is_named_and_moves_nobody() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let [named, foreign, here] = addresses(0);
+    let chase = format!("artnet:{named},bind={here}:6454");
+    let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
+    let to = format!("{here}:6454");
+    let _other = sent(&["--artnet", &to, "--from", &foreign, "--tc-start", "01:00:01:00"]);
+    let mut playing = Playing::start(&rise(&folder, 4), &sim.to(), &args);
+    playing.wait_for(&format!("{foreign} sends as well, and is not heard"));
+    let _film = sent(&["--artnet", &to, "--from", &named, "--tc-start", "01:00:00:00"]);
+    playing.wait_for("playing: ");
+    playing.wait_for("parking: the cue is over");
+    assert_eq!(playing.finish().report_of(0)["result"], "completed");
+    assert!(sim.end().rest_in_park());
+}
+
+#[test]
+fn midi_timecode_of_a_fifo_leads_the_seat_which_rests_once_it_falls_silent() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let cue = rise(&folder, 60);
+    let fifo = cue.with_file_name("midi");
+    assert!(std::process::Command::new("mkfifo").arg(&fifo).status().expect("mkfifo runs").success());
+    let fifo = fifo.to_str().expect("text");
+    let mut playing = Playing::start(&cue, &sim.to(), &["--json", "--chase", &format!("mtc:{fifo}")]);
+    let film = sent(&["--mtc", fifo]);
+    playing.wait_for("playing: ");
+    drop(film);
+    playing.wait_for("waiting: nothing is heard of the film any more");
+    playing.signal(Signal::INT);
+    let run = playing.finish();
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(sim.end().rest_in_park());
+}
+
+#[test]
+fn a_technician_sees_timecode_move_with_no_hall_and_no_cue() {
+    let [named, _, here] = addresses(1);
+    let _film = sent(&["--artnet", &format!("{here}:6454"), "--from", &named, "--film-fps", "24"]);
+    let source = format!("artnet:{named},bind={here}:6454");
+    let seen = kinocue(&["sync", "watch", &source, "--film-fps", "24", "--seconds", "3", "--json"]);
+    assert_eq!(seen.code, Some(0), "{seen:?}");
+    let last: Value = serde_json::from_str(seen.stdout.lines().last().expect("it is said")).expect("JSON");
+    let row = &last["sources"][0];
+    assert_eq!((row["state"].as_str(), last["leads"].as_u64()), (Some("locked"), Some(0)), "{last}");
+    let text = kinocue(&["sync", "watch", &source, "--seconds", "1"]).stdout;
+    assert!(text.contains(&format!("artnet:{named}: ")), "{text}");
 }

@@ -36,11 +36,14 @@ const ROWS: &[Row] = &[
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 15.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
-    // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 240 for an engine
+    // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
+    // by MIDI, Art-Net, OSC, HTTP and the clock of the day, and for sync watch; 370 for the film of a hall and its
+    // status; 240 for an engine
     // whose phases hold what is theirs, with types of their own for show time, lanes and what crosses to the planner; 150 for a limiter
     // that judges axes in groups, and for seats that vibrate on.
-    ("lines of code", counts::lines_of_code, Less, 53_691.0, 39_800.0),
-    ("public items and fields", counts::public_items, Less, 1_145.0, 400.0),
+    ("lines of code", counts::lines_of_code, Less, 55_190.0, 39_800.0),
+    // Two more for the film in the status, which tests make.
+    ("public items and fields", counts::public_items, Less, 1_147.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
     ("lines of the longest file", counts::longest_file, Less, 469.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.6, 3.0),

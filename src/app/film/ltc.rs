@@ -8,10 +8,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::riff::SampleStream;
-use super::source::{FilmArgs, LtcInput};
-use super::{FilmError, Told, start};
+use super::{ChildSlot, FilmError, WordSink, read_some, start};
 use crate::film::ltc::LtcReader;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::source::{FilmArgs, LtcInput};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -24,8 +24,8 @@ const AGAIN: Duration = Duration::from_secs(1);
 pub(super) fn start_reading(
     input: &LtcInput,
     args: &FilmArgs,
-    told: Told,
-    child: &Arc<Mutex<Option<Child>>>,
+    told: WordSink,
+    child: &ChildSlot,
 ) -> Result<(), FilmError> {
     let line = LtcLine { args: args.clone(), told };
     let failed = |path: &Path| {
@@ -62,12 +62,7 @@ pub(super) fn start_reading(
 
 /// Reads what a command writes. One that fails, as a sound card does that is pulled out, is started anew; one that ends well has
 /// nothing more to say.
-fn run(
-    mut command: Command,
-    name: &str,
-    line: LtcLine,
-    child: &Arc<Mutex<Option<Child>>>,
-) -> Result<(), FilmError> {
+fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Result<(), FilmError> {
     command.stdin(Stdio::null()).stdout(Stdio::piped());
     let failed = |source| FilmError::Command { command: name.to_owned(), source };
     let mut output = put(command.spawn().map_err(failed)?, child);
@@ -104,23 +99,21 @@ pub(super) fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>
 /// A line that carries LTC.
 struct LtcLine {
     args: FilmArgs,
-    told: Told,
+    told: WordSink,
 }
 
 impl LtcLine {
     /// Reads to the end of a stream; one that is `paced`, at the speed of its sound.
     fn read(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
         let (mut samples, mut block, mut octets) = (SampleStream::default(), Vec::new(), [0; BLOCK]);
-        let FilmArgs { rate, start, .. } = self.args;
+        let FilmArgs { rate, start, latency, .. } = self.args;
         let (begun, mut heard) = (Monotonic.now(), 0_u64);
         let mut reader: Option<LtcReader> = None;
         loop {
-            let count = match stream.read(&mut octets) {
-                Ok(0) => return Ok(()),
-                Ok(count) => count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(error),
-            };
+            let count = read_some(&mut stream, &mut octets)?;
+            if count == 0 {
+                return Ok(());
+            }
             let mut at = Monotonic.now();
             block.clear();
             samples.push(&octets[..count], &mut block).map_err(io::Error::other)?;
@@ -130,11 +123,20 @@ impl LtcLine {
                 at = begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s));
                 Monotonic.sleep_until(at);
             }
-            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, Duration::ZERO, rate, start));
+            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
             reader.hear(&block, at, &mut |what| {
-                let _ = self.told.send(what); // without a listener the program ends
+                self.told.tell(what); // without a listener the program ends
             });
+            self.note(reader);
         }
+    }
+
+    fn note(&self, reader: &LtcReader) {
+        let level = f64::from(reader.level());
+        self.told.note(|notes| {
+            notes.level_db = Some(20.0 * level.max(1e-6).log10());
+            notes.label(reader.labels());
+        });
     }
 
     /// Nothing more can come: whoever wrote is gone for good, and the film over.
@@ -143,13 +145,14 @@ impl LtcLine {
     }
 
     /// The writer is gone, and another may come; says whether anybody waits for one.
-    fn again(&self, _read: io::Result<()>) -> bool {
+    fn again(&self, read: io::Result<()>) -> bool {
+        self.told.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
         let is_heard = self.say(FilmWord::Gone);
         Monotonic.sleep_until(Monotonic.now() + AGAIN);
         is_heard
     }
 
     fn say(&self, word: FilmWord) -> bool {
-        self.told.send(Observation::new(Monotonic.now(), word)).is_ok()
+        self.told.tell(Observation::new(Monotonic.now(), word))
     }
 }

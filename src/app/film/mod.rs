@@ -1,31 +1,40 @@
-//! The film that a show chases: its source is read on threads of their own, and where the film is by it is published for the tick
-//! thread. A source that fails leads nobody; the threads end with the program, or with what they read.
+//! The film that a show chases: its sources are read on threads of their own, and where the film is by the best of them is published
+//! for the tick thread. A source that fails leads nobody; the threads end with the program, or with what they read.
 
+mod clock;
+mod datagrams;
+mod hall;
 mod ltc;
 mod mpv;
+mod mtc;
+mod network;
 mod riff;
+mod sent;
 mod sound;
-mod source;
+mod table;
+#[cfg(test)]
+mod tests;
+mod told;
 
-use std::io;
+use std::io::{self, Read};
 use std::process::Child;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
+pub(crate) use hall::HallFilm;
+pub(crate) use sent::TimecodeSent;
 pub(crate) use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
-pub(crate) use source::{FilmArgs, FilmSource};
+pub(crate) use table::{FilmTable, SharedTable, SourceRow};
 
-use crate::film::follower::PaceLimits;
-use crate::film::observation::Observation;
+use crate::film::chooser::MOST_SOURCES;
 use crate::film::point::PublishedPoint;
-use crate::film::tracker::SourceTracker;
-use crate::sys::clock::Monotonic;
-use crate::time::Clock as _;
+use crate::film::source::{FilmArgs, FilmSource};
+use table::Ranking;
+use told::{Notes, WordSink};
 
-/// How often where the film is is published, whatever is heard.
-const PUBLISH_EVERY: Duration = Duration::from_millis(50);
 /// Observations that wait at the most: seconds of a source that tells a hundred a second.
 const WAITING: usize = 512;
 
@@ -49,37 +58,111 @@ pub(crate) enum FilmError {
         /// Why.
         source: io::Error,
     },
+    /// The clock of the day may be too far off.
+    #[error(
+        "by its own account the system's clock may be off by {most:?} (likely {likely:?}), and {allowed:?} is allowed; have chrony or \
+         ntpd steer it, or allow more with clock:TIME,max_error={}ms",
+        (most.as_secs_f64() * 1e3).ceil()
+    )]
+    Clock {
+        /// At the most.
+        most: Duration,
+        /// As is estimated.
+        likely: Duration,
+        /// What is allowed.
+        allowed: Duration,
+    },
+    /// The day has no such time, as where clocks are set forward.
+    #[error(
+        "there is no such time in this machine's time zone; write it with its offset, as 2026-11-21T19:00:00+01:00"
+    )]
+    NoSuchTime,
+    /// There are too many of them.
+    #[error("{0} sources are too many; {MOST_SOURCES} can be ranked")]
+    Many(usize),
     /// The system starts no further thread.
     #[error("no thread could be started; allow more with `ulimit -u`")]
     Thread(#[from] io::Error),
 }
 
-/// A source that is being read.
+/// What holds for all sources of a show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SourceRules {
+    /// True if those may lead as well that have not proved themselves.
+    pub(crate) allows_coarse: bool,
+    /// How far from 1 a film's rate is followed.
+    pub(crate) band: f64,
+}
+
+/// The command that gives the sound of a source, if it has one.
+type ChildSlot = Arc<Mutex<Option<Child>>>;
+
+/// Sources that are being read.
 #[derive(Debug)]
 pub(crate) struct FilmReader {
     point: Arc<PublishedPoint>,
-    /// The command that gives the sound.
-    child: Arc<Mutex<Option<Child>>>,
+    table: SharedTable,
+    children: Vec<ChildSlot>,
+    over: Arc<AtomicBool>,
 }
 
 impl FilmReader {
-    /// Begins to read a source.
+    /// Begins to read sources, the first of which leads while it can. Coarse ones lead only if that is allowed.
     ///
     /// # Errors
-    /// [`FilmError`] where it cannot be had at all. One that ends later is looked for again.
-    pub(crate) fn start(args: &FilmArgs) -> Result<Self, FilmError> {
-        let point = Arc::new(PublishedPoint::default());
-        let (told, heard) = sync_channel(WAITING);
-        let published = Arc::clone(&point);
-        let kind = args.source.kind();
-        let band = PaceLimits::default().band;
-        start("film", move || track(&published, SourceTracker::new(kind, band, Monotonic.now()), &heard))?;
-        let child = Arc::default();
-        match &args.source {
-            FilmSource::Ltc(input) => ltc::start_reading(input, args, told, &child)?,
-            FilmSource::Mpv(socket) => mpv::start_reading(socket, args.begin(), told)?,
+    /// [`FilmError`] where one cannot be had at all. One that ends later is looked for again.
+    pub(crate) fn start(sources: &[FilmArgs], rules: SourceRules) -> Result<Self, FilmError> {
+        Self::each(sources, rules, &mut Err)
+    }
+
+    /// The same in a hall, which opens whatever its sources are: what is wrong with one is noted beside it.
+    ///
+    /// # Errors
+    /// [`FilmError::Thread`].
+    pub(crate) fn open(sources: &[FilmArgs], rules: SourceRules) -> Result<Self, FilmError> {
+        Self::each(sources, rules, &mut |_| Ok(()))
+    }
+
+    fn each(
+        sources: &[FilmArgs],
+        rules: SourceRules,
+        on_error: &mut dyn FnMut(FilmError) -> Result<(), FilmError>,
+    ) -> Result<Self, FilmError> {
+        if sources.len() > MOST_SOURCES {
+            return Err(FilmError::Many(sources.len()));
         }
-        Ok(Self { point, child })
+        let (to, heard) = sync_channel(WAITING);
+        let notes: Vec<Notes> = sources.iter().map(|_| Notes::default()).collect();
+        let ranking = Ranking::new(sources, &notes, rules);
+        let (point, table) = (Arc::clone(&ranking.point), ranking.table.clone());
+        let mut reader = Self { point, table, children: Vec::new(), over: Arc::default() };
+        start("film", move || ranking.run(&heard))?;
+        for (place, (args, notes)) in sources.iter().zip(notes).enumerate() {
+            let told = WordSink { place, to: to.clone(), notes, over: Arc::clone(&reader.over) };
+            let noted = told.clone();
+            if let Err(error) = reader.read(args, told) {
+                let why = std::error::Error::source(&error).map(|why| format!(": {why}")).unwrap_or_default();
+                noted.note(|notes| notes.trouble = Some(format!("{error}{why}")));
+                on_error(error)?;
+            }
+        }
+        Ok(reader)
+    }
+
+    fn read(&mut self, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
+        match &args.source {
+            FilmSource::Ltc(input) => {
+                let child = ChildSlot::default();
+                self.children.push(Arc::clone(&child));
+                ltc::start_reading(input, args, told, &child)
+            }
+            FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args.begin(), told)?),
+            FilmSource::Mtc(device) => mtc::start_reading(device, args, told),
+            FilmSource::ArtNet(sender) => network::hear_artnet(sender, args, told),
+            FilmSource::Osc(sender) => network::hear_osc(sender, args, told),
+            FilmSource::Http(sender) => network::hear_http(sender, args, told),
+            FilmSource::Clock(from) => clock::start_reading(from, told),
+        }
     }
 
     /// Where the film is, for whoever follows it.
@@ -87,14 +170,22 @@ impl FilmReader {
     pub(crate) fn point(&self) -> Arc<PublishedPoint> {
         Arc::clone(&self.point)
     }
+
+    /// What is heard of it, for people.
+    pub(crate) fn table(&self) -> SharedTable {
+        self.table.clone()
+    }
 }
 
 impl Drop for FilmReader {
     fn drop(&mut self) {
-        if let Some(mut child) = ltc::lock(&self.child).take() {
-            // One that has ended by itself cannot be ended any more.
-            let _ = child.kill();
-            let _ = child.wait();
+        self.over.store(true, Ordering::Relaxed);
+        for child in &self.children {
+            if let Some(mut child) = ltc::lock(child).take() {
+                // One that has ended by itself cannot be ended any more.
+                let _ = child.kill();
+                let _ = child.wait();
+            }
         }
     }
 }
@@ -103,19 +194,12 @@ fn start(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<()> {
     thread::Builder::new().name(name.to_owned()).spawn(run).map(drop)
 }
 
-/// Makes of observations where the film is, until nobody can tell any more: then the newest point grows stale.
-fn track(point: &PublishedPoint, mut tracker: SourceTracker, heard: &Receiver<Observation>) {
+/// What there is to read, once there is something; 0 at the end.
+fn read_some(from: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
     loop {
-        match heard.recv_timeout(PUBLISH_EVERY) {
-            Ok(told) => tracker.hear(&told),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return,
+        match from.read(bytes) {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            read => return read,
         }
-        let now = Monotonic.now();
-        tracker.poll(now);
-        point.publish(&tracker.point(now));
     }
 }
-
-/// Where a reader's observations go.
-type Told = SyncSender<Observation>;

@@ -5,7 +5,7 @@ use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Told, start};
+use super::{WordSink, start};
 use crate::film::mpv::MpvClient;
 use crate::film::observation::{FilmWord, Observation};
 use crate::sys::clock::Monotonic;
@@ -17,7 +17,7 @@ const AGAIN: Duration = Duration::from_secs(1);
 const READ_FOR: Duration = Duration::from_millis(10);
 
 /// Begins to ask the player at that socket; the cue begins where its film is at `begin`.
-pub(super) fn start_reading(socket: &Path, begin: ShowTime, told: Told) -> io::Result<()> {
+pub(super) fn start_reading(socket: &Path, begin: ShowTime, told: WordSink) -> io::Result<()> {
     let player = MpvPlayer { socket: socket.to_path_buf(), begin, told };
     start("mpv", move || while player.talk() {})
 }
@@ -25,7 +25,7 @@ pub(super) fn start_reading(socket: &Path, begin: ShowTime, told: Told) -> io::R
 struct MpvPlayer {
     socket: PathBuf,
     begin: ShowTime,
-    told: Told,
+    told: WordSink,
 }
 
 impl MpvPlayer {
@@ -33,8 +33,8 @@ impl MpvPlayer {
     fn talk(&self) -> bool {
         let now = Monotonic.now();
         let mut client = MpvClient::new(now);
-        // What ended it, the state of the source says: gone.
-        let _ = UnixStream::connect(&self.socket).and_then(|stream| self.converse(stream, &mut client));
+        let ended = UnixStream::connect(&self.socket).and_then(|stream| self.converse(stream, &mut client));
+        self.told.note(|notes| notes.trouble = ended.err().map(|error| error.to_string()));
         let mut is_heard = true;
         client.hear_end(Monotonic.now(), &mut |what| is_heard &= self.tell(what));
         Monotonic.sleep_until(Monotonic.now() + AGAIN);
@@ -52,20 +52,35 @@ impl MpvPlayer {
             }
             match stream.read(&mut octets) {
                 Ok(0) => return Ok(()),
-                Ok(count) => client.hear(&octets[..count], Monotonic.now(), &mut |what| {
-                    self.tell(what);
-                }),
+                Ok(count) => {
+                    client.hear(&octets[..count], Monotonic.now(), &mut |what| {
+                        self.tell(what);
+                    });
+                    self.note(client);
+                }
+                Err(_) if self.told.is_over() => return Ok(()),
                 Err(error) if is_nothing_yet(&error) => {}
                 Err(error) => return Err(error),
             }
         }
     }
 
+    fn note(&self, client: &MpvClient) {
+        self.told.note(|notes| {
+            if notes.film.as_deref() != client.path() {
+                notes.film = client.path().map(str::to_owned);
+            }
+            notes.avsync_ms = client.avsync_s().map(|seconds| seconds * 1e3);
+            notes.garbage = client.garbage();
+            notes.trouble = None;
+        });
+    }
+
     fn tell(&self, mut what: Observation) -> bool {
         if let FilmWord::Position(media) = &mut what.word {
             *media = ShowTime::from_nanos(media.as_nanos().saturating_sub(self.begin.as_nanos()));
         }
-        self.told.send(what).is_ok()
+        self.told.tell(what)
     }
 }
 

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::riff::{RiffFault, SampleStream};
-use super::source::FilmArgError;
 use crate::film::ltc::{LtcDecoder, LtcFrame, LtcGenerator};
+use crate::film::source::FilmArgError;
 use crate::film::timecode::{FrameRate, Timecode};
 
 /// SampleStream a second of the sound that is made.

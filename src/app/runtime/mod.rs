@@ -205,8 +205,14 @@ impl Runtime {
         let (leave, granted) = (Arc::default(), RealTime::NOTHING);
         let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
         let silent = manner.silent;
-        let ticks = Ticks { engine, lanes, film, sender, mail };
+        let ticks = Ticks { engine, lanes, film, of_the_hall: None, sender, mail };
         Ok(Self { handle, line, silent, acks, watch, plans, ticks })
+    }
+
+    /// The same with a film that shows may follow.
+    pub(super) fn with_film(mut self, film: Option<Arc<PublishedPoint>>) -> Self {
+        self.ticks.of_the_hall = film;
+        self
     }
 
     /// What it is led and watched by.
@@ -318,6 +324,8 @@ struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,
     film: Option<LeadingFilm>,
+    /// The film of a hall, whose shows say how they follow it.
+    of_the_hall: Option<Arc<PublishedPoint>>,
     sender: Sender,
     mail: Mail,
 }
@@ -325,9 +333,10 @@ struct Ticks {
 impl Ticks {
     /// The loop on that clock, from the grid's first tick on.
     fn on<'a, C: Clock>(self, clock: &'a C, grid: TickGrid, control: &'a Control) -> TickLoop<'a, C, Sender> {
-        let Self { engine, lanes, film, sender: sink, mail } = self;
+        let Self { engine, lanes, film, of_the_hall, sender: sink, mail } = self;
         let now = grid.next_deadline();
         let film = film.map(|film| FilmLead::new(film.source, film.rules, now));
+        let film = film.or_else(|| of_the_hall.map(|source| FilmLead::of_a_hall(source, now)));
         let conductor = Conductor::of_a_hall(now).chasing(film);
         let places = Places::new(&lanes, grid.rate());
         let Control { desk, leave, .. } = control;

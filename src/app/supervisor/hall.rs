@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::hall_settings::HallSettings;
 use super::show::ProvedShow;
 use super::state_mirror::StateMirror;
+use crate::app::film::SharedTable;
 use crate::app::runtime::RuntimeHandle;
 use crate::config::Config;
 use crate::control::{Code, Problem};
@@ -41,6 +42,8 @@ pub(super) struct HallContext {
     pub(super) left_at: Option<ShowTime>,
     /// Why the last show ended.
     pub(super) ended: Cause,
+    /// What is heard of the film, if one leads shows.
+    pub(super) film: Option<SharedTable>,
     /// The slow work that is under way.
     pub(super) job: Option<&'static str>,
     pub(super) now: MonoTime,
@@ -106,6 +109,7 @@ impl HallContext {
             aside: None,
             left_at: None,
             ended: Cause::Started,
+            film: None,
             job: None,
             now,
         }
@@ -250,7 +254,9 @@ impl HallContext {
 
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
     pub(super) fn note_place(&mut self, from: State, to: State) {
-        if rides(from) && !rides(to) && self.mirror.cause != Cause::CueEnded {
+        // A film that leads says by itself where a show goes on.
+        let is_led = self.cued.as_ref().is_some_and(|cued| cued.film.is_some());
+        if rides(from) && !rides(to) && !is_led && self.mirror.cause != Cause::CueEnded {
             self.left_at = Some(self.live.show());
         }
     }

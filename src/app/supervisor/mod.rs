@@ -9,6 +9,7 @@ mod belts;
 mod commands;
 mod features;
 mod figures;
+mod film;
 mod gear;
 mod hall;
 mod hall_settings;
@@ -50,6 +51,7 @@ use std::time::Duration;
 
 use jiff::Zoned;
 
+use super::film::SharedTable;
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
 use crate::control::model::Ending;
@@ -95,6 +97,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) carryover: Carryover,
     /// Where what is set is kept.
     pub(crate) settings_file: SettingsFile,
+    /// What is heard of the film, if one leads.
+    pub(crate) film: Option<SharedTable>,
 }
 
 /// What is left once the hall has closed.
@@ -148,7 +152,8 @@ impl Supervisor {
         let settings = carryover.settings(&runtime.config);
         ports.source.lead(Arc::clone(&runtime.desk));
         examine(library.clone());
-        let hall = HallContext::new(&runtime, settings, now);
+        let mut hall = HallContext::new(&runtime, settings, now);
+        hall.film = ports.film.clone();
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,

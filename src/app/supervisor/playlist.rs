@@ -79,8 +79,8 @@ impl Onward {
     /// Has the cue of an entry read, which starts then where that is due.
     pub(super) fn fetch(&mut self, entry: usize, start: Option<Start>) -> Vec<Act> {
         (self.start, self.follows, self.waits) = (start, false, None);
-        let cue = self.list.as_ref().map(|list| list.playlist.entries[entry].cue.clone());
-        cue.map(|cue| Act::Start(Job::Entry(entry, cue))).into_iter().collect()
+        let of_list = self.list.as_ref().map(|list| &list.playlist.entries[entry]);
+        of_list.map(|of| Act::Start(Job::Entry(entry, of.cue.clone(), of.film))).into_iter().collect()
     }
 
     /// Takes up a playlist that was checked.

@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use super::hall_settings::HallSettings;
 use crate::app::StagedShow;
-use crate::app::staged::headroom;
+use crate::app::staged::{at_any_pace, headroom};
 use crate::config::Config;
 use crate::control::{Code, Problem, ShowStatus};
 use crate::engine::{Headroom, Show};
+use crate::film::chase::ChaseRules;
+use crate::film::timecode::Label;
 use crate::library::{CueId, IdError, Library};
 use crate::proof::{self, Digest, Terms};
-use crate::rt::Loaded;
+use crate::rt::{FilmStart, Loaded};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 
@@ -28,6 +30,8 @@ pub(super) struct ProvedShow {
     pub(super) left_at: Option<ShowTime>,
     /// How long the first move onto it takes, seconds.
     pub(super) join_s: f64,
+    /// How it follows the film of the hall, if it does.
+    pub(super) film: Option<FilmStart>,
 }
 
 impl ProvedShow {
@@ -40,6 +44,17 @@ impl ProvedShow {
         config: &Config,
         timeline: Timeline,
         sha256: String,
+    ) -> Result<Self, Problem> {
+        Self::prove_for(id, config, timeline, sha256, None)
+    }
+
+    /// Proves a cue at any pace that the film which leads it may ask for.
+    fn prove_for(
+        id: String,
+        config: &Config,
+        timeline: Timeline,
+        sha256: String,
+        film: Option<FilmStart>,
     ) -> Result<Self, Problem> {
         let refused = |faults: Vec<String>| {
             let detail = format!("the cue {id} does not fit this hall");
@@ -58,7 +73,8 @@ impl ProvedShow {
         if !strokes.is_empty() {
             return Err(refused(strokes.iter().map(ToString::to_string).collect()));
         }
-        let terms = Terms::of_hall(config, Digest::of(timeline.cue()), rate, 1.0);
+        let paced = film.map(|film| at_any_pace(config, film.rules.pace));
+        let terms = Terms::of_hall(paced.as_ref().unwrap_or(config), Digest::of(timeline.cue()), rate, 1.0);
         let proof = proof::prove(&timeline, terms);
         if !proof.passed() {
             let mut faults: Vec<String> = proof.violations.iter().map(ToString::to_string).collect();
@@ -76,6 +92,7 @@ impl ProvedShow {
             start: ShowTime::ZERO,
             left_at: None,
             join_s: 0.0,
+            film,
         })
     }
 
@@ -118,6 +135,7 @@ impl ProvedShow {
         self.join_s = course.settled().as_secs_f64() - course.start.as_secs_f64();
         let mut loaded = staged.loaded();
         loaded.engine.begin_trimmed(settings.trim_ms);
+        loaded.film = self.film;
         Ok(loaded)
     }
 }
@@ -131,7 +149,26 @@ const fn motion_at(film: ShowTime, trim_ms: i32) -> ShowTime {
     ShowTime::from_nanos(film.as_nanos() - trim_ms as i64 * 1_000_000)
 }
 
-pub(super) fn read(library: &Library, config: &Config, id: &CueId) -> Result<Box<ProvedShow>, Problem> {
+/// How a cue that ends there follows the film of a hall, if one leads; an entry of a playlist may name the timecode of its beginning.
+fn film_of(config: &Config, named: Option<Label>, end: ShowTime) -> Result<Option<FilmStart>, Problem> {
+    let refused =
+        |why: String| Problem::new(Code::Check, why, "correct the playlist, or [sync], and load it again");
+    let Some(sync) = &config.sync else {
+        let why =
+            named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
+        return why.map_or(Ok(None), Err);
+    };
+    let rules = ChaseRules { pace: sync.pace, rejoin: sync.rejoin, ..ChaseRules::until(end) };
+    Ok(sync.begin(named).map_err(refused)?.map(|begin| FilmStart { begin, rules }))
+}
+
+pub(super) fn read(
+    library: &Library,
+    config: &Config,
+    id: &CueId,
+    film: Option<Label>,
+) -> Result<Box<ProvedShow>, Problem> {
     let (timeline, sha256) = library.read(id)?;
-    ProvedShow::prove(id.to_string(), config, timeline, sha256).map(Box::new)
+    let film = film_of(config, film, timeline.duration())?;
+    ProvedShow::prove_for(id.to_string(), config, timeline, sha256, film).map(Box::new)
 }

@@ -2,9 +2,9 @@
 
 use jiff::Zoned;
 
-use super::belts;
 use super::features::Features;
 use super::hall::HallContext;
+use super::{belts, film};
 use crate::config::Controller;
 use crate::control::model::us;
 use crate::control::{
@@ -68,6 +68,7 @@ impl StatusParts<'_> {
             moving,
             show: hall.cued.as_ref().map(|cued| cued.status(position(cued))),
             playlist: features.onward.list.as_ref().map(|list| list.status(&Zoned::now())),
+            film: hall.film.as_ref().map(|table| film::status(&table.read(), hall)),
             trim_ms: hall.settings.trim_ms,
             levels: hall.settings.levels.clone(),
             presets: hall.config.presets.iter().map(|preset| preset.name.clone()).collect(),

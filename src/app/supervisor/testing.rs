@@ -403,5 +403,18 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
     let config = folder.join("hall.toml");
     let (began, signals) = (Monotonic.now(), Signals::default());
     let (settings_file, _) = SettingsFile::open(folder);
-    (handle, SupervisorPorts { inbox, source, config, began, signals, service_log, carryover, settings_file })
+    (
+        handle,
+        SupervisorPorts {
+            inbox,
+            source,
+            config,
+            began,
+            signals,
+            service_log,
+            carryover,
+            settings_file,
+            film: None,
+        },
+    )
 }

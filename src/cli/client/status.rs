@@ -5,7 +5,7 @@ use super::server::ServerArgs;
 use super::table::table;
 use super::view::{percent, time, us};
 use crate::cli::{Exit, Failure, print};
-use crate::control::{ControllerStatus, PlaylistStatus, ShowStatus, Status};
+use crate::control::{ControllerStatus, FilmStatus, PlaylistStatus, ShowStatus, Status};
 
 /// Shows the hall's status.
 ///
@@ -52,6 +52,7 @@ fn block(status: &Status) -> Vec<(&'static str, String)> {
     lines.push(("state", format!("{} for {:.0} s{lapses}: {}", status.state, status.since_s, status.cause)));
     lines.push(("next", status.next.clone()));
     lines.push(("show", status.show.as_ref().map_or_else(|| "nothing is loaded".to_owned(), show)));
+    lines.extend(status.film.as_ref().map(|one| ("film", film(one))));
     lines.extend(status.playlist.as_ref().map(|list| ("playlist", playlist(list))));
     lines.push(("levels", status.mix()));
     if !status.presets.is_empty() {
@@ -74,6 +75,14 @@ fn show(show: &ShowStatus) -> String {
     let left =
         resume_s.map(time).map(|at| format!("; left at {at}: kinocue go --from {at} goes on from there"));
     format!("{cue}{title}, at {} of {}{}", time(*position_s), time(*length_s), left.unwrap_or_default())
+}
+
+fn film(film: &FilmStatus) -> String {
+    let FilmStatus { state, cause, next, source, position_s, leads, .. } = film;
+    let at = position_s.map_or_else(String::new, |at| format!(", at {}", time(at)));
+    let by = source.as_ref().map_or_else(String::new, |source| format!(" by {source}"));
+    let leads = if *leads { "" } else { "; no show that is loaded follows it" };
+    format!("{state}{at}{by}: {cause}; next: {next}{leads}")
 }
 
 fn playlist(list: &PlaylistStatus) -> String {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::{CtrlC, keyboard};
 use crate::app::Control;
+use crate::app::film::SharedTable;
 use crate::engine::Unplanned;
 use crate::rt::News;
 use crate::state::{Cause, State, Transition, Whose};
@@ -18,8 +19,8 @@ pub(super) struct Messages {
     pub(super) length: ShowTime,
     /// How long the first move onto the cue takes.
     pub(super) join: Duration,
-    /// True if a film leads the show.
-    pub(super) chases: bool,
+    /// What is heard of the film, if one leads the show.
+    pub(super) film: Option<SharedTable>,
     /// The controllers' names.
     pub(super) names: Vec<String>,
 }
@@ -47,7 +48,7 @@ impl Messages {
         let mut text = match (state, cause) {
             // A play goes as soon as it is armed, and one that chases a film waits for that.
             (State::Boot | State::Armed, _) => return None,
-            (State::Playing(_), Cause::Asked(Transition::Go)) if self.chases => return None,
+            (State::Playing(_), Cause::Asked(Transition::Go)) if self.film.is_some() => return None,
             (State::Playing(_), Cause::Asked(Transition::Go)) => {
                 format!("{state} ({:.2} s): {cause}", self.join.as_secs_f64())
             }
@@ -121,7 +122,7 @@ mod tests {
             ctrl_c: CtrlC::default(),
             length: ShowTime::from_secs_f64(8.0),
             join: Duration::from_millis(1_250),
-            chases: false,
+            film: None,
             names: vec!["A1".to_owned(), "A2".to_owned()],
         }
     }

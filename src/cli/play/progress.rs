@@ -60,6 +60,7 @@ impl Progress {
             parks: false,
             now: None,
             standings: HealthMessages::default(),
+            film: Vec::new(),
         };
         let done = Arc::clone(&over);
         let teller = Builder::new()
@@ -100,6 +101,8 @@ struct Teller {
     now: Option<(State, Next)>,
     /// How the controllers stood when they were looked at last.
     standings: HealthMessages,
+    /// What was true of the film's sources when they were looked at last.
+    film: Vec<String>,
 }
 
 impl Teller {
@@ -128,7 +131,16 @@ impl Teller {
             lines.extend(self.said.news(&news));
         }
         lines.extend(self.standings.changes(&self.said.control.live.table(), &self.said.names));
+        self.look_at_film(&mut lines);
         lines
+    }
+
+    /// What is newly true of the film's sources.
+    fn look_at_film(&mut self, lines: &mut Vec<String>) {
+        let Some(table) = &self.said.film else { return };
+        let warnings = table.read().warnings();
+        lines.extend(warnings.iter().filter(|warning| !self.film.contains(warning)).cloned());
+        self.film = warnings;
     }
 
     fn draw(&mut self, for_ever: bool, led: bool, over: &AtomicBool) {

@@ -73,11 +73,19 @@ fn a_film_outside_the_cue_moves_nobody() {
         stand.ahead_s = ahead_s;
         assert_eq!(stand.run(1.5), ChaseVerdict::Wait, "{ahead_s}");
     }
-    let mut stand = Stand::following(rules());
-    stand.ahead_s = 700.0;
-    assert_eq!(stand.tick(), ChaseVerdict::Hold(HoldCause::Apart));
-    assert!(!matches!(stand.run(3.0), ChaseVerdict::Hold(_) | ChaseVerdict::Wait));
-    assert_eq!(stand.run(3.0), ChaseVerdict::Park(ParkCause::CueLeft));
+}
+
+#[test]
+fn seats_hold_for_a_film_that_jumps_out_of_the_cue_and_never_join_its_end() {
+    for ahead_s in [-3_600.0, 700.0] {
+        let mut stand = Stand::following(rules());
+        stand.ahead_s = ahead_s;
+        assert_eq!(stand.tick(), ChaseVerdict::Hold(HoldCause::Apart));
+        for _ in 0..190 {
+            assert_eq!(stand.tick(), ChaseVerdict::Hold(HoldCause::Film(FilmState::Locked)), "{ahead_s}");
+        }
+        assert_eq!(stand.run(1.0), ChaseVerdict::Park(ParkCause::CueLeft));
+    }
 }
 
 #[test]

@@ -41,11 +41,13 @@ impl LtcGenerator {
     }
 
     /// How many times as fast as the film it runs from the next half cell on; below zero, backwards from the next frame on.
+    #[cfg(test)]
     pub(crate) const fn set_speed(&mut self, speed: f64) {
         self.speed = speed;
     }
 
     /// The frame that ended in the newest sample, and when, samples since the first.
+    #[cfg(test)]
     pub(crate) const fn take_ended(&mut self) -> Option<(Timecode, f64)> {
         self.ended.take()
     }

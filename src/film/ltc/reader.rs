@@ -7,7 +7,7 @@ use super::decoder::{LtcDecoder, LtcFrame};
 use super::samples::SampleClock;
 use crate::film::labels::LabelClock;
 use crate::film::observation::{FilmWord, Observation};
-use crate::film::timecode::{FrameRate, TimecodeError};
+use crate::film::timecode::FrameRate;
 use crate::time::{MonoTime, ShowTime};
 
 /// A line is silent after so many cells without an edge: 2 ms of a film at its speed.
@@ -49,14 +49,9 @@ impl LtcReader {
         self.decoder.level()
     }
 
-    /// How frames are labelled, as far as that is known.
-    pub(crate) fn rate(&self) -> Option<FrameRate> {
-        self.labels.rate()
-    }
-
-    /// Why the labels are none that can be used.
-    pub(crate) const fn refused(&self) -> Option<&TimecodeError> {
-        self.labels.refused()
+    /// Its labels.
+    pub(crate) const fn labels(&self) -> &LabelClock {
+        &self.labels
     }
 
     /// Takes a block that was read at an instant.

@@ -148,7 +148,7 @@ fn no_line_makes_the_client_panic() {
 fn the_film_of_a_player_is_known_within_half_a_millisecond_and_its_pause_at_once() {
     let film = TrueFilm::new(60.0, 1.0003).rate_from(30.0, 0.0);
     let (mut client, mut luck) = (client(), Luck::new(14));
-    let mut tracker = SourceTracker::new(SourceKind::MpvSound, 0.0015, mono(0.0));
+    let mut tracker = SourceTracker::new(SourceKind::Mpv, 0.0015, mono(0.0));
     let mut worst = 0.0_f64;
     let mut t = 0.0;
     while t < 29.9 {

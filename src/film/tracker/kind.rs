@@ -7,10 +7,8 @@ use std::time::Duration;
 pub(crate) enum SourceKind {
     /// LTC, by the clock of its samples.
     Ltc,
-    /// `audio-pts` of mpv.
-    MpvSound,
-    /// `time-pos` of mpv, less a frame: a film without sound.
-    MpvPicture,
+    /// mpv: `audio-pts`, or `time-pos` less a frame where a film has no sound.
+    Mpv,
     /// MTC quarter frames.
     Mtc,
     /// Art-Net timecode.
@@ -40,8 +38,7 @@ impl SourceKind {
     pub(super) const fn traits(self) -> Traits {
         let (sigma_ms, late_only, coarse) = match self {
             Self::Ltc => (0.05, false, false),
-            Self::MpvSound => (0.2, false, false),
-            Self::MpvPicture => (1.0, false, false),
+            Self::Mpv => (0.2, false, false),
             Self::Mtc => (0.5, true, false),
             Self::ArtNet => (4.0, true, false),
             Self::Message => (10.0, false, true),

@@ -62,8 +62,8 @@ impl Run {
 /// The goals for a source, milliseconds: p99, bias; seconds: lock.
 fn goals(kind: SourceKind) -> (f64, f64, f64) {
     match kind {
-        SourceKind::Ltc | SourceKind::MpvSound | SourceKind::Mtc | SourceKind::WallClock => (0.5, 0.5, 1.0),
-        SourceKind::MpvPicture | SourceKind::ArtNet => (1.0, 1.0, 1.0),
+        SourceKind::Ltc | SourceKind::Mpv | SourceKind::Mtc | SourceKind::WallClock => (0.5, 0.5, 1.0),
+        SourceKind::ArtNet => (1.0, 1.0, 1.0),
         SourceKind::Message => (11.0, 3.0, 6.0),
     }
 }
@@ -221,7 +221,7 @@ fn player(film: &TrueFilm, until: f64, words: &[(f64, FilmWord)]) -> Vec<Observa
 fn a_told_stop_is_obeyed_at_once_and_a_told_start_locks_within_a_third_of_a_second() {
     let film = TrueFilm::new(10.0, 1.0).rate_from(10.0, 0.0).rate_from(15.0, 1.0);
     let all = player(&film, 20.0, &[(10.0, FilmWord::Stop), (15.0, FilmWord::Play)]);
-    let run = Run::of(SourceKind::MpvSound, &film, &all, 20.0);
+    let run = Run::of(SourceKind::Mpv, &film, &all, 20.0);
     let states: Vec<FilmState> = run.states.iter().map(|seen| seen.1).collect();
     let (absent, acquiring) = (FilmState::Absent, FilmState::Acquiring);
     assert_eq!(
@@ -237,10 +237,10 @@ fn a_player_that_is_frozen_stands_and_one_that_goes_on_unasked_runs_again() {
     let film = TrueFilm::new(10.0, 1.0).rate_from(10.0, 0.0).rate_from(15.0, 1.0);
     let exact = Told { noise_s: 0.0, ..SOURCES[1].1 };
     let all = exact.of(&film, (0.1, 20.0), &[], &mut Luck::new(2));
-    let run = Run::of(SourceKind::MpvSound, &film, &all, 20.0);
+    let run = Run::of(SourceKind::Mpv, &film, &all, 20.0);
     let stopped = run.states.iter().find(|seen| seen.1 == FilmState::Stopped).expect("it stands").0;
     assert!(stopped - 10.0 <= 0.25, "{:?}", run.states);
-    let point = Run::of(SourceKind::MpvSound, &film, &all[..250], 14.0).tracker.point(mono(14.0));
+    let point = Run::of(SourceKind::Mpv, &film, &all[..250], 14.0).tracker.point(mono(14.0));
     assert_eq!((point.rate, point.media.as_secs_f64()), (0.0, 20.0), "it stands where it was stopped");
     assert!(run.tracker.state().may_lead(), "{:?}", run.states);
 }
@@ -252,7 +252,7 @@ fn after_a_told_seek_four_samples_lock_and_what_comes_in_between_counts_for_noth
     let lie = FilmWord::Position(ShowTime::from_millis(5));
     all.push(Observation::new(mono(10.01), lie));
     all.sort_by_key(|told| told.at);
-    let run = Run::of(SourceKind::MpvSound, &film, &all, 12.0);
+    let run = Run::of(SourceKind::Mpv, &film, &all, 12.0);
     let locked = run.states.last().expect("there are some");
     assert!(locked.1 == FilmState::Locked && locked.0 <= 10.3, "{:?}", run.states);
     assert_eq!((run.tracker.epoch, run.tracker.counts.rejected), (1, 1));
@@ -284,7 +284,7 @@ fn a_told_speed_is_believed_at_once() {
         .rate_from(12.0, 1.500_45)
         .rate_from(14.0, 1.0003);
     let speeds = [(10.0, FilmWord::Speed(1.001)), (12.0, FilmWord::Speed(1.5)), (14.0, FilmWord::Speed(1.0))];
-    let run = Run::of(SourceKind::MpvSound, &film, &player(&film, 16.0, &speeds), 16.0);
+    let run = Run::of(SourceKind::Mpv, &film, &player(&film, 16.0, &speeds), 16.0);
     let worst =
         run.errors.iter().filter(|e| (10.0..12.0).contains(&e.0)).map(|e| e.1.abs()).fold(0.0, f64::max);
     assert!(worst < 0.000_3, "{worst}");
@@ -315,7 +315,7 @@ fn a_player_whose_device_steps_by_20_ms_is_followed_as_a_noisy_one() {
         Observation::new(mono(t), FilmWord::Position(ShowTime::from_secs_f64(media)))
     };
     let all: Vec<Observation> = (1..1_200).map(|n| told(n, &mut luck)).collect();
-    let run = Run::of(SourceKind::MpvSound, &film, &all, 60.0);
+    let run = Run::of(SourceKind::Mpv, &film, &all, 60.0);
     let (bias, p99) = run.bias_and_p99_ms(30.0);
     println!("steps of 20 ms: p99 {p99:.2} ms, bias {bias:.2} ms, {:?}", run.states);
     assert!(p99 < 4.0 && bias.abs() < 2.0 && run.tracker.state().may_lead(), "{:?}", run.states);

@@ -1,0 +1,47 @@
+//! Datagrams of one sender who is named: anybody in a network can send some, and an address is what tells them apart.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddrV4};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use socket2::{Domain, Socket, Type};
+
+use super::WordSink;
+use crate::sys::batch::{Batch, stamp_arrivals};
+use crate::sys::clock::{Monotonic, wall_now_ns};
+use crate::time::{Clock as _, MonoTime};
+
+/// How often it is looked whether anybody still listens.
+const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000_000 };
+/// A kernel's stamp that is older was made by another time of the day.
+const OLDEST: Duration = Duration::from_millis(100);
+
+/// Opens the port. Others on this machine may have it open as well: a network's timecode is for all.
+pub(super) fn open(bind: SocketAddrV4) -> io::Result<Socket> {
+    let socket = Socket::new(Domain::IPV4, Type::DGRAM, None)?;
+    socket.set_reuse_address(true)?;
+    socket.set_nonblocking(true)?;
+    socket.bind(&bind.into())?;
+    stamp_arrivals(&socket)?;
+    Ok(socket)
+}
+
+/// Hands each datagram to `hear`, with its sender and the instant at which the kernel had it, until nobody listens.
+pub(super) fn read(socket: &Socket, told: &WordSink, mut hear: impl FnMut(&[u8], Ipv4Addr, MonoTime)) {
+    let mut batch = Batch::new();
+    while !told.is_over() {
+        let mut wanted = [PollFd::new(socket, PollFlags::IN)];
+        // Whatever this says, the socket says it again.
+        let _ = poll(&mut wanted, Some(&LOOK));
+        if batch.receive(socket).is_err() {
+            continue;
+        }
+        let (now, wall_ns) = (Monotonic.now(), wall_now_ns());
+        for datagram in batch.datagrams() {
+            let age = datagram.stamp_ns.map_or(0, |stamp| wall_ns.saturating_sub(stamp));
+            let age = Some(Duration::from_nanos(age)).filter(|age| *age < OLDEST).unwrap_or_default();
+            hear(datagram.bytes, *datagram.from.ip(), now.before(age));
+        }
+    }
+}

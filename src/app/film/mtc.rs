@@ -1,0 +1,70 @@
+//! MIDI timecode from a raw device or a FIFO: bytes as they come, each read stamped with the instant at which it was.
+
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileTypeExt as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::{FilmError, WordSink, read_some, start};
+use crate::film::mtc::MtcReader;
+use crate::film::observation::{FilmWord, Observation};
+use crate::film::source::FilmArgs;
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+
+/// From the end of a line to the next look for one.
+const AGAIN: Duration = Duration::from_secs(1);
+
+/// Begins to read a line of MIDI; a device that is pulled out may come back, a FIFO have another writer.
+pub(super) fn start_reading(path: &Path, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
+    let failed = |source| FilmError::Open { what: path.display().to_string(), source };
+    let kind = path.metadata().map_err(failed)?.file_type();
+    if !kind.is_fifo() && !kind.is_char_device() {
+        let why = "it is neither a raw MIDI device nor a FIFO";
+        return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, why)));
+    }
+    let line = MidiLine { path: path.to_path_buf(), args: args.clone(), told };
+    start("mtc", move || while line.listen() {})?;
+    Ok(())
+}
+
+struct MidiLine {
+    path: PathBuf,
+    args: FilmArgs,
+    told: WordSink,
+}
+
+impl MidiLine {
+    /// One line, from its begin to its end; false once nobody listens.
+    fn listen(&self) -> bool {
+        // Opening a FIFO waits for a writer.
+        let read = File::open(&self.path).and_then(|line| self.read(line));
+        self.told.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
+        let is_heard = self.told.tell(Observation::new(Monotonic.now(), FilmWord::Gone));
+        Monotonic.sleep_until(Monotonic.now() + AGAIN);
+        is_heard
+    }
+
+    fn read(&self, mut line: File) -> io::Result<()> {
+        let mut reader = MtcReader::new(self.args.rate, self.args.start);
+        let mut bytes = [0; 256];
+        self.told.note(|notes| notes.trouble = None);
+        loop {
+            let count = read_some(&mut line, &mut bytes)?;
+            if count == 0 {
+                return Ok(());
+            }
+            let (at, mut is_heard) = (Monotonic.now(), true);
+            for byte in &bytes[..count] {
+                reader.hear(*byte, at, &mut |what| is_heard &= self.told.tell(what));
+            }
+            self.told.note(|notes| {
+                notes.label(reader.labels());
+            });
+            if !is_heard {
+                return Ok(());
+            }
+        }
+    }
+}

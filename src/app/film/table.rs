@@ -1,0 +1,217 @@
+//! All sources of a show, in their ranking: observations in, where the film is by the best of them out, and what a person is to see.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use serde::{Serialize, Serializer};
+
+use super::SourceRules;
+use super::told::{Notes, SourceNotes, noted};
+use crate::film::chooser::{Chooser, SourceView};
+use crate::film::observation::Observation;
+use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
+use crate::film::source::FilmArgs;
+use crate::film::tracker::{SourceGrade, SourceTracker};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, MonoTime};
+
+/// How often where the film is is published, whatever is heard, and the table with it.
+const PUBLISH_EVERY: Duration = Duration::from_millis(50);
+
+/// What is known of the film by all sources.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct FilmTable {
+    /// In their ranking.
+    pub(crate) sources: Vec<SourceRow>,
+    /// The place of the one that leads.
+    pub(crate) leads: Option<usize>,
+    /// How often another took over.
+    pub(crate) switches: u64,
+    /// A source that ranks higher is ahead by so many seconds, and a person has to decide.
+    pub(crate) disagrees: Option<Disagreement>,
+}
+
+/// Two sources that say different things.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Disagreement {
+    pub(crate) source: usize,
+    pub(crate) ahead_s: f64,
+}
+
+/// One source, as a person is to see it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct SourceRow {
+    pub(crate) source: String,
+    #[serde(serialize_with = "word")]
+    pub(crate) state: FilmState,
+    /// What that means.
+    pub(crate) words: &'static str,
+    /// Where in the cue the film is, seconds, if that is known.
+    pub(crate) media_s: Option<f64>,
+    /// How much faster than the clock it runs, millionths.
+    pub(crate) rate_ppm: Option<f64>,
+    /// Deviation of where it is, milliseconds.
+    pub(crate) sigma_ms: Option<f64>,
+    /// Whether it may lead seats.
+    pub(crate) may_lead: bool,
+    pub(crate) used: u64,
+    pub(crate) rejected: u64,
+    pub(crate) jumps: u64,
+    pub(crate) dropouts: u64,
+    #[serde(flatten)]
+    pub(crate) notes: SourceNotes,
+}
+
+fn word<S: Serializer>(state: &FilmState, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(state.word())
+}
+
+/// The newest table, for whoever looks.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SharedTable(Arc<Mutex<FilmTable>>);
+
+impl SharedTable {
+    pub(crate) fn read(&self) -> FilmTable {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn put(&self, table: FilmTable) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = table;
+    }
+}
+
+/// A source that is tracked.
+struct TrackedSource {
+    name: String,
+    tracker: SourceTracker,
+    grade: SourceGrade,
+    notes: Notes,
+}
+
+impl TrackedSource {
+    fn view(&mut self, now: MonoTime, allows_coarse: bool) -> SourceView {
+        self.tracker.poll(now);
+        let may_lead = self.grade.may_lead(&self.tracker, allows_coarse, now);
+        SourceView { point: self.tracker.point(now), may_lead }
+    }
+
+    fn row(&self, view: &SourceView, now: MonoTime) -> SourceRow {
+        let FilmPoint { media, rate, .. } = view.point;
+        let (state, counts) = (self.tracker.state(), self.tracker.counts());
+        let is_known = !matches!(state, FilmState::Absent);
+        let runs = matches!(state, FilmState::Locked | FilmState::Freewheeling);
+        SourceRow {
+            source: self.name.clone(),
+            state,
+            words: state.of_a_source(),
+            media_s: is_known.then(|| media.as_secs_f64()),
+            rate_ppm: runs.then_some((rate - 1.0) * 1e6),
+            sigma_ms: self.tracker.sigma_s(now).filter(|_| runs).map(|sigma| sigma * 1e3),
+            may_lead: view.may_lead,
+            used: counts.used,
+            rejected: counts.rejected,
+            jumps: counts.jumps,
+            dropouts: counts.dropouts,
+            notes: noted(&self.notes).clone(),
+        }
+    }
+}
+
+/// All sources of a show.
+pub(super) struct Ranking {
+    sources: Vec<TrackedSource>,
+    allows_coarse: bool,
+    chooser: Chooser,
+    views: Vec<SourceView>,
+    pub(super) point: Arc<PublishedPoint>,
+    pub(super) table: SharedTable,
+    next: MonoTime,
+}
+
+impl Ranking {
+    /// Those sources, of which nothing was heard yet, with the notes of each.
+    pub(super) fn new(args: &[FilmArgs], notes: &[Notes], rules: SourceRules) -> Self {
+        let (now, SourceRules { allows_coarse, band }) = (Monotonic.now(), rules);
+        let of = |(args, notes): (&FilmArgs, &Notes)| TrackedSource {
+            name: args.source.to_string(),
+            tracker: SourceTracker::new(args.source.kind(), band, now),
+            grade: SourceGrade::default(),
+            notes: Arc::clone(notes),
+        };
+        let mut ranking = Self {
+            sources: args.iter().zip(notes).map(of).collect(),
+            allows_coarse,
+            chooser: Chooser::default(),
+            views: Vec::with_capacity(args.len()),
+            point: Arc::default(),
+            table: SharedTable::default(),
+            next: now,
+        };
+        ranking.publish(now);
+        ranking
+    }
+
+    /// Makes of observations where the film is, until nobody can tell any more: then the newest point grows stale.
+    pub(super) fn run(mut self, heard: &Receiver<(usize, Observation)>) {
+        loop {
+            match heard.recv_timeout(PUBLISH_EVERY) {
+                Ok((place, told)) => self.sources[place].tracker.hear(&told),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.next = Monotonic.now();
+                    return self.publish(self.next);
+                }
+            }
+            self.publish(Monotonic.now());
+        }
+    }
+
+    fn publish(&mut self, now: MonoTime) {
+        self.views.clear();
+        let allows_coarse = self.allows_coarse;
+        self.views.extend(self.sources.iter_mut().map(|source| source.view(now, allows_coarse)));
+        let chosen = self.chooser.choose(&self.views, now);
+        self.point.publish(&chosen.point);
+        // What is heard a hundred times a second is not read that often.
+        if now < self.next {
+            return;
+        }
+        self.next = now + PUBLISH_EVERY;
+        let disagrees =
+            chosen.disagrees.map(|(source, ahead)| Disagreement { source, ahead_s: ahead.as_secs_f64() });
+        let rows = self.sources.iter().zip(&self.views).map(|(source, view)| source.row(view, now)).collect();
+        let switches = self.chooser.switches();
+        self.table.put(FilmTable { sources: rows, leads: chosen.source, switches, disagrees });
+    }
+}
+
+impl FilmTable {
+    /// What a person should know beside where the film is: sentences that stay as they are for as long as they are true.
+    pub(crate) fn warnings(&self) -> Vec<String> {
+        let name = |place: usize| self.sources.get(place).map_or("", |row| row.source.as_str());
+        let apart = self.disagrees.map(|two| {
+            let leads = self.leads.map_or("", name);
+            format!("{} and {leads} disagree about where the film is; {leads} leads", name(two.source))
+        });
+        self.sources.iter().flat_map(SourceRow::warnings).chain(apart).collect()
+    }
+}
+
+impl SourceRow {
+    fn warnings(&self) -> Vec<String> {
+        let Self { source, notes, .. } = self;
+        let foreign = notes
+            .foreign_from
+            .map(|from| format!("{source}: {from} sends as well, and is not heard; see who that is"));
+        let set = (notes.clock_steps > 0).then(|| {
+            format!("{source}: the system's clock was set while the film ran; the film goes on as it was")
+        });
+        let sentences = [&notes.trouble, &notes.refused].into_iter().flatten();
+        let sentences = sentences.map(|why| format!("{source}: {why}"));
+        let coarse = (self.state == FilmState::Locked && !self.may_lead).then(|| {
+            format!("{source}: too coarse to lead seats; allow it with --allow-coarse if it has to")
+        });
+        sentences.chain(foreign).chain(set).chain(coarse).collect()
+    }
+}

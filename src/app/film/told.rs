@@ -1,0 +1,86 @@
+//! What readers tell: where the film is, in observations; and what a person should know beside that, in notes.
+
+use std::net::Ipv4Addr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde::Serialize;
+
+use crate::film::labels::LabelClock;
+use crate::film::observation::Observation;
+
+/// What is noted of a source beside where its film is.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct SourceNotes {
+    /// Why it is not read at present.
+    pub(crate) trouble: Option<String>,
+    /// Why its labels are none that can be used.
+    pub(crate) refused: Option<String>,
+    /// Frames a second, as configured or found.
+    pub(crate) fps: Option<String>,
+    /// Who else sends what this source is to send, the first of them, and how often others did.
+    pub(crate) foreign_from: Option<Ipv4Addr>,
+    pub(crate) foreign: u64,
+    /// Datagrams, requests or lines that said nothing.
+    pub(crate) garbage: u64,
+    /// How loud the line is, dB of full scale.
+    pub(crate) level_db: Option<f64>,
+    /// The film that a player has open.
+    pub(crate) film: Option<String>,
+    /// How far the player's picture is from its sound, milliseconds.
+    pub(crate) avsync_ms: Option<f64>,
+    /// How far off the system's clock may be by its own account, milliseconds.
+    pub(crate) clock_error_ms: Option<f64>,
+    /// How often the system's clock was set, which a film that runs does not follow.
+    pub(crate) clock_steps: u64,
+}
+
+impl SourceNotes {
+    pub(super) fn label(&mut self, labels: &LabelClock) {
+        self.refused = labels.refused().map(ToString::to_string);
+        self.fps = labels.rate().map(|rate| rate.to_string());
+    }
+}
+
+/// The notes of one source, shared.
+pub(super) type Notes = Arc<Mutex<SourceNotes>>;
+
+pub(super) fn noted(notes: &Notes) -> MutexGuard<'_, SourceNotes> {
+    notes.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Where a reader's words go.
+#[derive(Debug, Clone)]
+pub(super) struct WordSink {
+    /// Its place in the ranking.
+    pub(super) place: usize,
+    pub(super) to: SyncSender<(usize, Observation)>,
+    pub(super) notes: Notes,
+    /// Nobody listens any more.
+    pub(super) over: Arc<AtomicBool>,
+}
+
+impl WordSink {
+    /// Tells of the film; false once nobody listens.
+    pub(super) fn tell(&self, what: Observation) -> bool {
+        !self.is_over() && self.to.send((self.place, what)).is_ok()
+    }
+
+    /// Notes something for people.
+    pub(super) fn note(&self, what: impl FnOnce(&mut SourceNotes)) {
+        what(&mut noted(&self.notes));
+    }
+
+    /// Somebody sent what this source alone is to send. The first is named: names may be made up at any pace.
+    pub(super) fn note_foreign(&self, from: Ipv4Addr) {
+        self.note(|notes| {
+            notes.foreign += 1;
+            notes.foreign_from.get_or_insert(from);
+        });
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.over.load(Ordering::Relaxed)
+    }
+}

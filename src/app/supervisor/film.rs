@@ -1,0 +1,44 @@
+//! The film of a hall as surfaces show it.
+
+use super::hall::HallContext;
+use crate::app::film::{FilmTable, SourceRow};
+use crate::control::{FilmSourceStatus, FilmStatus};
+use crate::film::point::FilmState;
+
+/// The film by the source that leads, or by the first while none does.
+pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
+    let follows = hall.cued.as_ref().and_then(|cued| cued.film);
+    let begin_s = follows.map_or(0.0, |film| film.begin.as_secs_f64());
+    let best = table.leads.or(Some(0)).and_then(|place| table.sources.get(place));
+    let state = best.map_or(FilmState::Absent, |row| row.state);
+    FilmStatus {
+        state: state.word().to_owned(),
+        cause: best.map(cause).unwrap_or_default(),
+        next: state.next().to_owned(),
+        leads: follows.is_some(),
+        source: table.leads.and(best).map(|row| row.source.clone()),
+        position_s: best.and_then(|row| row.media_s).map(|at| at - begin_s),
+        rate_ppm: best.and_then(|row| row.rate_ppm),
+        sources: table.sources.iter().map(|row| source(row, begin_s)).collect(),
+    }
+}
+
+fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
+    FilmSourceStatus {
+        source: row.source.clone(),
+        state: row.state.word().to_owned(),
+        cause: cause(row),
+        position_s: row.media_s.map(|at| at - begin_s),
+        rate_ppm: row.rate_ppm,
+        sigma_ms: row.sigma_ms,
+        may_lead: row.may_lead,
+        dropouts: row.dropouts,
+        foreign: row.notes.foreign,
+    }
+}
+
+/// What the state of a source means, and what is wrong with it.
+fn cause(row: &SourceRow) -> String {
+    let troubles = [&row.notes.trouble, &row.notes.refused].into_iter().flatten();
+    troubles.fold(row.words.to_owned(), |text, why| format!("{text}: {why}"))
+}

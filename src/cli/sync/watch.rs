@@ -1,0 +1,111 @@
+use std::fmt::Write as _;
+use std::io::{self, IsTerminal as _};
+use std::time::Duration;
+
+use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::film::follower::PaceLimits;
+use crate::film::source::{FilmArgs, FilmSource};
+use crate::sys::clock::Monotonic;
+use crate::time::{Clock as _, ShowTime};
+
+/// Says what is heard of a film, with no hall, no cue and no seat: which source says what, how good it is, and which would lead.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct Args {
+    /// The sources in their ranking, as `play --chase` takes them.
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<FilmSource>,
+    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
+    #[arg(long, value_name = "N")]
+    film_fps: Option<String>,
+    /// The film's timecode at which the cue would begin, HH:MM:SS:FF [default: 00:00:00:00].
+    #[arg(long, value_name = "TIMECODE")]
+    tc_start: Option<String>,
+    /// Let coarse sources lead as well.
+    #[arg(long)]
+    allow_coarse: bool,
+    /// End after so many seconds [default: at Ctrl-C].
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    seconds: Option<u32>,
+    /// Print a JSON object twice a second.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How often it is said.
+const EVERY: Duration = Duration::from_millis(500);
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let of = |source: &FilmSource| {
+        FilmArgs::new(source.clone(), args.film_fps.as_deref(), args.tc_start.as_deref())
+    };
+    let sources: Vec<FilmArgs> =
+        args.sources.iter().map(of).collect::<Result<_, _>>().or_exit(Exit::Usage)?;
+    let rules = SourceRules { allows_coarse: args.allow_coarse, band: PaceLimits::default().band };
+    let reader = FilmReader::start(&sources, rules).or_exit(Exit::System)?;
+    let (table, draws) = (reader.table(), io::stdout().is_terminal() && !args.json);
+    let mut drawn = 0;
+    let mut at = Monotonic.now();
+    let end = args.seconds.map(|seconds| at + Duration::from_secs(seconds.into()));
+    while end.is_none_or(|end| at < end) {
+        at = at + EVERY;
+        Monotonic.sleep_until(at);
+        let table = table.read();
+        if args.json {
+            print::json(&table)?;
+            continue;
+        }
+        let text = text(&table);
+        // Over what was said before.
+        let up = if draws && drawn > 0 { format!("\x1b[{drawn}A\x1b[J") } else { String::new() };
+        drawn = text.lines().count();
+        print::out(&(up + &text))?;
+    }
+    Ok(Exit::Done)
+}
+
+fn text(table: &FilmTable) -> String {
+    let mut text = String::new();
+    for (place, row) in table.sources.iter().enumerate() {
+        let leads = if table.leads == Some(place) { "> " } else { "  " };
+        let _ = writeln!(text, "{leads}{}", line(row)); // a String takes it
+    }
+    for warning in table.warnings() {
+        let _ = writeln!(text, "  {warning}");
+    }
+    text
+}
+
+fn line(row: &SourceRow) -> String {
+    let SourceRow { source, words, notes, .. } = row;
+    let mut text = format!("{source}: {words}");
+    if let Some(media_s) = row.media_s {
+        let _ = write!(text, ", at {}", ShowTime::from_secs_f64(media_s));
+    }
+    if let (Some(ppm), Some(sigma)) = (row.rate_ppm, row.sigma_ms) {
+        let _ = write!(text, ", {ppm:+.0} ppm, sigma {sigma:.2} ms");
+    }
+    if let Some(fps) = &notes.fps {
+        let _ = write!(text, ", {fps} fps");
+    }
+    if let Some(level) = notes.level_db {
+        let _ = write!(text, ", {level:.0} dBFS");
+    }
+    if let Some(film) = &notes.film {
+        let _ = write!(text, ", {film}");
+    }
+    if let Some(error) = notes.clock_error_ms {
+        let _ = write!(text, ", clock within {error:.1} ms");
+    }
+    let counts = [
+        (row.dropouts, "dropouts"),
+        (row.jumps, "jumps"),
+        (row.rejected, "left out"),
+        (notes.foreign, "of others"),
+        (notes.garbage, "that say nothing"),
+    ];
+    for (count, what) in counts.into_iter().filter(|(count, _)| *count > 0) {
+        let _ = write!(text, ", {count} {what}");
+    }
+    text
+}

@@ -1,0 +1,233 @@
+//! `[sync]`: the film that leads the shows of a hall, and who tells where it is; without the table each show is its own film.
+
+use std::str::FromStr as _;
+use std::time::Duration;
+
+use super::fault::Faults;
+use super::section::{Entry, Section};
+use crate::film::chase::Rejoin;
+use crate::film::chooser::MOST_SOURCES;
+use crate::film::follower::PaceLimits;
+use crate::film::source::{FilmArgs, FilmSource, milliseconds};
+use crate::film::timecode::{Label, Timecode};
+use crate::time::ShowTime;
+
+/// How far from 1 a film's rate may be, and how much the seats may add to it: 25/24 is 4.2 %.
+const BAND_MOST: f64 = 0.05;
+const SLEW: std::ops::RangeInclusive<f64> = 0.005..=0.02;
+
+/// Kinds of sources; each has a table of its name.
+const KINDS: [&str; 7] = ["ltc", "mpv", "mtc", "artnet", "osc", "http", "clock"];
+
+/// The film that leads.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FilmSync {
+    /// Who tells where it is; the first that can leads.
+    pub(crate) sources: Vec<FilmArgs>,
+    /// True if `start` says where the film is when a cue begins; else no show follows it.
+    pub(crate) leads: bool,
+    /// How much later than the film's timecode the motion is.
+    pub(crate) offset: ShowTime,
+    /// The paces that shows are proved at.
+    pub(crate) pace: PaceLimits,
+    /// When seats that hold may join again.
+    pub(crate) rejoin: Rejoin,
+    /// True if those may lead as well that have not proved themselves.
+    pub(crate) allows_coarse: bool,
+}
+
+impl FilmSync {
+    /// Where the film is when a cue begins that an entry of a playlist may name the timecode of; `None` if no film leads it.
+    ///
+    /// # Errors
+    /// Why the timecode is none of the film, for a person.
+    pub(crate) fn begin(&self, named: Option<Label>) -> Result<Option<ShowTime>, String> {
+        let Some(label) = named else { return Ok(self.leads.then_some(self.offset)) };
+        let (rate, start) =
+            self.sources.first().map_or((None, Label::default()), |args| (args.rate, args.start));
+        // Without it a label says how many frames there were, and not how long they took.
+        let rate = rate.ok_or_else(|| format!("film = \"{label}\" needs film_fps in [sync]"))?;
+        let of = |label: Label| Timecode::of(label, rate).map_err(|error| error.to_string());
+        let since = of(label)?.media_since(of(Label { drops: label.drops, ..start })?);
+        Ok(Some(ShowTime::from_nanos(since.as_nanos().saturating_add(self.offset.as_nanos()))))
+    }
+}
+
+/// Reads the table.
+pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync> {
+    let mut section = Section::new("[sync]", entry.at, entry.table(faults)?, faults);
+    section.require(&["sources"]);
+    let names = section.get("sources").and_then(|entry| entry.array(section.faults)).unwrap_or_default();
+    if names.len() > MOST_SOURCES {
+        names[MOST_SOURCES]
+            .fault(section.faults, &format!("{MOST_SOURCES} sources can be ranked, not {}", names.len()));
+    }
+    let [fps, start] = ["film_fps", "start"].map(|key| section.text(key));
+    let sources = names.iter().filter_map(|name| source(*name, &mut section)).collect::<Vec<_>>();
+    let latency = section.get("ltc").and_then(|entry| latency(entry, section.faults));
+    let args = |(name, source): (Entry<'_>, FilmSource)| {
+        let latency = latency.filter(|_| matches!(source, FilmSource::Ltc(_))).unwrap_or_default();
+        let args = FilmArgs::new(source, fps.as_deref(), start.as_deref());
+        let args = args.map_err(|error| name.fault(section.faults, &error.to_string())).ok()?;
+        Some(FilmArgs { latency, ..args })
+    };
+    let sources = sources.into_iter().filter_map(args).collect();
+    let default = PaceLimits::default();
+    let pace = PaceLimits {
+        band: share(&mut section, "rate_band", 0.0..=BAND_MOST).unwrap_or(default.band),
+        slew: share(&mut section, "slew", SLEW).unwrap_or(default.slew),
+    };
+    let offset = section.get("offset").and_then(|entry| signed_ms(entry, section.faults)).unwrap_or_default();
+    let rejoin =
+        section.choice("rejoin", &[("auto", Rejoin::Auto), ("ask", Rejoin::Ask)]).unwrap_or(Rejoin::Auto);
+    let allows_coarse = section.get("allow_coarse").and_then(|entry| entry.switch(section.faults));
+    section.finish();
+    let (leads, allows_coarse) = (start.is_some(), allows_coarse.unwrap_or(false));
+    Some(FilmSync { sources, leads, offset, pace, rejoin, allows_coarse })
+}
+
+/// A source: by the name of its table, or whole, as `play --chase` takes it.
+fn source<'t>(name: Entry<'t>, section: &mut Section<'t, '_, '_>) -> Option<(Entry<'t>, FilmSource)> {
+    let text = name.text(section.faults)?;
+    let whole = if text.contains(':') { text.to_owned() } else { of_table(name, text, section)? };
+    let source = FilmSource::from_str(&whole);
+    source.map_err(|error| name.fault(section.faults, &error.to_string())).ok().map(|source| (name, source))
+}
+
+/// What a table says, as `play --chase` takes it.
+fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) -> Option<String> {
+    let Some(kind) = KINDS.into_iter().find(|kind| *kind == text) else {
+        name.fault(section.faults, &format!("{text:?} is none of {}", KINDS.join(", ")));
+        return None;
+    };
+    // The key that says who, and the one that may be beside it.
+    let (needed, more) = match kind {
+        "ltc" => ("input", "latency"),
+        "mpv" => ("socket", ""),
+        "mtc" => ("device", ""),
+        "clock" => ("at", "max_error"),
+        _ => ("from", "bind"),
+    };
+    let Some(entry) = section.get(kind) else {
+        name.fault(section.faults, &format!("there is no [sync.{kind}]; it has to say {needed}"));
+        return None;
+    };
+    let mut table =
+        Section::new(format!("[sync.{kind}]"), entry.at, entry.table(section.faults)?, section.faults);
+    table.require(&[needed]);
+    let said = table.text(needed);
+    let beside = if more.is_empty() { None } else { table.text(more) };
+    table.finish();
+    let beside = beside.filter(|_| more != "latency").map(|value| format!(",{more}={value}"));
+    Some(format!("{kind}:{}{}", said?, beside.unwrap_or_default()))
+}
+
+fn latency(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
+    let table = entry.value.as_table()?;
+    let entry = table.get("latency").map(|value| Entry::new("latency", value))?;
+    let late = milliseconds(entry.text(faults)?).filter(|late| *late <= Duration::from_secs(1));
+    if late.is_none() {
+        entry.fault(faults, "is no latency of up to a second; write it as \"10.6ms\"");
+    }
+    late
+}
+
+/// `"0.15%"`.
+fn share(
+    section: &mut Section<'_, '_, '_>,
+    key: &'static str,
+    range: std::ops::RangeInclusive<f64>,
+) -> Option<f64> {
+    let entry = section.get(key)?;
+    let text = entry.text(section.faults)?;
+    let share = text.strip_suffix('%').and_then(|percent| percent.trim_end().parse::<f64>().ok());
+    let share = share.map(|percent| percent / 100.0).filter(|share| range.contains(share));
+    if share.is_none() {
+        let (least, most) = (100.0 * range.start(), 100.0 * range.end());
+        entry.fault(
+            section.faults,
+            &format!("{text:?} is no share within {least}% to {most}%; write it as \"1%\""),
+        );
+    }
+    share
+}
+
+/// `"-40ms"`, up to ten seconds either way.
+fn signed_ms(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<ShowTime> {
+    let text = entry.text(faults)?;
+    let later =
+        milliseconds(text.strip_prefix('-').unwrap_or(text)).filter(|span| *span <= Duration::from_secs(10));
+    let Some(later) = later else {
+        entry.fault(faults, &format!("{text:?} is no time of up to 10000ms; write it as \"-40ms\""));
+        return None;
+    };
+    Some(if text.starts_with('-') { ShowTime::ZERO - later } else { ShowTime::ZERO + later })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::tests::{faults_of, hall_with, with};
+
+    #[test]
+    fn without_the_table_each_show_is_its_own_film() {
+        assert_eq!(with("").unwrap().sync, None);
+    }
+
+    #[test]
+    fn sources_are_ranked_by_the_names_of_their_tables_or_whole() {
+        let text = "[sync]\nsources = [\"ltc\", \"artnet\", \"mpv:/run/hall.sock\"]\nfilm_fps = \"25\"\nstart = \"01:00:00:00\"\n\
+                    rate_band = \"0.2%\"\nslew = \"0.5 %\"\noffset = \"-40ms\"\nallow_coarse = true\n\
+                    [sync.ltc]\ninput = \"alsa:hw:2,0\"\nlatency = \"10.6ms\"\n\
+                    [sync.artnet]\nfrom = \"10.0.0.20\"\nbind = \"10.0.0.2:6454\"\n";
+        let sync = hall_with(text).sync.unwrap();
+        let names: Vec<_> = sync.sources.iter().map(|args| args.source.to_string()).collect();
+        assert_eq!(names, ["ltc:alsa:hw:2,0", "artnet:10.0.0.20", "mpv:/run/hall.sock"]);
+        let late: Vec<_> = sync.sources.iter().map(|args| args.latency.as_micros()).collect();
+        assert_eq!(late, [10_600, 0, 0]);
+        assert!((sync.pace.band - 0.002).abs() < 1e-9 && (sync.pace.slew - 0.005).abs() < 1e-9);
+        assert!(sync.leads && sync.allows_coarse && sync.offset.as_nanos() == -40_000_000);
+        let bare = hall_with("[sync]\nsources = [\"mpv:/run/hall.sock\"]").sync.unwrap();
+        assert!(!bare.leads && !bare.allows_coarse, "nobody follows what begins nowhere");
+    }
+
+    #[test]
+    fn an_entry_of_a_playlist_may_begin_elsewhere_in_the_film() {
+        let sync = |more: &str| {
+            hall_with(&format!("[sync]\nsources = [\"mpv:/s\"]\noffset = \"40ms\"\n{more}")).sync.unwrap()
+        };
+        let reel = sync("film_fps = \"25\"\nstart = \"01:00:00:00\"");
+        let at =
+            |text: &str| reel.begin(Some(text.parse().unwrap())).map(|at| at.unwrap().as_nanos() / 1_000_000);
+        assert_eq!((at("01:10:00:05"), at("00:59:59:00")), (Ok(600_240), Ok(-960)));
+        assert!(at("01:00:00:25").unwrap_err().contains("outside 0..=24"));
+        assert_eq!(reel.begin(None).unwrap().map(|at| at.as_nanos()), Some(40_000_000));
+        let loose = sync("");
+        assert_eq!(loose.begin(None), Ok(None), "no film leads it");
+        assert!(loose.begin(Some("01:00:00:00".parse().unwrap())).unwrap_err().contains("needs film_fps"));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_place_and_what_to_write() {
+        let wrong = [
+            ("", "[sync] has no sources, which is needed"),
+            ("sources = [\"tape\"]", "sources: \"tape\" is none of ltc, mpv"),
+            ("sources = [\"artnet\"]", "there is no [sync.artnet]; it has to say from"),
+            ("sources = [\"artnet\"]\n[sync.artnet]\nbind = \"0.0.0.0:6454\"", "[sync.artnet] has no from"),
+            ("sources = [\"artnet:anybody\"]", "names no sender"),
+            ("sources = [\"mpv:/s\"]\nfilm_fps = \"26\"", "is no frame rate; take 23.976"),
+            ("sources = [\"mpv:/s\"]\nstart = \"1:2\"", "is no timecode"),
+            ("sources = [\"mpv:/s\"]\nrate_band = \"9%\"", "is no share within 0% to 5%"),
+            ("sources = [\"mpv:/s\"]\nslew = 0.01", "a string is wanted here"),
+            ("sources = [\"mpv:/s\"]\noffset = \"1s\"", "write it as \"-40ms\""),
+            (
+                "sources = [\"ltc\"]\n[sync.ltc]\ninput = \"-\"\nlatency = \"2000ms\"",
+                "no latency of up to a second",
+            ),
+            ("sources = [\"mpv:/s\"]\nrank = 1", "rank: unknown key in [sync]"),
+        ];
+        for (text, says) in wrong {
+            let faults = faults_of(&format!("[sync]\n{text}\n"));
+            assert!(faults.iter().any(|fault| fault.contains(says)), "{text}: {faults:?}");
+        }
+    }
+}

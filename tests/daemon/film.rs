@@ -1,0 +1,98 @@
+//! A hall whose film leads its shows: Art-Net timecode as a cinema server sends it.
+
+use crate::hall::Hall;
+use crate::process::Guarded;
+
+/// Where timecode is heard, and from whom: addresses of this machine that no other test and no other run of them has.
+fn network(test: u8) -> (String, String) {
+    let [_, _, high, low] = std::process::id().to_be_bytes();
+    let place = |net: u8| format!("127.{}.{high}.{}", net + test, low.max(1));
+    (place(40), format!("{}:6454", place(50)))
+}
+
+/// A film that runs from that label on, until it is dropped.
+fn film(test: u8, start: &str) -> Guarded {
+    let (from, to) = network(test);
+    let args = ["sync", "send", "--seconds", "600", "--artnet", &to, "--from", &from, "--tc-start", start];
+    Guarded::start(&args)
+}
+
+fn hall(test: u8) -> Hall {
+    let (from, bind) = network(test);
+    Hall::open_with(|config| {
+        format!(
+            "{config}[sync]\nsources = [\"artnet\"]\nfilm_fps = \"25\"\nstart = \"01:00:00:00\"\n\
+             [sync.artnet]\nfrom = \"{from}\"\nbind = \"{bind}\"\n"
+        )
+    })
+}
+
+#[test]
+fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nobody_before() {
+    let mut hall = hall(0);
+    let absent = hall.wait(|status| status["film"]["state"] == "absent");
+    assert_eq!(absent["film"]["leads"], false, "nothing is loaded");
+    let reel = film(0, "01:00:05:00");
+    hall.wait(|status| status["film"]["state"] == "locked");
+    hall.arm("night");
+    let armed = hall.wait(|status| status["film"]["position_s"].as_f64().is_some_and(|at| at > 7.0));
+    assert_eq!(
+        (&armed["state"], &armed["film"]["leads"]),
+        (&"armed".into(), &true.into()),
+        "{}",
+        armed["film"]
+    );
+    assert_eq!((hall.relay(0).count(), hall.relay(1).count()), (0, 0), "the film moves nobody");
+    hall.done(&["go"]);
+    let at = |status: &serde_json::Value, what: &str| status[what]["position_s"].as_f64().unwrap_or(f64::MAX);
+    let follows = |status: &serde_json::Value| (at(status, "film") - at(status, "show")).abs() < 0.25;
+    hall.wait(|status| status["state"] == "playing" && follows(status));
+
+    drop(reel);
+    let waits = hall.wait(|status| status["state"] == "waiting" && status["film"]["state"] == "lost");
+    assert_eq!(waits["cause"], "nothing is heard of the film any more");
+    assert!(waits["next"].as_str().is_some_and(|next| next.contains("see to the film")), "{}", waits["next"]);
+    let reel = film(0, "01:00:30:00");
+    hall.wait(|status| status["state"] == "playing" && status["show"]["position_s"].as_f64() > Some(29.0));
+    drop(reel);
+    let _trailer = film(0, "02:00:00:00");
+    let parked = hall.wait(|status| status["state"] == "parked");
+    assert_eq!(parked["film"]["leads"], true, "the show is still loaded");
+    let lines = hall.close();
+    assert!(lines.iter().any(|line| line.contains("the film has left the cue")), "{lines:?}");
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn each_entry_of_a_playlist_waits_for_its_own_place_in_one_reel() {
+    let mut hall = hall(1);
+    let entry = |start: &str, then: &str| {
+        format!("[[entry]]\ncue = \"ride\"\nfilm = \"{start}\"\nthen = \"{then}\"\n")
+    };
+    hall.write(
+        "playlists/reel.toml",
+        &format!("title = \"Reel\"\n{}{}", entry("01:10:00:00", "go"), entry("01:10:08:00", "hold")),
+    );
+    let _reel = film(1, "01:09:56:00");
+    hall.done(&["playlist", "reel"]);
+    hall.done(&["preflight"]);
+    hall.done(&["arm"]);
+    hall.done(&["go"]);
+    let first = hall.comes_to("playing");
+    assert_eq!(first["playlist"]["current"], 0);
+    let second = hall.wait(|status| status["state"] == "waiting" && status["playlist"]["current"] == 1);
+    assert!(second["film"]["position_s"].as_f64() < Some(0.0), "it has not begun: {}", second["film"]);
+    hall.comes_to("playing");
+    hall.comes_to("parked");
+    hall.close();
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_hall_opens_without_the_source_of_its_film_and_says_what_is_wrong_with_it() {
+    let hall = Hall::open_with(|config| {
+        format!("{config}[sync]\nsources = [\"mtc\"]\n[sync.mtc]\ndevice = \"/nowhere/midi\"\n")
+    });
+    let cause = |status: &serde_json::Value| status["film"]["sources"][0]["cause"].to_string();
+    hall.wait(|status| cause(status).contains("/nowhere/midi cannot be opened: No such file"));
+}
