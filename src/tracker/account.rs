@@ -93,6 +93,8 @@ impl Account {
                 State::Unasked | State::Failed => Fate::Stray,
                 State::Acked | State::Refused => Fate::Duplicate,
                 State::Lost => Fate::Stale,
+                // It is to a frame of that number that somebody else sent: this program before it was started anew.
+                State::InFlight if at < self.ring.get(index).at => Fate::Stray,
                 State::InFlight | State::InFlightUntimed => self.settle(index, frame, code, at, latencies),
             },
         };

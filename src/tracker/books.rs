@@ -163,6 +163,19 @@ mod tests {
     }
 
     #[test]
+    fn a_reply_that_came_before_its_frame_was_sent_is_to_none_of_these() {
+        let mut books = books();
+        let sent = &mut |tracker: &mut Tracker| tracker.on_sent(0, FrameNo(1), true, ms(500));
+        books.on_reply(reply(1, ms(3)), &mut |_: &mut Tracker| ());
+        books.settle(ms(5), &mut |_: &mut Tracker| ());
+        books.settle(ms(501), sent);
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (0, 1));
+        books.on_reply(reply(1, ms(501)), &mut |_: &mut Tracker| ());
+        books.settle(ms(502), &mut |_: &mut Tracker| ());
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (1, 1));
+    }
+
+    #[test]
     fn a_reply_to_a_frame_that_is_never_recorded_is_stray_after_a_second_or_at_the_end() {
         let mut books = books();
         books.on_reply(reply(7, ms(3)), &mut |_: &mut Tracker| ());
