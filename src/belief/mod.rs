@@ -33,6 +33,9 @@ const GAP_UNTOLD: Duration = Duration::from_millis(100);
 /// LaneEvidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
 /// three axes each, and one of them may be lost.
 pub const FRESH: Duration = Duration::from_millis(1_500);
+/// The first frame of a motion leaves so long after its seat was read, and two periods, at the most: an answer may be held back on its
+/// way, and meanwhile the seat is moved by hand.
+const BEGINS: Duration = Duration::from_millis(100);
 /// Frames further apart are not one motion: what comes after begins anew, from evidence. Hold frames are 100 ms apart.
 const QUIET: Duration = Duration::from_millis(500);
 /// What a seat may take to come to rest after the Time of its last frame is over; a reading before that is of a motion.
@@ -265,6 +268,12 @@ impl Belief {
         is_known.then(|| KnownPose(*self.spans.last()))
     }
 
+    /// The same where a frame is to go there next: it was known only just now, whichever way the answer took.
+    #[must_use]
+    pub fn start(&self, now: MonoTime) -> Option<KnownPose> {
+        self.pose(now).filter(|_| self.is_of_now(now, 1))
+    }
+
     fn is_a_point(&self) -> bool {
         self.sways == 0.0 && self.spans.is_a_point()
     }
@@ -272,8 +281,9 @@ impl Belief {
     /// The pose about which a seat vibrates on that was cut off; none where it is not known to be there and to do nothing else.
     #[must_use]
     pub fn vibrates_about(&self, now: MonoTime) -> Option<&Pose> {
-        let is_known = self.within == self.own && self.sways > 0.0 && self.is_fresh(now);
-        is_known.then(|| self.spans.last())
+        let is_known = self.within == self.own && self.sways > 0.0;
+        let begins = is_known && self.is_of_now(now, 1);
+        begins.then(|| self.spans.last())
     }
 
     /// The amplitude, strokes, with which a seat may vibrate by the frames that it was sent; 0 once one without is known to have arrived.
@@ -282,11 +292,12 @@ impl Belief {
         self.shaking.amplitude()
     }
 
-    /// Whether the seat was read since then and is known to be at rest; where no acks are asked for, whether it is known at all.
+    /// Whether a motion that was asked for at `since` may begin: the seat was read since then, and only just now, and is known to be at
+    /// rest; where no acks are asked for, whether it is known at all.
     #[must_use]
-    pub fn is_known_since(&self, since: MonoTime, now: MonoTime) -> bool {
+    pub fn may_begin(&self, since: MonoTime, now: MonoTime) -> bool {
         let read = !self.asks || matches!(self.known, Known::Measured(at, _) if at >= since);
-        read && self.pose(now).is_some()
+        read && self.start(now).is_some()
     }
 
     /// Whether a reading told where some axes are, and of others nothing is known.
@@ -315,8 +326,18 @@ impl Belief {
     }
 
     fn is_fresh(&self, now: MonoTime) -> bool {
+        self.is_recent(now, FRESH)
+    }
+
+    /// Whether a motion may begin from what is known; so many periods after it may pass until the frame leaves. Where no acks are
+    /// asked for nobody reads either.
+    fn is_of_now(&self, now: MonoTime, periods: u32) -> bool {
+        self.is_recent(now, if self.asks { BEGINS + periods * self.period } else { FRESH })
+    }
+
+    fn is_recent(&self, now: MonoTime, within: Duration) -> bool {
         match self.known {
-            Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= FRESH,
+            Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= within,
             Known::Commanded(_) => !self.asks,
             Known::Nothing | Known::Contradicted(_) => false,
         }
@@ -333,7 +354,7 @@ impl Belief {
     #[must_use]
     pub fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
-        if self.is_quiet(now) && !self.is_fresh(now) && self.within != 0 {
+        if self.within != 0 && self.is_quiet(now) && !self.is_of_now(now, 2) {
             return false;
         }
         let from_all = self.may_be_anywhere_between(now);

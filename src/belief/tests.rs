@@ -179,8 +179,20 @@ fn a_motion_begins_from_evidence_after_half_a_second_without_frames() {
     bench.ack(1);
     bench.look(120);
     assert!(bench.allows(0.02, 10, 120));
-    assert!(bench.allows(0.01, 10, 1_000), "the ack is fresh enough");
-    assert!(!bench.allows(0.01, 10, 2_000));
+    assert!(bench.allows(0.01, 10, 600), "it goes on");
+    assert!(!bench.allows(0.01, 10, 700), "somebody may have moved it since the ack");
+    bench.read(0.01, 700, true);
+    assert!(bench.allows(0.01, 10, 820) && !bench.allows(0.01, 10, 821));
+}
+
+#[test]
+fn a_motion_that_was_asked_for_may_begin_a_tenth_of_a_second_and_a_period_after_a_reading_since_then_and_no_later()
+ {
+    let mut bench = Bench::found(0.5);
+    bench.read(0.5, 300, true);
+    let may_begin = |since, now| bench.belief.may_begin(ms(since), ms(now));
+    assert!(may_begin(300, 410) && !may_begin(300, 411) && !may_begin(301, 310));
+    assert!(bench.belief.pose(ms(411)).is_some() && bench.belief.start(ms(411)).is_none());
 }
 
 #[test]
