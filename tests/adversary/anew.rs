@@ -89,3 +89,33 @@ fn nor_is_one_that_was_moved_while_its_way_was_planned() {
         assert_no_breach(kind, &ether);
     }
 }
+
+#[test]
+fn whoever_closes_a_hall_in_a_pause_has_asked_for_its_park() {
+    for kind in ALL {
+        let ether = ether(kind, |_| {});
+        open(&ether, kind, false, &BTreeMap::new(), |hall| {
+            hall.ride(0);
+            hall.pass(1_000);
+            hall.ask(Transition::Pause);
+            hall.pass(3_000);
+            hall.leave();
+            hall.pass(5_000);
+        });
+        assert_no_breach(kind, &ether);
+    }
+}
+
+#[test]
+fn whoever_is_refused_one_thing_has_asked_for_the_next_all_the_same() {
+    for kind in ALL {
+        let ether = ether(kind, |_| {});
+        ether.world().lines[0].seat.put(0, 60.0);
+        lead(kind, &ether, false, |hall| {
+            hall.ask(Transition::Pause);
+            hall.ask(Transition::Park);
+            hall.pass(3_000);
+        });
+        assert_no_breach(kind, &ether);
+    }
+}
