@@ -21,7 +21,7 @@ mod senders {
 
 use std::net::SocketAddrV4;
 
-use kinocue::sys::clock::Monotonic;
+use kinocue::harness::sys::clock::Monotonic;
 use senders::again::sender;
 use senders::children::Peer;
 use senders::outcome::Outcome;

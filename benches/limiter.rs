@@ -12,10 +12,10 @@ use std::time::Duration;
 
 use common::spread::{Spread, verdict};
 use kinocue::harness::asked::{Sound, Trial, Wild, sound, standing, wild};
-use kinocue::limiter::{Admitted, Limiter, Provenance};
-use kinocue::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::{Clock as _, Rate};
+use kinocue::harness::limiter::{Admitted, Limiter, Provenance};
+use kinocue::harness::motion::{MAX_AXES, Pose, SeatType, Slot, Window};
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock as _, Rate};
 
 /// What an axis may cost in a tick, ns.
 const GOAL_NS: f64 = 25.0;

@@ -15,7 +15,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use kinocue::cue::{self, Source};
-use kinocue::timeline::Timeline;
+use kinocue::harness::timeline::Timeline;
 
 use common::spread::{Spread, verdict};
 

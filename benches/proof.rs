@@ -15,10 +15,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use kinocue::cue::{self, Source};
-use kinocue::motion::SeatType;
-use kinocue::proof::{Digest, Terms, prove};
-use kinocue::time::Rate;
-use kinocue::timeline::Timeline;
+use kinocue::harness::motion::SeatType;
+use kinocue::harness::proof::{Digest, Terms, prove};
+use kinocue::harness::time::Rate;
+use kinocue::harness::timeline::Timeline;
 
 use common::spread::{Spread, verdict};
 

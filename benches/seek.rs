@@ -12,11 +12,11 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
+use kinocue::harness::plan::{Curve, From, LaneScene, Place, Request, Scene, To};
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
+use kinocue::harness::timeline::Hint;
 use kinocue::harness::{ride, stage};
-use kinocue::plan::{Curve, From, LaneScene, Place, Request, Scene, To};
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::Clock as _;
-use kinocue::timeline::Hint;
 
 const HOURS: u32 = 2;
 const SEEKS: u32 = 300;

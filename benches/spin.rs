@@ -23,8 +23,8 @@ use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
-use kinocue::rt::Spinning;
-use kinocue::sys::clock::Monotonic;
+use kinocue::harness::rt::Spinning;
+use kinocue::harness::sys::clock::Monotonic;
 use senders::again::sender;
 use senders::ours;
 use senders::outcome::Outcome;

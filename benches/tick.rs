@@ -13,14 +13,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use common::spread::{Spread, verdict};
-use kinocue::belief::{LaneEvidence, Reading, Taken};
-use kinocue::engine::Step;
+use kinocue::harness::belief::{LaneEvidence, Reading, Taken};
+use kinocue::harness::engine::Step;
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::net::Delivery;
+use kinocue::harness::rt::{Live, Places, mailboxes};
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock as _, MonoTime};
 use kinocue::harness::{ride, stage};
-use kinocue::motion::MAX_AXES;
-use kinocue::net::Delivery;
-use kinocue::rt::{Live, Places, mailboxes};
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::{Clock as _, MonoTime};
 use kinocue::wire::MAX_LEN;
 
 const CONTROLLERS: usize = 64;

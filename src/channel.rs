@@ -16,7 +16,7 @@ pub struct Sample(pub [f64; MAX_PARTS]);
 
 /// A channel, by its place in `CHANNELS`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ChannelId {
+pub(crate) enum ChannelId {
     /// Vibration of an axis (SMC manual 2.2.2.9).
     Vibration,
     /// Analogue outputs: Extend (SMC manual 2.2.2.5), Play DAC (IMAX manual 2.2.2.6).
@@ -267,7 +267,7 @@ pub(crate) fn is_switch(name: &str) -> bool {
 
 /// The values of all tracks at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Samples([Sample; TRACKS]);
+pub(crate) struct Samples([Sample; TRACKS]);
 
 impl Samples {
     /// All off.

@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 /// How grave a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Severity {
+pub(crate) enum Severity {
     /// Worth knowing; nothing to be done.
     Info,
     /// Should be looked at; does not stop a show.
@@ -21,7 +21,7 @@ pub enum Severity {
 impl Severity {
     /// The word for it.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub(crate) const fn word(self) -> &'static str {
         match self {
             Self::Info => "info",
             Self::Warn => "warn",
@@ -33,7 +33,7 @@ impl Severity {
 /// What a check is about; a column of the table of controllers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Family {
+pub(crate) enum Family {
     /// Whether it answers, and how fast.
     Answers,
     /// True if it is the controller it should be.
@@ -52,7 +52,7 @@ pub enum Family {
 
 impl Family {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Answers,
         Self::Identity,
         Self::Network,
@@ -64,7 +64,7 @@ impl Family {
 
     /// What heads its column.
     #[must_use]
-    pub const fn title(self) -> &'static str {
+    pub(crate) const fn title(self) -> &'static str {
         match self {
             Self::Answers => "answers",
             Self::Identity => "identity",
@@ -98,13 +98,13 @@ macro_rules! checks {
 
             /// What it is about.
             #[must_use]
-            pub const fn family(self) -> Family {
+            pub(crate) const fn family(self) -> Family {
                 match self { $(Self::$check => Family::$family,)+ }
             }
 
             /// How grave it is.
             #[must_use]
-            pub const fn severity(self) -> Severity {
+            pub(crate) const fn severity(self) -> Severity {
                 match self { $(Self::$check => Severity::$severity,)+ }
             }
 
@@ -322,19 +322,19 @@ impl Check {
     /// True if a configuration may accept it for good: a setting that was found and understood, but not that a
     /// controller is silent or in trouble at present, and nothing that is only told.
     #[must_use]
-    pub const fn can_be_accepted(self) -> bool {
+    pub(crate) const fn can_be_accepted(self) -> bool {
         !self.is_unknown() && !self.is_present() && !matches!(self.severity(), Severity::Info)
     }
 
     /// True if it means that something is not known.
     #[must_use]
-    pub const fn is_unknown(self) -> bool {
+    pub(crate) const fn is_unknown(self) -> bool {
         matches!(self, Self::NoAnswer | Self::RegisterUnread | Self::Route)
     }
 
     /// True if it is about this moment, and no setting.
     #[must_use]
-    pub const fn is_present(self) -> bool {
+    pub(crate) const fn is_present(self) -> bool {
         matches!(self, Self::EmergencyStopActive | Self::ActiveError | Self::BeltsOpen | Self::Position)
     }
 }

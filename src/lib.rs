@@ -20,59 +20,72 @@
     clippy::print_stderr,
     reason = "a closed pipe must not end a show: `cli::print`"
 )]
+#![allow(
+    rustdoc::private_intra_doc_links,
+    reason = "what the documentation is built of includes what is private"
+)]
+#![cfg_attr(
+    not(feature = "harness"),
+    allow(
+        dead_code,
+        unreachable_pub,
+        unused_imports,
+        reason = "tests and benches reach them; with `harness`, nothing may be"
+    )
+)]
 
-pub mod motion;
-pub mod plain;
-pub mod time;
+mod motion;
+mod plain;
+mod time;
 pub mod wire;
 
-pub mod channel;
+mod channel;
 pub mod cue;
-pub mod timeline;
+mod timeline;
 
-pub mod checks;
-pub mod config;
-pub mod proof;
+mod checks;
+mod config;
+mod proof;
 
-pub mod belief;
-pub mod drive;
-pub mod engine;
-pub mod film;
-pub mod limiter;
-pub mod plan;
-pub mod rt;
-pub mod state;
+mod belief;
+mod drive;
+mod engine;
+mod film;
+mod limiter;
+mod plan;
+mod rt;
+mod state;
 
-pub mod health;
-pub mod net;
-pub mod observe;
-pub mod tracker;
+mod health;
+mod net;
+mod observe;
+mod tracker;
 
-pub mod device;
-pub mod preflight;
+mod device;
+mod preflight;
 
-pub mod control;
-pub mod journal;
-pub mod library;
-pub mod playlist;
-pub mod settings;
+mod control;
+mod journal;
+mod library;
+mod playlist;
+mod settings;
 
-pub mod api;
-pub mod console;
-pub mod log;
-pub mod metrics;
-pub mod osc;
-pub mod sd;
-pub mod text_port;
+mod api;
+mod console;
+mod log;
+mod metrics;
+mod osc;
+mod sd;
+mod text_port;
 
-pub mod capture;
-pub mod doctor;
-pub mod latency;
-pub mod sim;
+mod capture;
+mod doctor;
+mod latency;
+mod sim;
 
 #[cfg(feature = "harness")]
 pub mod harness;
 
-pub mod app;
+mod app;
 pub mod cli;
-pub mod sys;
+mod sys;

@@ -10,7 +10,7 @@ const PATH_LEN: usize = 4_096;
 /// The text with its control characters, and those that change the direction of writing, escaped as Rust writes them, and
 /// cut after `limit` bytes: whatever a file, a network or a person gives makes one line, and looks like what it is.
 #[must_use]
-pub fn escaped(text: &str, limit: usize) -> Cow<'_, str> {
+pub(crate) fn escaped(text: &str, limit: usize) -> Cow<'_, str> {
     if text.len() <= limit && !text.contains(misleads) {
         return Cow::Borrowed(text);
     }
@@ -33,20 +33,20 @@ pub fn escaped(text: &str, limit: usize) -> Cow<'_, str> {
 
 /// The name of a file as one line.
 #[must_use]
-pub fn path(path: &Path) -> String {
+pub(crate) fn path(path: &Path) -> String {
     escaped(&path.to_string_lossy(), PATH_LEN).into_owned()
 }
 
 /// The text with the same characters escaped, but for line breaks and tabs: for lines of our own that hold what came from
 /// elsewhere.
 #[must_use]
-pub fn lines(text: &str) -> Cow<'_, str> {
+pub(crate) fn lines(text: &str) -> Cow<'_, str> {
     with(text, |c, out| out.extend(c.escape_default()))
 }
 
 /// JSON with the same characters in its strings escaped, as JSON does; it says the same to whoever reads it.
 #[must_use]
-pub fn json(text: &str) -> Cow<'_, str> {
+pub(crate) fn json(text: &str) -> Cow<'_, str> {
     // None of them lies beyond the first plane, where JSON would want two escapes.
     with(text, |c, out| out.push_str(&format!("\\u{:04x}", u32::from(c))))
 }

@@ -6,7 +6,7 @@ mod grid;
 mod typed;
 
 pub use grid::{Rate, Tick, TickGrid};
-pub use typed::{TRIM_MS, parse_duration, parse_time, parse_trim};
+pub(crate) use typed::{TRIM_MS, parse_duration, parse_time, parse_trim};
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Sub};

@@ -6,22 +6,22 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use kinocue::app::StagedShow;
-use kinocue::belief::Reading;
-use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
-use kinocue::drive::Manner;
-use kinocue::engine::Show;
-use kinocue::harness::{ORIGIN, swell};
-use kinocue::motion::{MAX_AXES, Pose};
-use kinocue::net::Delivery;
-use kinocue::rt::{
+use kinocue::harness::app::StagedShow;
+use kinocue::harness::belief::Reading;
+use kinocue::harness::config::from_to_args;
+use kinocue::harness::drive::Manner;
+use kinocue::harness::engine::Show;
+use kinocue::harness::motion::{MAX_AXES, Pose};
+use kinocue::harness::net::Delivery;
+use kinocue::harness::rt::{
     Alarm, Command, Conductor, Desk, FrameSink, Live, Loaded, MailEnds, News, NewsIn, Places, PlanLoop,
     Planning, TickLoop, mailboxes,
 };
-use kinocue::state::{Event, Finding, PlayMode, Readiness, State, Transition};
-use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
-use kinocue::timeline::Timeline;
+use kinocue::harness::state::{Event, Finding, PlayMode, Readiness, State, Transition};
+use kinocue::harness::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
+use kinocue::harness::timeline::Timeline;
+use kinocue::harness::{ORIGIN, swell};
 use kinocue::wire::{MotionRequest, Timing};
 use rtrb::Producer;
 

@@ -8,11 +8,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use kinocue::cue::{self, Cue, CueFaults, Source};
-use kinocue::engine::Mix;
+use kinocue::harness::engine::Mix;
+use kinocue::harness::proof::Digest;
+use kinocue::harness::rt::Alarm;
+use kinocue::harness::state::Transition;
 use kinocue::harness::{Event, Played, Virtual, swell};
-use kinocue::proof::Digest;
-use kinocue::rt::Alarm;
-use kinocue::state::Transition;
 use kinocue::wire::Analogue;
 use proptest::prelude::*;
 

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use kinocue::cue::{self, Source};
-use kinocue::motion::SeatType;
-use kinocue::proof::figures;
-use kinocue::time::{Rate, ShowTime};
-use kinocue::timeline::{EffectSet, Hint, Timeline};
+use kinocue::harness::motion::SeatType;
+use kinocue::harness::proof::figures;
+use kinocue::harness::time::{Rate, ShowTime};
+use kinocue::harness::timeline::{EffectSet, Hint, Timeline};
 
 #[path = "../examples/make_cues/files.rs"]
 mod files;

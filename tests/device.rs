@@ -7,9 +7,9 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
-use kinocue::config::{Controller, from_to_args};
-use kinocue::device::{Address, Patience, Talk, reads, table};
-use kinocue::sim::{Farm, Options, Setup};
+use kinocue::harness::config::{Controller, from_to_args};
+use kinocue::harness::device::{Address, Patience, Talk, reads, table};
+use kinocue::harness::sim::{Farm, Options, Setup};
 use kinocue::wire::Dialect;
 use said::Said;
 

@@ -1,11 +1,11 @@
 //! Shows that chase a film, in virtual time: whatever the film does, the seat keeps its limits, and is where the film is.
 
-use kinocue::engine::Ending;
-use kinocue::film::point::FilmState;
+use kinocue::harness::engine::Ending;
+use kinocue::harness::film::point::FilmState;
+use kinocue::harness::rt::News;
+use kinocue::harness::state::{Cause, PlayMode, State, Transition};
+use kinocue::harness::time::ShowTime;
 use kinocue::harness::{Event, ORIGIN, Played, Virtual};
-use kinocue::rt::News;
-use kinocue::state::{Cause, PlayMode, State, Transition};
-use kinocue::time::ShowTime;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

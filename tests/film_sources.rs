@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
+use kinocue::harness::time::MonoTime;
 use kinocue::harness::{Event, ORIGIN, Played, ShownFilm, TrueFilm, Virtual, swell};
-use kinocue::time::MonoTime;
 
 /// The stroke of a seat, mm, and what of it the ramp covers, in how many seconds.
 const STROKE_MM: f64 = 150.0;

@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::latency::{Percentiles, read};
-use kinocue::motion::Pulses;
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::Clock as _;
+use kinocue::harness::latency::{Percentiles, read};
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
 use kinocue::wire::{
     Access, Analogue, Code, Dialect, FrameNo, MAX_LEN, Motion, MotionRequest, ReadRequest, RegisterReply,
     ReplyCode, Timing, Words, position, position_words,

@@ -3,13 +3,13 @@
 
 use std::time::Duration;
 
-use kinocue::engine::{Ending, Mix, Unplanned};
+use kinocue::harness::engine::{Ending, Mix, Unplanned};
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::rt::{Alarm, News};
+use kinocue::harness::state::{self, Cause, Refusal, State, Transition, Trouble, Why};
+use kinocue::harness::time::ShowTime;
+use kinocue::harness::timeline::Hint;
 use kinocue::harness::{Event, Frame, Played, Virtual, Worst, swell};
-use kinocue::motion::MAX_AXES;
-use kinocue::rt::{Alarm, News};
-use kinocue::state::{self, Cause, Refusal, State, Transition, Trouble, Why};
-use kinocue::time::ShowTime;
-use kinocue::timeline::Hint;
 use kinocue::wire;
 
 fn assert_within(worst: Worst) {

@@ -5,9 +5,9 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use kinocue::control::{Code, Problem};
-use kinocue::library::{Bounds, CueInfo, Hall, Library, Proved};
-use kinocue::playlist::Playlist;
+use kinocue::harness::control::{Code, Problem};
+use kinocue::harness::library::{Bounds, CueInfo, Hall, Library, Proved};
+use kinocue::harness::playlist::Playlist;
 use tempfile::TempDir;
 
 const GOOD: &str = "# title: Ride\ntime_ms,a1,a2,a3,fx_air\n0,0,0,0,0\n1000,0,0,0,1\n2000,0,0,0,0\n";
@@ -259,7 +259,7 @@ fn a_playlist_of_proved_cues_has_no_faults_and_unknown_ones_are_proved_when_it_i
     let fixture = Fixture::new();
     fs::write(fixture.cues().join("ride.csv"), GOOD).unwrap();
     fs::write(fixture.cues().join("wild.csv"), BAD).unwrap();
-    let config = kinocue::config::load(&fixture.dir.path().join("hall.toml")).unwrap();
+    let config = kinocue::harness::config::load(&fixture.dir.path().join("hall.toml")).unwrap();
     let check = |text: &str| {
         let playlist = Playlist::parse(Path::new("day.toml"), text).unwrap();
         playlist.check(&fixture.library, &config).iter().map(ToString::to_string).collect::<Vec<_>>()

@@ -7,12 +7,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use kinocue::cue::{self, Source};
-use kinocue::engine::Ending;
+use kinocue::harness::engine::Ending;
+use kinocue::harness::motion::SeatType;
+use kinocue::harness::proof::{Digest, Proof, Terms, prove};
+use kinocue::harness::time::Rate;
+use kinocue::harness::timeline::Timeline;
 use kinocue::harness::{Event, Played, Virtual, Worst};
-use kinocue::motion::SeatType;
-use kinocue::proof::{Digest, Proof, Terms, prove};
-use kinocue::time::Rate;
-use kinocue::timeline::Timeline;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

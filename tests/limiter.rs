@@ -2,9 +2,9 @@
 //! the definition of the measure, not by the limiter's own sums; `benches/limiter.rs` does the same for a million sequences.
 
 use kinocue::harness::asked::{self, Sound, Trial, Wild, sound, wild, window};
-use kinocue::limiter::{Admitted, Limit, Limiter, Provenance};
-use kinocue::motion::{Limits, MAX_AXES, Measure, Pose, SeatType, Spacing, Window};
-use kinocue::time::{Rate, ShowTime};
+use kinocue::harness::limiter::{Admitted, Limit, Limiter, Provenance};
+use kinocue::harness::motion::{Limits, MAX_AXES, Measure, Pose, SeatType, Spacing, Window};
+use kinocue::harness::time::{Rate, ShowTime};
 
 #[test]
 fn whatever_is_asked_for_what_is_sent_keeps_the_limits() {

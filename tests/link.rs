@@ -3,8 +3,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use kinocue::time::MonoTime;
-use kinocue::tracker::{Books, Counts, KEPT, Reply, Tracker};
+use kinocue::harness::time::MonoTime;
+use kinocue::harness::tracker::{Books, Counts, KEPT, Reply, Tracker};
 use kinocue::wire::{FrameNo, ReplyCode};
 use proptest::prelude::*;
 

@@ -6,21 +6,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kinocue::app::StagedShow;
-use kinocue::belief::Reading;
-use kinocue::config::from_to_args;
 use kinocue::cue::{self, Source};
-use kinocue::drive::{Lane, Manner};
-use kinocue::engine::{Ending, Show};
-use kinocue::motion::MAX_AXES;
-use kinocue::net::Delivery;
-use kinocue::rt::{
+use kinocue::harness::app::StagedShow;
+use kinocue::harness::belief::Reading;
+use kinocue::harness::config::from_to_args;
+use kinocue::harness::drive::{Lane, Manner};
+use kinocue::harness::engine::{Ending, Show};
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::net::Delivery;
+use kinocue::harness::rt::{
     Conductor, Ended, FrameSink, Live, MailEnds, Places, PlanLoop, Planning, Sent, Task, TickLoop,
     TickReport, mailboxes,
 };
-use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
-use kinocue::timeline::Timeline;
-use kinocue::tracker::Tracker;
+use kinocue::harness::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
+use kinocue::harness::timeline::Timeline;
+use kinocue::harness::tracker::Tracker;
 use kinocue::wire::{FrameNo, MotionRequest, ReplyCode, Timing};
 use rtrb::Consumer;
 

@@ -343,7 +343,7 @@ fn checks_are_explained_without_any_controller() {
     };
     let (exit, all) = explain(&["--explain"]);
     assert_eq!(exit, Some(0));
-    for check in kinocue::preflight::Check::ALL {
+    for check in kinocue::harness::preflight::Check::ALL {
         assert!(all.contains(check.id()), "{check}");
         let (exit, one) = explain(&["--explain", check.id()]);
         assert_eq!(exit, Some(0));

@@ -5,8 +5,8 @@ use std::path::Path;
 use assert_cmd::Command;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
-use kinocue::control::model::{Ending, FrameCounts, Percentiles};
-use kinocue::journal::{Action, Journal, Limits, Outcome, ShowRecord};
+use kinocue::harness::control::model::{Ending, FrameCounts, Percentiles};
+use kinocue::harness::journal::{Action, Journal, Limits, Outcome, ShowRecord};
 use serde_json::Value;
 
 const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };

@@ -6,13 +6,13 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use kinocue::channel::Sample;
-use kinocue::config;
 use kinocue::cue::{self, Cue, CueFaults, Source, Step};
-use kinocue::device::settings;
-use kinocue::motion::MAX_AXES;
-use kinocue::playlist::Playlist;
-use kinocue::time::ShowTime;
+use kinocue::harness::channel::Sample;
+use kinocue::harness::config;
+use kinocue::harness::device::settings;
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::playlist::Playlist;
+use kinocue::harness::time::ShowTime;
 use kinocue::wire::Analogue;
 use proptest::prelude::*;
 

@@ -4,11 +4,11 @@
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 
-use kinocue::motion::Pulses;
-use kinocue::net::Ports;
-use kinocue::observe::Watched;
-use kinocue::rt::{Accounts, AckLoop, Live, MailEnds, mailboxes};
-use kinocue::time::Rate;
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::net::Ports;
+use kinocue::harness::observe::Watched;
+use kinocue::harness::rt::{Accounts, AckLoop, Live, MailEnds, mailboxes};
+use kinocue::harness::time::Rate;
 use kinocue::wire::{Code, Dialect, MAX_LEN, PerAxis, Status, VibrationPort};
 
 const ANY: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, 0);

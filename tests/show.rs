@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
-use kinocue::engine::Ending;
+use kinocue::harness::engine::Ending;
+use kinocue::harness::rt::Alarm;
+use kinocue::harness::state::{self, Transition};
+use kinocue::harness::time::ShowTime;
+use kinocue::harness::timeline::Hint;
 use kinocue::harness::{Event, Played, Virtual, Worst, swell};
-use kinocue::rt::Alarm;
-use kinocue::state::{self, Transition};
-use kinocue::time::ShowTime;
-use kinocue::timeline::Hint;
 use kinocue::wire::Timing;
 
 /// Within the limits where only pulses are seen.

@@ -4,12 +4,12 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use kinocue::engine::{Ending, Mix};
+use kinocue::harness::engine::{Ending, Mix};
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::rt::Alarm;
+use kinocue::harness::state::{self, Transition};
+use kinocue::harness::time::{MonoTime, ShowTime};
 use kinocue::harness::{Event, Played, Virtual, Worst};
-use kinocue::motion::MAX_AXES;
-use kinocue::rt::Alarm;
-use kinocue::state::{self, Transition};
-use kinocue::time::{MonoTime, ShowTime};
 use kinocue::wire::Timing;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

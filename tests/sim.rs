@@ -6,11 +6,11 @@ use std::os::unix::net::UnixStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use kinocue::motion::Pulses;
-use kinocue::sim::{
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::sim::{
     Action, Command as Order, CommandError, Controller, Farm, FarmError, LinkFaults, Options, Setup, pa,
 };
-use kinocue::time::MonoTime;
+use kinocue::harness::time::MonoTime;
 use kinocue::wire::{
     Analogue, Code, FrameNo, MAX_LEN, Motion, MotionReply, ReadRequest, RegisterReply, ReplyCode, Status,
     Timing,

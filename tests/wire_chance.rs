@@ -1,6 +1,6 @@
 //! The protocol against chance: what was written is read again, and no bytes whatever make a parser panic.
 
-use kinocue::motion::Pulses;
+use kinocue::harness::motion::Pulses;
 use kinocue::wire::{
     Access, Code, FrameNo, FromController, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply,
     MotionRequest, PerAxis, ReadRequest, RegisterReply, ReplyCode, Report, ServoRead, ServoReply, ServoWrite,

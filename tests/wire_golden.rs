@@ -1,6 +1,6 @@
 //! The protocol against bytes from the manuals and from public programs, both ways.
 
-use kinocue::motion::Pulses;
+use kinocue::harness::motion::Pulses;
 use kinocue::wire::{
     Access, Analogue, Code, FrameNo, ImaxMotion, ImaxRegisters, MAX_LEN, Message, MotionReply, MotionRequest,
     PerAxis, ReadRequest, RegisterReply, ReplyCode, Report, ServoRead, ServoReply, ServoWrite, Status,

@@ -14,8 +14,8 @@ use std::process::{Command, Output};
 use std::time::Duration;
 
 use kinocue::harness::Virtual;
-use kinocue::motion::Pulses;
-use kinocue::sim::{Controller, Setup};
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::sim::{Controller, Setup};
 use kinocue::wire::{
     Access, Code, MAX_LEN, Message, ReadRequest, RegisterReply, ReplyCode, Status, Vibration, VibrationPort,
     WireError, Words, WriteRequest,

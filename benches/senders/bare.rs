@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::motion::Pulses;
-use kinocue::net::DrainGrid;
-use kinocue::sys::batch::{Batch, SLOTS, stamp_arrivals};
-use kinocue::sys::clock::{Monotonic, thread_cpu_time, wall_now_ns};
-use kinocue::sys::realtime::{normal_priority, request};
-use kinocue::time::{Clock as _, MonoTime, nanos};
-use kinocue::tracker::{ACK_TIMEOUT, Histogram, histogram};
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::net::DrainGrid;
+use kinocue::harness::sys::batch::{Batch, SLOTS, stamp_arrivals};
+use kinocue::harness::sys::clock::{Monotonic, thread_cpu_time, wall_now_ns};
+use kinocue::harness::sys::realtime::{normal_priority, request};
+use kinocue::harness::time::{Clock as _, MonoTime, nanos};
+use kinocue::harness::tracker::{ACK_TIMEOUT, Histogram, histogram};
 use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, MotionReply, Timing};
 
 use super::outcome::{Outcome, Quantiles, each};

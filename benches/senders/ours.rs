@@ -7,18 +7,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::belief::Reading;
-use kinocue::drive::Lane;
-use kinocue::harness::{ride, stage};
-use kinocue::motion::MAX_AXES;
-use kinocue::net::{DrainGrid, Ports, Sender};
-use kinocue::rt::{
+use kinocue::harness::belief::Reading;
+use kinocue::harness::drive::Lane;
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::net::{DrainGrid, Ports, Sender};
+use kinocue::harness::rt::{
     Accounts, AckLoop, Conductor, Live, MailEnds, Places, PlanLoop, Planning, TickLoop, mailboxes,
 };
-use kinocue::sys::clock::{Monotonic, thread_cpu_time};
-use kinocue::sys::realtime::{RealTime, normal_priority, request};
-use kinocue::time::{Clock, MonoTime, TickGrid};
-use kinocue::tracker::histogram;
+use kinocue::harness::sys::clock::{Monotonic, thread_cpu_time};
+use kinocue::harness::sys::realtime::{RealTime, normal_priority, request};
+use kinocue::harness::time::{Clock, MonoTime, TickGrid};
+use kinocue::harness::tracker::histogram;
+use kinocue::harness::{ride, stage};
 
 use super::outcome::{Outcome, Quantiles, each};
 

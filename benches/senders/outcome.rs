@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use kinocue::tracker::Histogram;
+use kinocue::harness::tracker::Histogram;
 use serde::{Deserialize, Serialize};
 
 /// The figures of one sender in one round.

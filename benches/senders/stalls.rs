@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::time::Duration;
 
-use kinocue::time::{Clock, MonoTime};
+use kinocue::harness::time::{Clock, MonoTime};
 use serde::{Deserialize, Serialize};
 
 /// How long the kernel's real-time throttle takes the processor away, about: what is left of a second behind 950 ms.

@@ -4,10 +4,10 @@ use std::iter::Sum;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Scope, ScopedJoinHandle};
 
-use kinocue::engine::Mix;
-use kinocue::rt::{Command, Desk};
-use kinocue::state::Transition;
-use kinocue::time::ShowTime;
+use kinocue::harness::engine::Mix;
+use kinocue::harness::rt::{Command, Desk};
+use kinocue::harness::state::Transition;
+use kinocue::harness::time::ShowTime;
 use rtrb::Producer;
 
 /// Seeks are planned, which other commands are not: one in so many commands.

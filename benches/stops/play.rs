@@ -6,16 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::belief::Reading;
-use kinocue::harness::{ride, stage};
-use kinocue::motion::MAX_AXES;
-use kinocue::net::{DrainGrid, Ports};
-use kinocue::rt::{
+use kinocue::harness::belief::Reading;
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::net::{DrainGrid, Ports};
+use kinocue::harness::rt::{
     AckLoop, Conductor, Desk, Live, MailEnds, Places, PlanLoop, Planning, TickLoop, mailboxes,
 };
-use kinocue::sys::clock::Monotonic;
-use kinocue::sys::realtime;
-use kinocue::time::{Clock as _, MonoTime, TickGrid};
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::sys::realtime;
+use kinocue::harness::time::{Clock as _, MonoTime, TickGrid};
+use kinocue::harness::{ride, stage};
 
 use super::flood::{self, Flood};
 use super::watch::{Seen, Watch};

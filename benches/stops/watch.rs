@@ -1,10 +1,10 @@
 //! Sockets that note when each lane's effects went off, and where it went.
 
-use kinocue::motion::Pulses;
-use kinocue::net::{Delivery, Sender};
-use kinocue::rt::FrameSink;
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::{Clock as _, MonoTime};
+use kinocue::harness::motion::Pulses;
+use kinocue::harness::net::{Delivery, Sender};
+use kinocue::harness::rt::FrameSink;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock as _, MonoTime};
 use kinocue::wire::{MotionRequest, PerAxis};
 
 /// The sockets, and what was seen of each lane.

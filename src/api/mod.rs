@@ -57,14 +57,14 @@ use shared::{Pulse, Shared};
 use socket::SocketFile;
 
 /// What its threads are called. A panic on one of them ends the request that it was for, and nothing else.
-pub const THREAD: &str = "api";
+pub(crate) const THREAD: &str = "api";
 /// Threads that wait for disks.
 const BLOCKING: usize = 8;
 /// How long what is under way may go on when the server ends.
 const LAST_WORDS: Duration = Duration::from_secs(2);
 
 /// The console: the content type and the bytes of what is at a path, `/` for its page; `None` if there is nothing.
-pub type Pages = fn(path: &str) -> Option<(&'static str, &'static [u8])>;
+pub(crate) type Pages = fn(path: &str) -> Option<(&'static str, &'static [u8])>;
 
 /// What the API serves, and where.
 #[derive(Debug)]

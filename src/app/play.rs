@@ -43,7 +43,7 @@ impl Play {
     ///
     /// # Errors
     /// As [`Play::new`].
-    pub fn chasing(
+    pub(crate) fn chasing(
         config: Config,
         timeline: Timeline,
         show: Show,
@@ -61,7 +61,12 @@ impl Play {
     ///
     /// # Errors
     /// As [`Play::new`], but for what a cue may be.
-    pub fn holding(config: Config, timeline: Timeline, show: Show, silent: bool) -> Result<Self, PlayError> {
+    pub(crate) fn holding(
+        config: Config,
+        timeline: Timeline,
+        show: Show,
+        silent: bool,
+    ) -> Result<Self, PlayError> {
         // At level 0 the cue has no part in the pose.
         let manner = Manner { level: 0.0, silent };
         let mut play = Self::staged(config, timeline, show, manner, None)?;
@@ -94,7 +99,7 @@ impl Play {
 
     /// How long the first move onto the cue takes.
     #[must_use]
-    pub fn join(&self) -> Duration {
+    pub(crate) fn join(&self) -> Duration {
         let course = &self.staged.course;
         let span = course.settled().as_nanos() - course.start.as_nanos();
         Duration::from_nanos(span.unsigned_abs())

@@ -16,70 +16,70 @@ use crate::time::MonoTime;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Report {
     /// The layout of this document ([`crate::control::FORMAT`]).
-    pub format: u32,
+    pub(crate) format: u32,
     /// The cue file, as it was named.
-    pub cue: String,
+    pub(crate) cue: String,
     /// `completed`, `stopped` or `fault`.
     pub result: Ending,
     /// Ticks that sent.
-    pub ticks: u64,
+    pub(crate) ticks: u64,
     /// Ticks slept through.
-    pub missed_ticks: u64,
+    pub(crate) missed_ticks: u64,
     /// Ticks per second.
-    pub rate_hz: f64,
+    pub(crate) rate_hz: f64,
     /// Lateness of the ticks that sent, µs.
     #[serde(with = "InMicros")]
-    pub lateness_us: Percentiles,
+    pub(crate) lateness_us: Percentiles,
     /// What the system granted.
-    pub realtime: RealTimeReport,
+    pub(crate) realtime: RealTimeReport,
     /// Datagrams on the frame port from nobody we sent to.
-    pub strangers: u64,
+    pub(crate) strangers: u64,
     /// One entry for each controller.
-    pub controllers: Vec<ControllerReport>,
+    pub(crate) controllers: Vec<ControllerReport>,
     /// What happened to the controllers, oldest first.
-    pub events: Vec<EventReport>,
+    pub(crate) events: Vec<EventReport>,
 }
 
 /// Something that happened to a controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EventReport {
+pub(crate) struct EventReport {
     /// The controller's name.
-    pub controller: String,
+    pub(crate) controller: String,
     /// Seconds from tick 0, below zero before it.
-    pub at_s: f64,
+    pub(crate) at_s: f64,
     /// What, in words.
-    pub what: String,
+    pub(crate) what: String,
 }
 
 /// The last known state of a controller; null if it never told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StateReport {
+pub(crate) struct StateReport {
     /// Seconds since it was last heard.
-    pub heard_s_ago: Option<f64>,
+    pub(crate) heard_s_ago: Option<f64>,
     /// True if an emergency stop is in effect.
-    pub emergency_stop: bool,
+    pub(crate) emergency_stop: bool,
     /// Its error number (chapter 6 of the manuals); 0 for none.
-    pub error: Option<u16>,
+    pub(crate) error: Option<u16>,
     /// Error number of each drive; 0 for none.
-    pub servo_errors: Option<Vec<u16>>,
+    pub(crate) servo_errors: Option<Vec<u16>>,
     /// Inputs, bit 0 = X01.
-    pub inputs: Option<u16>,
+    pub(crate) inputs: Option<u16>,
     /// Outputs, bit 0 = Y01, as it reports them.
-    pub outputs: Option<u16>,
+    pub(crate) outputs: Option<u16>,
     /// Measured positions, pulses; an echo of the command is none.
-    pub measured: Option<Vec<i32>>,
+    pub(crate) measured: Option<Vec<i32>>,
     /// Seconds since they were measured.
-    pub measured_s_ago: Option<f64>,
+    pub(crate) measured_s_ago: Option<f64>,
     /// Force of each axis, in the drive's own unit.
-    pub forces: Option<Vec<i16>>,
+    pub(crate) forces: Option<Vec<i16>>,
     /// Reports that it sent unasked.
-    pub reports: u64,
+    pub(crate) reports: u64,
 }
 
 impl StateReport {
     /// The state as it was known at `now`.
     #[must_use]
-    pub fn of(state: &ControllerState, now: MonoTime) -> Self {
+    pub(crate) fn of(state: &ControllerState, now: MonoTime) -> Self {
         let seconds = |at: MonoTime| now.since(at).as_secs_f64();
         Self {
             heard_s_ago: state.heard_at.map(seconds),
@@ -98,30 +98,30 @@ impl StateReport {
 
 /// What the system granted, as read back from it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RealTimeReport {
+pub(crate) struct RealTimeReport {
     /// Scheduling policy of the tick thread: `fifo`, `other` …
-    pub policy: String,
+    pub(crate) policy: String,
     /// Its priority; 0 for policies without one.
-    pub priority: u8,
+    pub(crate) priority: u8,
     /// True if memory is locked.
-    pub memory_locked: bool,
+    pub(crate) memory_locked: bool,
     /// How long the tick thread spun before each deadline.
-    pub spin_us: SpinReport,
+    pub(crate) spin_us: SpinReport,
 }
 
 /// How long a play spun before each deadline, µs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SpinReport {
+pub(crate) struct SpinReport {
     /// What was asked for.
-    pub asked: f64,
+    pub(crate) asked: f64,
     /// What was in effect, so that spin and work together stay under 90 % of the period: the mean of all ticks.
-    pub in_effect: f64,
+    pub(crate) in_effect: f64,
 }
 
 impl RealTimeReport {
     /// What the system granted, and how long was spun.
     #[must_use]
-    pub fn of(granted: &RealTime, spun: Spun) -> Self {
+    pub(crate) fn of(granted: &RealTime, spun: Spun) -> Self {
         let us = |span: Duration| (span.as_secs_f64() * 1e7).round() / 10.0;
         Self {
             policy: granted.policy.to_string(),
@@ -146,47 +146,47 @@ impl RealTimeReport {
 
 /// What became of one controller's frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ControllerReport {
+pub(crate) struct ControllerReport {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Where it is reached.
-    pub address: String,
+    pub(crate) address: String,
     /// Its frames; in the end asked is always acked + refused + lost.
     #[serde(flatten)]
-    pub frames: FrameCounts,
+    pub(crate) frames: FrameCounts,
     /// Slow frames before tick 0, which brought it to its park pose.
-    pub park_frames: u64,
+    pub(crate) park_frames: u64,
     /// Further replies to an answered frame.
-    pub duplicate: u64,
+    pub(crate) duplicate: u64,
     /// Replies after 1 s.
-    pub stale: u64,
+    pub(crate) stale: u64,
     /// Datagrams from its address that are no reply to a frame.
-    pub stray: u64,
+    pub(crate) stray: u64,
     /// Frames that the kernel did not take.
-    pub send_failed: u64,
+    pub(crate) send_failed: u64,
     /// Reports of the kernel that its port is closed.
-    pub port_closed: u64,
+    pub(crate) port_closed: u64,
     /// Times that the limiter held its motion back.
-    pub clamps: u64,
+    pub(crate) clamps: u64,
     /// Frames that were not sent, because from somewhere that its seat might be they would have been too fast.
-    pub withheld: u64,
+    pub(crate) withheld: u64,
     /// Times that it was not known any more which frames arrive.
-    pub gaps: u64,
+    pub(crate) gaps: u64,
     /// Frames that found it busy with one before, by the sum of their Times, and were late by that.
-    pub late: u64,
+    pub(crate) late: u64,
     /// Of these, frames that found it with more than two to do, and were hurried for that (PA06).
-    pub hurried: u64,
+    pub(crate) hurried: u64,
     /// Ack latency, µs.
     #[serde(with = "InMicros")]
-    pub ack_us: Percentiles,
+    pub(crate) ack_us: Percentiles,
     /// What it last said of itself.
-    pub state: StateReport,
+    pub(crate) state: StateReport,
 }
 
 impl Report {
     /// The figures as people read them, with a table of the controllers.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let mut text = String::new();
         let late = &self.lateness_us;
         let lines = [

@@ -9,25 +9,25 @@ use crate::time::MonoTime;
 
 /// What the threads of a play, or of a hall with all its shows, came back with.
 #[derive(Debug)]
-pub struct Run {
+pub(crate) struct Run {
     /// What the tick loop did.
-    pub ended: Ended,
+    pub(crate) ended: Ended,
     /// Everything that was counted.
-    pub accounts: Accounts,
+    pub(crate) accounts: Accounts,
     /// What the system granted the tick thread.
-    pub granted: RealTime,
+    pub(crate) granted: RealTime,
     /// How long it spun before its deadlines.
-    pub spun: Spun,
+    pub(crate) spun: Spun,
     /// Moves that the planner did not find.
-    pub refusals: Vec<PlanError>,
+    pub(crate) refusals: Vec<PlanError>,
     /// What the limiter had to do, lane by lane.
-    pub clamps: Vec<Counts>,
+    pub(crate) clamps: Vec<Counts>,
     /// What the check of where seats may be had to do, lane by lane.
-    pub tallies: Vec<Tally>,
+    pub(crate) tallies: Vec<Tally>,
     /// The instant of tick 0.
-    pub origin: MonoTime,
+    pub(crate) origin: MonoTime,
     /// The instant at which the accounts were closed.
-    pub closed_at: MonoTime,
+    pub(crate) closed_at: MonoTime,
 }
 
 impl Run {

@@ -40,19 +40,19 @@ const SUPERVISOR_ENDS: Duration = Duration::from_secs(10);
 
 /// Where the daemon has its files.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub(crate) struct Places {
     /// The configuration.
-    pub config: PathBuf,
+    pub(crate) config: PathBuf,
     /// The folder of what it keeps from one start to the next.
-    pub state: PathBuf,
+    pub(crate) state: PathBuf,
     /// The sockets of this machine.
-    pub sockets: Sockets,
+    pub(crate) sockets: Sockets,
 }
 
 /// Why the daemon does not run. Nothing has moved then.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ServeError {
+pub(crate) enum ServeError {
     /// The hall cannot be opened.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
@@ -119,22 +119,22 @@ impl Mark {
 
 /// What a daemon is made of.
 #[derive(Debug)]
-pub struct Parts {
+pub(crate) struct Parts {
     /// Its first configuration.
-    pub config: Config,
+    pub(crate) config: Config,
     /// Where it has its files.
-    pub places: Places,
+    pub(crate) places: Places,
     /// The console.
-    pub pages: Pages,
+    pub(crate) pages: Pages,
     /// What tells it to end, and to read its configuration anew.
-    pub signals: Signals,
+    pub(crate) signals: Signals,
     /// Where it says what happens.
-    pub log: Log,
+    pub(crate) log: Log,
 }
 
 /// What a daemon came to.
 #[derive(Debug)]
-pub struct Served {
+pub(crate) struct Served {
     config: Arc<Config>,
     closed: Box<RuntimeEnd>,
     ended: Ending,
@@ -143,7 +143,7 @@ pub struct Served {
 impl Served {
     /// Sums it up as a play of `cue`: all that was sent since the configuration was last read, with the end of the last show.
     #[must_use]
-    pub fn sum_up(self, cue: String) -> Played {
+    pub(crate) fn sum_up(self, cue: String) -> Played {
         let Self { config, mut closed, ended } = self;
         // That a group is there when the hall opens is no change worth telling.
         let mut seen = BTreeSet::new();
@@ -163,7 +163,7 @@ impl Served {
 ///
 /// # Panics
 /// If one of its threads panicked.
-pub fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
+pub(crate) fn serve(parts: Parts, up: impl FnOnce(Handle, &[SocketAddr])) -> Result<Served, ServeError> {
     let mark = Mark::of(&parts.places.state)?;
     let crashed = mark.is_there()?;
     let served = serve_halls(parts, &mark, crashed, up);
@@ -295,7 +295,7 @@ fn feed_watchdog(handle: &RuntimeHandle) -> Option<WatchdogThread> {
 ///
 /// # Errors
 /// [`ServeError::System`] where they cannot be handled.
-pub fn signals() -> Result<Signals, ServeError> {
+pub(crate) fn signals() -> Result<Signals, ServeError> {
     let signals = Signals::default();
     let on = |signal, flag: &Arc<_>| flag::register(signal, Arc::clone(flag)).map_err(ServeError::System);
     on(SIGTERM, &signals.leave)?;

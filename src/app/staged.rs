@@ -19,15 +19,15 @@ pub struct StagedShow {
     /// The cue's curve.
     pub timeline: Arc<Timeline>,
     /// One lane for each controller, in the configuration's order.
-    pub lanes: Vec<Lane>,
+    pub(crate) lanes: Vec<Lane>,
     /// Plans the courses to come; it has given out the first.
-    pub planner: Planner,
+    pub(crate) planner: Planner,
     /// What the lanes do from tick 0 on.
     pub course: Box<Course>,
     /// How much faster than the film the cue may run.
     pub headroom: Headroom,
     /// What operators want of each seat as it begins.
-    pub mixes: Box<[Mix]>,
+    pub(crate) mixes: Box<[Mix]>,
 }
 
 /// How much faster than the film a cue may run on the seats of a hall.

@@ -48,13 +48,13 @@ pub struct Played {
     /// Its report.
     pub report: Report,
     /// What the system refused, in words.
-    pub refusals: Vec<String>,
+    pub(crate) refusals: Vec<String>,
     /// What else a person should know, in words.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Controllers that acked nothing, or were lost at the end; `None` if no replies were asked for.
-    pub silent: Vec<String>,
+    pub(crate) silent: Vec<String>,
     /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
-    pub off_park: Vec<String>,
+    pub(crate) off_park: Vec<String>,
 }
 
 /// What is summed up.

@@ -19,17 +19,17 @@ use crate::text_port::{self, Text, TextError};
 
 /// Where the sockets of this machine are.
 #[derive(Debug, Clone)]
-pub struct Sockets {
+pub(crate) struct Sockets {
     /// The control socket.
-    pub control: PathBuf,
+    pub(crate) control: PathBuf,
     /// The one that takes a stop alone.
-    pub stop: PathBuf,
+    pub(crate) stop: PathBuf,
 }
 
 /// Why a surface does not open.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum SurfaceError {
+pub(crate) enum SurfaceError {
     /// The API, or the stop socket.
     #[error(transparent)]
     Api(#[from] ApiError),
@@ -46,7 +46,7 @@ pub enum SurfaceError {
 
 /// All surfaces, open until this is dropped.
 #[derive(Debug)]
-pub struct Surfaces {
+pub(crate) struct Surfaces {
     // The stop goes last.
     ports: Option<Ports>,
     api: api::Running,
@@ -65,7 +65,7 @@ impl Surfaces {
     ///
     /// # Errors
     /// Why one of them does not open.
-    pub fn open(
+    pub(crate) fn open(
         config: &Config,
         sockets: &Sockets,
         handle: &Handle,
@@ -93,12 +93,12 @@ impl Surfaces {
 
     /// Where the API listens over TCP.
     #[must_use]
-    pub fn addresses(&self) -> &[std::net::SocketAddr] {
+    pub(crate) fn addresses(&self) -> &[std::net::SocketAddr] {
         self.api.addresses()
     }
 
     /// Closes them in turn, the stop last.
-    pub fn close(self) {
+    pub(crate) fn close(self) {
         let Self { ports, api, stop } = self;
         drop(ports);
         drop(api);

@@ -9,7 +9,7 @@ use crate::wire::FrameNo;
 
 /// Where a reading comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
+pub(crate) enum Source {
     /// The position registers DP06 to DP0b and DP21 to DP26 (SMC manual 2.3.3).
     Registers,
     /// A status report, 0x3101 (SMC manual 2.2.2.15).
@@ -24,20 +24,20 @@ pub enum Source {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// The pose, as fractions of each slot's stroke.
-    pub pose: Pose,
+    pub(crate) pose: Pose,
     /// The slots that it tells of, a bit each; what the pose says of the others means nothing.
-    pub slots: u16,
+    pub(crate) slots: u16,
     /// When the oldest part of it was read.
-    pub at: MonoTime,
+    pub(crate) at: MonoTime,
     /// Whether earlier readings found it in the same place.
-    pub rests: bool,
+    pub(crate) rests: bool,
     /// Whether one found it elsewhere, not long ago.
-    pub moves: bool,
+    pub(crate) moves: bool,
     /// How far from where it was read it may be, strokes, if it has swung about one place for long by no more than what it was told
     /// to vibrate; else 0.
-    pub sways: f64,
+    pub(crate) sways: f64,
     /// Where it comes from.
-    pub by: Source,
+    pub(crate) by: Source,
 }
 
 impl Reading {
@@ -69,7 +69,7 @@ const BY: u32 = 18;
 impl LaneEvidence {
     /// The newest frame that was acked.
     #[must_use]
-    pub fn acked(&self) -> Option<FrameNo> {
+    pub(crate) fn acked(&self) -> Option<FrameNo> {
         let acked = self.acked.load(Ordering::Acquire);
         #[expect(clippy::cast_possible_truncation, reason = "the number is the lower half")]
         (acked & SOME != 0).then_some(FrameNo(acked as u32))
@@ -84,13 +84,13 @@ impl LaneEvidence {
 
     /// Which reading is the newest; 0 before the first.
     #[must_use]
-    pub fn version(&self) -> u32 {
+    pub(crate) fn version(&self) -> u32 {
         self.version.load(Ordering::Acquire)
     }
 
     /// The newest reading and its version; none before the first, and while one is being written.
     #[must_use]
-    pub fn reading(&self) -> Option<(u32, Reading)> {
+    pub(crate) fn reading(&self) -> Option<(u32, Reading)> {
         let version = self.version();
         if version == 0 || version % 2 == 1 {
             return None;

@@ -7,7 +7,7 @@ use crate::wire::FrameNo;
 
 /// What is known of where the axes of a seat are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Known {
+pub(crate) enum Known {
     /// Nothing: they may be anywhere in their strokes.
     Nothing,
     /// They were read, at that instant and from there.
@@ -23,20 +23,20 @@ pub enum Known {
 
 /// What the check before the kernel has done for one lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
+pub(crate) struct Tally {
     /// Frames that were not sent, because from somewhere that the seat may be they would have been too fast.
-    pub withheld: u64,
+    pub(crate) withheld: u64,
     /// Gaps in which it was not known which frames arrive.
-    pub gaps: u64,
+    pub(crate) gaps: u64,
     /// Frames that reached a controller which was still busy with the one before, by the sum of their Times.
-    pub late: u64,
+    pub(crate) late: u64,
     /// Frames that reached one with more than two still to do: it plays them faster than they say (PA06).
-    pub hurried: u64,
+    pub(crate) hurried: u64,
 }
 
 /// What a look at the evidence has brought.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Found {
+pub(crate) enum Found {
     /// Nothing that keeps frames from leading the seat on.
     Nothing,
     /// From now on nobody knows which frames arrive.

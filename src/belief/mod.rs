@@ -16,9 +16,11 @@ mod tests;
 
 use std::time::Duration;
 
-pub use evidence::{LaneEvidence, Reading, Source};
+pub(crate) use evidence::Source;
+pub use evidence::{LaneEvidence, Reading};
 use history::History;
-pub use kinds::{Fall, Found, Known, Taken, Tally};
+pub use kinds::Taken;
+pub(crate) use kinds::{Fall, Found, Known, Tally};
 use shaking::Shaking;
 use span::Spans;
 
@@ -27,12 +29,12 @@ use crate::time::MonoTime;
 use crate::wire::FrameNo;
 
 /// So long without an ack, or without a frame that the kernel takes, is a gap: from then on nobody knows which frames arrive.
-pub const GAP: Duration = Duration::from_millis(50);
+pub(crate) const GAP: Duration = Duration::from_millis(50);
 /// So long without one it is, even if the ack thread has not told meanwhile of what arrived.
 const GAP_UNTOLD: Duration = Duration::from_millis(100);
 /// LaneEvidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
 /// three axes each, and one of them may be lost.
-pub const FRESH: Duration = Duration::from_millis(1_500);
+pub(crate) const FRESH: Duration = Duration::from_millis(1_500);
 /// The first frame of a motion leaves so long after its seat was read, and two periods, at the most: an answer may be held back on its
 /// way, and meanwhile the seat is moved by hand.
 const BEGINS: Duration = Duration::from_millis(100);
@@ -64,21 +66,21 @@ impl KnownPose {
     /// What a reading makes known of the seat of a lane with that window; none where it does not tell of every axis, or the seat was
     /// not at rest.
     #[must_use]
-    pub fn of(reading: &Reading, window: &Window) -> Option<Self> {
+    pub(crate) fn of(reading: &Reading, window: &Window) -> Option<Self> {
         let whole = reading.rests && reading.slots & window.own() == window.own();
         whole.then_some(Self(reading.pose))
     }
 
     /// The pose.
     #[must_use]
-    pub const fn pose(&self) -> &Pose {
+    pub(crate) const fn pose(&self) -> &Pose {
         &self.0
     }
 }
 
 /// What is known of one lane.
 #[derive(Debug, Clone)]
-pub struct Belief {
+pub(crate) struct Belief {
     /// Strokes that each slot may move in a millisecond; without bound where the seat has no such axis.
     speed: Pose,
     /// How far apart two places are the same, strokes.
@@ -111,7 +113,7 @@ impl Belief {
     /// Nothing is known of a lane with that window, which gets a frame in each `period`; `asks` says whether frames ask for
     /// acks.
     #[must_use]
-    pub fn new(window: &Window, period: Duration, asks: bool) -> Self {
+    pub(crate) fn new(window: &Window, period: Duration, asks: bool) -> Self {
         let (mut speed, mut near) = ([f64::INFINITY; MAX_AXES], [f64::INFINITY; MAX_AXES]);
         for (index, slot) in window.slots().iter().enumerate().filter(|(_, slot)| slot.is_own) {
             speed[index] = ROUNDING * slot.limits.velocity * 1e-3;
@@ -141,24 +143,25 @@ impl Belief {
 
     /// What is known, and from which evidence.
     #[must_use]
-    pub const fn known(&self) -> Known {
+    pub(crate) const fn known(&self) -> Known {
         self.known
     }
 
     /// What the check has done so far.
     #[must_use]
-    pub const fn tally(&self) -> &Tally {
+    pub(crate) const fn tally(&self) -> &Tally {
         &self.tally
     }
 
     /// Whether it is not known which frames arrive; until the seat was read at rest.
     #[must_use]
-    pub const fn is_in_a_gap(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) const fn is_in_a_gap(&self) -> bool {
         self.gap
     }
 
     /// Takes up what the ack thread has seen so far; all that arrived before `told` is in it.
-    pub fn look(&mut self, evidence: &LaneEvidence, told: MonoTime, now: MonoTime) -> Found {
+    pub(crate) fn look(&mut self, evidence: &LaneEvidence, told: MonoTime, now: MonoTime) -> Found {
         if let Some(acked) = evidence.acked()
             && self.acked.is_none_or(|before| acked.since(before) > 0)
         {
@@ -263,14 +266,14 @@ impl Belief {
     /// The pose in which the seat is known to be at rest at `now`; none where an axis of it may be elsewhere, or where that was
     /// known too long ago.
     #[must_use]
-    pub fn pose(&self, now: MonoTime) -> Option<KnownPose> {
+    pub(crate) fn pose(&self, now: MonoTime) -> Option<KnownPose> {
         let is_known = self.within == self.own && self.is_a_point() && self.is_fresh(now);
         is_known.then(|| KnownPose(*self.spans.last()))
     }
 
     /// The same where a frame is to go there next: it was known only just now, whichever way the answer took.
     #[must_use]
-    pub fn start(&self, now: MonoTime) -> Option<KnownPose> {
+    pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
         self.pose(now).filter(|_| self.is_of_now(now, 1))
     }
 
@@ -280,7 +283,7 @@ impl Belief {
 
     /// The pose about which a seat vibrates on that was cut off; none where it is not known to be there and to do nothing else.
     #[must_use]
-    pub fn vibrates_about(&self, now: MonoTime) -> Option<&Pose> {
+    pub(crate) fn vibrates_about(&self, now: MonoTime) -> Option<&Pose> {
         let is_known = self.within == self.own && self.sways > 0.0;
         let begins = is_known && self.is_of_now(now, 1);
         begins.then(|| self.spans.last())
@@ -288,27 +291,27 @@ impl Belief {
 
     /// The amplitude, strokes, with which a seat may vibrate by the frames that it was sent; 0 once one without is known to have arrived.
     #[must_use]
-    pub const fn shakes(&self) -> f64 {
+    pub(crate) const fn shakes(&self) -> f64 {
         self.shaking.amplitude()
     }
 
     /// Whether a motion that was asked for at `since` may begin: the seat was read since then, and only just now, and is known to be at
     /// rest; where no acks are asked for, whether it is known at all.
     #[must_use]
-    pub fn may_begin(&self, since: MonoTime, now: MonoTime) -> bool {
+    pub(crate) fn may_begin(&self, since: MonoTime, now: MonoTime) -> bool {
         let read = !self.asks || matches!(self.known, Known::Measured(at, _) if at >= since);
         read && self.start(now).is_some()
     }
 
     /// Whether a reading told where some axes are, and of others nothing is known.
     #[must_use]
-    pub const fn is_measured_in_part(&self) -> bool {
+    pub(crate) const fn is_measured_in_part(&self) -> bool {
         matches!(self.known, Known::Measured(..)) && self.within != self.own
     }
 
     /// Whether something that is known puts the seat elsewhere than in `pose`, by more than is noise.
     #[must_use]
-    pub fn contradicts(&self, pose: &Pose) -> bool {
+    pub(crate) fn contradicts(&self, pose: &Pose) -> bool {
         self.is_elsewhere(self.within, pose)
     }
 
@@ -321,7 +324,7 @@ impl Belief {
 
     /// The distances within which two places are the same, strokes.
     #[must_use]
-    pub const fn near(&self) -> &Pose {
+    pub(crate) const fn near(&self) -> &Pose {
         &self.near
     }
 
@@ -345,14 +348,14 @@ impl Belief {
 
     /// Whether no frame has been under way for so long that the next is the first of a motion.
     #[must_use]
-    pub fn is_quiet(&self, now: MonoTime) -> bool {
+    pub(crate) fn is_quiet(&self, now: MonoTime) -> bool {
         now > self.busy_until + QUIET.max(2 * self.period)
     }
 
     /// Whether a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever
     /// it may be. Losses shorter than [`GAP`] are left out: while acks come, an axis is where its last frame leads.
     #[must_use]
-    pub fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
+    pub(crate) fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
         if self.within != 0 && self.is_quiet(now) && !self.is_of_now(now, 2) {
             return false;
@@ -368,7 +371,7 @@ impl Belief {
 
     /// How far from `pose` each axis may be at the most; 0 where the seat has no such axis.
     #[must_use]
-    pub fn farthest(&self, pose: &Pose, now: MonoTime) -> Pose {
+    pub(crate) fn farthest(&self, pose: &Pose, now: MonoTime) -> Pose {
         let from_all = self.may_be_anywhere_between(now);
         let mut farthest = [0.0; MAX_AXES];
         slots_in(self.own).for_each(|slot| farthest[slot] = self.distance(slot, pose, from_all));
@@ -394,7 +397,7 @@ impl Belief {
     }
 
     /// Notes a frame that the kernel took.
-    pub fn taken(&mut self, taken: &Taken<'_>) {
+    pub(crate) fn taken(&mut self, taken: &Taken<'_>) {
         let Taken { frame, asked, pose, lasts_ms, shakes, at } = *taken;
         let lasts = Duration::from_millis(u64::from(lasts_ms));
         let behind = self.busy_until.since(at);
@@ -413,18 +416,18 @@ impl Belief {
     }
 
     /// Notes that the kernel did not take a frame.
-    pub fn refused(&mut self, at: MonoTime) {
+    pub(crate) fn refused(&mut self, at: MonoTime) {
         self.refused_since.get_or_insert(at);
     }
 
     /// The seat may have been moved unseen: what was known of it is known no more.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         (self.known, self.within, self.sways) = (Known::Nothing, 0, 0.0);
         self.spans = Spans::at(*self.spans.last());
     }
 
     /// Notes that a frame was not sent.
-    pub const fn withheld(&mut self) {
+    pub(crate) const fn withheld(&mut self) {
         self.tally.withheld += 1;
     }
 }

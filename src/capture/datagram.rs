@@ -26,7 +26,7 @@ const FRAGMENT_OFFSET: u16 = 0x1fff;
 
 /// What a captured packet carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Content<'a> {
+pub(crate) enum Content<'a> {
     /// A whole UDP datagram over IPv4, or as much of it as the capture kept.
     Datagram(Datagram<'a>),
     /// One part of a UDP datagram that was sent in several. They are not put together: no message of the protocol is
@@ -40,36 +40,36 @@ pub enum Content<'a> {
 
 /// A UDP datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Datagram<'a> {
+pub(crate) struct Datagram<'a> {
     /// Who sent it.
-    pub source: SocketAddrV4,
+    pub(crate) source: SocketAddrV4,
     /// For whom.
-    pub destination: SocketAddrV4,
+    pub(crate) destination: SocketAddrV4,
     /// What it carries, as far as it was captured.
-    pub payload: &'a [u8],
+    pub(crate) payload: &'a [u8],
     /// Bytes that the payload had on the wire; more than were captured where the capture cut it.
-    pub payload_len: usize,
+    pub(crate) payload_len: usize,
 }
 
 impl Datagram<'_> {
     /// True if the capture kept only a part of it.
     #[must_use]
-    pub const fn is_cut(&self) -> bool {
+    pub(crate) const fn is_cut(&self) -> bool {
         self.payload.len() < self.payload_len
     }
 }
 
 /// A part of a UDP datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fragment {
+pub(crate) struct Fragment {
     /// Who sent it.
-    pub source: Ipv4Addr,
+    pub(crate) source: Ipv4Addr,
     /// For whom.
-    pub destination: Ipv4Addr,
+    pub(crate) destination: Ipv4Addr,
     /// Source and destination port; only the first part has them.
-    pub ports: Option<(u16, u16)>,
+    pub(crate) ports: Option<(u16, u16)>,
     /// Where it belongs in the whole, bytes.
-    pub offset: u16,
+    pub(crate) offset: u16,
 }
 
 /// What an IPv4 packet carries.

@@ -5,7 +5,7 @@ use std::io;
 /// Why bytes are no capture, or no more of one; places are counted from 0 at the start of the capture.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum CaptureError {
+pub(crate) enum CaptureError {
     /// It opens like no capture.
     #[error("byte 0: {} opens neither pcap nor pcapng", hex(found))]
     Magic {

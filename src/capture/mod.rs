@@ -16,42 +16,42 @@ mod tests;
 use std::io::Read;
 use std::time::Duration;
 
-pub use datagram::{Content, Datagram, Fragment};
-pub use error::CaptureError;
+pub(crate) use datagram::{Content, Datagram, Fragment};
+pub(crate) use error::CaptureError;
 
 use pcap::Pcap;
 use pcapng::PcapNg;
 use source::Source;
 
 /// The longest packet that is taken, bytes: what tcpdump and Wireshark write at most.
-pub const MAX_PACKET: u32 = 262_144;
+pub(crate) const MAX_PACKET: u32 = 262_144;
 
 /// Bytes that tell a capture from anything else.
-pub const MAGIC_LEN: usize = 4;
+pub(crate) const MAGIC_LEN: usize = 4;
 
 /// True if a file that opens with these bytes is a capture.
 #[must_use]
-pub fn is_capture(magic: [u8; MAGIC_LEN]) -> bool {
+pub(crate) fn is_capture(magic: [u8; MAGIC_LEN]) -> bool {
     magic == pcapng::MAGIC || pcap::Layout::of(magic).is_some()
 }
 
 /// A packet as it was captured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Packet<'a> {
+pub(crate) struct Packet<'a> {
     /// Counted from 1, as Wireshark does.
-    pub number: u64,
+    pub(crate) number: u64,
     /// When it was captured, since 1970-01-01 UTC; `None` if the capture does not say.
-    pub at: Option<Duration>,
+    pub(crate) at: Option<Duration>,
     /// The link type, which says what its bytes begin with.
-    pub link: u16,
+    pub(crate) link: u16,
     /// Its bytes, as many as the capture kept.
-    pub bytes: &'a [u8],
+    pub(crate) bytes: &'a [u8],
 }
 
 impl<'a> Packet<'a> {
     /// What it carries.
     #[must_use]
-    pub fn content(&self) -> Content<'a> {
+    pub(crate) fn content(&self) -> Content<'a> {
         match link::ipv4(self.link, self.bytes) {
             Ok(Some(packet)) => datagram::content(packet),
             Ok(None) => Content::Other,
@@ -62,7 +62,7 @@ impl<'a> Packet<'a> {
 
 /// A capture being read.
 #[derive(Debug)]
-pub struct Capture<R> {
+pub(crate) struct Capture<R> {
     source: Source<R>,
     format: Format,
     packets: u64,
@@ -79,7 +79,7 @@ impl<R: Read> Capture<R> {
     ///
     /// # Errors
     /// [`CaptureError::Magic`] where it is no capture, and those of [`Capture::packet`].
-    pub fn open(reader: R) -> Result<Self, CaptureError> {
+    pub(crate) fn open(reader: R) -> Result<Self, CaptureError> {
         let mut source = Source::new(reader);
         let magic: [u8; MAGIC_LEN] = source.array()?;
         let format = if magic == pcapng::MAGIC {
@@ -96,7 +96,7 @@ impl<R: Read> Capture<R> {
     /// # Errors
     /// If the capture ends inside a packet, where it is damaged, and where reading fails. What is left of it cannot
     /// be read then.
-    pub fn packet(&mut self) -> Result<Option<Packet<'_>>, CaptureError> {
+    pub(crate) fn packet(&mut self) -> Result<Option<Packet<'_>>, CaptureError> {
         let record = match &mut self.format {
             Format::Pcap(pcap) => pcap.record(&mut self.source)?,
             Format::PcapNg(pcapng) => pcapng.record(&mut self.source)?,

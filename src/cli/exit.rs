@@ -6,7 +6,7 @@ use std::process::ExitCode;
 /// How the program ends; the numbers are those of `sysexits.h`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Exit {
+pub(crate) enum Exit {
     /// Done, also after a requested stop.
     Done = 0,
     /// A check failed: limits, preflight, doctor.
@@ -47,11 +47,11 @@ impl From<Exit> for ExitCode {
 
 /// An error together with the code that the program ends with.
 #[derive(Debug)]
-pub struct Failure {
+pub(crate) struct Failure {
     /// How the program ends.
-    pub exit: Exit,
+    pub(crate) exit: Exit,
     /// What to tell the person; shown with its chain of causes.
-    pub error: anyhow::Error,
+    pub(crate) error: anyhow::Error,
 }
 
 impl fmt::Display for Failure {
@@ -61,7 +61,7 @@ impl fmt::Display for Failure {
 }
 
 /// Gives an error its exit code.
-pub trait OrExit<T> {
+pub(crate) trait OrExit<T> {
     /// The value, or the error as a [`Failure`] that ends the program with `exit`.
     ///
     /// # Errors

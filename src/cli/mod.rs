@@ -37,7 +37,7 @@ mod sync;
 mod targets;
 mod token;
 
-pub use exit::{Exit, Failure, OrExit};
+pub(crate) use exit::{Exit, Failure, OrExit};
 
 const AFTER: &str = "\
 Examples:

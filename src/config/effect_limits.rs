@@ -13,17 +13,17 @@ const DUTY_WINDOW_S: f64 = 60.0;
 
 /// What an effect stands.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EffectLimit {
+pub(crate) struct EffectLimit {
     /// The effect's name in `[effects]`.
-    pub name: String,
+    pub(crate) name: String,
     /// The shortest time that it may be on; zero where any will do.
-    pub min_on: Duration,
+    pub(crate) min_on: Duration,
     /// The longest time that it may be on at a stretch.
-    pub max_on: Option<Duration>,
+    pub(crate) max_on: Option<Duration>,
     /// The greatest part, above 0 to 1, of any window of time that it may be on.
-    pub max_duty: Option<f64>,
+    pub(crate) max_duty: Option<f64>,
     /// How long that window is, 1 s or more.
-    pub duty_window: Duration,
+    pub(crate) duty_window: Duration,
 }
 
 /// Reads the table; every name has to be one of the effects.

@@ -13,13 +13,13 @@ const TOLD: usize = 1_000;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigFault {
     /// The file.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Line, counted from 1.
-    pub line: usize,
+    pub(crate) line: usize,
     /// Column in characters, counted from 1.
-    pub column: usize,
+    pub(crate) column: usize,
     /// What is wrong, with value and limit.
-    pub message: String,
+    pub(crate) message: String,
 }
 
 impl fmt::Display for ConfigFault {

@@ -121,9 +121,9 @@ pub enum Misfit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Swing {
     /// Millimetres.
-    pub mm: f64,
+    pub(crate) mm: f64,
     /// Pulses.
-    pub pulses: f64,
+    pub(crate) pulses: f64,
 }
 
 impl fmt::Display for Swing {
@@ -136,11 +136,11 @@ impl fmt::Display for Swing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Amplitude {
     /// How far.
-    pub swing: Swing,
+    pub(crate) swing: Swing,
     /// The seat type that it means so much on.
-    pub seat: String,
+    pub(crate) seat: String,
     /// The first show time at which it is asked for.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
 }
 
 impl fmt::Display for Amplitude {
@@ -153,7 +153,7 @@ impl fmt::Display for Amplitude {
 impl Misfit {
     /// The column of a CSV cue that it is about.
     #[must_use]
-    pub fn column(&self) -> String {
+    pub(crate) fn column(&self) -> String {
         match self {
             Self::UntakenAxis { axis } => format!("a{axis}"),
             Self::UnknownEffect { name, .. } => format!("fx_{name}"),
@@ -169,7 +169,7 @@ impl Misfit {
 
     /// The show time that it is about; `None` if the column as such is wrong.
     #[must_use]
-    pub const fn at(&self) -> Option<ShowTime> {
+    pub(crate) const fn at(&self) -> Option<ShowTime> {
         match self {
             Self::LevelTooHigh { at, .. } => Some(*at),
             _ => None,
@@ -179,17 +179,17 @@ impl Misfit {
 
 /// True if a cue stays within the strokes of the hall.
 #[derive(Debug, Default)]
-pub struct HallStroke {
+pub(crate) struct HallStroke {
     /// Faults for each seat type and window of axes that is left.
-    pub faults: Vec<CueFaults>,
+    pub(crate) faults: Vec<CueFaults>,
     /// Axes whose curve is held at an end of the stroke somewhere.
-    pub held: Vec<Held>,
+    pub(crate) held: Vec<Held>,
 }
 
 impl Config {
     /// What the hall cannot do of a cue, the stroke left aside; nothing where all of it can be played.
     #[must_use]
-    pub fn misfits(&self, timeline: &Timeline) -> Vec<Misfit> {
+    pub(crate) fn misfits(&self, timeline: &Timeline) -> Vec<Misfit> {
         let untaken = self.untaken_axes(timeline.axes()).into_iter().map(|axis| Misfit::UntakenAxis { axis });
         let unknown = timeline.effect_names().iter().filter(|name| !self.has_effect(name));
         let unknown = unknown.map(|name| {
@@ -240,7 +240,7 @@ impl Config {
 
     /// Holds the cue's axes against the stroke of each seat that takes them.
     #[must_use]
-    pub fn fits_stroke(&self, timeline: &Timeline) -> HallStroke {
+    pub(crate) fn fits_stroke(&self, timeline: &Timeline) -> HallStroke {
         let mut proved: Vec<(Range<usize>, &Arc<SeatType>)> = Vec::new();
         let mut result = HallStroke::default();
         for controller in &self.controllers {

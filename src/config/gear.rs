@@ -8,7 +8,7 @@ use super::section::{Entry, Section};
 /// What gear may ask at the most, over OSC or by lines of text; a stop is always taken. Arming, homing and clearing are not
 /// among it: the address that something comes from proves nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum GearWord {
+pub(crate) enum GearWord {
     /// To start what a person has armed.
     Go,
     /// To hold.
@@ -29,7 +29,7 @@ pub enum GearWord {
 
 impl GearWord {
     /// All of them, by the words of the configuration.
-    pub const ALL: [(&'static str, Self); 8] = [
+    pub(crate) const ALL: [(&'static str, Self); 8] = [
         ("go", Self::Go),
         ("pause", Self::Pause),
         ("resume", Self::Resume),
@@ -40,7 +40,7 @@ impl GearWord {
         ("seats", Self::Seats),
     ];
     /// What it may ask where nothing is said.
-    pub const DEFAULT: [Self; 5] = [Self::Go, Self::Pause, Self::Resume, Self::Levels, Self::Seats];
+    pub(crate) const DEFAULT: [Self; 5] = [Self::Go, Self::Pause, Self::Resume, Self::Levels, Self::Seats];
 }
 
 /// Reads the list of what may be asked; [`GearWord::DEFAULT`] where it is left out.

@@ -7,13 +7,13 @@ use super::section::{Entry, Section};
 
 /// What the library and the playlists are kept in.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Store {
+pub(crate) struct Store {
     /// The longest cue that can be uploaded, MiB, 1 to 2,048.
-    pub max_cue_mib: u32,
+    pub(crate) max_cue_mib: u32,
     /// The most memory that a cue may take to be checked, and so to be played, MiB, 64 to 8,192.
-    pub max_memory_mib: u32,
+    pub(crate) max_memory_mib: u32,
     /// The folder with the playlists; none for `playlists` beside the library.
-    pub playlists: Option<PathBuf>,
+    pub(crate) playlists: Option<PathBuf>,
 }
 
 impl Default for Store {

@@ -9,17 +9,17 @@ use super::section::{Entry, Section};
 
 /// Where the journal is kept, and how much of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Log {
+pub(crate) struct Log {
     /// Its folder.
-    pub dir: PathBuf,
+    pub(crate) dir: PathBuf,
     /// After how much a new file is begun, MiB, 1 to 1,024.
-    pub max_size_mib: u32,
+    pub(crate) max_size_mib: u32,
     /// All files together, MiB, at least twice that; the oldest go first.
-    pub max_total_mib: u32,
+    pub(crate) max_total_mib: u32,
     /// How long files are kept, days, 1 to 36,500.
-    pub max_age_days: u32,
+    pub(crate) max_age_days: u32,
     /// When the house is open; a show that starts at another time is marked in the report.
-    pub hours: Option<Hours>,
+    pub(crate) hours: Option<Hours>,
 }
 
 impl Default for Log {
@@ -36,17 +36,17 @@ impl Default for Log {
 
 /// The hours of a house, by wall clock; they may reach past midnight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hours {
+pub(crate) struct Hours {
     /// When it opens.
-    pub from: Time,
+    pub(crate) from: Time,
     /// When it closes.
-    pub until: Time,
+    pub(crate) until: Time,
 }
 
 impl Hours {
     /// True if it is open at a time of day.
     #[must_use]
-    pub fn contains(&self, time: Time) -> bool {
+    pub(crate) fn contains(&self, time: Time) -> bool {
         if self.from <= self.until {
             (self.from..self.until).contains(&time)
         } else {

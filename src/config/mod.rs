@@ -28,28 +28,26 @@ mod target;
 mod tests;
 mod text;
 
-pub use crate::wire::{Dialect, Timing, VibrationPort};
+pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
-pub use effect_limits::EffectLimit;
-pub(crate) use fault::Faults;
-pub use fault::{ConfigFault, ConfigFaults};
-pub use fit::{Amplitude, HallStroke, Misfit, Swing};
-pub use gear::GearWord;
-pub use level::parse_level;
-pub(crate) use level::{level, switches, trim};
-pub use library::Store;
-pub use log::{Hours, Log};
-pub use osc::OscPort;
-pub use preset::Preset;
+pub(crate) use effect_limits::EffectLimit;
+pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
+pub(crate) use fit::{HallStroke, Misfit};
+pub(crate) use gear::GearWord;
+pub(crate) use level::{level, parse_level, switches, trim};
+pub(crate) use library::Store;
+pub(crate) use log::Log;
+pub(crate) use osc::OscPort;
+pub(crate) use preset::Preset;
 pub(crate) use section::{Entry, Section, did_you_mean};
-pub use target::{TargetError, from_to_args};
-pub use text::TextPort;
+pub use target::from_to_args;
+pub(crate) use text::TextPort;
 
 /// The outputs a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
-pub const ALL_OUTPUTS: u16 = 0x0fff;
+pub(crate) const ALL_OUTPUTS: u16 = 0x0fff;
 
 /// The largest configuration file that is read, bytes.
-pub const MAX_FILE_LEN: u64 = 1 << 20;
+pub(crate) const MAX_FILE_LEN: u64 = 1 << 20;
 
 /// A hall: how it is played, what its seats are, and where its controllers are.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,32 +57,32 @@ pub struct Config {
     /// The seat types, by name.
     pub seats: Vec<Arc<SeatType>>,
     /// The site's wiring. Two names may mean one output.
-    pub effects: Vec<Effect>,
+    pub(crate) effects: Vec<Effect>,
     /// How long, and how much of the time, effects may be on; at most one entry for each name.
-    pub effect_limits: Vec<EffectLimit>,
+    pub(crate) effect_limits: Vec<EffectLimit>,
     /// Levels and effects by name, in the order of the names.
-    pub presets: Vec<Preset>,
+    pub(crate) presets: Vec<Preset>,
     /// What the library and the playlists are kept in.
-    pub store: Store,
+    pub(crate) store: Store,
     /// Where the journal is kept, and how much of it.
-    pub log: Log,
+    pub(crate) log: Log,
     /// The controllers that take part, at least one, in the order of the file.
     pub controllers: Vec<Controller>,
     /// Those that are out for good, in the order of the file.
-    pub absent: Vec<Absent>,
+    pub(crate) absent: Vec<Absent>,
     /// The port that takes OSC, where there is one.
-    pub osc: Option<OscPort>,
+    pub(crate) osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
-    pub text: Option<TextPort>,
+    pub(crate) text: Option<TextPort>,
     /// HTTP over TCP.
-    pub api: Api,
+    pub(crate) api: Api,
 }
 
 /// How cues are played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Show {
     /// What the hall is called.
-    pub name: String,
+    pub(crate) name: String,
     /// Frames a second to every controller, 1 to 1,000.
     pub rate_hz: f64,
     /// What the Time field of a frame means.
@@ -96,13 +94,13 @@ pub struct Show {
     /// What the hall does when a group of controllers is lost.
     pub loss_policy: LossPolicy,
     /// How long before a deadline the tick thread stops sleeping and spins, µs, 0 to 900.
-    pub spin_us: u32,
+    pub(crate) spin_us: u32,
     /// The folder with the cues of the daemon.
-    pub library: PathBuf,
+    pub(crate) library: PathBuf,
     /// Whose belts GO waits for.
-    pub belts: Belts,
+    pub(crate) belts: Belts,
     /// Findings of preflight that are accepted for good, of whichever controller.
-    pub accept_findings: Vec<Acceptance>,
+    pub(crate) accept_findings: Vec<Acceptance>,
 }
 
 impl Default for Show {
@@ -124,7 +122,7 @@ impl Default for Show {
 
 /// Whose belts GO waits for, of the controllers that have `belt_inputs` and take part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Belts {
+pub(crate) enum Belts {
     /// Nobody's: it is only shown which ones are open.
     Shown,
     /// At least one belt of each rigid seat.
@@ -146,17 +144,17 @@ pub enum LossPolicy {
 
 /// One name of an output.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Effect {
+pub(crate) struct Effect {
     /// What cues call it.
-    pub name: String,
+    pub(crate) name: String,
     /// The output, 1 to 12 for Y01 to Y12.
-    pub output: u8,
+    pub(crate) output: u8,
 }
 
 impl Effect {
     /// The output as a bit of the Port Out word: bit 0 is Y01 (SMC manual 2.2.2.5).
     #[must_use]
-    pub fn word(&self) -> u16 {
+    pub(crate) fn word(&self) -> u16 {
         1_u16.checked_shl(u32::from(self.output).wrapping_sub(1)).unwrap_or(0) & ALL_OUTPUTS
     }
 }
@@ -165,58 +163,58 @@ impl Effect {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Controller {
     /// Its name in reports, unlike any other's.
-    pub name: String,
+    pub(crate) name: String,
     /// The row its seat stands in.
-    pub row: Option<String>,
+    pub(crate) row: Option<String>,
     /// What it moves.
     pub seat: Arc<SeatType>,
     /// Where it listens (PA10 to PA14), unlike any other's.
-    pub address: SocketAddrV4,
+    pub(crate) address: SocketAddrV4,
     /// PA95: its first axis is axis `axis_offset + 1` of the cue; 0 to 11.
-    pub axis_offset: usize,
+    pub(crate) axis_offset: usize,
     /// Who applies the axis offset.
-    pub fan_out: FanOut,
+    pub(crate) fan_out: FanOut,
     /// The message set it speaks; an IMAX speaks that of MBOX.
-    pub dialect: Dialect,
+    pub(crate) dialect: Dialect,
     /// How it has Port Out in vibration frames.
-    pub vibration_port: VibrationPort,
+    pub(crate) vibration_port: VibrationPort,
     /// Controllers under one rigid seat share a group; its own name by default.
-    pub group: String,
+    pub(crate) group: String,
     /// The accept and reply code of its frames.
-    pub accept: Accept,
+    pub(crate) accept: Accept,
     /// The effects it switches; `None` for all of them and every bit of a raw output word.
-    pub effects: Option<Vec<String>>,
+    pub(crate) effects: Option<Vec<String>>,
     /// The highest level of each output of the table that cues set ([`crate::channel::switches`]), 0 to 1; 0 where it has none.
     pub(crate) at_most: [f64; SWITCHES],
     /// The inputs of which any one means an emergency stop, bit 0 = X01; 0 if only its replies tell.
     pub estop_inputs: u16,
     /// The inputs of its belts, each active while its belt is open, bit 0 = X01; 0 for none.
-    pub belt_inputs: u16,
+    pub(crate) belt_inputs: u16,
     /// Findings of preflight that are accepted for good of this controller.
-    pub accept_findings: Vec<Acceptance>,
+    pub(crate) accept_findings: Vec<Acceptance>,
 }
 
 /// A controller that is out for good (`enabled = false`): no frame goes to it, nobody waits for it, and nothing is asked of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Absent {
+pub(crate) struct Absent {
     /// What the configuration says of it.
-    pub controller: Controller,
+    pub(crate) controller: Controller,
     /// How many of those that take part stand before it in the file.
-    pub after: usize,
+    pub(crate) after: usize,
 }
 
 /// A finding of preflight that the site lives with.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Acceptance {
+pub(crate) struct Acceptance {
     /// What is accepted.
-    pub check: Check,
+    pub(crate) check: Check,
     /// Why, in the words of whoever answers for it; not empty.
-    pub why: String,
+    pub(crate) why: String,
 }
 
 /// Who applies the axis offset (PA95).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FanOut {
+pub(crate) enum FanOut {
     /// The host: a frame carries just the controller's own axes; PA95 is 0.
     Slice,
     /// The device: a frame carries all axes of the cue; PA95 is the axis offset.
@@ -225,7 +223,7 @@ pub enum FanOut {
 
 /// The accept and reply code (SMC manual 2.2.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Accept {
+pub(crate) enum Accept {
     /// ffff: whoever gets the datagram.
     All,
     /// The station's own code: the last two bytes of its address (PA12, PA13).
@@ -237,7 +235,7 @@ pub enum Accept {
 impl Accept {
     /// The code in a frame to the station at `address`.
     #[must_use]
-    pub fn code(self, address: SocketAddrV4) -> u16 {
+    pub(crate) fn code(self, address: SocketAddrV4) -> u16 {
         let [_, _, xx, yy] = address.ip().octets();
         match self {
             Self::All => 0xffff,
@@ -251,14 +249,14 @@ impl Config {
     /// What the effect called `name` adds to the output word of `controller`: 0 where that controller does not
     /// switch it, `None` where no output has that name.
     #[must_use]
-    pub fn effect_outputs(&self, controller: &Controller, name: &str) -> Option<u16> {
+    pub(crate) fn effect_outputs(&self, controller: &Controller, name: &str) -> Option<u16> {
         let effect = self.effects.iter().find(|effect| effect.name == name)?;
         Some(if controller.switches(name) { effect.word() } else { 0 })
     }
 
     /// The bits of a raw output word that reach `controller`.
     #[must_use]
-    pub fn allowed_outputs(&self, controller: &Controller) -> u16 {
+    pub(crate) fn allowed_outputs(&self, controller: &Controller) -> u16 {
         match &controller.effects {
             None => ALL_OUTPUTS,
             Some(_) => {
@@ -276,32 +274,32 @@ impl Config {
     }
 
     /// Every controller that the file names: those that take part, and those that are out for good.
-    pub fn named(&self) -> impl Iterator<Item = &Controller> {
+    pub(crate) fn named(&self) -> impl Iterator<Item = &Controller> {
         self.controllers.iter().chain(self.absent.iter().map(|one| &one.controller))
     }
 
     /// The axes of a cue of `cue_axes` axes that are no controller's, also of none that is out for good, counted from 1.
     #[must_use]
-    pub fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
+    pub(crate) fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
         (1..=cue_axes).filter(|&axis| !self.named().any(|c| c.takes(axis - 1))).collect()
     }
 
     /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.
     #[must_use]
-    pub fn playlists(&self) -> PathBuf {
+    pub(crate) fn playlists(&self) -> PathBuf {
         let beside = || self.show.library.with_file_name("playlists");
         self.store.playlists.clone().unwrap_or_else(beside)
     }
 
     /// The preset called `name`.
     #[must_use]
-    pub fn preset(&self, name: &str) -> Option<&Preset> {
+    pub(crate) fn preset(&self, name: &str) -> Option<&Preset> {
         self.presets.iter().find(|preset| preset.name == name)
     }
 
     /// The seat type called `name`.
     #[must_use]
-    pub fn seat(&self, name: &str) -> Option<&Arc<SeatType>> {
+    pub(crate) fn seat(&self, name: &str) -> Option<&Arc<SeatType>> {
         self.seats.iter().find(|seat| seat.name == name)
     }
 }
@@ -315,7 +313,7 @@ pub(crate) fn cue_axes(controllers: &[Controller]) -> usize {
 impl Controller {
     /// Axes that its frames have to carry of a cue of `cue_axes` axes: just its own, or all up to its last.
     #[must_use]
-    pub fn frame_axes(&self, cue_axes: usize) -> usize {
+    pub(crate) fn frame_axes(&self, cue_axes: usize) -> usize {
         match self.fan_out {
             FanOut::Slice => self.seat.axes,
             FanOut::Shared => cue_axes.max(self.window().end).min(MAX_AXES),
@@ -324,13 +322,13 @@ impl Controller {
 
     /// True if axis `axis` of the cue, counted from 0, is one of its own.
     #[must_use]
-    pub fn takes(&self, axis: usize) -> bool {
+    pub(crate) fn takes(&self, axis: usize) -> bool {
         self.window().contains(&axis)
     }
 
     /// The place of its first own axis in its frames.
     #[must_use]
-    pub const fn first_slot(&self) -> usize {
+    pub(crate) const fn first_slot(&self) -> usize {
         match self.fan_out {
             FanOut::Slice => 0,
             FanOut::Shared => self.axis_offset,
@@ -339,7 +337,7 @@ impl Controller {
 
     /// The axes of the cue that are its own, counted from 0.
     #[must_use]
-    pub fn window(&self) -> Range<usize> {
+    pub(crate) fn window(&self) -> Range<usize> {
         self.axis_offset..self.axis_offset + self.seat.axes
     }
 

@@ -8,13 +8,13 @@ use super::section::{Entry, Section};
 
 /// The port that takes OSC messages over UDP.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OscPort {
+pub(crate) struct OscPort {
     /// Where it listens.
-    pub listen: SocketAddrV4,
+    pub(crate) listen: SocketAddrV4,
     /// Whose messages are taken, at least one.
-    pub sources: Vec<Ipv4Addr>,
+    pub(crate) sources: Vec<Ipv4Addr>,
     /// What they may ask; stop may be asked always.
-    pub allow: Vec<GearWord>,
+    pub(crate) allow: Vec<GearWord>,
 }
 
 /// Reads the table.

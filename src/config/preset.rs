@@ -9,15 +9,15 @@ use super::section::{Entry, Section};
 
 /// Levels and effects that are set together. What it does not name stays as it is.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Preset {
+pub(crate) struct Preset {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Of the motion about the neutral pose, 0 to 1.
-    pub motion: Option<f64>,
+    pub(crate) motion: Option<f64>,
     /// Of the vibration, 0 to 1.
-    pub vibration: Option<f64>,
+    pub(crate) vibration: Option<f64>,
     /// True if an effect may be on, by its name.
-    pub effects: BTreeMap<String, bool>,
+    pub(crate) effects: BTreeMap<String, bool>,
 }
 
 /// Reads the presets; every effect that they name has to be one of the site's.

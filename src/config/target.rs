@@ -102,7 +102,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
 
 impl Config {
     /// The controllers to which every effect stays off.
-    pub fn without_effects(&self) -> impl Iterator<Item = &Controller> {
+    pub(crate) fn without_effects(&self) -> impl Iterator<Item = &Controller> {
         self.controllers.iter().filter(|controller| self.allowed_outputs(controller) == 0)
     }
 }

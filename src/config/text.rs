@@ -9,15 +9,15 @@ use super::section::{Entry, Section};
 
 /// The port that takes lines of plain text over TCP.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TextPort {
+pub(crate) struct TextPort {
     /// Where it listens.
-    pub listen: SocketAddrV4,
+    pub(crate) listen: SocketAddrV4,
     /// Whose connections are taken, at least one.
-    pub sources: Vec<Ipv4Addr>,
+    pub(crate) sources: Vec<Ipv4Addr>,
     /// What they may ask; stop may be asked always.
-    pub allow: Vec<GearWord>,
+    pub(crate) allow: Vec<GearWord>,
     /// SHA-256 of the token that the first line of a connection has to show; `None` if none is wanted.
-    pub token: Option<[u8; 32]>,
+    pub(crate) token: Option<[u8; 32]>,
 }
 
 /// Reads the table.

@@ -7,11 +7,11 @@ mod tests;
 
 /// A file of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asset {
+pub(crate) struct Asset {
     /// Its `Content-Type`.
-    pub content_type: &'static str,
+    pub(crate) content_type: &'static str,
     /// Its bytes.
-    pub body: &'static [u8],
+    pub(crate) body: &'static [u8],
 }
 
 const HTML: &str = "text/html; charset=utf-8";
@@ -69,13 +69,13 @@ const VENDOR: &[(&str, Asset)] = files!("":
 
 /// What is at a path, which begins with a slash; `/` is the page itself. None where there is nothing.
 #[must_use]
-pub fn asset(path: &str) -> Option<Asset> {
+pub(crate) fn asset(path: &str) -> Option<Asset> {
     let path = if path == "/" { "/index.html" } else { path };
     PAGE.iter().chain(VENDOR).find(|(at, _)| *at == path).map(|(_, asset)| *asset)
 }
 
 /// The content type and the bytes of what is at a path, as a server hands them out.
 #[must_use]
-pub fn page(path: &str) -> Option<(&'static str, &'static [u8])> {
+pub(crate) fn page(path: &str) -> Option<(&'static str, &'static [u8])> {
     asset(path).map(|asset| (asset.content_type, asset.body))
 }

@@ -85,13 +85,13 @@ pub enum Command {
 #[serde(default)]
 pub struct Levels {
     /// Of the motion about the neutral pose, 0 to 1.
-    pub motion: f64,
+    pub(crate) motion: f64,
     /// Of the vibration, 0 to 1.
-    pub vibration: f64,
+    pub(crate) vibration: f64,
     /// True if each effect may be on.
-    pub effects: BTreeMap<String, bool>,
+    pub(crate) effects: BTreeMap<String, bool>,
     /// Of motion and vibration in each row, 0 to 1, on top of the hall's.
-    pub rows: BTreeMap<String, f64>,
+    pub(crate) rows: BTreeMap<String, f64>,
 }
 
 /// A change of levels; what is not named stays as it is.
@@ -114,7 +114,7 @@ pub struct LevelsChange {
 
 impl Command {
     /// What people alone may ask: no gear and no line of text, whose senders are known by address alone.
-    pub const OF_PEOPLE: [&str; 5] = ["arm", "disarm", "home", "clear", "load"];
+    pub(crate) const OF_PEOPLE: [&str; 5] = ["arm", "disarm", "home", "clear", "load"];
 
     /// Its row of the table of commands: its word, the least role, whether it goes stale, and what gear has to be allowed.
     const fn row(&self) -> (&'static str, Role, bool, Option<GearWord>) {
@@ -157,20 +157,20 @@ impl Command {
 
     /// The least role that may ask it.
     #[must_use]
-    pub const fn least_role(&self) -> Role {
+    pub(crate) const fn least_role(&self) -> Role {
         self.row().1
     }
 
     /// True if it is dropped once [`super::FRESH`] is over: it begins a motion, or frees the way to one, in a hall that may be
     /// another by then.
     #[must_use]
-    pub const fn goes_stale(&self) -> bool {
+    pub(crate) const fn goes_stale(&self) -> bool {
         self.row().2
     }
 
     /// What gear has to be allowed for it; none for what needs no leave, a stop, and for what gear has no way to ask.
     #[must_use]
-    pub const fn gear_word(&self) -> Option<GearWord> {
+    pub(crate) const fn gear_word(&self) -> Option<GearWord> {
         self.row().3
     }
 }

@@ -20,7 +20,7 @@ const ASKS: usize = 64;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How old an ask that [goes stale](Command::goes_stale) may be when its turn comes.
-pub const FRESH: Duration = Duration::from_secs(2);
+pub(crate) const FRESH: Duration = Duration::from_secs(2);
 
 /// What a surface wants, and on whose behalf.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +47,7 @@ impl Asked {
 
     /// True if it was asked before that instant.
     #[must_use]
-    pub fn is_before(&self, at: MonoTime) -> bool {
+    pub(crate) fn is_before(&self, at: MonoTime) -> bool {
         self.asked_at < at
     }
 
@@ -92,7 +92,7 @@ struct Led {
 
 impl StatusSource {
     /// From now on a stop goes to that desk: the hall was opened anew.
-    pub fn lead(&self, desk: Arc<Desk>) {
+    pub(crate) fn lead(&self, desk: Arc<Desk>) {
         self.1.write().unwrap_or_else(PoisonError::into_inner).desk = desk;
     }
 
@@ -126,12 +126,12 @@ pub fn handle(desk: Arc<Desk>, first: Status) -> (Handle, Inbox, StatusSource) {
 
 impl Handle {
     /// Has the seats come to rest: a flag that the tick thread reads every tick. Waits for nothing and cannot fail.
-    pub fn stop(&self) {
+    pub(crate) fn stop(&self) {
         self.led.read().unwrap_or_else(PoisonError::into_inner).desk.stop();
     }
 
     /// Leaves word of a stop for the journal, without waiting: where there is no room, it is not noted.
-    pub fn note_stop(&self, who: Who) {
+    pub(crate) fn note_stop(&self, who: Who) {
         let (reply, _) = oneshot::channel();
         let note = Asked { desired: Desired { ask: Command::Stop, who }, asked_at: Monotonic.now(), reply };
         drop(self.asks.try_send(note));
@@ -153,7 +153,7 @@ impl Handle {
 
     /// To be woken by each new status.
     #[must_use]
-    pub fn watch(&self) -> watch::Receiver<Arc<Status>> {
+    pub(crate) fn watch(&self) -> watch::Receiver<Arc<Status>> {
         self.status.clone()
     }
 
@@ -161,7 +161,7 @@ impl Handle {
     ///
     /// # Errors
     /// [`Problem`] where it was not done.
-    pub async fn ask(&self, who: Who, ask: Command) -> Result<Arc<Status>, Problem> {
+    pub(crate) async fn ask(&self, who: Who, ask: Command) -> Result<Arc<Status>, Problem> {
         self.post(who, ask)?.answer().await
     }
 
@@ -177,7 +177,7 @@ impl Handle {
     ///
     /// # Errors
     /// [`Problem`] where it is not even queued: the role is too low, it is stale already, or too many wait.
-    pub fn post_asked(&self, who: Who, ask: Command, asked_at: MonoTime) -> Result<Posted, Problem> {
+    pub(crate) fn post_asked(&self, who: Who, ask: Command, asked_at: MonoTime) -> Result<Posted, Problem> {
         if who.role < ask.least_role() {
             let (word, least) = (ask.word(), ask.least_role());
             let detail = format!("{word} needs the role {least}, and {} has {}", who.name, who.role);
@@ -218,7 +218,7 @@ impl Posted {
     ///
     /// # Errors
     /// [`Problem`] where it was not done.
-    pub async fn answer(self) -> Result<Arc<Status>, Problem> {
+    pub(crate) async fn answer(self) -> Result<Arc<Status>, Problem> {
         match tokio::time::timeout(PATIENCE, self.0).await {
             Ok(answer) => answer.unwrap_or_else(|_| Err(gone())),
             Err(_) => Err(Problem::new(
@@ -232,7 +232,7 @@ impl Posted {
 
 /// What was asked of a hall that is another since.
 #[must_use]
-pub fn overtaken(word: &str, state: State) -> Problem {
+pub(crate) fn overtaken(word: &str, state: State) -> Problem {
     let detail = format!("{word} was asked before the hall was {state}");
     Problem::new(Code::Late, detail, "look at the seats, then ask again")
 }

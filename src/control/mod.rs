@@ -4,20 +4,24 @@
 
 mod ask;
 mod handle;
-pub mod model;
+pub(crate) mod model;
 mod places;
 mod problem;
 mod status;
 mod who;
 
 pub use crate::config::Role;
-pub use ask::{Command, Levels, LevelsChange};
-pub use handle::{Asked, Desired, FRESH, Handle, Inbox, Posted, StatusSource, handle, overtaken};
-pub use model::{FrameCounts, Health, Histogram, Percentiles, Severity, Then, Times};
-pub use places::{Place, Places, network};
+pub(crate) use ask::Levels;
+pub use ask::{Command, LevelsChange};
+pub(crate) use handle::{Asked, FRESH, Posted, overtaken};
+pub use handle::{Desired, Handle, Inbox, StatusSource, handle};
+pub use model::Health;
+pub(crate) use model::{Histogram, Percentiles, Severity, Then, Times};
+pub(crate) use places::{Place, Places, network};
 pub use problem::{Code, Problem};
-pub use status::{
-    ControllerStatus, EntryStatus, FORMAT, HallFacts, JournalLine, PlaylistStatus, PreflightStatus,
-    RealTimeStatus, ShowStatus, Status, TestRow, TestStatus, Warning,
+pub use status::{ControllerStatus, JournalLine, Status};
+pub(crate) use status::{
+    EntryStatus, FORMAT, HallFacts, PlaylistStatus, PreflightStatus, RealTimeStatus, ShowStatus, TestRow,
+    TestStatus, Warning,
 };
 pub use who::{Surface, Who};

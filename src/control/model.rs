@@ -10,17 +10,17 @@ use crate::tracker::{self, Counts};
 
 /// An enum whose words are stable, for programs: as it is written, read and shown.
 macro_rules! words {
-    ($(#[$about:meta])* $name:ident { $($(#[$of:meta])* $variant:ident = $word:tt,)+ }) => {
+    ($(#[$about:meta])* $vis:vis $name:ident { $($(#[$of:meta])* $variant:ident = $word:tt,)+ }) => {
         $(#[$about])*
         #[derive(
             Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize, utoipa::ToSchema,
         )]
-        pub enum $name { $($(#[$of])* #[serde(rename = $word)] $variant,)+ }
+        $vis enum $name { $($(#[$of])* #[serde(rename = $word)] $variant,)+ }
 
         impl $name {
             /// Its word.
             #[must_use]
-            pub const fn word(self) -> &'static str {
+            $vis const fn word(self) -> &'static str {
                 match self { $(Self::$variant => $word,)+ }
             }
         }
@@ -38,7 +38,7 @@ pub(crate) use words;
 words! {
     /// How a controller stands.
     #[derive(Default)]
-    Health {
+    pub Health {
         /// It answers.
         Ok = "ok",
         /// It answers some frames.
@@ -67,7 +67,7 @@ words! {
 words! {
     /// How grave something is.
     #[derive(Default)]
-    Severity {
+    pub(crate) Severity {
         /// Good to know.
         #[default]
         Info = "info",
@@ -80,7 +80,7 @@ words! {
 
 words! {
     /// How a show ended.
-    Ending {
+    pub Ending {
         /// It was played to its end.
         Completed = "completed",
         /// A person ended it.
@@ -93,7 +93,7 @@ words! {
 words! {
     /// What follows the end of an entry of a playlist.
     #[derive(Default)]
-    Then {
+    pub(crate) Then {
         /// The next entry waits for a person, or for its time.
         #[default]
         Hold = "hold",
@@ -176,7 +176,7 @@ impl FrameCounts {
 
     /// What came since.
     #[must_use]
-    pub fn since(self, before: Self) -> Self {
+    pub(crate) fn since(self, before: Self) -> Self {
         self.with(before, u64::saturating_sub)
     }
 }
@@ -190,7 +190,7 @@ impl std::iter::Sum for FrameCounts {
 /// Nanoseconds as µs, rounded to a tenth.
 #[must_use]
 #[expect(clippy::cast_precision_loss, reason = "a few seconds in nanoseconds")]
-pub fn us(ns: u64) -> f64 {
+pub(crate) fn us(ns: u64) -> f64 {
     (ns as f64 / 100.0).round() / 10.0
 }
 
@@ -211,7 +211,7 @@ pub struct Percentiles {
 impl Percentiles {
     /// Those of a histogram of nanoseconds.
     #[must_use]
-    pub fn of(times: &tracker::Histogram) -> Self {
+    pub(crate) fn of(times: &tracker::Histogram) -> Self {
         let at = |ns: u64| (!times.is_empty()).then(|| us(ns));
         Self {
             p50_us: at(times.value_at_quantile(0.5)),
@@ -225,7 +225,7 @@ impl Percentiles {
 /// Percentiles where the name of the whole has the unit, for serde's `with`.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Percentiles")]
-pub struct InMicros {
+pub(crate) struct InMicros {
     #[serde(rename = "p50")]
     p50_us: Option<f64>,
     #[serde(rename = "p99")]
@@ -242,21 +242,21 @@ pub struct InMicros {
 pub struct Times {
     /// Percentiles.
     #[serde(flatten)]
-    pub percentiles: Percentiles,
+    pub(crate) percentiles: Percentiles,
     /// How many there are.
-    pub histogram: Histogram,
+    pub(crate) histogram: Histogram,
 }
 
 /// Counts by size.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub struct Histogram {
+pub(crate) struct Histogram {
     /// The upper bounds, µs, each twice the one before or less; the last bucket has none.
-    pub bounds_us: Vec<f64>,
+    pub(crate) bounds_us: Vec<f64>,
     /// How many are in each bucket, one more than bounds.
-    pub counts: Vec<u64>,
+    pub(crate) counts: Vec<u64>,
     /// The sum of all, s.
-    pub sum_s: f64,
+    pub(crate) sum_s: f64,
 }
 
 #[cfg(test)]

@@ -9,14 +9,14 @@ use tokio::sync::Notify;
 
 /// Room for connections.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub(crate) struct Places {
     most: usize,
     taken: Arc<Mutex<Vec<Taken>>>,
 }
 
 /// A place, free again when it is dropped.
 #[derive(Debug)]
-pub struct Place {
+pub(crate) struct Place {
     taken: Arc<Mutex<Vec<Taken>>>,
     leave: Arc<Notify>,
 }
@@ -40,7 +40,7 @@ enum Guest {
 impl Places {
     /// For at most `most` connections.
     #[must_use]
-    pub fn new(most: usize) -> Self {
+    pub(crate) fn new(most: usize) -> Self {
         Self { most, taken: Arc::default() }
     }
 
@@ -48,7 +48,7 @@ impl Places {
     ///
     /// Strangers leave before those who are known; of these, one of whoever has the most, the one that was silent longest.
     #[must_use]
-    pub fn take(&self, address: Option<IpAddr>) -> (Place, bool) {
+    pub(crate) fn take(&self, address: Option<IpAddr>) -> (Place, bool) {
         let mut taken = lock(&self.taken);
         let crowded = taken.len() >= self.most;
         if let Some(index) = if crowded { first_to_go(&taken) } else { None } {
@@ -62,7 +62,7 @@ impl Places {
 
 impl Place {
     /// Says who has it, as has been shown just now.
-    pub fn show(&self, who: &str) {
+    pub(crate) fn show(&self, who: &str) {
         let mut taken = lock(&self.taken);
         if let Some(index) = taken.iter().position(|one| Arc::ptr_eq(&one.leave, &self.leave)) {
             let mut mine = taken.remove(index);
@@ -72,7 +72,7 @@ impl Place {
     }
 
     /// Waits until it has to be left; for good, where it never has to.
-    pub async fn leave(&self) {
+    pub(crate) async fn leave(&self) {
         self.leave.notified().await;
     }
 }
@@ -95,7 +95,7 @@ fn first_to_go(taken: &[Taken]) -> Option<usize> {
 
 /// What one machine can take another address of at will: the whole /64 of IPv6.
 #[must_use]
-pub fn network(address: IpAddr) -> IpAddr {
+pub(crate) fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(v6) => {
             let [a, b, c, d, ..] = v6.segments();

@@ -11,7 +11,7 @@ use crate::state::Refusal;
 words! {
     /// The kind of a problem. Its word is stable: programs may rely on it.
     #[non_exhaustive]
-    Code {
+    pub Code {
         /// The state of the hall does not allow it.
         State = "state",
         /// Who asked may not.
@@ -51,7 +51,7 @@ words! {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
 pub struct Problem {
     /// The status of the HTTP reply.
-    pub status: u16,
+    pub(crate) status: u16,
     /// Which kind.
     pub code: Code,
     /// What went wrong, with the value and the limit; no full stop.
@@ -66,7 +66,7 @@ pub struct Problem {
 impl Code {
     /// The status of the HTTP reply.
     #[must_use]
-    pub const fn status(self) -> u16 {
+    pub(crate) const fn status(self) -> u16 {
         match self {
             Self::Value => 400,
             Self::Token => 401,

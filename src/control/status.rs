@@ -10,7 +10,7 @@ use crate::state::{Cause, Next, State};
 
 /// The layout of [`Status`] and of the report of a play: the number goes up when a field changes its name or its meaning. 1 was that
 /// of 0.1.
-pub const FORMAT: u32 = 2;
+pub(crate) const FORMAT: u32 = 2;
 
 /// The whole status of the hall.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -96,16 +96,16 @@ impl Status {
 /// How the hall is, in short.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub struct HallFacts {
+pub(crate) struct HallFacts {
     /// The state, one word.
     #[schema(value_type = String)]
-    pub state: Word<State>,
+    pub(crate) state: Word<State>,
     /// Why it is in that state.
-    pub cause: String,
+    pub(crate) cause: String,
     /// What a person does next.
-    pub next: String,
+    pub(crate) next: String,
     /// Where in the cue the film is, s; null if none is loaded.
-    pub position_s: Option<f64>,
+    pub(crate) position_s: Option<f64>,
 }
 
 impl From<&Status> for HallFacts {
@@ -124,24 +124,24 @@ impl From<&Status> for HallFacts {
 #[serde(default)]
 pub struct ShowStatus {
     /// The id of the cue.
-    pub cue: String,
+    pub(crate) cue: String,
     /// Its title.
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// SHA-256 of its file, hexadecimal.
-    pub sha256: String,
+    pub(crate) sha256: String,
     /// How long it is, s.
-    pub length_s: f64,
+    pub(crate) length_s: f64,
     /// Where the film is in it, s.
-    pub position_s: f64,
+    pub(crate) position_s: f64,
     /// How long the first move onto it takes, s.
-    pub join_s: f64,
+    pub(crate) join_s: f64,
     /// Where the film was when its last show ended before the cue did, s: a go may go on from there (`from_s`); null where
     /// there is nothing to go on from.
-    pub resume_s: Option<f64>,
+    pub(crate) resume_s: Option<f64>,
     /// How many axes it has.
-    pub axes: usize,
+    pub(crate) axes: usize,
     /// The effects and outputs that it uses, by the names of their switches.
-    pub effects: Vec<String>,
+    pub(crate) effects: Vec<String>,
 }
 
 /// A playlist, and where in it the hall is.
@@ -149,37 +149,37 @@ pub struct ShowStatus {
 #[serde(default)]
 pub struct PlaylistStatus {
     /// Its id.
-    pub id: String,
+    pub(crate) id: String,
     /// Its title.
-    pub title: String,
+    pub(crate) title: String,
     /// Its entries.
-    pub entries: Vec<EntryStatus>,
+    pub(crate) entries: Vec<EntryStatus>,
     /// Which entry is loaded, counted from 0.
-    pub current: usize,
+    pub(crate) current: usize,
     /// When the next one starts by itself, RFC 3339; null if none does.
-    pub next_start: Option<String>,
+    pub(crate) next_start: Option<String>,
 }
 
 /// One entry of a playlist.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub struct EntryStatus {
+pub(crate) struct EntryStatus {
     /// The id of the cue.
-    pub cue: String,
+    pub(crate) cue: String,
     /// Its title.
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// How long it is, s.
-    pub length_s: f64,
+    pub(crate) length_s: f64,
     /// The preset that is set before its own levels; null if there is none.
-    pub preset: Option<String>,
+    pub(crate) preset: Option<String>,
     /// The level of its motion, 0 to 1; null if the preset's or the hall's stays.
-    pub level: Option<f64>,
+    pub(crate) level: Option<f64>,
     /// Its trim, ms; null if the hall's stays.
-    pub trim_ms: Option<i32>,
+    pub(crate) trim_ms: Option<i32>,
     /// What follows its end: `hold` (a person goes on) or `go`.
-    pub then: Then,
+    pub(crate) then: Then,
     /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
-    pub at: Option<String>,
+    pub(crate) at: Option<String>,
 }
 
 /// What the system granted the tick thread.
@@ -187,13 +187,13 @@ pub struct EntryStatus {
 #[serde(default)]
 pub struct RealTimeStatus {
     /// Scheduling policy: `fifo`, `other` …
-    pub policy: String,
+    pub(crate) policy: String,
     /// Its priority; 0 for policies without one.
-    pub priority: u8,
+    pub(crate) priority: u8,
     /// True if memory is locked.
-    pub memory_locked: bool,
+    pub(crate) memory_locked: bool,
     /// What was refused, each with what to do.
-    pub refusals: Vec<String>,
+    pub(crate) refusals: Vec<String>,
 }
 
 /// One controller.
@@ -255,13 +255,13 @@ pub struct ControllerStatus {
 #[serde(default)]
 pub struct PreflightStatus {
     /// True if nothing fails.
-    pub passed: bool,
+    pub(crate) passed: bool,
     /// Seconds since then.
-    pub age_s: f64,
+    pub(crate) age_s: f64,
     /// How many controllers answered.
-    pub answered: usize,
+    pub(crate) answered: usize,
     /// The findings that are no `ok`, gravest first.
-    pub findings: Vec<Warning>,
+    pub(crate) findings: Vec<Warning>,
 }
 
 /// A test that moves each axis and switches each effect in turn.
@@ -269,35 +269,35 @@ pub struct PreflightStatus {
 #[serde(default)]
 pub struct TestStatus {
     /// True if it runs; if not, the rows are its result.
-    pub running: bool,
+    pub(crate) running: bool,
     /// What it does at present, or how it ended, in a few words.
-    pub step: String,
+    pub(crate) step: String,
     /// How many axes and effects have been through it.
-    pub done: usize,
+    pub(crate) done: usize,
     /// How many it has to go through.
-    pub total: usize,
+    pub(crate) total: usize,
     /// What has been through it so far, in the order of the test.
-    pub rows: Vec<TestRow>,
+    pub(crate) rows: Vec<TestRow>,
 }
 
 /// What a test found of one axis or effect of one controller.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default)]
-pub struct TestRow {
+pub(crate) struct TestRow {
     /// The controller.
-    pub controller: String,
+    pub(crate) controller: String,
     /// The axis, `a1` and on, or the name of the effect.
-    pub part: String,
+    pub(crate) part: String,
     /// Frames that asked for a reply meanwhile.
-    pub asked: u64,
+    pub(crate) asked: u64,
     /// Of these: acked.
-    pub acked: u64,
+    pub(crate) acked: u64,
     /// Ack latency meanwhile, µs: half of them are no longer; null if none was acked.
-    pub p50_us: Option<f64>,
+    pub(crate) p50_us: Option<f64>,
     /// 99 of 100 of them are no longer, µs.
-    pub p99_us: Option<f64>,
+    pub(crate) p99_us: Option<f64>,
     /// True if the controller took part as it should.
-    pub passed: bool,
+    pub(crate) passed: bool,
 }
 
 /// Something that a person should know.
@@ -305,15 +305,15 @@ pub struct TestRow {
 #[serde(default)]
 pub struct Warning {
     /// Stable, for programs: `not-real-time`, `controller-lost` …
-    pub id: String,
+    pub(crate) id: String,
     /// How grave it is.
-    pub severity: Severity,
+    pub(crate) severity: Severity,
     /// The controller it is about; null if it is the hall.
-    pub controller: Option<String>,
+    pub(crate) controller: Option<String>,
     /// What is the matter.
-    pub text: String,
+    pub(crate) text: String,
     /// What to do.
-    pub remedy: String,
+    pub(crate) remedy: String,
 }
 
 /// One thing that somebody asked.

@@ -40,7 +40,7 @@ pub struct Who {
 impl Surface {
     /// True if it is that of show-control gear, which is known by its address alone.
     #[must_use]
-    pub const fn is_gear(self) -> bool {
+    pub(crate) const fn is_gear(self) -> bool {
         matches!(self, Self::Osc | Self::Text)
     }
 }

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use crate::plain;
 
 /// How many faults of a file are told; the rest is counted.
-pub const FAULTS_TOLD: usize = 20;
+pub(crate) const FAULTS_TOLD: usize = 20;
 /// How much of a column's name is told, bytes.
 const NAME_TOLD: usize = 80;
 
@@ -52,13 +52,13 @@ impl fmt::Display for Place {
 
 /// One thing that is wrong with a cue.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fault {
+pub(crate) struct Fault {
     /// Where it stands.
-    pub place: Place,
+    pub(crate) place: Place,
     /// The name of the column or field, where it is about one.
-    pub column: Option<String>,
+    pub(crate) column: Option<String>,
     /// What is wrong.
-    pub problem: Problem,
+    pub(crate) problem: Problem,
 }
 
 impl fmt::Display for Fault {
@@ -73,7 +73,7 @@ impl fmt::Display for Fault {
 
 /// Which kind of trouble a file makes, for the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FaultClass {
+pub(crate) enum FaultClass {
     /// Missing, a folder, or not to be opened.
     NoInput,
     /// Reading failed midway.
@@ -93,25 +93,25 @@ pub struct CueFaults {
 impl CueFaults {
     /// The file.
     #[must_use]
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// The first faults, [`FAULTS_TOLD`] at most, in the order they were met.
     #[must_use]
-    pub fn told(&self) -> &[Fault] {
+    pub(crate) fn told(&self) -> &[Fault] {
         &self.told
     }
 
     /// How many faults there are beyond those told.
     #[must_use]
-    pub const fn more(&self) -> u64 {
+    pub(crate) const fn more(&self) -> u64 {
         self.more
     }
 
     /// True if there was no file to read, reading failed, or what was read is wrong.
     #[must_use]
-    pub fn class(&self) -> FaultClass {
+    pub(crate) fn class(&self) -> FaultClass {
         match self.told.first().map(|fault| &fault.problem) {
             Some(Problem::Missing | Problem::Folder | Problem::Unopened(_)) => FaultClass::NoInput,
             Some(Problem::Unread(_)) => FaultClass::Io,

@@ -3,21 +3,21 @@
 use crate::time::ShowTime;
 
 /// The most rows of a cue: two hours at 1 kHz and some.
-pub const MAX_ROWS: usize = 8_000_000;
+pub(crate) const MAX_ROWS: usize = 8_000_000;
 /// The most bytes of one line, its end not counted, and of one MCAP message.
-pub const MAX_LINE: usize = 64 * 1024;
+pub(crate) const MAX_LINE: usize = 64 * 1024;
 /// The most bytes of a file, and of what a compressed file unpacks to.
-pub const MAX_FILE: u64 = 2 * 1024 * 1024 * 1024;
+pub(crate) const MAX_FILE: u64 = 2 * 1024 * 1024 * 1024;
 /// The most effects that a cue may name.
-pub const MAX_EFFECTS: usize = 32;
+pub(crate) const MAX_EFFECTS: usize = 32;
 /// The most markers of a cue.
-pub const MAX_MARKERS: usize = 10_000;
+pub(crate) const MAX_MARKERS: usize = 10_000;
 /// The most bytes of a marker's name.
-pub const MAX_MARKER_NAME: usize = 256;
+pub(crate) const MAX_MARKER_NAME: usize = 256;
 /// The bytes of a title that are kept.
 pub(super) const MAX_TITLE: usize = 1_024;
 /// The last show time a row may have: a day.
-pub const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);
+pub(crate) const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);
 /// The greatest position in mm, far beyond any seat.
 pub(super) const MAX_MILLIMETRES: f64 = 100_000.0;
 /// The greatest position in pulses: what a frame can carry (SMC manual 2.2.2.5).
@@ -25,12 +25,12 @@ pub(super) const MAX_PULSES: f64 = i32::MAX as f64;
 /// The outputs that a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).
 pub(super) const ALL_OUTPUTS: u16 = 0x0fff;
 /// The slowest vibration a frame can carry, Hz: a period of 65,535 x 0.125 ms (SMC manual 2.2.2.9), rounded up.
-pub const MIN_VIBRATION_HZ: f64 = 0.1221;
+pub(crate) const MIN_VIBRATION_HZ: f64 = 0.1221;
 /// The fastest vibration, Hz: a period of 0.125 ms (SMC manual 2.2.2.9).
-pub const MAX_VIBRATION_HZ: f64 = 8_000.0;
+pub(crate) const MAX_VIBRATION_HZ: f64 = 8_000.0;
 
 /// The limits that a person may meet, for `--help`.
-pub const IN_WORDS: &str =
+pub(crate) const IN_WORDS: &str =
     "at most 8 million rows (two hours at 1 kHz), 12 axes, 64 KiB a line and 2 GiB a file";
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ mod csv;
 mod csv_write;
 mod fault;
 mod header;
-pub mod limits;
+pub(crate) mod limits;
 mod mcap;
 mod number;
 mod place;
@@ -24,15 +24,18 @@ mod unit;
 mod value;
 
 pub(crate) use builder::CueBuilder;
-pub use csv_write::{CsvError, write as write_csv};
-pub(crate) use fault::Collector;
-pub use fault::{CueFaults, FAULTS_TOLD, Fault, FaultClass, Place};
-pub use mcap::{recover, write as write_mcap};
+pub(crate) use csv_write::CsvError;
+pub use csv_write::write as write_csv;
+pub use fault::CueFaults;
+pub(crate) use fault::{Collector, FAULTS_TOLD, Fault, FaultClass, Place};
+pub use mcap::recover;
+pub use mcap::write as write_mcap;
 use place::Origin;
-pub use problem::Problem;
-pub use steps::{Step, Steps};
-pub use tracks::{Tracks, Vibration};
-pub use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation, UnknownUnit};
+pub(crate) use problem::Problem;
+pub use steps::Step;
+pub(crate) use steps::Steps;
+pub(crate) use tracks::{Tracks, Vibration};
+pub(crate) use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation};
 
 use crate::channel::{ChannelId, Sample};
 use crate::plain;
@@ -61,7 +64,7 @@ pub enum Source {
 
 /// What a cue switches over time.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Effects {
+pub(crate) enum Effects {
     /// Effects by name; bit i of a step says whether effect i is on.
     Named {
         /// The effects' names, at most [`limits::MAX_EFFECTS`].
@@ -83,7 +86,7 @@ impl Default for Effects {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Marker {
     /// When.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
     /// What it is called.
     pub name: String,
 }
@@ -135,19 +138,19 @@ impl Cue {
     }
 
     /// Gives it another title.
-    pub fn set_title(&mut self, title: String) {
+    pub(crate) fn set_title(&mut self, title: String) {
         self.title = Some(title_of(&title));
     }
 
     /// The unit of positions and amplitudes in memory.
     #[must_use]
-    pub const fn unit(&self) -> Unit {
+    pub(crate) const fn unit(&self) -> Unit {
         self.unit
     }
 
     /// How the curve runs between the rows.
     #[must_use]
-    pub const fn interpolation(&self) -> Interpolation {
+    pub(crate) const fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 
@@ -180,13 +183,13 @@ impl Cue {
     /// # Panics
     /// If there is no such row.
     #[must_use]
-    pub fn row(&self, row: usize) -> &[f64] {
+    pub(crate) fn row(&self, row: usize) -> &[f64] {
         &self.positions[row * self.axes..][..self.axes]
     }
 
     /// The time of the last row.
     #[must_use]
-    pub fn duration(&self) -> ShowTime {
+    pub(crate) fn duration(&self) -> ShowTime {
         self.times.last().copied().unwrap_or_default()
     }
 
@@ -198,7 +201,7 @@ impl Cue {
 
     /// What the cue switches.
     #[must_use]
-    pub const fn effects(&self) -> &Effects {
+    pub(crate) const fn effects(&self) -> &Effects {
         &self.effects
     }
 
@@ -210,14 +213,14 @@ impl Cue {
 
     /// The line a row came from, or the number of its message or byte row, from 1.
     #[must_use]
-    pub fn line(&self, row: usize) -> u64 {
+    pub(crate) fn line(&self, row: usize) -> u64 {
         self.origin.line(row)
     }
 
     /// Where a row's position of an axis stands in the file. Reads the file again for the column; where it has
     /// changed since, the column is 1.
     #[must_use]
-    pub fn place(&self, row: usize, axis: usize) -> Place {
+    pub(crate) fn place(&self, row: usize, axis: usize) -> Place {
         let time = self.times.get(row).copied().unwrap_or_default();
         self.origin.place(&self.path, row, axis, time)
     }
@@ -225,7 +228,7 @@ impl Cue {
     /// Where the header of its file names a column, or where that column has what holds from `at` on; the file as a whole where
     /// it has no such header. Reads the file again.
     #[must_use]
-    pub fn column_place(&self, column: &str, at: Option<ShowTime>) -> Place {
+    pub(crate) fn column_place(&self, column: &str, at: Option<ShowTime>) -> Place {
         let row = at.map(|at| self.times.partition_point(|time| *time <= at).saturating_sub(1));
         self.origin.column_place(&self.path, column, row)
     }
@@ -292,7 +295,7 @@ pub fn load(path: &Path, source: &Source) -> Result<Cue, CueFaults> {
 /// # Errors
 /// A fault of class [`FaultClass::NoInput`] where there is none, it is a folder, a pipe or a device, or the system refuses; one of class
 /// [`FaultClass::BadCue`] where it is over [`limits::MAX_FILE`].
-pub fn open(path: &Path) -> Result<File, CueFaults> {
+pub(crate) fn open(path: &Path) -> Result<File, CueFaults> {
     let file = sys::file::open(path).map_err(|error| {
         let problem = match error.kind() {
             io::ErrorKind::NotFound => Problem::Missing,
@@ -328,7 +331,7 @@ fn title_of(text: &str) -> String {
 
 /// True if a file that begins so is MCAP.
 #[must_use]
-pub fn is_mcap(front: &[u8]) -> bool {
+pub(crate) fn is_mcap(front: &[u8]) -> bool {
     front.starts_with(mcap::MAGIC)
 }
 

@@ -6,7 +6,7 @@ use crate::time::ShowTime;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step<T> {
     /// From when on.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
     /// What holds from then on.
     pub value: T,
 }
@@ -53,7 +53,7 @@ impl<T: Copy + PartialEq + Default> Steps<T> {
     /// The value that holds at `at`, the type's default before the first. `hint` is where the last answer was found:
     /// asked onwards in time this takes constant time, after a seek the logarithm of the number of changes.
     #[must_use]
-    pub fn at(&self, at: ShowTime, hint: &mut usize) -> T {
+    pub(crate) fn at(&self, at: ShowTime, hint: &mut usize) -> T {
         let steps = self.0.as_slice();
         let next = |i: usize| steps.get(i).is_none_or(|step| at < step.at);
         let started = |i: usize| i == 0 || steps.get(i - 1).is_some_and(|step| step.at <= at);

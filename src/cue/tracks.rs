@@ -6,9 +6,9 @@ use crate::motion::MAX_AXES;
 
 /// A vibration of one axis; none if either part is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Vibration {
+pub(crate) struct Vibration {
     /// Frequency, Hz: 0, or [`super::limits::MIN_VIBRATION_HZ`] to [`super::limits::MAX_VIBRATION_HZ`].
-    pub hz: f64,
+    pub(crate) hz: f64,
     /// Amplitude in the cue's unit, 0 or more.
     pub amplitude: f64,
 }

@@ -7,7 +7,7 @@ use crate::motion::SeatType;
 
 /// The unit that positions and vibration amplitudes have in memory, counted from the stroke's lower end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Unit {
+pub(crate) enum Unit {
     /// Fraction of the stroke, 0 to 1.
     #[default]
     Fraction,
@@ -20,7 +20,7 @@ pub enum Unit {
 impl Unit {
     /// The word for it in a cue file.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Fraction => "fraction",
             Self::Millimetre => "mm",
@@ -30,13 +30,13 @@ impl Unit {
 
     /// The factor that turns a position in this unit into a fraction of the seat's stroke.
     #[must_use]
-    pub fn to_stroke(self, seat: &SeatType) -> f64 {
+    pub(crate) fn to_stroke(self, seat: &SeatType) -> f64 {
         self.stroke(seat).recip()
     }
 
     /// The length of the seat's stroke in this unit.
     #[must_use]
-    pub fn stroke(self, seat: &SeatType) -> f64 {
+    pub(crate) fn stroke(self, seat: &SeatType) -> f64 {
         match self {
             Self::Fraction => 1.0,
             Self::Millimetre => seat.stroke_mm,
@@ -74,7 +74,7 @@ pub enum DeclaredUnit {
 impl DeclaredUnit {
     /// The unit in memory.
     #[must_use]
-    pub const fn unit(self) -> Unit {
+    pub(crate) const fn unit(self) -> Unit {
         match self {
             Self::Fraction | Self::Percent | Self::U8 => Unit::Fraction,
             Self::Millimetre => Unit::Millimetre,
@@ -136,7 +136,7 @@ impl FromStr for DeclaredUnit {
 
 /// How the curve runs between the points of a cue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Interpolation {
+pub(crate) enum Interpolation {
     /// The C2 cubic spline, not-a-knot at its ends; a parabola through three points, a line through two.
     #[default]
     Spline,
@@ -151,7 +151,7 @@ pub enum Interpolation {
 impl Interpolation {
     /// The word for it in a cue file.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Spline => "spline",
             Self::Monotone => "monotone",
@@ -164,7 +164,7 @@ impl Interpolation {
 /// The text is none of the interpolations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("interpolations are spline, monotone, linear or hold")]
-pub struct UnknownInterpolation;
+pub(crate) struct UnknownInterpolation;
 
 impl FromStr for Interpolation {
     type Err = UnknownInterpolation;

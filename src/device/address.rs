@@ -26,7 +26,7 @@ pub enum Address {
 impl Address {
     /// The register `steps` further on in the same table; none past its end.
     #[must_use]
-    pub fn after(self, steps: u16) -> Option<Self> {
+    pub(crate) fn after(self, steps: u16) -> Option<Self> {
         let narrow = |number: u8| u8::try_from(u16::from(number).checked_add(steps)?).ok();
         match self {
             Self::Pa(number) => narrow(number).map(Self::Pa),
@@ -39,7 +39,7 @@ impl Address {
 
     /// True if it belongs to a drive.
     #[must_use]
-    pub const fn is_servo(self) -> bool {
+    pub(crate) const fn is_servo(self) -> bool {
         matches!(self, Self::Servo { .. })
     }
 }

@@ -6,7 +6,7 @@ use crate::wire::Dialect;
 /// Why a value is not written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Objection {
+pub(crate) enum Objection {
     /// It makes no sense there.
     #[error("{address}={value} is outside {min}..={max}, the values of {name}")]
     Range {
@@ -67,7 +67,7 @@ fn never(address: Address) -> &'static str {
 
 /// What a dialect is called in configurations.
 #[must_use]
-pub const fn dialect_name(dialect: Dialect) -> &'static str {
+pub(crate) const fn dialect_name(dialect: Dialect) -> &'static str {
     match dialect {
         Dialect::Smc => "smc",
         Dialect::Mbox => "mbox",
@@ -79,7 +79,7 @@ pub const fn dialect_name(dialect: Dialect) -> &'static str {
 ///
 /// # Errors
 /// The [`Objection`].
-pub fn check(assignment: Assignment, dialect: Dialect, force: bool) -> Result<(), Objection> {
+pub(crate) fn check(assignment: Assignment, dialect: Dialect, force: bool) -> Result<(), Objection> {
     let Assignment { address, value } = assignment;
     let Some(register) = table().get(address) else {
         let name = "a register of a servo drive";
@@ -108,13 +108,13 @@ pub fn check(assignment: Assignment, dialect: Dialect, force: bool) -> Result<()
 
 /// True if writing the value moves the seat.
 #[must_use]
-pub fn moves(address: Address) -> bool {
+pub(crate) fn moves(address: Address) -> bool {
     table().get(address).is_some_and(|register| register.flags.moves)
 }
 
 /// True if the register keeps what is written to it, so that reading it back proves the write.
 #[must_use]
-pub fn keeps(address: Address) -> bool {
+pub(crate) fn keeps(address: Address) -> bool {
     table().get(address).is_none_or(|register| !register.flags.command)
 }
 

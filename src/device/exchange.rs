@@ -24,20 +24,20 @@ const HEAD_LEN: usize = 16;
 
 /// How a controller is spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Endpoint {
+pub(crate) struct Endpoint {
     /// The message set it speaks.
-    pub dialect: Dialect,
+    pub(crate) dialect: Dialect,
     /// The accept and reply code of what it is sent.
-    pub code: Code,
+    pub(crate) code: Code,
 }
 
 /// How long to wait for an answer, and how often to ask for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
     /// For each try.
-    pub timeout: Duration,
+    pub(crate) timeout: Duration,
     /// At least 1.
-    pub tries: u32,
+    pub(crate) tries: u32,
 }
 
 impl Default for Patience {
@@ -51,16 +51,16 @@ impl Default for Patience {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
     /// The registers that were asked for, in order; what was written, echoed.
-    pub words: Vec<u16>,
+    pub(crate) words: Vec<u16>,
     /// How the controller is. An SMC controller answers in every state, and a reply with x = 3 or 4 tells of that state,
     /// not of the request.
-    pub code: ReplyCode,
+    pub(crate) code: ReplyCode,
     /// Its error number; 0 for none.
-    pub error: DeviceError,
+    pub(crate) error: DeviceError,
     /// From the last sending to the answer.
-    pub took: Duration,
+    pub(crate) took: Duration,
     /// How often it was sent.
-    pub tries: u32,
+    pub(crate) tries: u32,
 }
 
 /// What became of a request.
@@ -69,27 +69,27 @@ pub struct Outcome {
     /// Whose it was.
     pub lane: usize,
     /// What was asked.
-    pub request: Request,
+    pub(crate) request: Request,
     /// What came of it.
     pub result: Result<Answer, Fault>,
 }
 
 /// What came from a controller's address and was no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Odds {
+pub(crate) struct Odds {
     /// No message, or a reply longer or shorter than its count.
-    pub malformed: u64,
+    pub(crate) malformed: u64,
     /// Replies to what was never asked.
-    pub foreign: u64,
+    pub(crate) foreign: u64,
     /// Replies to what had been given up or asked again.
-    pub late: u64,
+    pub(crate) late: u64,
     /// Further replies to what had been answered: a repeating network, or a second controller of this address.
-    pub duplicate: u64,
+    pub(crate) duplicate: u64,
 }
 
 /// What is under way with every controller.
 #[derive(Debug)]
-pub struct Exchange {
+pub(crate) struct Exchange {
     lanes: Vec<Lane>,
     patience: Patience,
     outcomes: Vec<Option<Outcome>>,
@@ -128,7 +128,7 @@ struct Owed {
 impl Exchange {
     /// Nothing under way with any of `peers`.
     #[must_use]
-    pub fn new(peers: &[Endpoint]) -> Self {
+    pub(crate) fn new(peers: &[Endpoint]) -> Self {
         let lane = |&peer: &Endpoint| Lane {
             peer,
             queue: VecDeque::new(),
@@ -147,7 +147,7 @@ impl Exchange {
 
     /// How many controllers there are.
     #[must_use]
-    pub const fn lanes(&self) -> usize {
+    pub(crate) const fn lanes(&self) -> usize {
         self.lanes.len()
     }
 
@@ -155,7 +155,7 @@ impl Exchange {
     ///
     /// # Panics
     /// If a request is for a lane that there is not.
-    pub fn begin(&mut self, requests: Vec<(usize, Request)>, patience: Patience) {
+    pub(crate) fn begin(&mut self, requests: Vec<(usize, Request)>, patience: Patience) {
         self.patience = patience;
         self.outcomes = requests.iter().map(|_| None).collect();
         for lane in &mut self.lanes {
@@ -168,7 +168,7 @@ impl Exchange {
     }
 
     /// What has to be sent to a controller now; to be called until it returns none.
-    pub fn due(&mut self, lane: usize, at: MonoTime) -> Option<&[u8]> {
+    pub(crate) fn due(&mut self, lane: usize, at: MonoTime) -> Option<&[u8]> {
         let one = &mut self.lanes[lane];
         one.owed.retain(|owed| owed.until > at);
         if one.flight.as_ref().is_some_and(|flight| at < flight.sent + self.patience.timeout) {
@@ -225,12 +225,12 @@ impl Exchange {
     }
 
     /// Notes that the kernel did not take what was due.
-    pub fn on_unsent(&mut self, lane: usize, fault: SendFault) {
+    pub(crate) fn on_unsent(&mut self, lane: usize, fault: SendFault) {
         self.note(lane, Odd::Unsent(fault));
     }
 
     /// Notes that the kernel reported a closed port.
-    pub fn on_closed(&mut self, lane: usize) {
+    pub(crate) fn on_closed(&mut self, lane: usize) {
         self.note(lane, Odd::Closed);
     }
 
@@ -242,7 +242,7 @@ impl Exchange {
 
     /// Takes a datagram from a controller's address; says whether it was about registers or broken, and so is done
     /// with. Motion replies and reports are left to others.
-    pub fn on_datagram(&mut self, lane: usize, bytes: &[u8], at: MonoTime) -> bool {
+    pub(crate) fn on_datagram(&mut self, lane: usize, bytes: &[u8], at: MonoTime) -> bool {
         match Reply::parse(bytes) {
             Ok(Some(reply)) => self.on_reply(lane, &reply, at),
             Ok(None) => return false,
@@ -279,24 +279,25 @@ impl Exchange {
 
     /// When something may next be due, if nothing comes before; none when all is done.
     #[must_use]
-    pub fn wake(&self) -> Option<MonoTime> {
+    pub(crate) fn wake(&self) -> Option<MonoTime> {
         self.lanes.iter().filter_map(|lane| lane.wake(self.patience.timeout)).min()
     }
 
     /// True if every request has its outcome.
     #[must_use]
-    pub fn finished(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) fn finished(&self) -> bool {
         self.lanes.iter().all(|lane| lane.flight.is_none() && lane.queue.is_empty())
     }
 
     /// The outcomes of a finished exchange, in the order of the requests.
-    pub fn take(&mut self) -> Vec<Outcome> {
+    pub(crate) fn take(&mut self) -> Vec<Outcome> {
         self.outcomes.drain(..).flatten().collect()
     }
 
     /// What came from a controller's address and was no answer, since the beginning.
     #[must_use]
-    pub fn odds(&self, lane: usize) -> Odds {
+    pub(crate) fn odds(&self, lane: usize) -> Odds {
         self.lanes[lane].odds
     }
 }

@@ -52,7 +52,7 @@ pub enum Fault {
 impl Fault {
     /// True if the controller answered, but would not.
     #[must_use]
-    pub const fn refused(&self) -> bool {
+    pub(crate) const fn refused(&self) -> bool {
         matches!(self, Self::Refused { .. } | Self::NoWay { .. })
     }
 }
@@ -105,7 +105,7 @@ fn behind(request: &Request, odd: Option<&Odd>) -> String {
 /// What a reply code other than 2 says, by the controller's dialect (SMC manual 2.2.1 and chapter 6; MBOX as public
 /// programs read it).
 #[must_use]
-pub fn refusal(code: ReplyCode, error: DeviceError, dialect: Dialect) -> String {
+pub(crate) fn refusal(code: ReplyCode, error: DeviceError, dialect: Dialect) -> String {
     let x = code as u8;
     let words = match (dialect, code) {
         (_, ReplyCode::Running) => "the controller runs normally",

@@ -9,11 +9,11 @@ use crate::time::{Clock, MonoTime};
 use crate::wire::{DeviceError, Dialect, ReplyCode};
 
 /// The control register that resets, and tells when it is done.
-pub const DPF0: Address = Address::Dp(0xf0);
+pub(crate) const DPF0: Address = Address::Dp(0xf0);
 /// What a reset does: 0 searches zero, 1 goes there without a search.
-pub const PA0E: Address = Address::Pa(0x0e);
+pub(crate) const PA0E: Address = Address::Pa(0x0e);
 /// How long homing may take before it is given up.
-pub const TIMEOUT: Duration = Duration::from_secs(60);
+pub(crate) const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// What is written to DPF0, and what it reads when homing is complete.
 const START: u16 = 0;
@@ -28,7 +28,7 @@ const LOOKS: u32 = 2;
 /// Why a seat is not home.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum HomeError {
+pub(crate) enum HomeError {
     /// It did not take the order.
     #[error(transparent)]
     Order(#[from] Fault),
@@ -70,7 +70,7 @@ fn last(dpf0: Option<u16>) -> String {
 
 /// How far a seat is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Progress {
+pub(crate) enum Progress {
     /// It took the order.
     Started,
     /// It is on its way.
@@ -103,7 +103,7 @@ struct Seat {
 /// with the lane's number; gives how long each took, in the order of `lanes`.
 ///
 /// Nothing else moves the seats meanwhile, as long as the conversation holds the frame port.
-pub fn home<L: Link, C: Clock>(
+pub(crate) fn home<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
     lanes: &[(usize, Dialect)],
     timeout: Duration,
@@ -129,7 +129,7 @@ pub fn home<L: Link, C: Clock>(
 
 /// The controllers among `lanes` that would not search their zero (PA0e), each with what is wrong. One that does not
 /// answer is not among them: the order to home will tell.
-pub fn unsearched<L: Link, C: Clock>(
+pub(crate) fn unsearched<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
     lanes: &[(usize, Dialect)],
 ) -> Vec<(usize, HomeError)> {
@@ -167,7 +167,7 @@ fn start<L: Link, C: Clock>(
 
 /// What keeps a controller that answered so from homing, where anything does.
 #[must_use]
-pub fn hindrance(answer: &Answer, dialect: Dialect) -> Option<HomeError> {
+pub(crate) fn hindrance(answer: &Answer, dialect: Dialect) -> Option<HomeError> {
     let &Answer { code, error, .. } = answer;
     let hopeless = match code {
         ReplyCode::Running => false,

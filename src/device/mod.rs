@@ -14,25 +14,29 @@
 //! place, [`table()`], and nowhere else.
 
 mod address;
-pub mod change;
+pub(crate) mod change;
 mod exchange;
 mod fault;
-pub mod home;
+pub(crate) mod home;
 mod request;
 mod select;
 pub mod settings;
-pub mod stand;
-pub mod survey;
+pub(crate) mod stand;
+pub(crate) mod survey;
 mod table;
 mod talk;
 #[cfg(test)]
 mod testing;
 
 pub use address::Address;
-pub use exchange::{Answer, Endpoint, Exchange, Odds, Outcome, Patience};
-pub use fault::{Fault, Odd, refusal};
-pub use request::{MAX_READ, Request, reads};
-pub use select::{Assignment, SelectError, Selection, assignments, selections};
-pub use stand::{places, position_words_of};
-pub use table::{Family, Flags, Register, Table, table};
-pub use talk::{Link, Talk, Watch, peers};
+pub use exchange::Patience;
+pub(crate) use exchange::{Answer, Endpoint, Exchange, Odds, Outcome};
+pub(crate) use fault::{Fault, Odd, refusal};
+pub(crate) use request::Request;
+pub use request::reads;
+pub(crate) use select::{Assignment, Selection, assignments, selections};
+pub(crate) use stand::{places, position_words_of};
+pub use table::table;
+pub(crate) use table::{Family, Flags, Register};
+pub use talk::Talk;
+pub(crate) use talk::{Link, Watch, peers};

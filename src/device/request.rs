@@ -10,7 +10,7 @@ use crate::wire::{
 
 /// The most registers of a controller that one request reads: a reply of 80 bytes. The manuals set no limit, but
 /// public programs ask for a few at a time, and nobody has shown a controller that answers many.
-pub const MAX_READ: u16 = 32;
+pub(crate) const MAX_READ: u16 = 32;
 
 /// Object channels of reads (SMC manual 2.2.2.1).
 const READ_DP: u16 = 0;
@@ -45,19 +45,19 @@ pub enum Request {
 impl Request {
     /// A read of one register.
     #[must_use]
-    pub const fn read(address: Address) -> Self {
+    pub(crate) const fn read(address: Address) -> Self {
         Self::Read { first: address, count: 1 }
     }
 
     /// A write that a power cycle undoes, unless PA0f = 2 follows.
     #[must_use]
-    pub const fn write(address: Address, value: u16) -> Self {
+    pub(crate) const fn write(address: Address, value: u16) -> Self {
         Self::Write { address, value, keep: false }
     }
 
     /// The first register it is about.
     #[must_use]
-    pub const fn first(&self) -> Address {
+    pub(crate) const fn first(&self) -> Address {
         match self {
             Self::Read { first, .. } => *first,
             Self::Write { address, .. } => *address,

@@ -15,7 +15,7 @@ const ALIKE: f64 = 0.75;
 /// Why words name no registers, or no values for them.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum SelectError {
+pub(crate) enum SelectError {
     /// No number of a register, or a range of them.
     #[error("{word:?} is no register number; {space} takes {wanted}")]
     Number {
@@ -78,27 +78,27 @@ pub enum SelectError {
 
 /// Registers that one or a few words name.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Selection {
+pub(crate) struct Selection {
     /// Which, in order.
-    pub addresses: Vec<Address>,
+    pub(crate) addresses: Vec<Address>,
     /// True if a single register was named rather than a range or a table; it must then be there.
-    pub single: bool,
+    pub(crate) single: bool,
 }
 
 /// A value for a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Assignment {
+pub(crate) struct Assignment {
     /// Which register.
-    pub address: Address,
+    pub(crate) address: Address,
     /// What it shall hold.
-    pub value: u16,
+    pub(crate) value: u16,
 }
 
 /// The registers that `words` name, in the order of the words; all of PA and DP where there are none.
 ///
 /// # Errors
 /// A [`SelectError`] for the first words that name none.
-pub fn selections(words: &[String]) -> Result<Vec<Selection>, SelectError> {
+pub(crate) fn selections(words: &[String]) -> Result<Vec<Selection>, SelectError> {
     let mut words = Words::new(words);
     if words.peek().is_none() {
         return Ok(vec![whole(Address::Pa), whole(Address::Dp)]);
@@ -114,7 +114,7 @@ pub fn selections(words: &[String]) -> Result<Vec<Selection>, SelectError> {
 ///
 /// # Errors
 /// A [`SelectError`] for the first words that are none; for a register named twice, and where there are no words.
-pub fn assignments(words: &[String]) -> Result<Vec<Assignment>, SelectError> {
+pub(crate) fn assignments(words: &[String]) -> Result<Vec<Assignment>, SelectError> {
     let mut words = Words::new(words);
     let mut found: Vec<Assignment> = Vec::new();
     while words.peek().is_some() {

@@ -14,7 +14,7 @@ use crate::wire::Dialect;
 const VERSION: u32 = 1;
 
 /// What registers hold.
-pub type Values = BTreeMap<Address, u16>;
+pub(crate) type Values = BTreeMap<Address, u16>;
 
 /// Why a text is no settings file.
 #[derive(Debug, thiserror::Error)]
@@ -43,13 +43,13 @@ pub enum SettingsError {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Saved {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Where it was reached.
-    pub address: SocketAddrV4,
+    pub(crate) address: SocketAddrV4,
     /// The dialect it was read in.
-    pub dialect: Dialect,
+    pub(crate) dialect: Dialect,
     /// Its parameters.
-    pub values: Values,
+    pub(crate) values: Values,
 }
 
 #[derive(Deserialize)]
@@ -76,14 +76,14 @@ enum Spelling {
 }
 
 /// The parameters of a controller that are settings: all but those that are commands.
-pub fn parameters(dialect: Dialect) -> impl Iterator<Item = &'static Register> {
+pub(crate) fn parameters(dialect: Dialect) -> impl Iterator<Item = &'static Register> {
     let parameter = |register: &&Register| matches!(register.address, Address::Pa(_));
     table().of(dialect).filter(parameter).filter(|register| !register.flags.command)
 }
 
 /// The settings as the text of a file.
 #[must_use]
-pub fn text(all: &[Saved]) -> String {
+pub(crate) fn text(all: &[Saved]) -> String {
     let mut text = String::from("# Parameters of motion controllers, read by `kinocue register save`.\n");
     let done = "a String takes what is written to it";
     writeln!(text, "kinocue_settings = {VERSION}").expect(done);
@@ -147,26 +147,26 @@ fn saved(name: String, section: Section) -> Result<Saved, SettingsError> {
 
 /// A parameter that differs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// Which one.
     #[serde(rename = "register")]
-    pub address: Address,
+    pub(crate) address: Address,
     /// What the file has.
-    pub saved: u16,
+    pub(crate) saved: u16,
     /// What the controller has.
-    pub found: u16,
+    pub(crate) found: u16,
 }
 
 /// True if two controllers with the same settings may differ here: their own addresses.
 #[must_use]
-pub fn is_own(address: Address) -> bool {
+pub(crate) fn is_own(address: Address) -> bool {
     table().get(address).is_some_and(|register| register.flags.identity)
 }
 
 /// Where `found` differs from `saved`, in order. A controller's own address is left out unless `own` is set; a register
 /// that only one of them has is left out too.
 #[must_use]
-pub fn differences(saved: &Values, found: &Values, own: bool) -> Vec<Difference> {
+pub(crate) fn differences(saved: &Values, found: &Values, own: bool) -> Vec<Difference> {
     let pairs = saved.iter().filter_map(|(address, saved)| Some((*address, *saved, *found.get(address)?)));
     pairs
         .filter(|(address, saved, found)| saved != found && (own || !is_own(*address)))

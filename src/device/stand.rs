@@ -24,7 +24,7 @@ const OFFSET: Address = Address::Pa(0x95);
 /// Why a seat is not sent frames that should hold it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum StandError {
+pub(crate) enum StandError {
     /// It did not tell something that has to be known.
     #[error(transparent)]
     Unread(#[from] Fault),
@@ -108,7 +108,7 @@ pub enum StandError {
 impl StandError {
     /// True if the controller answered, but will not do.
     #[must_use]
-    pub const fn answered(&self) -> bool {
+    pub(crate) const fn answered(&self) -> bool {
         match self {
             Self::Unread(fault) => fault.refused(),
             _ => true,
@@ -121,7 +121,7 @@ impl StandError {
 ///
 /// # Panics
 /// If `controllers` are fewer than the conversation was opened with.
-pub fn stand<L: Link, C: Clock>(
+pub(crate) fn stand<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
     controllers: &[Controller],
 ) -> Vec<Result<Vec<Pulses>, StandError>> {
@@ -144,7 +144,7 @@ fn settings(controller: &Controller) -> Vec<Address> {
 }
 
 /// The registers with the positions of the first `axes` axes.
-pub fn places(axes: usize) -> impl Iterator<Item = Address> {
+pub(crate) fn places(axes: usize) -> impl Iterator<Item = Address> {
     (0..axes).map_while(words).flatten()
 }
 
@@ -156,7 +156,7 @@ fn words(axis: usize) -> Option<[Address; 2]> {
 
 /// What the position registers of the first `axes` axes hold, two words each; `None` if one of them is missing.
 #[must_use]
-pub fn position_words_of(values: &Values, axes: usize) -> Option<Vec<[u16; 2]>> {
+pub(crate) fn position_words_of(values: &Values, axes: usize) -> Option<Vec<[u16; 2]>> {
     let held = |address| values.get(&address).copied();
     (0..axes.min(DP_POSITIONS.len()))
         .map(|axis| {

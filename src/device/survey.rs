@@ -15,11 +15,11 @@ use crate::time::{Clock, MonoTime};
 use crate::wire::{DeviceError, Dialect, ReplyCode};
 
 /// Reads whose round trip is measured.
-pub const ROUNDS: usize = 20;
+pub(crate) const ROUNDS: usize = 20;
 /// How long each of these waits for its answer.
-pub const ROUND_TIMEOUT: Duration = Duration::from_millis(100);
+pub(crate) const ROUND_TIMEOUT: Duration = Duration::from_millis(100);
 /// How long a survey listens for reports at the least.
-pub const LISTEN: Duration = Duration::from_millis(300);
+pub(crate) const LISTEN: Duration = Duration::from_millis(300);
 /// No round begins this long after the survey began.
 const LAST_ROUND: Duration = Duration::from_secs(7);
 
@@ -35,35 +35,35 @@ const PACKETS: Address = Address::Dp(0x34);
 
 /// What one controller told.
 #[derive(Debug, Clone, Default)]
-pub struct Survey {
+pub(crate) struct Survey {
     /// What its registers hold.
-    pub values: Values,
+    pub(crate) values: Values,
     /// Why the first question had no answer; `None` if it had one.
-    pub silent: Option<Fault>,
+    pub(crate) silent: Option<Fault>,
     /// Why later questions had none.
-    pub unread: Vec<Fault>,
+    pub(crate) unread: Vec<Fault>,
     /// Its state, where an answer told of another than the normal one; the last of these.
-    pub state: Option<(ReplyCode, DeviceError)>,
+    pub(crate) state: Option<(ReplyCode, DeviceError)>,
     /// How long the answers to the measured reads took.
-    pub round_trips: Vec<Duration>,
+    pub(crate) round_trips: Vec<Duration>,
     /// Measured reads that were sent.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// What came from its address and was no answer.
-    pub odds: Odds,
+    pub(crate) odds: Odds,
     /// Registers that told two values, though nobody here wrote them.
-    pub changed: Vec<Address>,
+    pub(crate) changed: Vec<Address>,
     /// Where its axes stood the second time, by the position registers.
-    pub again: Values,
+    pub(crate) again: Values,
     /// Datagrams that it received beyond those sent from here; `None` if that is not known.
-    pub foreign_packets: Option<u16>,
+    pub(crate) foreign_packets: Option<u16>,
     /// What it reported unasked.
-    pub reported: ControllerState,
+    pub(crate) reported: ControllerState,
 }
 
 impl Survey {
     /// True if it answered at all.
     #[must_use]
-    pub const fn answered(&self) -> bool {
+    pub(crate) const fn answered(&self) -> bool {
         self.silent.is_none()
     }
 }
@@ -73,7 +73,7 @@ impl Survey {
 ///
 /// # Panics
 /// If `controllers` or `wanted` are fewer than the conversation was opened with.
-pub fn survey<L: Link, C: Clock>(
+pub(crate) fn survey<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
     controllers: &[Controller],
     wanted: &[Vec<Address>],

@@ -15,7 +15,7 @@ const COLUMNS: usize = 12;
 /// Whose register it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Family {
+pub(crate) enum Family {
     /// Every controller has it.
     Both,
     /// The SMC manual alone has it.
@@ -27,26 +27,26 @@ pub enum Family {
 impl Family {
     /// True if a controller of `dialect` has it.
     #[must_use]
-    pub const fn has(self, dialect: Dialect) -> bool {
+    pub(crate) const fn has(self, dialect: Dialect) -> bool {
         matches!((self, dialect), (Self::Both, _) | (Self::Smc, Dialect::Smc) | (Self::Mbox, Dialect::Mbox))
     }
 }
 
 /// What has to be heeded before a register is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Flags {
+pub(crate) struct Flags {
     /// A network setting: a wrong one makes the controller unreachable.
-    pub network: bool,
+    pub(crate) network: bool,
     /// The controller's own address or hardware address; in no two controllers the same.
-    pub identity: bool,
+    pub(crate) identity: bool,
     /// Can take back the factory settings.
-    pub factory: bool,
+    pub(crate) factory: bool,
     /// Writing it moves the seat.
-    pub moves: bool,
+    pub(crate) moves: bool,
     /// Writing it does something; it does not read what was written.
-    pub command: bool,
+    pub(crate) command: bool,
     /// Not to be written: it is measured, or the manuals disagree about it.
-    pub never: bool,
+    pub(crate) never: bool,
 }
 
 /// What a register is.
@@ -56,33 +56,33 @@ pub struct Register {
     #[serde(rename = "register")]
     pub address: Address,
     /// What it is called, in lower case; like no other's.
-    pub name: String,
+    pub(crate) name: String,
     /// The unit of its values; empty for plain numbers.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// The least value that makes sense.
-    pub min: u16,
+    pub(crate) min: u16,
     /// The greatest value that makes sense.
-    pub max: u16,
+    pub(crate) max: u16,
     /// Its value in the factory by the IMAX manual; `None` if that has none.
-    pub default_imax: Option<u16>,
+    pub(crate) default_imax: Option<u16>,
     /// The same by the SMC manual, where that says anything of its own.
-    pub default_smc: Option<u16>,
+    pub(crate) default_smc: Option<u16>,
     /// Whose it is.
-    pub dialect: Family,
+    pub(crate) dialect: Family,
     /// True if PA0f = 2 keeps it over a power cycle.
-    pub saved: bool,
+    pub(crate) saved: bool,
     /// What has to be heeded before it is written.
-    pub flags: Flags,
+    pub(crate) flags: Flags,
     /// Where the manuals have it: manual and section.
-    pub source: &'static str,
+    pub(crate) source: &'static str,
     /// What its values mean, parted by semicolons; may be empty.
-    pub meaning: &'static str,
+    pub(crate) meaning: &'static str,
 }
 
 impl Register {
     /// Its value in a controller of `dialect` as it leaves the factory, where a manual tells.
     #[must_use]
-    pub fn default(&self, dialect: Dialect) -> Option<u16> {
+    pub(crate) fn default(&self, dialect: Dialect) -> Option<u16> {
         match dialect {
             Dialect::Smc => self.default_smc.or(self.default_imax),
             Dialect::Mbox => self.default_imax,
@@ -91,13 +91,13 @@ impl Register {
 
     /// The values that make sense.
     #[must_use]
-    pub const fn range(&self) -> RangeInclusive<u16> {
+    pub(crate) const fn range(&self) -> RangeInclusive<u16> {
         self.min..=self.max
     }
 
     /// What `value` means, where the manuals put it in words.
     #[must_use]
-    pub fn says(&self, value: u16) -> Option<&'static str> {
+    pub(crate) fn says(&self, value: u16) -> Option<&'static str> {
         self.meaning.split(';').find_map(|part| {
             let (number, words) = part.split_once(':')?;
             (number.trim().parse() == Ok(value)).then_some(words.trim())
@@ -111,7 +111,7 @@ pub struct Table(Vec<Register>);
 
 impl Table {
     /// All of them.
-    pub fn iter(&self) -> std::slice::Iter<'_, Register> {
+    pub(crate) fn iter(&self) -> std::slice::Iter<'_, Register> {
         self.0.iter()
     }
 
@@ -122,14 +122,14 @@ impl Table {
 
     /// The register at an address; none for drives and where the manuals have nothing.
     #[must_use]
-    pub fn get(&self, address: Address) -> Option<&Register> {
+    pub(crate) fn get(&self, address: Address) -> Option<&Register> {
         self.0.binary_search_by_key(&address, |register| register.address).ok().map(|index| &self.0[index])
     }
 
     /// True if controllers of `dialect` have what is at an address. Drives can be asked through SMC controllers only;
     /// which registers they have, their own manuals say.
     #[must_use]
-    pub fn has(&self, address: Address, dialect: Dialect) -> bool {
+    pub(crate) fn has(&self, address: Address, dialect: Dialect) -> bool {
         match self.get(address) {
             Some(register) => register.dialect.has(dialect),
             None => address.is_servo() && dialect == Dialect::Smc,
@@ -138,14 +138,15 @@ impl Table {
 
     /// The register called `name`; capitals do not matter, and `-` and `_` stand for spaces.
     #[must_use]
-    pub fn by_name(&self, name: &str) -> Option<&Register> {
+    pub(crate) fn by_name(&self, name: &str) -> Option<&Register> {
         let name = name.to_lowercase().replace(['-', '_'], " ");
         self.0.iter().find(|register| register.name.to_lowercase().replace('-', " ") == name)
     }
 
     /// The factory value of a parameter for a controller of `dialect`; 0 if the manuals say nothing.
     #[must_use]
-    pub fn factory(&self, parameter: u8, dialect: Dialect) -> u16 {
+    #[cfg(test)]
+    pub(crate) fn factory(&self, parameter: u8, dialect: Dialect) -> u16 {
         self.get(Address::Pa(parameter)).and_then(|register| register.default(dialect)).unwrap_or(0)
     }
 }

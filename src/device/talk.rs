@@ -17,7 +17,7 @@ const LOOK: Duration = Duration::from_millis(1);
 const STRANGERS: usize = 64;
 
 /// Takes a datagram that was no reply about registers: who sent it, what, and when it came.
-pub type Watch<'w> = dyn FnMut(Origin, &[u8], MonoTime) + 'w;
+pub(crate) type Watch<'w> = dyn FnMut(Origin, &[u8], MonoTime) + 'w;
 
 /// The way to the controllers: the frame port in the program, virtual controllers in tests.
 pub trait Link {
@@ -63,7 +63,7 @@ pub struct Talk<L = (Sender, Receiver), C = Monotonic> {
 
 /// How the controllers of a configuration are spoken to.
 #[must_use]
-pub fn peers(controllers: &[Controller]) -> Vec<Endpoint> {
+pub(crate) fn peers(controllers: &[Controller]) -> Vec<Endpoint> {
     let peer = |one: &Controller| Endpoint { dialect: one.dialect, code: Code(one.accept.code(one.address)) };
     controllers.iter().map(peer).collect()
 }
@@ -82,7 +82,7 @@ impl Talk {
 impl<L: Link, C: Clock> Talk<L, C> {
     /// A conversation over a link of one's own.
     #[must_use]
-    pub fn over(link: L, clock: C, peers: &[Endpoint]) -> Self {
+    pub(crate) fn over(link: L, clock: C, peers: &[Endpoint]) -> Self {
         let exchange = Exchange::new(peers);
         Self { link, clock, closed: vec![0; exchange.lanes()], exchange, strangers: BTreeMap::new() }
     }
@@ -100,7 +100,7 @@ impl<L: Link, C: Clock> Talk<L, C> {
     ///
     /// # Panics
     /// If a request is for a lane that there is not.
-    pub fn ask_watching(
+    pub(crate) fn ask_watching(
         &mut self,
         requests: Vec<(usize, Request)>,
         patience: Patience,
@@ -116,7 +116,7 @@ impl<L: Link, C: Clock> Talk<L, C> {
     }
 
     /// Waits until an instant, and gives what comes meanwhile to `watch`.
-    pub fn wait(&mut self, until: MonoTime, watch: &mut Watch<'_>) {
+    pub(crate) fn wait(&mut self, until: MonoTime, watch: &mut Watch<'_>) {
         while self.clock.now() < until {
             self.clock.sleep_until(until.min(self.clock.now() + LOOK));
             self.look(watch);
@@ -124,19 +124,20 @@ impl<L: Link, C: Clock> Talk<L, C> {
     }
 
     /// The present instant of the conversation's clock.
-    pub fn now(&self) -> MonoTime {
+    pub(crate) fn now(&self) -> MonoTime {
         self.clock.now()
     }
 
     /// What came from a controller's address and was no answer.
     #[must_use]
-    pub fn odds(&self, lane: usize) -> Odds {
+    pub(crate) fn odds(&self, lane: usize) -> Odds {
         self.exchange.odds(lane)
     }
 
     /// Who else wrote to the frame port, and how often; the first 64.
     #[must_use]
-    pub const fn strangers(&self) -> &BTreeMap<SocketAddrV4, u64> {
+    #[cfg(test)]
+    pub(crate) const fn strangers(&self) -> &BTreeMap<SocketAddrV4, u64> {
         &self.strangers
     }
 

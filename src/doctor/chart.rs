@@ -17,13 +17,13 @@ fn ends() -> impl Iterator<Item = u64> {
 
 /// Some of the times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bucket {
+pub(crate) struct Bucket {
     /// From here, ns.
-    pub from_ns: u64,
+    pub(crate) from_ns: u64,
     /// To here, ns; not in it. That of the last bucket has no end: `u64::MAX`.
-    pub to_ns: u64,
+    pub(crate) to_ns: u64,
     /// How many.
-    pub count: u64,
+    pub(crate) count: u64,
 }
 
 impl Bucket {
@@ -38,7 +38,7 @@ impl Bucket {
 
 /// Sorts a histogram of nanoseconds into buckets, from the first that holds a time to the last.
 #[must_use]
-pub fn buckets(times: &Histogram) -> Vec<Bucket> {
+pub(crate) fn buckets(times: &Histogram) -> Vec<Bucket> {
     let mut from_ns = 0;
     let mut all: Vec<Bucket> = ends()
         .map(|to_ns| {
@@ -62,7 +62,7 @@ pub fn buckets(times: &Histogram) -> Vec<Bucket> {
 /// Draws it: a row for each bucket with its bar, its count and the percentiles that lie in it; below them the percentiles.
 /// Empty where nothing was recorded.
 #[must_use]
-pub fn draw(times: &Histogram) -> String {
+pub(crate) fn draw(times: &Histogram) -> String {
     let mut text = String::new();
     let buckets = buckets(times);
     let most = buckets.iter().map(|bucket| bucket.count).max().unwrap_or(0);

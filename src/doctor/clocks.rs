@@ -5,22 +5,22 @@ use crate::sys::machine::ClockSync;
 
 /// What is known of the clocks.
 #[derive(Debug, Clone)]
-pub struct Clocks {
+pub(crate) struct Clocks {
     /// What the kernel reads the time from.
-    pub source: Seen<Source>,
+    pub(crate) source: Seen<Source>,
     /// The finest step of a sleep, ns.
-    pub resolution_ns: u64,
+    pub(crate) resolution_ns: u64,
     /// How well the wall clock is held.
-    pub sync: Seen<ClockSync>,
+    pub(crate) sync: Seen<ClockSync>,
 }
 
 /// The kernel's clock source.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Source {
+pub(crate) struct Source {
     /// The one in use.
-    pub current: String,
+    pub(crate) current: String,
     /// Those that could be.
-    pub available: Vec<String>,
+    pub(crate) available: Vec<String>,
 }
 
 /// Read without leaving the program, in some ten nanoseconds.
@@ -37,7 +37,7 @@ const FAR_US: u64 = 100_000;
 impl Clocks {
     /// One line for each.
     #[must_use]
-    pub fn judge(&self) -> Vec<Line> {
+    pub(crate) fn judge(&self) -> Vec<Line> {
         vec![self.clock_source(), self.resolution(), self.wall_clock()]
     }
 

@@ -21,7 +21,7 @@ const CPUS: &str = "/sys/devices/system/cpu";
 
 /// Everything that can be seen of this machine.
 #[must_use]
-pub fn facts() -> Facts {
+pub(crate) fn facts() -> Facts {
     let trial = sys::try_realtime().map_err(|error| format!("no thread to try it on: {error}"));
     let limits = sys::limits();
     let config = kernel_config();

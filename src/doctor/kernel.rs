@@ -6,18 +6,18 @@ use crate::sys::realtime::PRIORITY;
 
 /// What is known of the kernel.
 #[derive(Debug, Clone)]
-pub struct Kernel {
+pub(crate) struct Kernel {
     /// When it lets a woken thread go before what it is doing itself.
-    pub preemption: Seen<Preemption>,
+    pub(crate) preemption: Seen<Preemption>,
     /// How much later than asked it may wake an ordinary thread.
-    pub slack: Seen<Slack>,
+    pub(crate) slack: Seen<Slack>,
     /// Threads with a real-time priority of at least [`PRIORITY`], ours left out.
-    pub others: Seen<RealTimeThreads>,
+    pub(crate) others: Seen<RealTimeThreads>,
 }
 
 /// The kernel's preemption model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Preemption {
+pub(crate) enum Preemption {
     /// `PREEMPT_RT`: almost anywhere, also in interrupt handlers.
     RealTime,
     /// `full`: wherever it holds no lock.
@@ -33,7 +33,7 @@ pub enum Preemption {
 impl Preemption {
     /// The model that the kernel calls by this name, at boot and in its configuration.
     #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         Some(match name {
             "rt" => Self::RealTime,
             "full" => Self::Full,
@@ -57,15 +57,15 @@ impl Preemption {
 
 /// What tells of the preemption model; empty texts where a file could not be read.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct PreemptionSigns<'a> {
+pub(crate) struct PreemptionSigns<'a> {
     /// `/proc/version`.
-    pub version: &'a str,
+    pub(crate) version: &'a str,
     /// `/sys/kernel/debug/sched/preempt`, for root alone.
-    pub in_force: &'a str,
+    pub(crate) in_force: &'a str,
     /// `/proc/cmdline`.
-    pub cmdline: &'a str,
+    pub(crate) cmdline: &'a str,
     /// The kernel's configuration.
-    pub config: &'a str,
+    pub(crate) config: &'a str,
 }
 
 impl PreemptionSigns<'_> {
@@ -73,7 +73,7 @@ impl PreemptionSigns<'_> {
     ///
     /// # Errors
     /// Why it cannot, in words.
-    pub fn model(&self) -> Seen<Preemption> {
+    pub(crate) fn model(&self) -> Seen<Preemption> {
         let says = |word: &str| self.version.split_ascii_whitespace().any(|said| said == word);
         if says("PREEMPT_RT") {
             return Ok(Preemption::RealTime);
@@ -104,28 +104,28 @@ impl PreemptionSigns<'_> {
 
 /// Timer slack of an ordinary thread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Slack {
+pub(crate) struct Slack {
     /// What it begins with, ns.
-    pub default_ns: u64,
+    pub(crate) default_ns: u64,
     /// True if 1 ns was accepted.
-    pub settable: bool,
+    pub(crate) settable: bool,
 }
 
 /// Real-time threads of high priority.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct RealTimeThreads {
+pub(crate) struct RealTimeThreads {
     /// Of programs, as `name (priority)`.
-    pub of_programs: Vec<String>,
+    pub(crate) of_programs: Vec<String>,
     /// How many of the kernel's own.
-    pub of_kernel: usize,
+    pub(crate) of_kernel: usize,
     /// True if any thread of the kernel's was seen; if not, other programs are hidden as well.
-    pub whole: bool,
+    pub(crate) whole: bool,
 }
 
 impl Kernel {
     /// One line for each; `granted` where a play would be real-time.
     #[must_use]
-    pub fn judge(&self, granted: bool) -> Vec<Line> {
+    pub(crate) fn judge(&self, granted: bool) -> Vec<Line> {
         vec![self.model(), self.timer_slack(granted), self.other_threads()]
     }
 

@@ -5,13 +5,13 @@ use crate::sys::realtime::Policy;
 use crate::tracker::Histogram;
 
 /// Ticks per second of the run: the fastest that kinocue plays.
-pub const RATE_HZ: f64 = 1_000.0;
+pub(crate) const RATE_HZ: f64 = 1_000.0;
 /// From one tick of the run to the next, ns.
-pub const PERIOD_NS: u64 = 1_000_000;
+pub(crate) const PERIOD_NS: u64 = 1_000_000;
 
 /// What else the machine did during a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Load {
+pub(crate) enum Load {
     /// Nothing of ours.
     Idle,
     /// One thread of ordinary priority on each processor that never sleeps.
@@ -21,7 +21,7 @@ pub enum Load {
 impl Load {
     /// As it is written in reports.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub(crate) const fn word(self) -> &'static str {
         match self {
             Self::Idle => "idle",
             Self::Loaded => "loaded",
@@ -38,30 +38,30 @@ impl Load {
 
 /// What came of a run.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub(crate) struct Run {
     /// What else went on.
-    pub load: Load,
+    pub(crate) load: Load,
     /// How the loop was scheduled.
-    pub policy: Policy,
+    pub(crate) policy: Policy,
     /// Wake-ups.
-    pub ticks: u64,
+    pub(crate) ticks: u64,
     /// Ticks slept through.
-    pub missed: u64,
+    pub(crate) missed: u64,
     /// From the deadline slept for to the wake-up, ns, of each wake-up; a stall shows whole.
-    pub lateness: Histogram,
+    pub(crate) lateness: Histogram,
 }
 
 /// The 99th percentile above which a run is worth a warning, per cent of the tick.
-pub const WARN_PERCENT: u64 = 10;
+pub(crate) const WARN_PERCENT: u64 = 10;
 /// The 99th percentile above which a machine is not ready, per cent of the tick.
-pub const BAD_PERCENT: u64 = 50;
+pub(crate) const BAD_PERCENT: u64 = 50;
 /// Ticks slept through of 1,000 above which a machine is not ready.
-pub const BAD_MISSED_PER_MILLE: u64 = 1;
+pub(crate) const BAD_MISSED_PER_MILLE: u64 = 1;
 
 impl Run {
     /// The line of this run.
     #[must_use]
-    pub fn judge(&self) -> Line {
+    pub(crate) fn judge(&self) -> Line {
         let id = self.load.id();
         if self.lateness.is_empty() {
             return Line::unknown(id, "no tick was measured", "kinocue doctor --seconds 10");
@@ -107,7 +107,7 @@ impl Run {
 
 /// A time in the unit that suits it.
 #[must_use]
-pub fn us(ns: u64) -> String {
+pub(crate) fn us(ns: u64) -> String {
     let tenths = |ns: u64, unit: u64| format!("{}.{}", ns / unit, ns % unit * 10 / unit);
     match ns {
         0..1_000_000 => format!("{} µs", tenths(ns, 1_000)),

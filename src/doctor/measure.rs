@@ -20,7 +20,7 @@ const OVERRUN: Duration = Duration::from_millis(100);
 /// Measures for `span`, and counts the ticks in `done` meanwhile. The calling thread stays real-time afterwards, where that
 /// was granted, and the memory locked, as in a play.
 #[must_use]
-pub fn measure(load: Load, span: Duration, done: &AtomicU64) -> Run {
+pub(crate) fn measure(load: Load, span: Duration, done: &AtomicU64) -> Run {
     let mut lateness = histogram();
     let policy = realtime::request().policy;
     let origin = Monotonic.now() + RUN_UP;

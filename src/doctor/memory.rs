@@ -5,13 +5,13 @@ use crate::sys::machine::Limit;
 
 /// What is known of memory.
 #[derive(Debug, Clone)]
-pub struct Memory {
+pub(crate) struct Memory {
     /// True if locking it was granted; else why not.
-    pub locked: Result<(), String>,
+    pub(crate) locked: Result<(), String>,
     /// Bytes that may be locked without a right (`RLIMIT_MEMLOCK`).
-    pub limit: Limit,
+    pub(crate) limit: Limit,
     /// What the machine swaps to.
-    pub swaps: Seen<Vec<String>>,
+    pub(crate) swaps: Seen<Vec<String>>,
 }
 
 const UNLIMITED: &str = "LimitMEMLOCK=infinity in the unit, or `@kinocue - memlock unlimited` in \
@@ -20,7 +20,7 @@ const UNLIMITED: &str = "LimitMEMLOCK=infinity in the unit, or `@kinocue - memlo
 impl Memory {
     /// One line for each.
     #[must_use]
-    pub fn judge(&self) -> Vec<Line> {
+    pub(crate) fn judge(&self) -> Vec<Line> {
         vec![self.lock(), self.lock_limit(), self.swap()]
     }
 

@@ -5,29 +5,29 @@
 //! machine with the help of [`text`]; [`measure`] runs the bare tick loop; [`chart`] draws what came of it. What could not
 //! be seen is said so, never guessed.
 
-pub mod chart;
-pub mod clocks;
-pub mod facts;
-pub mod kernel;
-pub mod lateness;
-pub mod measure;
-pub mod memory;
-pub mod network;
-pub mod processor;
-pub mod scheduling;
-pub mod text;
+pub(crate) mod chart;
+pub(crate) mod clocks;
+pub(crate) mod facts;
+pub(crate) mod kernel;
+pub(crate) mod lateness;
+pub(crate) mod measure;
+pub(crate) mod memory;
+pub(crate) mod network;
+pub(crate) mod processor;
+pub(crate) mod scheduling;
+pub(crate) mod text;
 
 use serde::Serialize;
 
-pub use facts::facts;
+pub(crate) use facts::facts;
 
 /// A fact, or why it could not be seen, in words.
-pub type Seen<T> = Result<T, String>;
+pub(crate) type Seen<T> = Result<T, String>;
 
 /// What a finding means for a show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub(crate) enum Verdict {
     /// As it should be.
     Ok,
     /// A show will run; something makes it less sure than it could be.
@@ -41,7 +41,7 @@ pub enum Verdict {
 impl Verdict {
     /// As it is written in reports.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub(crate) const fn word(self) -> &'static str {
         match self {
             Self::Ok => "ok",
             Self::Warn => "warn",
@@ -53,15 +53,15 @@ impl Verdict {
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Line {
+pub(crate) struct Line {
     /// Its name, the same in every version.
-    pub id: &'static str,
+    pub(crate) id: &'static str,
     /// What was found.
-    pub found: String,
+    pub(crate) found: String,
     /// What that means.
-    pub verdict: Verdict,
+    pub(crate) verdict: Verdict,
     /// What to change, as a command or as a line of a file; `None` where there is nothing to change.
-    pub fix: Option<String>,
+    pub(crate) fix: Option<String>,
 }
 
 impl Line {
@@ -88,34 +88,34 @@ impl Line {
 
 /// What the machine is to play to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hall {
+pub(crate) struct Hall {
     /// Controllers; each takes a socket.
-    pub controllers: u32,
+    pub(crate) controllers: u32,
     /// Addresses among them that are not this machine's own; each takes an entry of the neighbour table, unless it lies
     /// behind a router.
-    pub neighbours: u32,
+    pub(crate) neighbours: u32,
 }
 
 /// All that is known of the machine.
 #[derive(Debug)]
-pub struct Facts {
+pub(crate) struct Facts {
     /// Real-time scheduling and what may stand in its way.
-    pub scheduling: scheduling::Scheduling,
+    pub(crate) scheduling: scheduling::Scheduling,
     /// The kernel, and the other real-time programs that it runs.
-    pub kernel: kernel::Kernel,
+    pub(crate) kernel: kernel::Kernel,
     /// Locked memory and swap.
-    pub memory: memory::Memory,
+    pub(crate) memory: memory::Memory,
     /// The processors and how they save power.
-    pub processor: processor::Processor,
+    pub(crate) processor: processor::Processor,
     /// Its clocks.
-    pub clocks: clocks::Clocks,
+    pub(crate) clocks: clocks::Clocks,
     /// Its tables and buffers.
-    pub network: network::Network,
+    pub(crate) network: network::Network,
 }
 
 /// Judges every fact for a hall, in the order in which a person would mend things.
 #[must_use]
-pub fn judge(facts: &Facts, hall: Hall) -> Vec<Line> {
+pub(crate) fn judge(facts: &Facts, hall: Hall) -> Vec<Line> {
     let granted = facts.scheduling.granted();
     let mut lines = facts.scheduling.judge();
     lines.extend(facts.memory.judge());
@@ -128,7 +128,7 @@ pub fn judge(facts: &Facts, hall: Hall) -> Vec<Line> {
 
 /// True if a machine with these findings is ready: nothing is bad. What could not be seen does not count against it.
 #[must_use]
-pub fn ready(lines: &[Line]) -> bool {
+pub(crate) fn ready(lines: &[Line]) -> bool {
     lines.iter().all(|line| line.verdict != Verdict::Bad)
 }
 

@@ -5,28 +5,28 @@ use crate::sys::machine::Limit;
 
 /// What is known of the network's limits.
 #[derive(Debug, Clone)]
-pub struct Network {
+pub(crate) struct Network {
     /// Sizes of the table of neighbours.
-    pub neighbours: Seen<NeighbourTable>,
+    pub(crate) neighbours: Seen<NeighbourTable>,
     /// Bytes that a socket's receive buffer may be asked to have (`rmem_max`).
-    pub receive_max: Seen<u64>,
+    pub(crate) receive_max: Seen<u64>,
     /// Bytes that it has unasked (`rmem_default`).
-    pub receive_default: Seen<u64>,
+    pub(crate) receive_default: Seen<u64>,
     /// Pages that all UDP sockets of the machine may fill together (the last of `udp_mem`).
-    pub udp_pages: Seen<u64>,
+    pub(crate) udp_pages: Seen<u64>,
     /// Files that the process may have open.
-    pub files: Limit,
+    pub(crate) files: Limit,
 }
 
 /// The kernel's table of link addresses, `net.ipv4.neigh.default.gc_thresh1` to `3`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NeighbourTable {
+pub(crate) struct NeighbourTable {
     /// Below this many entries none is ever dropped.
-    pub kept: u64,
+    pub(crate) kept: u64,
     /// Above this many those that are older than 5 s are dropped when one is added.
-    pub tidied: u64,
+    pub(crate) tidied: u64,
     /// There are never more than this.
-    pub most: u64,
+    pub(crate) most: u64,
 }
 
 /// Neighbours that are no controllers: consoles, servers, gateways.
@@ -46,7 +46,7 @@ const PAGE: u64 = 4_096;
 impl Network {
     /// One line for each.
     #[must_use]
-    pub fn judge(&self, hall: Hall) -> Vec<Line> {
+    pub(crate) fn judge(&self, hall: Hall) -> Vec<Line> {
         vec![self.neighbour_table(hall), self.receive_buffer(hall), self.open_files(hall)]
     }
 

@@ -4,28 +4,28 @@ use super::{Line, Seen, some_of};
 
 /// What is known of the processors.
 #[derive(Debug, Clone)]
-pub struct Processor {
+pub(crate) struct Processor {
     /// Those that this process may run on.
-    pub allowed: Seen<usize>,
+    pub(crate) allowed: Seen<usize>,
     /// Processors' worth of time that the control group gives each period; `None` where there is no limit.
-    pub quota: Seen<Option<f64>>,
+    pub(crate) quota: Seen<Option<f64>>,
     /// The frequency governor of each.
-    pub governors: Seen<Vec<String>>,
+    pub(crate) governors: Seen<Vec<String>>,
     /// Idle states that are in use, of all processors.
-    pub idle: Seen<Vec<IdleState>>,
+    pub(crate) idle: Seen<Vec<IdleState>>,
     /// The device that holds off deep idle states.
-    pub dma_latency: Seen<DmaLatency>,
+    pub(crate) dma_latency: Seen<DmaLatency>,
     /// What is around us.
-    pub around: Around,
+    pub(crate) around: Around,
 }
 
 /// What is between this program and the bare machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Around {
+pub(crate) struct Around {
     /// True if a container is.
-    pub container: bool,
+    pub(crate) container: bool,
     /// Which virtual machine is; `None` where there is none.
-    pub machine: Seen<Option<String>>,
+    pub(crate) machine: Seen<Option<String>>,
 }
 
 /// Makers of virtual machines, as firmware tables name them.
@@ -36,7 +36,7 @@ const MAKERS: [&str; 5] = ["QEMU", "VMware", "innotek", "Xen", "Parallels"];
 ///
 /// # Errors
 /// Why that cannot be told, in words.
-pub fn machine(cpuinfo: &str, hypervisor: &str, maker: &str) -> Seen<Option<String>> {
+pub(crate) fn machine(cpuinfo: &str, hypervisor: &str, maker: &str) -> Seen<Option<String>> {
     let (hypervisor, maker) = (hypervisor.trim(), maker.trim());
     let flags = cpuinfo.lines().find(|line| line.starts_with("flags"));
     let marked = flags.map(|line| line.split_ascii_whitespace().any(|flag| flag == "hypervisor"));
@@ -54,20 +54,20 @@ pub fn machine(cpuinfo: &str, hypervisor: &str, maker: &str) -> Seen<Option<Stri
 
 /// A way for a processor to sleep.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct IdleState {
+pub(crate) struct IdleState {
     /// The driver's name of it.
-    pub name: String,
+    pub(crate) name: String,
     /// How long waking from it takes, µs.
-    pub latency_us: u64,
+    pub(crate) latency_us: u64,
 }
 
 /// `/dev/cpu_dma_latency`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DmaLatency {
+pub(crate) struct DmaLatency {
     /// True if it could be opened for writing; else why not.
-    pub opened: Result<(), String>,
+    pub(crate) opened: Result<(), String>,
     /// The longest wake-up, µs, that all who hold it open agreed on; `None` where it cannot be read.
-    pub held_us: Option<i32>,
+    pub(crate) held_us: Option<i32>,
 }
 
 /// An idle state that takes longer to wake from, µs, shows in the lateness at 1 kHz: a twentieth of the tick.
@@ -76,7 +76,7 @@ const DEEP_US: u64 = 50;
 impl Processor {
     /// One line for each; `granted` where a play would be real-time.
     #[must_use]
-    pub fn judge(&self, granted: bool) -> Vec<Line> {
+    pub(crate) fn judge(&self, granted: bool) -> Vec<Line> {
         vec![
             self.number(),
             self.time_quota(granted),

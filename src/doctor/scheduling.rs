@@ -6,60 +6,60 @@ use crate::sys::realtime::{PRIORITY, Policy};
 
 /// What is known of real-time scheduling.
 #[derive(Debug, Clone)]
-pub struct Scheduling {
+pub(crate) struct Scheduling {
     /// What came of trying it.
-    pub trial: Seen<Trial>,
+    pub(crate) trial: Seen<Trial>,
     /// The highest priority that needs no right (`RLIMIT_RTPRIO`).
-    pub limit: Limit,
+    pub(crate) limit: Limit,
     /// True if this process has the right to any priority (`CAP_SYS_NICE` in the first user namespace).
-    pub right: Seen<bool>,
+    pub(crate) right: Seen<bool>,
     /// The control group that rules processor time.
-    pub group: Seen<Group>,
+    pub(crate) group: Seen<Group>,
     /// How much of each period all real-time threads together may use.
-    pub throttle: Seen<Throttle>,
+    pub(crate) throttle: Seen<Throttle>,
 }
 
 /// What came of asking the kernel for `SCHED_FIFO`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// True if whoever started the program gave it.
-    pub given: bool,
+    pub(crate) given: bool,
     /// The policy in force afterwards.
-    pub policy: Policy,
+    pub(crate) policy: Policy,
     /// Its priority.
-    pub priority: u8,
+    pub(crate) priority: u8,
     /// Why it was refused.
-    pub refusal: Option<Refusal>,
+    pub(crate) refusal: Option<Refusal>,
 }
 
 /// Why the kernel refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub(crate) struct Refusal {
     /// In the kernel's words.
-    pub words: String,
+    pub(crate) words: String,
     /// True if it was `EPERM`: for lack of a right, or by a control group.
-    pub not_permitted: bool,
+    pub(crate) not_permitted: bool,
 }
 
 /// A control group, as far as real-time scheduling goes.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Group {
+pub(crate) struct Group {
     /// Its path within its hierarchy.
-    pub path: String,
+    pub(crate) path: String,
     /// The file that gives it its real-time share, and the share in µs; only the first version has one, and only in a
     /// kernel with `CONFIG_RT_GROUP_SCHED`.
-    pub share: Option<(String, i64)>,
+    pub(crate) share: Option<(String, i64)>,
     /// True if the kernel shares out real-time by groups; `None` where its configuration could not be read.
-    pub configured: Option<bool>,
+    pub(crate) configured: Option<bool>,
 }
 
 /// The kernel's guard against a real-time thread that never sleeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Throttle {
+pub(crate) struct Throttle {
     /// `sched_rt_runtime_us`; below zero there is no guard.
-    pub runtime_us: i64,
+    pub(crate) runtime_us: i64,
     /// `sched_rt_period_us`.
-    pub period_us: i64,
+    pub(crate) period_us: i64,
 }
 
 /// A play with a spin keeps below this part of a processor.
@@ -68,7 +68,7 @@ const MOST_PERCENT: i64 = 90;
 impl Scheduling {
     /// True if a play would be real-time.
     #[must_use]
-    pub fn granted(&self) -> bool {
+    pub(crate) fn granted(&self) -> bool {
         self.trial.as_ref().is_ok_and(|trial| trial.policy != Policy::Other)
     }
 
@@ -79,7 +79,7 @@ impl Scheduling {
 
     /// One line for each.
     #[must_use]
-    pub fn judge(&self) -> Vec<Line> {
+    pub(crate) fn judge(&self) -> Vec<Line> {
         vec![self.policy(), self.priority_limit(), self.control_group(), self.guard()]
     }
 

@@ -3,27 +3,27 @@
 
 /// The value of a `Name: value` line, as `/proc/self/status` has them.
 #[must_use]
-pub fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
+pub(crate) fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
     let value = |line: &'a str| line.strip_prefix(name)?.trim_start().strip_prefix(':');
     text.lines().find_map(value).map(str::trim)
 }
 
 /// True if the effective rights of `/proc/self/status` hold the one of that number.
 #[must_use]
-pub fn has_right(status: &str, number: u32) -> Option<bool> {
+pub(crate) fn has_right(status: &str, number: u32) -> Option<bool> {
     let held = u64::from_str_radix(field(status, "CapEff")?, 16).ok()?;
     Some(held.checked_shr(number)? & 1 == 1)
 }
 
 /// True if `/proc/self/uid_map` is that of the first user namespace; in any other one rights do not reach the scheduler.
 #[must_use]
-pub fn is_first_user_namespace(uid_map: &str) -> bool {
+pub(crate) fn is_first_user_namespace(uid_map: &str) -> bool {
     uid_map.split_ascii_whitespace().eq(["0", "0", "4294967295"])
 }
 
 /// How many processors a list such as `0-3,8` names.
 #[must_use]
-pub fn list_len(list: &str) -> Option<usize> {
+pub(crate) fn list_len(list: &str) -> Option<usize> {
     list.trim().split(',').map(range_len).sum()
 }
 
@@ -35,17 +35,17 @@ fn range_len(range: &str) -> Option<usize> {
 
 /// A control group of this process.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ControlGroup {
+pub(crate) struct ControlGroup {
     /// Its path below where its hierarchy is mounted.
-    pub path: String,
+    pub(crate) path: String,
     /// True if it is of the second version.
-    pub unified: bool,
+    pub(crate) unified: bool,
 }
 
 /// The control group that rules processor time, from `/proc/self/cgroup`: the first version's `cpu` hierarchy if there is
 /// one, else the second version's.
 #[must_use]
-pub fn cpu_group(cgroup: &str) -> Option<ControlGroup> {
+pub(crate) fn cpu_group(cgroup: &str) -> Option<ControlGroup> {
     let rows = || cgroup.lines().filter_map(row);
     let first = rows().find(|(controllers, _)| controllers.split(',').any(|name| name == "cpu"));
     let row = first.or_else(|| rows().find(|(controllers, _)| controllers.is_empty()));
@@ -59,7 +59,7 @@ fn row(line: &str) -> Option<(&str, &str)> {
 
 /// Where the hierarchy of a control group is mounted, from `/proc/self/mounts`.
 #[must_use]
-pub fn group_mount<'a>(mounts: &'a str, group: &ControlGroup) -> Option<&'a str> {
+pub(crate) fn group_mount<'a>(mounts: &'a str, group: &ControlGroup) -> Option<&'a str> {
     mounts.lines().find_map(|line| {
         let mut words = line.split(' ');
         let (_, at, kind, options) = (words.next()?, words.next()?, words.next()?, words.next()?);
@@ -75,14 +75,14 @@ pub fn group_mount<'a>(mounts: &'a str, group: &ControlGroup) -> Option<&'a str>
 /// Processors' worth of time that `cpu.max` of the second version gives a group each period; `None` where the text is
 /// none, `Some(None)` where there is no limit.
 #[must_use]
-pub fn cpu_max(text: &str) -> Option<Option<f64>> {
+pub(crate) fn cpu_max(text: &str) -> Option<Option<f64>> {
     let (quota, period) = text.trim().split_once(' ')?;
     if quota == "max" { Some(None) } else { Some(Some(share(quota.parse().ok()?, period.parse().ok()?)?)) }
 }
 
 /// The same of `cpu.cfs_quota_us` and `cpu.cfs_period_us` of the first version.
 #[must_use]
-pub fn cfs_quota(quota: &str, period: &str) -> Option<Option<f64>> {
+pub(crate) fn cfs_quota(quota: &str, period: &str) -> Option<Option<f64>> {
     let quota: f64 = quota.trim().parse().ok()?;
     if quota < 0.0 { Some(None) } else { Some(Some(share(quota, period.trim().parse().ok()?)?)) }
 }
@@ -93,14 +93,14 @@ fn share(quota: f64, period: f64) -> Option<f64> {
 
 /// The names of what is swapped to, from `/proc/swaps`.
 #[must_use]
-pub fn swaps(text: &str) -> Vec<String> {
+pub(crate) fn swaps(text: &str) -> Vec<String> {
     let names = text.lines().skip(1).filter_map(|line| line.split_ascii_whitespace().next());
     names.map(str::to_owned).collect()
 }
 
 /// True if a kernel's configuration has an option set; `None` where it does not speak of it.
 #[must_use]
-pub fn option_set(config: &str, name: &str) -> Option<bool> {
+pub(crate) fn option_set(config: &str, name: &str) -> Option<bool> {
     config.lines().find_map(|line| {
         let rest = line.strip_prefix("# ").unwrap_or(line).strip_prefix(name)?;
         match rest {
@@ -113,28 +113,28 @@ pub fn option_set(config: &str, name: &str) -> Option<bool> {
 
 /// The value of an option of the kernel's command line; the last of several.
 #[must_use]
-pub fn boot_option<'a>(cmdline: &'a str, name: &str) -> Option<&'a str> {
+pub(crate) fn boot_option<'a>(cmdline: &'a str, name: &str) -> Option<&'a str> {
     let value = |word: &'a str| word.strip_prefix(name)?.strip_prefix('=');
     cmdline.split_ascii_whitespace().rev().find_map(value)
 }
 
 /// The choice in brackets, as in `none voluntary (full)`.
 #[must_use]
-pub fn bracketed(text: &str) -> Option<&str> {
+pub(crate) fn bracketed(text: &str) -> Option<&str> {
     Some(text.split_once('(')?.1.split_once(')')?.0)
 }
 
 /// A thread, from `/proc/PID/task/TID/stat`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ThreadStat {
+pub(crate) struct ThreadStat {
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// True if it is the kernel's own.
-    pub of_kernel: bool,
+    pub(crate) of_kernel: bool,
     /// Its real-time priority; 0 if it has none.
-    pub priority: u32,
+    pub(crate) priority: u32,
     /// True if its policy is `SCHED_FIFO` or `SCHED_RR`.
-    pub real_time: bool,
+    pub(crate) real_time: bool,
 }
 
 /// `PF_KTHREAD` among the flags of a thread.
@@ -142,7 +142,7 @@ const OF_KERNEL: u64 = 0x0020_0000;
 
 /// Reads such a line. The name stands in brackets and may itself hold brackets and spaces.
 #[must_use]
-pub fn thread_stat(text: &str) -> Option<ThreadStat> {
+pub(crate) fn thread_stat(text: &str) -> Option<ThreadStat> {
     let (name, rest) = (text.split_once('(')?.1).rsplit_once(')')?;
     let fields: Vec<&str> = rest.split_ascii_whitespace().collect();
     let number = |of_manual: usize| fields.get(of_manual - 3)?.parse::<u64>().ok();

@@ -10,11 +10,11 @@ use crate::wire::{FrameNo, MAX_LEN, Timing};
 #[derive(Debug, Clone)]
 pub struct Lane {
     /// The axes of its frames.
-    pub window: Window,
+    pub(crate) window: Window,
     /// Asks for a reply in each Nth frame; 0 never asks.
-    pub ack_every: u32,
+    pub(crate) ack_every: u32,
     /// The longest Time that its controller executes as it is, ms (PA0b).
-    pub longest_ms: u32,
+    pub(crate) longest_ms: u32,
     pub(super) codec: Codec,
     pub(super) next_frame: FrameNo,
 }
@@ -32,7 +32,7 @@ pub struct Stamped {
     /// Its number.
     pub frame: FrameNo,
     /// True if it asks for a reply.
-    pub asked: bool,
+    pub(crate) asked: bool,
     /// The greatest amplitude of vibration that it asks of any slot, strokes.
     pub shakes: f64,
 }
@@ -53,7 +53,11 @@ impl Lane {
     }
 
     /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, plain, effects and outputs off.
-    pub fn encode_slow_park<'b>(&mut self, time_ms: u32, buf: &'b mut [u8; MAX_LEN]) -> (Stamped, &'b [u8]) {
+    pub(crate) fn encode_slow_park<'b>(
+        &mut self,
+        time_ms: u32,
+        buf: &'b mut [u8; MAX_LEN],
+    ) -> (Stamped, &'b [u8]) {
         let set_vibrates = |lane: &mut Self, vibrates| {
             let Codec::Mbox(codec) = &mut lane.codec;
             std::mem::replace(&mut codec.vibrates, vibrates)
@@ -66,7 +70,7 @@ impl Lane {
     }
 
     /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
-    pub fn hold(&mut self) {
+    pub(crate) fn hold(&mut self) {
         self.window.hold();
         let Codec::Mbox(codec) = &mut self.codec;
         codec.hold();
@@ -79,7 +83,7 @@ impl Lane {
     }
 
     /// Goes on counting where another left off: a frame number never comes twice.
-    pub const fn go_on_from(&mut self, before: &Self) {
+    pub(crate) const fn go_on_from(&mut self, before: &Self) {
         self.next_frame = before.next_frame;
     }
 

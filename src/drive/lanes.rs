@@ -20,14 +20,14 @@ pub struct Manner {
 impl Manner {
     /// In each of how many frames a reply is asked for; 0 never.
     #[must_use]
-    pub fn ack_every(&self, config: &Config) -> u32 {
+    pub(crate) fn ack_every(&self, config: &Config) -> u32 {
         if self.silent { 0 } else { config.show.ack_every }
     }
 }
 
 /// The lanes of every controller, in the configuration's order, for a cue without a [`crate::config::Misfit`].
 #[must_use]
-pub fn lanes(config: &Config, timeline: &Timeline, manner: Manner) -> Vec<Lane> {
+pub(crate) fn lanes(config: &Config, timeline: &Timeline, manner: Manner) -> Vec<Lane> {
     config.controllers.iter().map(|controller| lane(config, controller, timeline, manner)).collect()
 }
 

@@ -9,8 +9,10 @@ mod lanes;
 mod mbox;
 mod rounds;
 
-pub use lane::{Lane, Stamped};
-pub use lanes::{Manner, lanes};
+pub use lane::Lane;
+pub(crate) use lane::Stamped;
+pub use lanes::Manner;
+pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
 
 use crate::belief::Reading;

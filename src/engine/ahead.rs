@@ -177,13 +177,13 @@ impl Engine {
     }
 
     /// The request that the planner has not seen yet.
-    pub fn take_request(&mut self) -> Option<Request> {
+    pub(crate) fn take_request(&mut self) -> Option<Request> {
         self.phase.next()?.as_mut()?.take_request()
     }
 
     /// Hands over a course that the planner made, and the scene it made it for. One that nobody waits for any more, or
     /// that came after its time, is not taken up.
-    pub fn offer(&mut self, course: Box<Course>, scene: Box<Scene>) {
+    pub(crate) fn offer(&mut self, course: Box<Course>, scene: Box<Scene>) {
         let now = self.playhead.at();
         if let Some(next) = self.phase.next()
             && let Some(replan) = next.as_mut().filter(|next| next.serial == course.serial)
@@ -201,7 +201,7 @@ impl Engine {
 
     /// Hears that the planner found no course for the request of that serial. A seek is not done then, and a lane stays out;
     /// without any other move the show cannot go on.
-    pub fn refuse(&mut self, serial: u32, scene: Box<Scene>) {
+    pub(crate) fn refuse(&mut self, serial: u32, scene: Box<Scene>) {
         self.planner.scenes.put(scene);
         let next = self.phase.next().and_then(|next| next.take_if(|next| next.serial == serial));
         match next.map(|next| next.goal) {
@@ -218,7 +218,7 @@ impl Engine {
     }
 
     /// A course that is to be freed on another thread.
-    pub fn take_retired(&mut self) -> Option<Box<Course>> {
+    pub(crate) fn take_retired(&mut self) -> Option<Box<Course>> {
         self.planner.retired.take()
     }
 

@@ -8,28 +8,28 @@ use crate::wire::Timing;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beat {
     /// Which kind of Time they carry.
-    pub timing: Timing,
+    pub(crate) timing: Timing,
     /// The Time field.
-    pub time_ms: u32,
+    pub(crate) time_ms: u32,
     /// How long the frame takes, ms: what a relative one says, and the difference to the one before of an absolute one.
     pub lasts_ms: u32,
     /// What the cue's channels say, in its unit.
-    pub samples: Samples,
+    pub(crate) samples: Samples,
     /// The effects that are on.
-    pub effects: EffectSet,
+    pub(crate) effects: EffectSet,
 }
 
 impl Beat {
     /// Frames with all channels and effects off.
     #[must_use]
-    pub fn still(timing: Timing, time_ms: u32) -> Self {
+    pub(crate) fn still(timing: Timing, time_ms: u32) -> Self {
         let (samples, effects) = (Samples::REST, EffectSet::Named(0));
         Self { timing, time_ms, lasts_ms: time_ms, samples, effects }
     }
 
     /// The same for a frame that takes so many milliseconds, whatever its Time says.
     #[must_use]
-    pub const fn lasting(self, lasts_ms: u32) -> Self {
+    pub(crate) const fn lasting(self, lasts_ms: u32) -> Self {
         Self { lasts_ms, ..self }
     }
 }

@@ -30,7 +30,7 @@ impl Engine {
 
     /// The same with what operators want of each lane from the first frame on.
     #[must_use]
-    pub fn mixed(mut self, mixes: &[Mix]) -> Self {
+    pub(crate) fn mixed(mut self, mixes: &[Mix]) -> Self {
         for (motion, mix) in self.lanes.all.iter_mut().zip(mixes) {
             (motion.wanted, motion.out) = (*mix, !mix.on);
         }
@@ -44,14 +44,14 @@ impl Engine {
     }
 
     /// Takes over from the engine that is done: lanes to which nothing goes stay so, and the others are to be found.
-    pub fn take_over(&mut self, before: &Self) {
+    pub(crate) fn take_over(&mut self, before: &Self) {
         let lanes = self.lanes.all.iter_mut().zip(&before.lanes.all);
         lanes.for_each(|(motion, old)| motion.go_on_from(old));
     }
 
     /// Whether a lane that frames may go to is elsewhere than at park.
     #[must_use]
-    pub fn is_astray(&self) -> bool {
+    pub(crate) fn is_astray(&self) -> bool {
         self.lanes.is_any_off_park(&AT_PARK)
     }
 

@@ -8,7 +8,7 @@ use crate::time::ShowTime;
 
 /// What the hall wants of the engine: told every tick, so that none can be missed, and told again it changes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Directive {
+pub(crate) enum Directive {
     /// Nothing is to begin: the hall is not ready.
     Off,
     /// Nothing is to begin until somebody lets the show go.
@@ -76,7 +76,7 @@ impl Directive {
 
 impl Engine {
     /// Takes what the hall wants, as often as it is told.
-    pub fn obey(&mut self, directive: Directive) {
+    pub(crate) fn obey(&mut self, directive: Directive) {
         let before = std::mem::replace(&mut self.directive, directive);
         // Whoever has parked is done, and is not to park anew.
         if (before, directive) == (Directive::Park, Directive::Park) {
@@ -118,19 +118,19 @@ impl Engine {
     }
 
     /// Brings lanes that are to park to rest without the planner, where it has not told the way: from there it is asked anew.
-    pub fn rest_to_park(&mut self) {
+    pub(crate) fn rest_to_park(&mut self) {
         if self.is_to_park() && self.phase.is_following() {
             self.come_down(Rest::Ended);
         }
     }
 
     /// Ends the play where the lanes are.
-    pub fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.enter(Phase::Done);
     }
 
     /// Goes on elsewhere in the film, from a pause once it is resumed. A time after the end is the end.
-    pub fn seek(&mut self, film: ShowTime) {
+    pub(crate) fn seek(&mut self, film: ShowTime) {
         let target = self.playhead.cue_time(film.min(self.timeline.duration()));
         match &self.phase {
             Phase::Braking(Rest::Paused) | Phase::Holding(Holding { why: Rest::Paused, .. }) => {
@@ -147,7 +147,7 @@ impl Engine {
     }
 
     /// Sets how much later than the film the motion is to be; it is slewed in.
-    pub fn trim(&mut self, ms: i32) {
+    pub(crate) fn trim(&mut self, ms: i32) {
         if self.playhead.trim(ms)
             && let Phase::Braking(Rest::Paused)
             | Phase::Holding(Holding { why: Rest::Paused, next: None, .. }) = self.phase

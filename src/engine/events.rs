@@ -30,7 +30,7 @@ impl fmt::Display for Unplanned {
 
 /// Something that happened once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum EngineEvent {
+pub(crate) enum EngineEvent {
     /// Something could not be planned, without ending the show.
     Unplanned(Unplanned),
     /// A move that the show needs could not be planned.
@@ -55,7 +55,7 @@ impl EngineEvent {
 
 /// What has happened and was not taken yet, in room that was made before the show. Each lane has each of its events once at the most.
 #[derive(Debug)]
-pub struct EngineEvents(Vec<EngineEvent>);
+pub(crate) struct EngineEvents(Vec<EngineEvent>);
 
 /// EngineEvents that a lane can have at once, and that concern none.
 const OF_A_LANE: usize = 3;
@@ -76,7 +76,7 @@ impl EngineEvents {
     }
 
     /// Hands over what happened; what `take` says no to is kept for the next time.
-    pub fn take(&mut self, mut take: impl FnMut(EngineEvent) -> bool) {
+    pub(crate) fn take(&mut self, mut take: impl FnMut(EngineEvent) -> bool) {
         self.0.retain(|event| !take(*event));
     }
 }

@@ -33,7 +33,7 @@ impl Headroom {
     /// Measures the cue at full level on every different slot of the windows, as its proof does: however the frames fall on
     /// it, at the show's own rate. One phase alone may show a tenth less than the one that is met next.
     #[must_use]
-    pub fn measure(windows: &[Window], timeline: &Timeline, rate: Rate) -> Self {
+    pub(crate) fn measure(windows: &[Window], timeline: &Timeline, rate: Rate) -> Self {
         let spans = usize::try_from(timeline.duration().as_nanos().max(0) / SPAN).unwrap_or(0) + 1;
         let mut loads = vec![Load::default(); spans];
         let slots = different_slots(windows);
@@ -51,21 +51,21 @@ impl Headroom {
 
     /// The greatest speed-up from `at` on, with motion at `level`. Never allocates.
     #[must_use]
-    pub fn pace(&self, at: ShowTime, level: f64) -> f64 {
+    pub(crate) fn pace(&self, at: ShowTime, level: f64) -> f64 {
         let leaves = self.ahead(at).iter().map(|load| load.leaves_pace(level, self.turn));
         leaves.fold(MAX_SPEED_UP, f64::min)
     }
 
     /// What of the greatest rates of a level may be used from `at` on, 0 to 1. Never allocates.
     #[must_use]
-    pub fn fade(&self, at: ShowTime, level: f64) -> f64 {
+    pub(crate) fn fade(&self, at: ShowTime, level: f64) -> f64 {
         let leaves = self.ahead(at).iter().map(|load| load.leaves_fade(level, self.least, self.turn));
         leaves.fold(1.0, f64::min).max(0.0)
     }
 
     /// The greatest level at which the cue keeps the limits, and can still change its level; 1 at the most.
     #[must_use]
-    pub fn greatest_level(&self) -> f64 {
+    pub(crate) fn greatest_level(&self) -> f64 {
         (0.98 / self.greatest).min(1.0)
     }
 

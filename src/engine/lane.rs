@@ -97,13 +97,13 @@ impl LaneMotion {
 
     /// True if it is led, or would be if it were seen.
     #[must_use]
-    pub const fn takes_part(&self) -> bool {
+    pub(crate) const fn takes_part(&self) -> bool {
         self.is_there() || self.is_unseen()
     }
 
     /// True if it is to take part, and nobody has told where it stands.
     #[must_use]
-    pub const fn is_unseen(&self) -> bool {
+    pub(crate) const fn is_unseen(&self) -> bool {
         matches!(self.mode, LaneMode::Unseen) && self.wanted.on
     }
 
@@ -129,13 +129,13 @@ impl LaneMotion {
 
     /// Whether a frame goes to it in this tick.
     #[must_use]
-    pub const fn gets_a_frame(&self) -> bool {
+    pub(crate) const fn gets_a_frame(&self) -> bool {
         self.is_there() && self.ahead == 0
     }
 
     /// Whether nobody knows which frames reach it.
     #[must_use]
-    pub const fn is_blind(&self) -> bool {
+    pub(crate) const fn is_blind(&self) -> bool {
         matches!(self.mode, LaneMode::Blind(_))
     }
 
@@ -253,7 +253,7 @@ impl LaneMotion {
 
     /// What the limiter had to do.
     #[must_use]
-    pub const fn clamps(&self) -> &Counts {
+    pub(crate) const fn clamps(&self) -> &Counts {
         self.limiter.counts()
     }
 

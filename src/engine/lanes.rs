@@ -12,7 +12,7 @@ use crate::time::{Rate, ShowTime};
 
 /// What is to become of a lane, whatever the hall wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LaneOrder {
+pub(crate) enum LaneOrder {
     /// It comes to rest; after its hold frames nothing goes to it.
     Leave,
     /// Nothing goes to it from now on.

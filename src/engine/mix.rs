@@ -23,11 +23,11 @@ impl Mix {
     pub const FULL: Self =
         Self { motion: 1.0, vibration: 1.0, effects: u32::MAX, switches: u32::MAX, on: true };
     /// No vibration, no effects, all outputs off.
-    pub const STILL: Self = Self { motion: 1.0, vibration: 0.0, effects: 0, switches: 0, on: true };
+    pub(crate) const STILL: Self = Self { motion: 1.0, vibration: 0.0, effects: 0, switches: 0, on: true };
 
     /// What is left of what the cue says on a channel.
     #[must_use]
-    pub fn sample(&self, channel: ChannelId, cue: Sample) -> Sample {
+    pub(crate) fn sample(&self, channel: ChannelId, cue: Sample) -> Sample {
         let mut left = cue;
         let row = channel.row();
         for ((index, part), value) in (0..).zip(row.parts).zip(&mut left.0) {
@@ -42,7 +42,7 @@ impl Mix {
 
     /// The effects that are left of the cue's.
     #[must_use]
-    pub const fn effects(&self, cue: EffectSet) -> EffectSet {
+    pub(crate) const fn effects(&self, cue: EffectSet) -> EffectSet {
         match cue {
             EffectSet::Named(on) => EffectSet::Named(on & self.effects),
             EffectSet::Word(word) if self.effects == u32::MAX => EffectSet::Word(word),

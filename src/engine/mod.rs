@@ -22,16 +22,16 @@ mod slew;
 mod stamps;
 mod trail;
 
-pub use beat::{Beat, Step};
-pub use directive::Directive;
-pub use events::{EngineEvent, EngineEvents, Unplanned};
+pub(crate) use beat::Beat;
+pub use beat::Step;
+pub(crate) use directive::Directive;
+pub use events::Unplanned;
+pub(crate) use events::{EngineEvent, EngineEvents};
 pub use headroom::Headroom;
-pub use lane::LaneMotion;
-pub use lanes::LaneOrder;
+pub(crate) use lanes::LaneOrder;
 pub use mix::Mix;
-pub use phase::Rest;
-pub use playhead::Playhead;
-pub use slew::MAX_SPEED_UP;
+pub(crate) use phase::Rest;
+pub(crate) use playhead::Playhead;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -72,7 +72,7 @@ pub struct Show {
 
 /// How far a play is: a level, which nobody can miss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PlayProgress {
+pub(crate) enum PlayProgress {
     /// Nobody has let it go.
     Waiting,
     /// The lanes are on their way onto the cue, or somebody waits for them elsewhere.
@@ -114,7 +114,7 @@ impl Engine {
     /// An engine of which nobody has told where its lanes stand, at the levels of their windows; `course` begins at the show's
     /// start with those that are found at park ([`Engine::found`]).
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         show: Show,
         timeline: Arc<Timeline>,
         headroom: Headroom,
@@ -140,7 +140,7 @@ impl Engine {
     /// True if nothing is sent until the hall asks for the way on: the show has not begun, or lanes rest in a pause and have been
     /// told so.
     #[must_use]
-    pub fn waits(&self) -> bool {
+    pub(crate) fn waits(&self) -> bool {
         let goes_on = matches!(self.directive, Directive::Play | Directive::Park);
         let is_paused = matches!(self.phase, Phase::Holding(Holding { why: Rest::Paused, .. }));
         (is_paused && self.sends_nothing() && !goes_on) || matches!(self.phase, Phase::Waiting(_))
@@ -154,7 +154,7 @@ impl Engine {
 
     /// How far it is.
     #[must_use]
-    pub fn progress(&self) -> PlayProgress {
+    pub(crate) fn progress(&self) -> PlayProgress {
         match &self.phase {
             Phase::Waiting(_) => PlayProgress::Waiting,
             Phase::Following(Following { course, .. })
@@ -173,7 +173,7 @@ impl Engine {
     }
 
     /// What happened, to be taken every tick.
-    pub fn events(&mut self) -> &mut EngineEvents {
+    pub(crate) fn events(&mut self) -> &mut EngineEvents {
         self.lanes.note_arrivals(self.phase.course(), self.playhead.reached());
         &mut self.lanes.events
     }

@@ -15,13 +15,13 @@ impl Engine {
 
     /// Whether frames lead a lane, be it to rest.
     #[must_use]
-    pub fn is_led(&self, lane: usize) -> bool {
+    pub(crate) fn is_led(&self, lane: usize) -> bool {
         self.lane(lane).is_there() && !self.is_at_rest()
     }
 
     /// The pose that a lane was sent last, or in which it was found since; none where nothing goes to it.
     #[must_use]
-    pub fn rests_at(&self, lane: usize) -> Option<&Pose> {
+    pub(crate) fn rests_at(&self, lane: usize) -> Option<&Pose> {
         let motion = self.lane(lane);
         (motion.is_there() && self.is_at_rest()).then(|| motion.pose())
     }
@@ -32,7 +32,7 @@ impl Engine {
     }
 
     /// Sets what a lane makes of the cue.
-    pub fn mix(&mut self, lane: usize, mix: Mix) {
+    pub(crate) fn mix(&mut self, lane: usize, mix: Mix) {
         let is_put_back = self.lanes.all[lane].want(mix);
         // While it was out nobody minded where it stands.
         if is_put_back && self.lane(lane).mode == LaneMode::Unseen && !self.sends_nothing() {
@@ -41,7 +41,7 @@ impl Engine {
     }
 
     /// Does to a lane what has to be done whatever the hall wants.
-    pub fn order(&mut self, lane: usize, order: LaneOrder) {
+    pub(crate) fn order(&mut self, lane: usize, order: LaneOrder) {
         match order {
             LaneOrder::Leave if self.sends_nothing() => {
                 if self.lane(lane).takes_part() {
@@ -62,7 +62,7 @@ impl Engine {
 
     /// The seat of that lane, which was cut off, vibrates on about that pose: slow frames lead it there, without vibration. It is looked at
     /// then.
-    pub fn still(&mut self, lane: usize, pose: &Pose) {
+    pub(crate) fn still(&mut self, lane: usize, pose: &Pose) {
         if self.sends_nothing() {
             return self.lanes.fall_out(lane, Fall::Gap);
         }
@@ -72,7 +72,7 @@ impl Engine {
 
     /// Sets the pose of a lane that is blind one step further towards its rest, `farthest` being how far each slot may be from
     /// its present one. Says how long that takes, `longest_ms` at the most; none where nothing goes to the lane any more.
-    pub fn slow_down(&mut self, lane: usize, longest_ms: u32, farthest: &Pose) -> Option<u32> {
+    pub(crate) fn slow_down(&mut self, lane: usize, longest_ms: u32, farthest: &Pose) -> Option<u32> {
         let (index, rate) = (self.playhead.frames() - 1, self.show.rate);
         let lasts_ms = self.lanes.all[lane].slow_down(index, rate, longest_ms, farthest);
         if lasts_ms.is_none() {
@@ -83,7 +83,7 @@ impl Engine {
 
     /// A lane's seat is known to be at rest in that pose, `near` of which is noise. One that was away is there again, and joins the
     /// others where they follow the cue; one that rests goes on from there; one that is under way goes on.
-    pub fn found(&mut self, lane: usize, known: &KnownPose, near: &Pose) {
+    pub(crate) fn found(&mut self, lane: usize, known: &KnownPose, near: &Pose) {
         let is_ready = matches!(self.directive, Directive::Wait | Directive::Play);
         let is_fresh = is_ready && self.playhead.frames() == 0 && self.phase.rest().is_none();
         let rests = self.is_at_rest() && self.phase.next().is_none_or(|next| next.is_none());

@@ -23,7 +23,7 @@ pub(super) fn hold_frames(rate: Rate) -> u8 {
 
 /// Why lanes rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rest {
+pub(crate) enum Rest {
     /// Frames stopped for too long; the film runs on.
     Late,
     /// The film that is chased can be followed, and the way onto the cue is not known yet.

@@ -49,13 +49,13 @@ impl Playhead {
 
     /// Where the film is: what the playhead will be at once all lag and trim are slewed in, and the trim.
     #[must_use]
-    pub fn film(&self) -> ShowTime {
+    pub(crate) fn film(&self) -> ShowTime {
         ShowTime::from_nanos(self.due.as_nanos() + trim_ns(self.trim_ms))
     }
 
     /// How long the frame of the next tick takes.
     #[must_use]
-    pub fn frame_time(&self) -> Duration {
+    pub(crate) fn frame_time(&self) -> Duration {
         millis(self.rate.time_ms(self.frames))
     }
 

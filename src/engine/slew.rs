@@ -7,7 +7,7 @@ use crate::time::Rate;
 
 // Jerk grows by 6 %; a lag of 50 ms is gone in 2.6 s (docs/limiter.md, section 7).
 /// The most that show time runs faster or slower than the clock.
-pub const MAX_SPEED_UP: f64 = 0.02;
+pub(crate) const MAX_SPEED_UP: f64 = 0.02;
 /// How quickly that may change, per second: 0.2 % per 10 ms.
 pub(super) const CHANGE_PER_S: f64 = 0.2;
 

@@ -11,7 +11,7 @@ use super::point::{FILM_FRAME, FilmPoint, FilmState};
 use crate::time::{MonoTime, ShowTime, Tick};
 
 /// An error beyond this is never slewed away, unless it is configured otherwise: seats hold, and join.
-pub const JOIN_ABOVE: Duration = FILM_FRAME;
+pub(crate) const JOIN_ABOVE: Duration = FILM_FRAME;
 /// Seats that are parked join once the film has been followable for so long: a reader that flickers must not begin a show.
 const READY_FOR: Duration = Duration::from_millis(500);
 /// So long before the first sample of the cue seats join its first pose.
@@ -26,7 +26,7 @@ const UNSTABLE_WITHIN: Duration = Duration::from_mins(1);
 
 /// Where a show that chases a film stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ChaseState {
+pub(crate) enum ChaseState {
     /// Seats are parked, and have not joined yet.
     Waiting,
     /// Seats follow, or join.
@@ -83,7 +83,7 @@ pub enum ChaseVerdict {
 
 /// When seats that hold may join again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Rejoin {
+pub(crate) enum Rejoin {
     /// By themselves.
     Auto,
     /// When a person lets them.
@@ -198,12 +198,12 @@ impl Chase {
 
     /// Where it stands.
     #[must_use]
-    pub const fn state(&self) -> ChaseState {
+    pub(crate) const fn state(&self) -> ChaseState {
         self.state
     }
 
     /// A person lets seats that hold join, once.
-    pub const fn let_join(&mut self) {
+    pub(crate) const fn let_join(&mut self) {
         self.let_join = true;
     }
 

@@ -30,11 +30,11 @@ const NO_PACE: f64 = 4e-9;
 
 /// How the pace of the playhead may differ from the clock's. The proof of a cue is made for the greatest that they allow together.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PaceLimits {
+pub(crate) struct PaceLimits {
     /// How far from 1 the film's own rate is followed. 0.15 % covers pull-downs and crystals.
-    pub band: f64,
+    pub(crate) band: f64,
     /// How far from the film's rate the playhead's may be to take an error back.
-    pub slew: f64,
+    pub(crate) slew: f64,
 }
 
 impl Default for PaceLimits {
@@ -47,7 +47,7 @@ impl Default for PaceLimits {
 impl PaceLimits {
     /// The greatest pace that can be asked for.
     #[must_use]
-    pub const fn most(&self) -> f64 {
+    pub(crate) const fn most(&self) -> f64 {
         1.0 + self.band + self.slew
     }
 
@@ -56,7 +56,7 @@ impl PaceLimits {
     ///
     /// With the playhead p and the cue x: v = p' x', a = p'^2 x'' + p'' x', j = p'^3 x''' + 3 p' p'' x'' + p''' x'.
     #[must_use]
-    pub fn leave(&self, velocity: f64, acceleration: f64, jerk: f64) -> [f64; 3] {
+    pub(crate) fn leave(&self, velocity: f64, acceleration: f64, jerk: f64) -> [f64; 3] {
         let (pace, change) = (self.most(), self.change_per_s());
         let of_change = change / CHANGE_REACHED_S;
         [
@@ -68,14 +68,14 @@ impl PaceLimits {
 
     /// How quickly the pace changes at the most, per second.
     #[must_use]
-    pub const fn change_per_s(&self) -> f64 {
+    pub(crate) const fn change_per_s(&self) -> f64 {
         CHANGE * self.slew
     }
 }
 
 /// The playhead and its pace.
 #[derive(Debug, Clone)]
-pub struct Follower {
+pub(crate) struct Follower {
     limits: PaceLimits,
     playhead: ShowTime,
     pace: f64,
@@ -88,19 +88,19 @@ pub struct Follower {
 impl Follower {
     /// A playhead that has followed nothing yet.
     #[must_use]
-    pub const fn new(limits: PaceLimits) -> Self {
+    pub(crate) const fn new(limits: PaceLimits) -> Self {
         Self { limits, playhead: ShowTime::ZERO, pace: 1.0, change: 0.0, trim_s: 0.0 }
     }
 
     /// Where in the cue the frame of this tick leads.
     #[must_use]
-    pub const fn playhead(&self) -> ShowTime {
+    pub(crate) const fn playhead(&self) -> ShowTime {
         self.playhead
     }
 
     /// How many times as fast as the clock it moves.
     #[must_use]
-    pub const fn pace(&self) -> f64 {
+    pub(crate) const fn pace(&self) -> f64 {
         self.pace
     }
 
@@ -112,13 +112,13 @@ impl Follower {
 
     /// How far the film, less the trim, is ahead of where the playhead would be at the end of a frame, seconds.
     #[must_use]
-    pub fn error_s(&self, point: &FilmPoint, end: MonoTime, frame: Duration) -> f64 {
+    pub(crate) fn error_s(&self, point: &FilmPoint, end: MonoTime, frame: Duration) -> f64 {
         let ahead = point.media_at(end).as_nanos().saturating_sub(self.playhead.as_nanos());
         ShowTime::from_nanos(ahead).as_secs_f64() - self.trim_s - frame.as_secs_f64() * self.rate_of(point)
     }
 
     /// Puts the playhead where the film is at the end of a frame; seats get there by a join.
-    pub fn join(&mut self, point: &FilmPoint, end: MonoTime, trim_ms: i32) {
+    pub(crate) fn join(&mut self, point: &FilmPoint, end: MonoTime, trim_ms: i32) {
         self.trim_s = f64::from(trim_ms) * 1e-3;
         let trim = ShowTime::from_secs_f64(self.trim_s).as_nanos();
         self.playhead = ShowTime::from_nanos(point.media_at(end).as_nanos().saturating_sub(trim));
@@ -126,7 +126,7 @@ impl Follower {
     }
 
     /// Moves the playhead on by one frame that ends at `end`.
-    pub fn follow(&mut self, point: &FilmPoint, end: MonoTime, frame: Duration, trim_ms: i32) {
+    pub(crate) fn follow(&mut self, point: &FilmPoint, end: MonoTime, frame: Duration, trim_ms: i32) {
         let dt = frame.as_secs_f64();
         if dt <= 0.0 {
             return;

@@ -22,17 +22,17 @@
 )]
 
 pub(crate) mod artnet;
-pub mod chase;
+pub(crate) mod chase;
 pub(crate) mod chooser;
 mod estimate;
-pub mod follower;
+pub(crate) mod follower;
 mod labels;
 mod late;
 pub(crate) mod ltc;
 pub(crate) mod mpv;
 pub(crate) mod mtc;
 pub(crate) mod observation;
-pub mod point;
+pub(crate) mod point;
 #[cfg(test)]
 mod tests;
 pub(crate) mod timecode;

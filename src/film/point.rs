@@ -11,10 +11,10 @@ use crate::time::{MonoTime, ShowTime, Tick};
 
 /// A point older than this speaks for nobody. Whoever publishes does so ten times a second, whatever the source does; if that
 /// thread hangs, seats must not follow its last word for ever. A loaded machine may hold it up for some of these.
-pub const STALE: Duration = Duration::from_millis(500);
+pub(crate) const STALE: Duration = Duration::from_millis(500);
 
 /// A frame of film, at 24 a second. What is off by no more is slewed, and nobody in a seat notices; what is off by more is joined.
-pub const FILM_FRAME: Duration = Duration::from_nanos(41_666_667);
+pub(crate) const FILM_FRAME: Duration = Duration::from_nanos(41_666_667);
 
 /// What may be said of where the film is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -64,7 +64,7 @@ impl FilmState {
 
     /// True if seats may follow.
     #[must_use]
-    pub const fn may_lead(self) -> bool {
+    pub(crate) const fn may_lead(self) -> bool {
         matches!(self, Self::FreeRunning | Self::Locked | Self::Freewheeling)
     }
 }
@@ -132,7 +132,7 @@ impl PublishedPoint {
     /// The newest point; `None` before the first and while one is being written.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "what was put together is taken apart")]
-    pub fn read(&self) -> Option<FilmPoint> {
+    pub(crate) fn read(&self) -> Option<FilmPoint> {
         let version = self.version.load(Ordering::Acquire);
         if version == 0 || version % 2 == 1 {
             return None;

@@ -10,7 +10,7 @@ use super::follower::tests::tries;
 use super::observation::{FilmWord, Observation};
 use super::point::{ChasedFilm, PublishedPoint};
 use super::tracker::SourceTracker;
-use crate::harness::film::{Luck, SOURCES, Told, TrueFilm, mono};
+use crate::harness::shown::{Luck, SOURCES, Told, TrueFilm, mono};
 use crate::time::{ShowTime, Tick};
 
 const HZ: f64 = 50.0;

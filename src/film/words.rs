@@ -24,7 +24,7 @@ impl FilmState {
 impl HoldCause {
     /// Why the seats wait.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Film(state) => state.words(),
             Self::Apart => "the film was more than 40 ms away from the seats",
@@ -39,7 +39,7 @@ impl HoldCause {
 impl ParkCause {
     /// Why the seats park.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::FilmEnded => "the film is over",
             Self::CueLeft => "the film has left the cue",

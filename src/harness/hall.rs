@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use rtrb::Producer;
 
-use super::film::{Showing, ShownFilm};
+use super::shown::{Showing, ShownFilm};
 use super::{Frame, Played};
 use crate::app::StagedShow;
 use crate::belief::Reading;

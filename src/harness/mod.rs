@@ -8,12 +8,14 @@
 )]
 
 pub mod asked;
-pub(crate) mod film;
 mod hall;
 mod played;
 mod ride;
+mod rooms;
+pub(crate) mod shown;
 
-pub use film::{ShownFilm, TrueFilm};
 pub use hall::{Event, ORIGIN, Virtual, read_at_rest};
 pub use played::{Frame, Played, Worst, worst_of_lines};
 pub use ride::{ride, stage, swell};
+pub use rooms::*;
+pub use shown::{ShownFilm, TrueFilm};

@@ -15,7 +15,7 @@ pub struct Groups {
 impl Groups {
     /// The groups that the configuration names, in the order of their first controllers.
     #[must_use]
-    pub fn of(controllers: &[Controller]) -> Self {
+    pub(crate) fn of(controllers: &[Controller]) -> Self {
         Self::named(controllers.iter().map(|controller| controller.group.as_str()))
     }
 
@@ -40,19 +40,13 @@ impl Groups {
 
     /// How many groups there are.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.names.len()
-    }
-
-    /// True if there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.names.is_empty()
     }
 
     /// How many controllers they have in all.
     #[must_use]
-    pub fn controllers(&self) -> usize {
+    pub(crate) fn controllers(&self) -> usize {
         self.of.len()
     }
 
@@ -61,7 +55,7 @@ impl Groups {
     /// # Panics
     /// If there is no such controller.
     #[must_use]
-    pub fn group_of(&self, controller: usize) -> usize {
+    pub(crate) fn group_of(&self, controller: usize) -> usize {
         self.of[controller]
     }
 
@@ -69,7 +63,7 @@ impl Groups {
     ///
     /// # Panics
     /// If there is no such group.
-    pub fn members(&self, group: usize) -> impl Iterator<Item = usize> {
+    pub(crate) fn members(&self, group: usize) -> impl Iterator<Item = usize> {
         self.members[group].iter().copied()
     }
 
@@ -78,7 +72,7 @@ impl Groups {
     /// # Panics
     /// If there is no such group.
     #[must_use]
-    pub fn name(&self, group: usize) -> &str {
+    pub(crate) fn name(&self, group: usize) -> &str {
         &self.names[group]
     }
 }

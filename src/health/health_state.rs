@@ -34,7 +34,7 @@ impl HealthState {
 
     /// True if its registers are to be read, to see when it is back or put right.
     #[must_use]
-    pub const fn is_looked_at(self) -> bool {
+    pub(crate) const fn is_looked_at(self) -> bool {
         matches!(self, Self::Lost | Self::Stopped | Self::Error)
     }
 }
@@ -132,7 +132,7 @@ pub enum Why {
 impl Why {
     /// The controller it is about; `None` if that is the whole group.
     #[must_use]
-    pub const fn controller(self) -> Option<usize> {
+    pub(crate) const fn controller(self) -> Option<usize> {
         match self {
             Self::AcksMissing(controller)
             | Self::Silent(controller)
@@ -166,15 +166,15 @@ impl Why {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Change {
     /// Which, counted from 0.
-    pub group: usize,
+    pub(crate) group: usize,
     /// When that was noticed.
-    pub at: MonoTime,
+    pub(crate) at: MonoTime,
     /// How it stood.
-    pub from: HealthState,
+    pub(crate) from: HealthState,
     /// How it stands.
-    pub to: HealthState,
+    pub(crate) to: HealthState,
     /// Why.
-    pub why: Why,
+    pub(crate) why: Why,
 }
 
 /// What comes of a look at all groups.

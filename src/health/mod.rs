@@ -21,9 +21,10 @@ mod words;
 use std::time::Duration;
 
 pub use groups::Groups;
-pub use health_state::{Change, HealthState, Notice, Why};
-pub use proof::{Identity, Sighting};
-pub use words::ACKS_OFF;
+pub use health_state::Notice;
+pub(crate) use health_state::{Change, HealthState, Why};
+pub(crate) use proof::{Identity, Sighting};
+pub(crate) use words::ACKS_OFF;
 
 use crate::belief::Fall;
 use crate::config::LossPolicy;
@@ -87,31 +88,31 @@ impl HealthTable {
 
     /// The same for a hall that homes its seats: one that does not know its zero is out, whenever it is first seen.
     #[must_use]
-    pub fn of_a_hall(mut self) -> Self {
+    pub(crate) fn of_a_hall(mut self) -> Self {
         self.members.iter_mut().for_each(Member::demand_home);
         self
     }
 
     /// True if somebody wants a controller to take part: clearing and parking wait for nobody else.
-    pub fn on_part(&mut self, controller: usize, takes_part: bool) {
+    pub(crate) fn on_part(&mut self, controller: usize, takes_part: bool) {
         self.members[controller].out = !takes_part;
     }
 
     /// The groups.
     #[must_use]
-    pub const fn groups(&self) -> &Groups {
+    pub(crate) const fn groups(&self) -> &Groups {
         &self.groups
     }
 
     /// How a group stands.
     #[must_use]
-    pub fn standing(&self, group: usize) -> HealthState {
+    pub(crate) fn standing(&self, group: usize) -> HealthState {
         self.places[group].standing
     }
 
     /// Why it stands so.
     #[must_use]
-    pub fn why(&self, group: usize) -> Why {
+    pub(crate) fn why(&self, group: usize) -> Why {
         self.places[group].why
     }
 
@@ -127,17 +128,17 @@ impl HealthTable {
     }
 
     /// A frame was refused: x = 3 or 5, of an MBOX controller also 4.
-    pub fn on_refused(&mut self, controller: usize) {
+    pub(crate) fn on_refused(&mut self, controller: usize) {
         self.members[controller].on_refused();
     }
 
     /// A status report of the controller itself.
-    pub fn on_status(&mut self, controller: usize, at: MonoTime) {
+    pub(crate) fn on_status(&mut self, controller: usize, at: MonoTime) {
         self.members[controller].on_life(at);
     }
 
     /// What the observer has noticed.
-    pub fn on_event(&mut self, event: &observe::Event) {
+    pub(crate) fn on_event(&mut self, event: &observe::Event) {
         let member = &mut self.members[event.controller];
         match event.what {
             observe::What::EmergencyStop { .. } => member.on_emergency_stop(true),
@@ -151,85 +152,85 @@ impl HealthTable {
     }
 
     /// So many datagrams went out to read what a [`Sighting`] takes.
-    pub fn on_read_sent(&mut self, controller: usize, datagrams: u32) {
+    pub(crate) fn on_read_sent(&mut self, controller: usize, datagrams: u32) {
         self.members[controller].on_read_sent(datagrams);
     }
 
     /// So many other datagrams went out to a controller: its packet counter will have grown by as many.
-    pub fn on_other_sent(&mut self, controller: usize, datagrams: u64) {
+    pub(crate) fn on_other_sent(&mut self, controller: usize, datagrams: u64) {
         self.members[controller].on_other_sent(datagrams);
     }
 
     /// A beat went out: any answer of the controller is a sign of life ([`HealthTable::on_status`]), and it is lost without one.
-    pub fn on_beat_sent(&mut self, controller: usize, at: MonoTime) {
+    pub(crate) fn on_beat_sent(&mut self, controller: usize, at: MonoTime) {
         self.members[controller].on_beat_sent(at);
     }
 
     /// What DPF0 says, read by itself, of whether a controller knows its zero.
-    pub fn on_zero(&mut self, controller: usize, homed: bool) {
+    pub(crate) fn on_zero(&mut self, controller: usize, homed: bool) {
         self.members[controller].on_zero(homed);
     }
 
     /// It has answered something that this thread or another one asked.
-    pub fn on_answer(&mut self, controller: usize, at: MonoTime) {
+    pub(crate) fn on_answer(&mut self, controller: usize, at: MonoTime) {
         self.members[controller].on_answer(at);
     }
 
     /// It has answered with registers of 32 bits, as the IMAX manual has them (2.3) and no program that is known.
-    pub fn on_wide_registers(&mut self, controller: usize) {
+    pub(crate) fn on_wide_registers(&mut self, controller: usize) {
         self.members[controller].on_wide_registers();
     }
 
     /// What was read; of no account where no read was sent since the group was lost.
-    pub fn on_sighting(&mut self, controller: usize, sighting: &Sighting, at: MonoTime) {
+    pub(crate) fn on_sighting(&mut self, controller: usize, sighting: &Sighting, at: MonoTime) {
         self.members[controller].on_sighting(sighting, at);
     }
 
     /// A controller drives more axes than its seat type has, and frames have places for them.
-    pub fn on_more_axes(&mut self, controller: usize, drives: u16) {
+    pub(crate) fn on_more_axes(&mut self, controller: usize, drives: u16) {
         self.members[controller].on_more_axes(drives);
     }
 
     /// The packet counter of a controller, which was read while frames go there. To be told before the sending of all that it
     /// may have counted was.
-    pub fn on_count(&mut self, controller: usize, packets: u16) {
+    pub(crate) fn on_count(&mut self, controller: usize, packets: u16) {
         self.members[controller].on_count(packets);
     }
 
     /// A seat at rest was found elsewhere than frames left it: its group is out until it was looked at, and joins from there.
-    pub fn on_moved(&mut self, controller: usize) {
+    pub(crate) fn on_moved(&mut self, controller: usize) {
         self.members[controller].moved = true;
     }
 
     /// It is not known where the frames to a controller have led its seat, and none goes there any more: its group is out until it was
     /// looked at.
-    pub fn on_fell_out(&mut self, controller: usize, why: Fall) {
+    pub(crate) fn on_fell_out(&mut self, controller: usize, why: Fall) {
         self.members[controller].on_fell_out(why);
     }
 
     /// A seat was found, but not all of its axes tell where they are: its group is out until it was homed.
-    pub fn on_unread(&mut self, controller: usize) {
+    pub(crate) fn on_unread(&mut self, controller: usize) {
         self.members[controller].on_unread();
     }
 
     /// An axis, from 0, says that it is outside of its stroke, and where; none once all are inside. That is no position.
-    pub fn on_outside(&mut self, controller: usize, outside: Option<(usize, Pulses)>) {
+    pub(crate) fn on_outside(&mut self, controller: usize, outside: Option<(usize, Pulses)>) {
         self.members[controller].outside = outside;
     }
 
     /// True if the positions of a controller make two places of each, and nothing says in which order their words come.
-    pub fn on_ambiguous(&mut self, controller: usize, ambiguous: bool) {
+    pub(crate) fn on_ambiguous(&mut self, controller: usize, ambiguous: bool) {
         self.members[controller].ambiguous = ambiguous;
     }
 
     /// A controller is home; a person homes one only while the hall is paused or parked. Where that was all its group was
     /// out for, the group is looked at next.
-    pub fn on_homed(&mut self, controller: usize) {
+    pub(crate) fn on_homed(&mut self, controller: usize) {
         self.members[controller].on_homed();
     }
 
     /// All lanes of a group are on the cue, or at park: a group that rejoined is well.
-    pub fn on_joined(&mut self, group: usize) {
+    pub(crate) fn on_joined(&mut self, group: usize) {
         let place = &mut self.places[group];
         if place.standing == HealthState::Rejoining {
             (place.standing, place.why) = well(self.watched);
@@ -238,7 +239,7 @@ impl HealthTable {
 
     /// A person has cleared the group, or the hall is about to be armed: what was latched and is over is forgotten, and
     /// the group takes part again once it was seen as it was.
-    pub fn look_anew(&mut self, group: usize) {
+    pub(crate) fn look_anew(&mut self, group: usize) {
         for controller in self.groups.members(group) {
             self.members[controller].clear();
             self.members[controller].forget();

@@ -14,30 +14,30 @@ use crate::time::MonoTime;
 
 /// What was read of a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sighting {
+pub(crate) struct Sighting {
     /// What it is; no more than compared.
-    pub identity: Identity,
+    pub(crate) identity: Identity,
     /// Its error number; 0 for none.
-    pub error: u16,
+    pub(crate) error: u16,
     /// What kind of alarm its drives have (DPFE of an MBOX controller); 0 for none.
-    pub alarm: u16,
+    pub(crate) alarm: u16,
     /// DP34, the datagrams it received; `None` if it has no such register.
-    pub packets: Option<u16>,
+    pub(crate) packets: Option<u16>,
     /// True if DPF0 says that it knows its zero.
-    pub homed: bool,
+    pub(crate) homed: bool,
 }
 
 /// What a controller is, as far as registers tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Identity {
+pub(crate) struct Identity {
     /// DPFF.
-    pub version: u16,
+    pub(crate) version: u16,
     /// DPFE; 0 for an MBOX controller, whose DPFE is something else.
-    pub minor_version: u16,
+    pub(crate) minor_version: u16,
     /// PA00.
-    pub work_mode: u16,
+    pub(crate) work_mode: u16,
     /// PA02.
-    pub axes: u16,
+    pub(crate) axes: u16,
 }
 
 /// Datagrams that may have been under way when the counter was read, either way.

@@ -6,7 +6,7 @@ use super::{Change, HealthState, Why};
 use crate::wire::DPFE;
 
 /// What has to be said, loudly, where acks are off.
-pub const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
+pub(crate) const ACKS_OFF: &str = "acks are off: a controller that is lost, refuses frames or has an emergency stop is noticed by \
                             its own reports at best";
 
 impl fmt::Display for HealthState {
@@ -27,7 +27,7 @@ impl fmt::Display for HealthState {
 impl HealthState {
     /// What a person does about it.
     #[must_use]
-    pub const fn next(self) -> &'static str {
+    pub(crate) const fn next(self) -> &'static str {
         match self {
             Self::Ok => "nothing",
             Self::Rejoining => "park, or start a show: it joins slowly",
@@ -46,7 +46,7 @@ impl HealthState {
 impl Why {
     /// What a person does about it before all else; `None` if the standing says enough.
     #[must_use]
-    pub const fn next(self) -> Option<&'static str> {
+    pub(crate) const fn next(self) -> Option<&'static str> {
         match self {
             Self::Moved(_) => {
                 Some("find out what moved it; then park, or start a show: it joins slowly from where it is")

@@ -15,7 +15,7 @@ const KINDS_OF_ONE: usize = 16;
 
 /// What was asked of late.
 #[derive(Debug, Default)]
-pub struct Folds(Vec<Fold>);
+pub(crate) struct Folds(Vec<Fold>);
 
 /// Asks of one kind.
 #[derive(Debug)]
@@ -51,7 +51,7 @@ impl Kind {
 impl Folds {
     /// Takes what was asked with that word; gives what is to be written now.
     #[must_use]
-    pub fn take(&mut self, action: Action, word: &'static str, now: MonoTime) -> Vec<Action> {
+    pub(crate) fn take(&mut self, action: Action, word: &'static str, now: MonoTime) -> Vec<Action> {
         let mut written = self.due(now);
         let mut kind = Kind::new(&action, word);
         let of_one = self.0.iter().filter(|fold| fold.kind.who == kind.who).count();
@@ -73,14 +73,14 @@ impl Folds {
 
     /// The repeats whose time is over.
     #[must_use]
-    pub fn due(&mut self, now: MonoTime) -> Vec<Action> {
+    pub(crate) fn due(&mut self, now: MonoTime) -> Vec<Action> {
         let over = |fold: &mut Fold| now.since(fold.since) >= WINDOW;
         self.0.extract_if(.., over).filter_map(|fold| fold.repeats).collect()
     }
 
     /// All that is left.
     #[must_use]
-    pub fn rest(&mut self) -> Vec<Action> {
+    pub(crate) fn rest(&mut self) -> Vec<Action> {
         self.0.drain(..).filter_map(|fold| fold.repeats).collect()
     }
 }

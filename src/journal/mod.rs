@@ -23,9 +23,10 @@ mod report;
 mod tests;
 mod writer;
 
-pub use fold::Folds;
-pub use record::{Action, Outcome, PlaylistPlace, ShowRecord, stamp};
-pub use report::{JournalError, Most, Report, ShowResult, Shown, Totals, report};
+pub(crate) use fold::Folds;
+pub use record::{Action, Outcome, ShowRecord};
+pub(crate) use record::{PlaylistPlace, stamp};
+pub(crate) use report::{JournalError, Most, Report, Shown, Totals, report};
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -119,18 +120,19 @@ impl Journal {
 
     /// Why lines cannot be written at present, and what to do; `None` if they can.
     #[must_use]
-    pub fn trouble(&self) -> Option<String> {
+    pub(crate) fn trouble(&self) -> Option<String> {
         lock(&self.standing.trouble).clone()
     }
 
     /// Lines that were lost since the program started.
     #[must_use]
-    pub fn lost(&self) -> u64 {
+    #[cfg(test)]
+    pub(crate) fn lost(&self) -> u64 {
         self.standing.lost.load(Ordering::Relaxed)
     }
 
     /// What has become worse or better since this was last asked, a line each, for the log.
-    pub fn news(&mut self) -> Vec<String> {
+    pub(crate) fn news(&mut self) -> Vec<String> {
         std::mem::take(&mut lock(&self.standing.news))
     }
 

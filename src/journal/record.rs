@@ -44,13 +44,13 @@ const fn is_once(times: &u32) -> bool {
 impl Action {
     /// True if it was done.
     #[must_use]
-    pub fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.result == "done"
     }
 
     /// The same with texts no longer than are kept.
     #[must_use]
-    pub fn shortened(self) -> Self {
+    pub(crate) fn shortened(self) -> Self {
         let Self { at, who, what, result, state, times } = self;
         let [who, what, result] = [who, what, result].map(|text| shortened(text, MOST_ASKED));
         Self { at, who, what, result, state, times }
@@ -97,7 +97,7 @@ pub struct ShowRecord {
     pub operator: String,
     /// True if the playlist started it: at its time, or because the entry before came to its end.
     pub scheduled: bool,
-    /// True if that was outside the hours of the house ([`crate::config::Hours`]).
+    /// True if that was outside the hours of the house.
     pub out_of_hours: bool,
     /// How it ended; null if it has not.
     pub outcome: Option<Outcome>,
@@ -107,9 +107,9 @@ pub struct ShowRecord {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct PlaylistPlace {
     /// The id of the playlist.
-    pub id: String,
+    pub(crate) id: String,
     /// The entry, counted from 0.
-    pub entry: usize,
+    pub(crate) entry: usize,
 }
 
 /// How a show ended, and its figures.
@@ -194,7 +194,7 @@ impl ShowRecord {
 /// A time as the records have it: RFC 3339 with milliseconds and the offset of its zone, as
 /// `2026-11-21T19:00:03.250+01:00`.
 #[must_use]
-pub fn stamp(at: &Zoned) -> String {
+pub(crate) fn stamp(at: &Zoned) -> String {
     at.strftime("%Y-%m-%dT%H:%M:%S%.3f%:z").to_string()
 }
 

@@ -21,60 +21,60 @@ const MOST_NOTES: usize = 20;
 
 /// How much of some days is taken into a report; of more the newest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Most {
+pub(crate) struct Most {
     /// Shows.
-    pub shows: usize,
+    pub(crate) shows: usize,
     /// What was asked.
-    pub actions: usize,
+    pub(crate) actions: usize,
 }
 
 impl Most {
     /// All that there is.
-    pub const ALL: Self = Self { shows: usize::MAX, actions: usize::MAX };
+    pub(crate) const ALL: Self = Self { shows: usize::MAX, actions: usize::MAX };
 }
 
 /// The journal cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot read the journal in {}; --dir names its folder, or [log] in the configuration", path.display())]
-pub struct JournalError {
+pub(crate) struct JournalError {
     /// Its folder.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// What the system said.
-    pub source: io::Error,
+    pub(crate) source: io::Error,
 }
 
 /// What was played, and what was asked, on some days.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Report {
+pub(crate) struct Report {
     /// The first day, YYYY-MM-DD.
-    pub from: String,
+    pub(crate) from: String,
     /// The last day, YYYY-MM-DD.
-    pub to: String,
+    pub(crate) to: String,
     /// The shows that began on these days, in their order.
-    pub shows: Vec<Shown>,
+    pub(crate) shows: Vec<Shown>,
     /// All of them together.
-    pub totals: Totals,
+    pub(crate) totals: Totals,
     /// What was asked on these days, in its order.
-    pub actions: Vec<Action>,
+    pub(crate) actions: Vec<Action>,
     /// What a reader should know of the journal itself: lines that were cut short or lost.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// One show.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct Shown {
+pub(crate) struct Shown {
     /// What came of it.
-    pub result: ShowResult,
+    pub(crate) result: ShowResult,
     /// How long it took from begin to end, s; null if it has no end.
-    pub took_s: Option<f64>,
+    pub(crate) took_s: Option<f64>,
     /// Its record.
     #[serde(flatten)]
-    pub record: ShowRecord,
+    pub(crate) record: ShowRecord,
 }
 
 words! {
     /// What came of a show.
-    ShowResult {
+    pub(crate) ShowResult {
         /// It was played to its end.
         Completed = "completed",
         /// A person ended it.
@@ -90,24 +90,24 @@ words! {
 
 /// All shows together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, ToSchema)]
-pub struct Totals {
+pub(crate) struct Totals {
     /// How many began.
-    pub shows: usize,
+    pub(crate) shows: usize,
     /// Of these: played to their end.
-    pub completed: usize,
+    pub(crate) completed: usize,
     /// Ended by a person.
-    pub stopped: usize,
+    pub(crate) stopped: usize,
     /// Ended by a fault.
-    pub faults: usize,
+    pub(crate) faults: usize,
     /// Ended with the program or the machine.
-    pub interrupted: usize,
+    pub(crate) interrupted: usize,
     /// Going on.
-    pub running: usize,
+    pub(crate) running: usize,
     /// From begin to end, of those that ended, s.
-    pub took_s: f64,
+    pub(crate) took_s: f64,
     /// Frames of those that ended.
     #[serde(flatten)]
-    pub frames: FrameCounts,
+    pub(crate) frames: FrameCounts,
 }
 
 /// Reads the journal in `dir` for the days `from` to `to`, both included, and keeps no more of them than `most`. A show belongs to the day on which it began, by
@@ -115,7 +115,7 @@ pub struct Totals {
 ///
 /// # Errors
 /// [`JournalError`] where the folder or a file of it cannot be read. No records are no error.
-pub fn report(dir: &Path, from: Date, to: Date, most: Most) -> Result<Report, JournalError> {
+pub(crate) fn report(dir: &Path, from: Date, to: Date, most: Most) -> Result<Report, JournalError> {
     let mut days = Days::new(from, to, most);
     let mut gather = || -> io::Result<bool> {
         let folder = Folder::open(dir)?;

@@ -8,6 +8,7 @@ use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
 use proptest::prelude::*;
 
+use super::report::ShowResult;
 use super::*;
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 

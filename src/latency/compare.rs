@@ -7,49 +7,49 @@ use crate::rt::Times;
 use crate::tracker::Histogram;
 
 /// Fewer times than these have no 99th percentile to speak of.
-pub const MIN_TIMES: u64 = 1_000;
+pub(crate) const MIN_TIMES: u64 = 1_000;
 /// Percentiles that differ by less than this factor are alike: runs of the same program on an idle machine do as much.
 const ALIKE: f64 = 1.25;
 
 /// One figure of both measurements.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// `p50`, `p90`, `p99`, `p99.9` or `max`.
-    pub figure: &'static str,
+    pub(crate) figure: &'static str,
     /// Of the first, µs.
-    pub a_us: Option<f64>,
+    pub(crate) a_us: Option<f64>,
     /// Of the second, µs.
-    pub b_us: Option<f64>,
+    pub(crate) b_us: Option<f64>,
     /// The second over the first; null if that says nothing.
-    pub ratio: Option<f64>,
+    pub(crate) ratio: Option<f64>,
 }
 
 /// One kind of times in both measurements.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Times of the first.
-    pub a_count: u64,
+    pub(crate) a_count: u64,
     /// Times of the second.
-    pub b_count: u64,
+    pub(crate) b_count: u64,
     /// The figures, in rising order.
-    pub figures: Vec<Figure>,
+    pub(crate) figures: Vec<Figure>,
     /// What they come to, in a line.
-    pub verdict: String,
+    pub(crate) verdict: String,
 }
 
 /// Two measurements side by side; A is the one that the other is held against.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// Lateness of ticks.
-    pub lateness: Row,
+    pub(crate) lateness: Row,
     /// Latency of acks.
-    pub ack_latency: Row,
+    pub(crate) ack_latency: Row,
 }
 
 impl Comparison {
     /// Compares `b` with `a`.
     #[must_use]
-    pub fn of(a: &Times, b: &Times) -> Self {
+    pub(crate) fn of(a: &Times, b: &Times) -> Self {
         Self {
             lateness: row("lateness", &a.lateness, &b.lateness),
             ack_latency: row("ack latency", &a.acks, &b.acks),

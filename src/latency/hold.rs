@@ -14,7 +14,7 @@ const NAME: &str = "hold";
 /// The same hall with seats that park, and scale, where they stand: `places` has the positions of each controller's axes,
 /// in the order of the controllers.
 #[must_use]
-pub fn held(config: &Config, places: &[Vec<Pulses>]) -> Config {
+pub(crate) fn held(config: &Config, places: &[Vec<Pulses>]) -> Config {
     let hold = |(controller, places): (&Controller, &Vec<Pulses>)| {
         let seat = standing(&controller.seat, places);
         // A slice is cut on this side of the wire; here all its axes rest.
@@ -40,7 +40,7 @@ fn standing(seat: &SeatType, places: &[Pulses]) -> SeatType {
 
 /// A cue that lasts for `seconds` and asks for nothing, with as many axes as the controllers take.
 #[must_use]
-pub fn cue(controllers: &[Controller], seconds: u32) -> Timeline {
+pub(crate) fn cue(controllers: &[Controller], seconds: u32) -> Timeline {
     let lasts = ShowTime::from_millis(i64::from(seconds) * 1_000);
     Timeline::new(CueBuilder::flat(NAME, cue_axes(controllers), lasts))
 }

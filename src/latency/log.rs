@@ -15,9 +15,9 @@ use crate::rt::Times;
 use crate::tracker::Histogram;
 
 /// Tag of the lateness of ticks.
-pub const LATENESS: &str = "lateness";
+pub(crate) const LATENESS: &str = "lateness";
 /// Tag of the latency of acks.
-pub const ACKS: &str = "ack_latency";
+pub(crate) const ACKS: &str = "ack_latency";
 
 /// Why a file of histograms cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -43,7 +43,7 @@ pub enum LogError {
 }
 
 /// A log that is being written.
-pub struct Log<W> {
+pub(crate) struct Log<W> {
     out: W,
     serializer: V2DeflateSerializer,
 }
@@ -53,7 +53,7 @@ impl<W: Write> Log<W> {
     ///
     /// # Errors
     /// That of the writer.
-    pub fn begin(mut out: W, about: &str, start: SystemTime) -> io::Result<Self> {
+    pub(crate) fn begin(mut out: W, about: &str, start: SystemTime) -> io::Result<Self> {
         let mut serializer = V2DeflateSerializer::new();
         writeln!(out, "#[Histogram log format version 1.3]")?;
         let mut head = IntervalLogWriterBuilder::new();
@@ -70,7 +70,7 @@ impl<W: Write> Log<W> {
     ///
     /// # Errors
     /// That of the writer.
-    pub fn interval(&mut self, times: &Times, from: Duration, span: Duration) -> io::Result<()> {
+    pub(crate) fn interval(&mut self, times: &Times, from: Duration, span: Duration) -> io::Result<()> {
         let mut lines =
             IntervalLogWriterBuilder::new().begin_log_with(&mut self.out, &mut self.serializer)?;
         for (tag, histogram) in [(LATENESS, &times.lateness), (ACKS, &times.acks)] {
@@ -86,7 +86,7 @@ impl<W: Write> Log<W> {
     ///
     /// # Errors
     /// That of the writer.
-    pub fn end(mut self) -> io::Result<W> {
+    pub(crate) fn end(mut self) -> io::Result<W> {
         self.out.flush()?;
         Ok(self.out)
     }

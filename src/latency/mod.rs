@@ -6,9 +6,10 @@ mod hold;
 mod log;
 mod percentiles;
 
-pub use compare::{Comparison, Figure, MIN_TIMES, Row};
-pub use hold::{cue, held};
-pub use log::{ACKS, LATENESS, Log, LogError, read};
+pub(crate) use compare::{Comparison, Row};
+pub(crate) use hold::{cue, held};
+pub(crate) use log::Log;
+pub use log::read;
 pub use percentiles::Percentiles;
 
 use crate::rt::Times;
@@ -18,7 +19,7 @@ use crate::rt::Times;
 /// # Panics
 /// Where `earlier` counts what `now` does not.
 #[must_use]
-pub fn between(earlier: &Times, now: &Times) -> Times {
+pub(crate) fn between(earlier: &Times, now: &Times) -> Times {
     let mut part = now.clone();
     let grows = "counts only grow";
     part.lateness.subtract(&earlier.lateness).expect(grows);

@@ -11,15 +11,15 @@ pub struct Percentiles {
     /// How many times there were.
     pub count: u64,
     /// Median.
-    pub p50: Option<f64>,
+    pub(crate) p50: Option<f64>,
     /// 90th percentile.
-    pub p90: Option<f64>,
+    pub(crate) p90: Option<f64>,
     /// 99th percentile.
-    pub p99: Option<f64>,
+    pub(crate) p99: Option<f64>,
     /// 99.9th percentile.
-    pub p999: Option<f64>,
+    pub(crate) p999: Option<f64>,
     /// The longest.
-    pub max: Option<f64>,
+    pub(crate) max: Option<f64>,
 }
 
 impl Percentiles {
@@ -33,7 +33,7 @@ impl Percentiles {
 
     /// The figures with their names, in rising order.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, Option<f64>); 5] {
+    pub(crate) const fn named(&self) -> [(&'static str, Option<f64>); 5] {
         let Self { p50, p90, p99, p999, max, .. } = *self;
         [("p50", p50), ("p90", p90), ("p99", p99), ("p99.9", p999), ("max", max)]
     }

@@ -9,12 +9,12 @@ use crate::motion::SeatType;
 use crate::timeline::{Cubic, Timeline};
 
 /// The most stretches that a curve is asked in.
-pub const MAX_POINTS: usize = 4000;
+pub(crate) const MAX_POINTS: usize = 4000;
 
 /// What comes of drawing a cue; a line of JSON from the process that draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Drawing {
+pub(crate) enum Drawing {
     /// Its curves.
     Curve(CurveData),
     /// Why it has none: every fault, a line each.
@@ -25,7 +25,7 @@ pub enum Drawing {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CurveData {
     /// How long the cue is, s.
-    pub length_s: f64,
+    pub(crate) length_s: f64,
     /// The middle of each stretch of time, s; all are equally long.
     pub t_s: Vec<f64>,
     /// Each axis, axis 1 first.
@@ -36,9 +36,9 @@ pub struct CurveData {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AxisCurve {
     /// `a1` to `a12`.
-    pub name: String,
+    pub(crate) name: String,
     /// The least of each stretch.
-    pub min: Vec<f64>,
+    pub(crate) min: Vec<f64>,
     /// The greatest of each stretch.
     pub max: Vec<f64>,
 }
@@ -46,7 +46,7 @@ pub struct AxisCurve {
 /// Draws a cue in so many stretches, 1 to [`MAX_POINTS`]. In a cue that is not in fractions, an axis is measured against the
 /// stroke of the first seat of `hall` that takes it, else of the bench seat.
 #[must_use]
-pub fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
+pub(crate) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
     let bench = SeatType::bench3(timeline.axes());
     let to_stroke = |axis: usize| {
         let taker = hall.and_then(|hall| hall.named().find(|one| one.takes(axis)));
@@ -63,7 +63,7 @@ pub fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveD
 
 /// True if the hall has to be known to draw a cue in that unit.
 #[must_use]
-pub fn needs_hall(unit: Unit) -> bool {
+pub(crate) fn needs_hall(unit: Unit) -> bool {
     unit != Unit::Fraction
 }
 

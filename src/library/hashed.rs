@@ -11,7 +11,7 @@ const FRONT: usize = 16;
 
 /// What is read through this is hashed.
 #[derive(Debug)]
-pub struct Hashed<R> {
+pub(crate) struct Hashed<R> {
     input: R,
     hash: Sha256,
     front: Vec<u8>,
@@ -19,13 +19,13 @@ pub struct Hashed<R> {
 
 impl<R: Read> Hashed<R> {
     /// Nothing is read yet.
-    pub fn new(input: R) -> Self {
+    pub(crate) fn new(input: R) -> Self {
         Self { input, hash: Sha256::new(), front: Vec::new() }
     }
 
     /// Its first bytes, 16 at the most, of those that were read.
     #[must_use]
-    pub fn front(&self) -> &[u8] {
+    pub(crate) fn front(&self) -> &[u8] {
         &self.front
     }
 
@@ -33,7 +33,7 @@ impl<R: Read> Hashed<R> {
     ///
     /// # Errors
     /// If it cannot be read to its end.
-    pub fn finish(mut self) -> io::Result<String> {
+    pub(crate) fn finish(mut self) -> io::Result<String> {
         io::copy(&mut self, &mut io::sink())?;
         Ok(hex(&self.hash.finalize()))
     }

@@ -11,7 +11,7 @@ const MAX_LEN: usize = 64;
 pub struct Id(String);
 
 /// The name of a cue of the library.
-pub type CueId = Id;
+pub(crate) type CueId = Id;
 
 /// A text that is no id.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -21,7 +21,8 @@ pub struct IdError(String);
 impl Id {
     /// Its text.
     #[must_use]
-    pub fn as_str(&self) -> &str {
+    #[cfg(test)]
+    pub(crate) fn as_str(&self) -> &str {
         &self.0
     }
 }

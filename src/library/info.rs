@@ -7,33 +7,33 @@ use super::CueId;
 
 /// What a check of one cue for one hall has shown; a line of JSON from the process that checked it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
+pub(crate) struct Verdict {
     /// True if it can be read, fits the hall, and keeps all limits at full level.
-    pub passed: bool,
+    pub(crate) passed: bool,
     /// Every fault, each with its place in the file, the first twenty in words.
-    pub faults: Vec<String>,
+    pub(crate) faults: Vec<String>,
     /// How many there are beyond those.
-    pub more: u64,
+    pub(crate) more: u64,
     /// SHA-256 of the file, hexadecimal.
-    pub sha256: String,
+    pub(crate) sha256: String,
     /// SHA-256 of what the cue does, hexadecimal ([`crate::proof::Digest`]); `None` if it cannot be read.
-    pub digest: Option<String>,
+    pub(crate) digest: Option<String>,
     /// Its title.
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// How long it is, s; `None` if it cannot be read.
-    pub length_s: Option<f64>,
+    pub(crate) length_s: Option<f64>,
     /// How many axes it has; `None` if it cannot be read.
-    pub axes: Option<usize>,
+    pub(crate) axes: Option<usize>,
     /// The effects that it names.
-    pub effects: Vec<String>,
+    pub(crate) effects: Vec<String>,
     /// True if it is MCAP; CSV if not.
-    pub mcap: bool,
+    pub(crate) mcap: bool,
 }
 
 impl Verdict {
     /// Every fault, a line each.
     #[must_use]
-    pub fn lines(&self) -> Vec<String> {
+    pub(crate) fn lines(&self) -> Vec<String> {
         let more = (self.more > 0).then(|| format!("and {} more", self.more));
         self.faults.iter().cloned().chain(more).collect()
     }
@@ -58,7 +58,7 @@ pub enum Proved {
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CueInfo {
     /// Its id.
-    pub id: String,
+    pub(crate) id: String,
     /// Its title.
     pub title: Option<String>,
     /// How long it is, s.

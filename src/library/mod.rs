@@ -13,11 +13,12 @@ mod index;
 mod info;
 mod upload;
 
-pub use curve::{AxisCurve, CurveData, Drawing, MAX_POINTS, draw, needs_hall};
-pub use hashed::Hashed;
-pub use id::{CueId, Id, IdError};
-pub use info::{CueInfo, Proved, Verdict};
-pub use upload::Upload;
+pub(crate) use curve::{CurveData, Drawing, MAX_POINTS, draw, needs_hall};
+pub(crate) use hashed::Hashed;
+pub(crate) use id::{CueId, Id, IdError};
+pub(crate) use info::Verdict;
+pub use info::{CueInfo, Proved};
+pub(crate) use upload::Upload;
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -46,9 +47,9 @@ const CURVES: usize = 4;
 #[error("cannot open the cue library {}; name another with library in [show], or give it to the user of the service", path.display())]
 pub struct LibraryError {
     /// The folder.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// What the system said.
-    pub source: io::Error,
+    pub(crate) source: io::Error,
 }
 
 /// What cues are checked for, by what, and within which bounds.
@@ -85,7 +86,7 @@ impl Hall {
     /// The hall of that configuration file, with what its `[library]` says. Cues are checked by this very program, also where
     /// a newer one has taken its place on the disk since it was started.
     #[must_use]
-    pub fn new(config: &Path, store: &Store) -> Self {
+    pub(crate) fn new(config: &Path, store: &Store) -> Self {
         let bounds = Bounds {
             max_bytes: u64::from(store.max_cue_mib) << 20,
             memory_mib: u64::from(store.max_memory_mib),
@@ -281,7 +282,7 @@ impl Library {
 
     /// The longest file that is taken in, bytes.
     #[must_use]
-    pub fn max_bytes(&self) -> u64 {
+    pub(crate) fn max_bytes(&self) -> u64 {
         self.inner.hall.bounds.max_bytes
     }
 

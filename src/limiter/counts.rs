@@ -50,7 +50,7 @@ pub struct Clamp {
     /// The limit that was in the way; of several the one exceeded most.
     pub limit: Limit,
     /// How many times the limit it was: above 1, infinite where a position is outside the stroke or no number.
-    pub times: f64,
+    pub(crate) times: f64,
 }
 
 /// Counts of one lane since the limiter was made.
@@ -59,7 +59,7 @@ pub struct Counts {
     /// Times that a pose was not let pass; such ticks in a row, on any axes, are one.
     pub clamps: u64,
     /// Ticks on which at least one axis was sent something else than was asked, ways back included.
-    pub held_ticks: u64,
+    pub(crate) held_ticks: u64,
     /// Poses sent beyond a limit because no way within all of them was found.
     pub beyond: u64,
     /// Poses after which a way to rest was looked for: those that come near a limit.

@@ -14,7 +14,8 @@ mod limits;
 mod stop_path;
 mod times;
 
-pub use counts::{Clamp, Counts, Limit};
+pub use counts::Limit;
+pub(crate) use counts::{Clamp, Counts};
 
 use axis::{Axis, Mode};
 use counts::Counter;
@@ -81,7 +82,7 @@ struct Frame {
 impl Limiter {
     /// The limiter of a lane. It lets nothing pass before it is told where the lane stands ([`Self::restart`]).
     #[must_use]
-    pub fn new(window: &Window, rate: Rate) -> Self {
+    pub(crate) fn new(window: &Window, rate: Rate) -> Self {
         let (spacing, times) = (Spacing::at_rate(rate.hz()), Times::new(rate));
         let limits = window.slots().iter().map(|slot| AxisLimits::new(slot.limits, times.period()));
         let axes: Vec<Axis> = limits.map(|limits| Axis::new(limits, spacing)).collect();
@@ -114,7 +115,7 @@ impl Limiter {
     }
 
     /// The same for a lane that is known to stand in its park pose, but for what is noise.
-    pub fn restart_at_park(&mut self, known: &KnownPose, window: &Window) {
+    pub(crate) fn restart_at_park(&mut self, known: &KnownPose, window: &Window) {
         self.restart(known);
         self.rest_in(window.park());
     }
@@ -134,7 +135,7 @@ impl Limiter {
     }
 
     /// Goes on counting where another limiter of the same lane left off; its latched fault is its own.
-    pub const fn count_on(&mut self, before: &Counts) {
+    pub(crate) const fn count_on(&mut self, before: &Counts) {
         let fault = self.counter.counts.fault;
         self.counter.counts = *before;
         self.counter.counts.fault = fault;

@@ -16,7 +16,7 @@ use crate::time::Clock as _;
 mod journal;
 mod limit;
 
-pub use crate::plain::escaped;
+pub(crate) use crate::plain::escaped;
 use journal::Journal;
 use limit::RateLimiter;
 
@@ -30,7 +30,7 @@ const TEXT_LEN: usize = 4_096;
 /// How grave a line is; the numbers are those of syslog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Priority {
+pub(crate) enum Priority {
     /// The show suffers.
     Error = 3,
     /// Worth a look.
@@ -54,27 +54,31 @@ impl Priority {
 
 /// One line.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Line {
+pub(crate) struct Line {
     /// How grave it is.
-    pub priority: Priority,
+    pub(crate) priority: Priority,
     /// Why it is said: a stable word. Lines of one cause hold each other back.
-    pub cause: Cow<'static, str>,
+    pub(crate) cause: Cow<'static, str>,
     /// What a person reads; control characters are escaped on the way out.
-    pub message: String,
+    pub(crate) message: String,
     /// What programs read: names in lower case, as `controller`, and their values.
-    pub fields: Vec<(&'static str, String)>,
+    pub(crate) fields: Vec<(&'static str, String)>,
 }
 
 impl Line {
     /// One without fields.
     #[must_use]
-    pub fn new(priority: Priority, cause: impl Into<Cow<'static, str>>, message: impl Into<String>) -> Self {
+    pub(crate) fn new(
+        priority: Priority,
+        cause: impl Into<Cow<'static, str>>,
+        message: impl Into<String>,
+    ) -> Self {
         Self { priority, cause: cause.into(), message: message.into(), fields: Vec::new() }
     }
 
     /// The same with a field more.
     #[must_use]
-    pub fn with(mut self, name: &'static str, value: impl Into<String>) -> Self {
+    pub(crate) fn with(mut self, name: &'static str, value: impl Into<String>) -> Self {
         self.fields.push((name, value.into()));
         self
     }
@@ -132,7 +136,7 @@ impl Log {
     }
 
     /// Says it, or holds it back, or drops it where too much waits already. Waits for nobody who writes.
-    pub fn say(&self, line: Line) {
+    pub(crate) fn say(&self, line: Line) {
         let now = Monotonic.now();
         let mut state = self.0.lock();
         if let Some(line) = state.limiter.offer(line, now) {
@@ -145,12 +149,13 @@ impl Log {
 
     /// Lines that were dropped so far.
     #[must_use]
-    pub fn dropped(&self) -> u64 {
+    #[cfg(test)]
+    pub(crate) fn dropped(&self) -> u64 {
         self.0.dropped.load(Ordering::Relaxed)
     }
 
     /// Writes what waits and what is held back, waiting for it a second at the most. Nothing is written after that.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         let mut state = self.0.lock();
         state.closing = true;
         self.0.wake.notify_all();

@@ -17,14 +17,14 @@ mod shows;
 mod tests;
 
 /// The type of what [`render`] gives.
-pub const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+pub(crate) const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// All figures of a status as `OpenMetrics` text.
 ///
 /// # Panics
 /// Never: a `String` takes whatever is written to it.
 #[must_use]
-pub fn render(status: &Status) -> String {
+pub(crate) fn render(status: &Status) -> String {
     let mut registry = Registry::with_prefix("kinocue");
     registry.register_collector(Box::new(Families(families(status))));
     let mut page = String::new();

@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
 
 use super::*;
+use crate::control::model::FrameCounts;
 use crate::control::{
-    ControllerStatus, FrameCounts, Health, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus,
-    Severity, ShowStatus, Times, Warning,
+    ControllerStatus, Health, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus, Severity,
+    ShowStatus, Times, Warning,
 };
 use crate::state::{PlayMode, State};
 

@@ -9,32 +9,32 @@ const SHARES: [f64; 2] = [0.85, 1.0];
 
 /// How one axis moves: strokes, strokes per second, strokes per second squared.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct AxisState {
+pub(crate) struct AxisState {
     /// Fraction of the stroke.
-    pub position: f64,
+    pub(crate) position: f64,
     /// Strokes per second.
-    pub velocity: f64,
+    pub(crate) velocity: f64,
     /// Strokes per second squared.
-    pub acceleration: f64,
+    pub(crate) acceleration: f64,
 }
 
 impl AxisState {
     /// At rest there.
     #[must_use]
-    pub const fn at_rest(position: f64) -> Self {
+    pub(crate) const fn at_rest(position: f64) -> Self {
         Self { position, velocity: 0.0, acceleration: 0.0 }
     }
 
     /// The same motion run through `pace` times as fast.
     #[must_use]
-    pub fn at_pace(self, pace: f64) -> Self {
+    pub(crate) fn at_pace(self, pace: f64) -> Self {
         Self { velocity: self.velocity * pace, acceleration: self.acceleration * pace * pace, ..self }
     }
 }
 
 /// The way of one lane's slots to rest. Making and following it allocates nothing.
 #[derive(Debug, Clone, Copy)]
-pub struct Brake {
+pub(crate) struct Brake {
     halts: [Option<Halt>; MAX_AXES],
     seconds: f64,
 }
@@ -46,7 +46,7 @@ impl Brake {
     /// and rests further inside; one that cannot stay inside even then was driven at the end of its stroke, and is held
     /// there.
     #[must_use]
-    pub fn new(window: &Window, from: &[AxisState; MAX_AXES]) -> Self {
+    pub(crate) fn new(window: &Window, from: &[AxisState; MAX_AXES]) -> Self {
         let mut halts = [None; MAX_AXES];
         let mut seconds = 0.0_f64;
         for ((kept, slot), from) in halts.iter_mut().zip(window.slots()).zip(from) {
@@ -60,13 +60,13 @@ impl Brake {
 
     /// How long until the last axis rests, seconds.
     #[must_use]
-    pub const fn seconds(&self) -> f64 {
+    pub(crate) const fn seconds(&self) -> f64 {
         self.seconds
     }
 
     /// Where the slots are `seconds` after its start, inside the stroke.
     #[must_use]
-    pub fn pose(&self, seconds: f64) -> Pose {
+    pub(crate) fn pose(&self, seconds: f64) -> Pose {
         let mut pose = [0.0; MAX_AXES];
         for (place, halt) in pose.iter_mut().zip(&self.halts) {
             *place = halt.as_ref().map_or(0.0, |halt| halt.position(seconds));

@@ -12,9 +12,9 @@ const HISTORY: usize = 82;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Spacing {
     /// 20 ms in whole periods, halves up, at least one.
-    pub n: usize,
+    pub(crate) n: usize,
     /// The smallest count over 1.3 n that shares no factor with it.
-    pub m: usize,
+    pub(crate) m: usize,
 }
 
 impl Spacing {
@@ -41,16 +41,16 @@ pub struct Reading {
     /// In the position's unit, per second, per second squared, or per second cubed.
     pub value: f64,
     /// Show time in the middle of the poses that gave it.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
 }
 
 /// What one more pose showed; a part is 0 until enough poses have come.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Readings {
     /// Distance over Time of the newest frame.
-    pub velocity: Reading,
+    pub(crate) velocity: Reading,
     /// Change of velocity from the frame before to the newest, per second (not divided by time).
-    pub step: Reading,
+    pub(crate) step: Reading,
     /// Of the two distances, the acceleration of larger size.
     pub acceleration: Reading,
     /// Of the two distances, the jerk of larger size.

@@ -7,10 +7,13 @@ mod measure;
 mod seat;
 mod window;
 
-pub use brake::{AxisState, Brake};
+pub(crate) use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
-pub use measure::{Measure, Reading, Readings, Spacing};
-pub use seat::{FACTORY_INTERVAL_MS, Pulses, SeatType, in_stroke};
+#[cfg(test)]
+pub(crate) use measure::Readings;
+pub use measure::{Measure, Spacing};
+pub(crate) use seat::{FACTORY_INTERVAL_MS, in_stroke};
+pub use seat::{Pulses, SeatType};
 pub use window::{Limits, Slot, Window};
 
 /// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).

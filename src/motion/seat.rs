@@ -5,7 +5,7 @@ use super::MAX_AXES;
 /// The speed limit of a controller as it leaves the factory, turns a minute (PA07, IMAX manual 2.3.1).
 const FACTORY_RPM: u32 = 3_000;
 /// The longest Time that a controller executes as it leaves the factory, ms (PA0b, IMAX manual 2.3.1).
-pub const FACTORY_INTERVAL_MS: u32 = 3_000;
+pub(crate) const FACTORY_INTERVAL_MS: u32 = 3_000;
 
 /// Free fall, mm/s².
 const FREE_FALL_MM_S2: f64 = 9_806.65;
@@ -18,15 +18,15 @@ pub struct Pulses(pub i32);
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeatType {
     /// The name it has in the configuration.
-    pub name: String,
+    pub(crate) name: String,
     /// Axes of one controller, 1 to 12.
     pub axes: usize,
     /// Length of the stroke, mm, above 0.
     pub stroke_mm: f64,
     /// Travel per turn of the motor, mm, above 0.
-    pub lead_mm: f64,
+    pub(crate) lead_mm: f64,
     /// Pulses per turn of the motor, above 0.
-    pub pulses_per_rev: f64,
+    pub(crate) pulses_per_rev: f64,
     /// Greatest speed, mm/s, above 0.
     pub max_velocity_mm_s: f64,
     /// Greatest acceleration, mm/s², above 0.
@@ -34,13 +34,13 @@ pub struct SeatType {
     /// Greatest jerk, mm/s³, above 0.
     pub max_jerk_mm_s3: f64,
     /// Greatest speed of motion and vibration together, mm/s, where the site says what it is.
-    pub max_shaken_velocity_mm_s: Option<f64>,
+    pub(crate) max_shaken_velocity_mm_s: Option<f64>,
     /// Greatest acceleration of motion and vibration together, mm/s², where the site says what it is.
-    pub max_shaken_acceleration_mm_s2: Option<f64>,
+    pub(crate) max_shaken_acceleration_mm_s2: Option<f64>,
     /// The controller's own limit on speed, turns a minute (PA07), where the site says what it is.
-    pub max_rpm: Option<u32>,
+    pub(crate) max_rpm: Option<u32>,
     /// The longest Time that the controller executes as it is, ms (PA0b).
-    pub max_interval_ms: u32,
+    pub(crate) max_interval_ms: u32,
     /// Where each axis rests between shows, fraction of the stroke; axes past the last one rest at 0.
     pub park: [f64; MAX_AXES],
     /// What levels scale about, fraction of the stroke.
@@ -77,14 +77,14 @@ impl SeatType {
 
     /// How fast the controller lets an axis move, mm/s: its own limit, else that of the factory.
     #[must_use]
-    pub fn speed_ceiling_mm_s(&self) -> f64 {
+    pub(crate) fn speed_ceiling_mm_s(&self) -> f64 {
         f64::from(self.max_rpm.unwrap_or(FACTORY_RPM)) * self.lead_mm / 60.0
     }
 
     /// How fast motion and vibration together may be, mm/s: as fast as the controller lets an axis move, unless the site says
     /// less. What is faster is cut there, so the axis would not swing as it is said, and lag behind the cue.
     #[must_use]
-    pub fn shaken_velocity_mm_s(&self) -> f64 {
+    pub(crate) fn shaken_velocity_mm_s(&self) -> f64 {
         self.max_shaken_velocity_mm_s.unwrap_or(f64::INFINITY).min(self.speed_ceiling_mm_s())
     }
 
@@ -92,20 +92,20 @@ impl SeatType {
     /// seat that falls any harder leaves the person on it, and meets them again at the bottom of the swing. Where motion
     /// alone may be harder, vibration may not add to that.
     #[must_use]
-    pub fn shaken_acceleration_mm_s2(&self) -> f64 {
+    pub(crate) fn shaken_acceleration_mm_s2(&self) -> f64 {
         self.max_shaken_acceleration_mm_s2.unwrap_or(FREE_FALL_MM_S2.max(self.max_acceleration_mm_s2))
     }
 
     /// Where the motor stands at `fraction` of the stroke: rounded to nearest, ties away from zero, saturating.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]
-    pub fn pulses(&self, fraction: f64) -> Pulses {
+    pub(crate) fn pulses(&self, fraction: f64) -> Pulses {
         Pulses((fraction * self.stroke_pulses()).round() as i32)
     }
 
     /// The fraction of the stroke at which the motor stands at `pulses`.
     #[must_use]
-    pub fn fraction(&self, pulses: Pulses) -> f64 {
+    pub(crate) fn fraction(&self, pulses: Pulses) -> f64 {
         f64::from(pulses.0) / self.stroke_pulses()
     }
 }
@@ -117,7 +117,7 @@ const ROUNDING: f64 = 0.001;
 /// True if a motor can stand at `pulses`, of a stroke of so many: inside it, or outside by no more than rounding. What is
 /// farther out is no position, but a wrong word order, another seat type, or a zero that was lost.
 #[must_use]
-pub fn in_stroke(pulses: Pulses, stroke_pulses: f64) -> bool {
+pub(crate) fn in_stroke(pulses: Pulses, stroke_pulses: f64) -> bool {
     let slack = (ROUNDING * stroke_pulses).max(1.0);
     (-slack..=stroke_pulses + slack).contains(&f64::from(pulses.0))
 }

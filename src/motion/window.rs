@@ -6,7 +6,7 @@ use super::{MAX_AXES, Pose, Pulses, SeatType};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Greatest speed.
-    pub velocity: f64,
+    pub(crate) velocity: f64,
     /// Greatest acceleration.
     pub acceleration: f64,
     /// Greatest jerk.
@@ -29,23 +29,23 @@ impl Limits {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slot {
     /// The axis of the cue it carries, counted from 0; `None` if the cue has nothing for it: it is led to park then.
-    pub axis: Option<usize>,
+    pub(crate) axis: Option<usize>,
     /// True if the lane's own seat has such an axis: what is sent in the slot moves it.
-    pub is_own: bool,
+    pub(crate) is_own: bool,
     /// Cue unit to fraction of this slot's stroke.
-    pub to_stroke: f64,
+    pub(crate) to_stroke: f64,
     /// Where it rests, fraction of the stroke.
-    pub park: f64,
+    pub(crate) park: f64,
     /// What levels scale about, fraction of the stroke.
-    pub neutral: f64,
+    pub(crate) neutral: f64,
     /// How much of the cue's motion about that it makes, 0 to 1.
-    pub level: f64,
+    pub(crate) level: f64,
     /// Pulses over the whole stroke.
-    pub stroke_pulses: f64,
+    pub(crate) stroke_pulses: f64,
     /// Length of the stroke, mm.
-    pub stroke_mm: f64,
+    pub(crate) stroke_mm: f64,
     /// What the axis may do.
-    pub limits: Limits,
+    pub(crate) limits: Limits,
     /// Between which fractions of the stroke it may be sent, the lower first: the whole stroke, unless it is held.
     reach: (f64, f64),
 }
@@ -70,26 +70,26 @@ impl Slot {
 
     /// The same slot of a lane whose seat has no such axis: padding of the frame, or another controller's.
     #[must_use]
-    pub const fn of_others(self) -> Self {
+    pub(crate) const fn of_others(self) -> Self {
         Self { is_own: false, ..self }
     }
 
     /// The same slot with motion at `level`, 0 to 1.
     #[must_use]
-    pub const fn at_level(self, level: f64) -> Self {
+    pub(crate) const fn at_level(self, level: f64) -> Self {
         Self { level, ..self }
     }
 
     /// What the cue's unit is at its level, fraction of the stroke, and what is added to that: where the cue's values put
     /// the axis, were it not held inside the stroke.
     #[must_use]
-    pub fn scale(&self) -> (f64, f64) {
+    pub(crate) fn scale(&self) -> (f64, f64) {
         (self.to_stroke * self.level, self.neutral * (1.0 - self.level))
     }
 
     /// Where the cue's `value` puts the axis: fraction of the stroke, held inside it.
     #[must_use]
-    pub fn place(&self, value: f64) -> f64 {
+    pub(crate) fn place(&self, value: f64) -> f64 {
         let full = value * self.to_stroke;
         // At full level the cue's own value, to the last bit.
         let placed = if self.level == 1.0 { full } else { self.neutral + (full - self.neutral) * self.level };
@@ -101,7 +101,7 @@ impl Slot {
     #[inline]
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32, checked with the seat type")]
-    pub fn pulses(&self, fraction: f64) -> Pulses {
+    pub(crate) fn pulses(&self, fraction: f64) -> Pulses {
         let exact = fraction.clamp(self.reach.0, self.reach.1) * self.stroke_pulses;
         // What `round` says, without a call into the mathematical library for each slot of each frame.
         let whole = exact as i32;
@@ -129,41 +129,41 @@ impl Window {
 
     /// The same window with motion at `level`, 0 to 1.
     #[must_use]
-    pub fn at_level(&self, level: f64) -> Self {
+    pub(crate) fn at_level(&self, level: f64) -> Self {
         Self { slots: self.slots.iter().map(|slot| slot.at_level(level)).collect() }
     }
 
     /// The level of its slots; 1 where it has none.
     #[must_use]
-    pub fn level(&self) -> f64 {
+    pub(crate) fn level(&self) -> f64 {
         self.slots.first().map_or(1.0, |slot| slot.level)
     }
 
     /// Sets the level of every slot. Never allocates.
-    pub fn set_level(&mut self, level: f64) {
+    pub(crate) fn set_level(&mut self, level: f64) {
         self.slots.iter_mut().for_each(|slot| slot.level = level);
     }
 
     /// The slots, in frame order.
     #[must_use]
-    pub fn slots(&self) -> &[Slot] {
+    pub(crate) fn slots(&self) -> &[Slot] {
         &self.slots
     }
 
     /// The slots that the lane's seat has, a bit each.
     #[must_use]
-    pub fn own(&self) -> u16 {
+    pub(crate) fn own(&self) -> u16 {
         self.slots.iter().rev().fold(0, |own, slot| own << 1 | u16::from(slot.is_own))
     }
 
     /// The slots that are led somewhere, with their place in the frame: those that follow the cue, and those of the seat that have
     /// to be at park while others follow it. What is left rests at park throughout, and moves nothing.
-    pub fn moving(&self) -> impl Iterator<Item = (usize, &Slot)> {
+    pub(crate) fn moving(&self) -> impl Iterator<Item = (usize, &Slot)> {
         self.slots.iter().enumerate().filter(|(_, slot)| slot.axis.is_some() || slot.is_own)
     }
 
     /// Holds every slot at its park pose: whatever it is asked for from now on, it is sent there and nowhere else.
-    pub fn hold(&mut self) {
+    pub(crate) fn hold(&mut self) {
         for slot in &mut self.slots {
             let park = slot.park.clamp(0.0, 1.0);
             slot.reach = (park, park);
@@ -172,7 +172,7 @@ impl Window {
 
     /// The cue's pose as fractions of each slot's stroke, held inside it; slots without an axis rest at park.
     #[must_use]
-    pub fn place(&self, cue: &Pose) -> Pose {
+    pub(crate) fn place(&self, cue: &Pose) -> Pose {
         let mut placed = [0.0; MAX_AXES];
         for (place, slot) in placed.iter_mut().zip(&self.slots) {
             *place = match slot.axis {
@@ -185,7 +185,7 @@ impl Window {
 
     /// The park pose, as fractions of each slot's stroke.
     #[must_use]
-    pub fn park(&self) -> Pose {
+    pub(crate) fn park(&self) -> Pose {
         let mut placed = [0.0; MAX_AXES];
         for (place, slot) in placed.iter_mut().zip(&self.slots) {
             *place = slot.park;

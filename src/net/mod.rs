@@ -23,10 +23,11 @@ use socket2::Socket;
 
 use crate::time::MonoTime;
 
-pub use error::NetError;
+pub(crate) use error::NetError;
 pub use network::{Network, over};
-pub use recv::{Origin, Receiver};
-pub use route::{Route, route};
+pub use recv::Origin;
+pub(crate) use recv::Receiver;
+pub(crate) use route::{Route, route};
 pub use schedule::DrainGrid;
 pub use send::{Delivery, SendFault, Sender};
 

@@ -66,7 +66,7 @@ impl Receiver {
 
     /// How many controllers there are.
     #[must_use]
-    pub fn lanes(&self) -> usize {
+    pub(crate) fn lanes(&self) -> usize {
         match &self.0 {
             Way::Kernel(sockets) => sockets.lanes.len(),
             Way::Network(network) => network.lanes(),
@@ -78,7 +78,7 @@ impl Receiver {
     ///
     /// Returns the instant at which the drain began: unless a flood left datagrams behind, all that arrived before it
     /// has been given.
-    pub fn drain(&mut self, mut on: impl FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
+    pub(crate) fn drain(&mut self, mut on: impl FnMut(Origin, &[u8], MonoTime)) -> MonoTime {
         match &mut self.0 {
             Way::Kernel(sockets) => sockets.drain(&mut on),
             Way::Network(network) => network.drain(&mut on),
@@ -90,7 +90,7 @@ impl Receiver {
     /// # Panics
     /// If there is no such lane.
     #[must_use]
-    pub fn port_closed(&self, lane: usize) -> u64 {
+    pub(crate) fn port_closed(&self, lane: usize) -> u64 {
         match &self.0 {
             Way::Kernel(sockets) => sockets.lanes[lane].refusals.load(Ordering::Relaxed),
             Way::Network(network) => network.port_closed(lane),

@@ -5,18 +5,18 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 
 /// The way to a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Route {
+pub(crate) struct Route {
     /// The address of this machine that the controller sees.
-    pub local: Ipv4Addr,
+    pub(crate) local: Ipv4Addr,
     /// The largest IP packet that goes there in one piece, bytes.
-    pub mtu: u32,
+    pub(crate) mtu: u32,
 }
 
 /// The way from `bind`, which may be unspecified, to `peer`. Sends nothing.
 ///
 /// # Errors
 /// If the system knows no way, or `bind` is no address of this machine.
-pub fn route(bind: Ipv4Addr, peer: SocketAddrV4) -> io::Result<Route> {
+pub(crate) fn route(bind: Ipv4Addr, peer: SocketAddrV4) -> io::Result<Route> {
     let socket = UdpSocket::bind(SocketAddrV4::new(bind, 0))?;
     socket.connect(peer)?;
     let mtu = rustix::net::sockopt::ip_mtu(&socket)?;

@@ -29,7 +29,7 @@ pub struct SendFault {
 
 impl SendFault {
     /// Kept back, because what it belongs to was called off.
-    pub const CALLED_OFF: Self = Self { errno: libc::ECANCELED };
+    pub(crate) const CALLED_OFF: Self = Self { errno: libc::ECANCELED };
 
     /// That of a system's error number.
     #[must_use]
@@ -39,13 +39,15 @@ impl SendFault {
 
     /// The system's error number.
     #[must_use]
-    pub const fn errno(self) -> i32 {
+    #[cfg(test)]
+    pub(crate) const fn errno(self) -> i32 {
         self.errno
     }
 
     /// True if the controller's port is closed: it is restarting, or nothing listens there.
     #[must_use]
-    pub const fn refused(self) -> bool {
+    #[cfg(test)]
+    pub(crate) const fn refused(self) -> bool {
         self.errno == libc::ECONNREFUSED
     }
 
@@ -93,15 +95,6 @@ impl Sender {
         Self(Way::Network(network))
     }
 
-    /// How many controllers there are.
-    #[must_use]
-    pub fn lanes(&self) -> usize {
-        match &self.0 {
-            Way::Kernel(lanes) => lanes.len(),
-            Way::Network(network) => network.lanes(),
-        }
-    }
-
     /// Sends one datagram to controller `lane`, counted from 0 in the order in which they were opened.
     ///
     /// The kernel reports a closed port by failing a *later* call, without having sent that one's datagram; so it is
@@ -109,7 +102,7 @@ impl Sender {
     ///
     /// # Panics
     /// If there is no such lane.
-    pub fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
+    pub(crate) fn send(&self, lane: usize, datagram: &[u8]) -> Delivery {
         let lane = match &self.0 {
             Way::Kernel(lanes) => &lanes[lane],
             Way::Network(network) => return network.send(lane, datagram),

@@ -7,18 +7,18 @@ use crate::wire::DeviceError;
 
 /// Something that happened to a controller, with the instant at which the kernel received word of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Event {
+pub(crate) struct Event {
     /// Which controller, counted from 0 in the order of the lanes.
-    pub controller: usize,
+    pub(crate) controller: usize,
     /// When.
-    pub at: MonoTime,
+    pub(crate) at: MonoTime,
     /// What.
-    pub what: What,
+    pub(crate) what: What,
 }
 
 /// How an emergency stop showed first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub(crate) enum Cause {
     /// A reply with x = 4.
     Reply,
     /// One of the inputs that the configuration names.
@@ -27,7 +27,7 @@ pub enum Cause {
 
 /// What can happen to a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum What {
+pub(crate) enum What {
     /// An emergency stop is in effect.
     EmergencyStop {
         /// How it showed first.

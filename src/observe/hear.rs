@@ -9,7 +9,7 @@ use crate::wire::{Access, DP_INPUTS, FromController, RegisterReply, VibrationPor
 impl Observer {
     /// Hears a report that a controller sent unasked (0x3101, 0x1001); says whether it was one. What a register tells of the
     /// inputs is heard too, whoever asked for it: where no frames go, nothing else may tell that an emergency stop is over.
-    pub fn hear(&mut self, controller: usize, message: &FromController<'_>, at: MonoTime) -> bool {
+    pub(crate) fn hear(&mut self, controller: usize, message: &FromController<'_>, at: MonoTime) -> bool {
         match message {
             FromController::Status(status) => self.on_status(controller, status, at),
             FromController::Report(report) => {
@@ -33,7 +33,7 @@ impl Observer {
     }
 
     /// Hears a report that came from a port that is no controller's frame port; says whether it was one.
-    pub fn hear_elsewhere(&mut self, from: SocketAddrV4, bytes: &[u8], at: MonoTime) -> bool {
+    pub(crate) fn hear_elsewhere(&mut self, from: SocketAddrV4, bytes: &[u8], at: MonoTime) -> bool {
         // No report has a port of outputs that may be of two widths.
         let message = FromController::parse(VibrationPort::Two, bytes);
         let station = if let FromController::Status(status) = message { Some(status.station) } else { None };

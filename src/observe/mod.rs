@@ -7,8 +7,8 @@ mod event;
 mod hear;
 mod state;
 
-pub use event::{Cause, Event, What};
-pub use state::{ControllerState, Heard};
+pub(crate) use event::{Cause, Event, What};
+pub(crate) use state::{ControllerState, Heard};
 
 use std::collections::VecDeque;
 use std::net::{Ipv4Addr, SocketAddrV4};
@@ -56,29 +56,29 @@ impl Watched {
 
 /// What the first reply to a frame says beside positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// The frame that it answers.
-    pub frame: FrameNo,
+    pub(crate) frame: FrameNo,
     /// How the controller does.
-    pub code: ReplyCode,
+    pub(crate) code: ReplyCode,
     /// Its error number; 0 for none.
-    pub error: u16,
+    pub(crate) error: u16,
     /// Its inputs, bit 0 = X01.
-    pub inputs: u16,
+    pub(crate) inputs: u16,
 }
 
 /// What a look at the registers of a controller says of an emergency stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Look {
+pub(crate) struct Look {
     /// How it stands with it.
-    pub stop: StopSign,
+    pub(crate) stop: StopSign,
     /// The inputs, where they were told; bit 0 = X01.
-    pub inputs: Option<u16>,
+    pub(crate) inputs: Option<u16>,
 }
 
 /// How it stands with an emergency stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopSign {
+pub(crate) enum StopSign {
     /// This look alone does not tell.
     Unsure,
     /// Its inputs ask for it.
@@ -102,7 +102,7 @@ pub struct Observer {
 impl Observer {
     /// Nothing known yet of these controllers.
     #[must_use]
-    pub fn new(watched: Vec<Watched>) -> Self {
+    pub(crate) fn new(watched: Vec<Watched>) -> Self {
         Self {
             states: vec![ControllerState::default(); watched.len()],
             events: VecDeque::with_capacity(EVENTS_KEPT),
@@ -113,7 +113,7 @@ impl Observer {
 
     /// A datagram, as that controller writes them.
     #[must_use]
-    pub fn read<'a>(&self, controller: usize, bytes: &'a [u8]) -> FromController<'a> {
+    pub(crate) fn read<'a>(&self, controller: usize, bytes: &'a [u8]) -> FromController<'a> {
         FromController::parse(self.watched[controller].vibration_port, bytes)
     }
 
@@ -124,12 +124,12 @@ impl Observer {
     }
 
     /// What happened, oldest first; the last 1,000 of it.
-    pub fn events(&self) -> impl Iterator<Item = &Event> {
+    pub(crate) fn events(&self) -> impl Iterator<Item = &Event> {
         self.events.iter()
     }
 
     /// Gives `on` what happened since so many events; returns how many there are now. What is no longer kept is left out.
-    pub fn events_since(&self, heard: u64, on: impl FnMut(&Event)) -> u64 {
+    pub(crate) fn events_since(&self, heard: u64, on: impl FnMut(&Event)) -> u64 {
         let new = usize::try_from(heard.saturating_sub(self.forgotten)).unwrap_or(usize::MAX);
         self.events.iter().skip(new).for_each(on);
         self.forgotten + self.events.len() as u64
@@ -137,13 +137,14 @@ impl Observer {
 
     /// Events that are no longer kept.
     #[must_use]
-    pub const fn forgotten(&self) -> u64 {
+    #[cfg(test)]
+    pub(crate) const fn forgotten(&self) -> u64 {
         self.forgotten
     }
 
     /// Hears a reply to a motion frame, be it an old one or a repeated one: what it says of the controller counts only once
     /// it is known for neither ([`Observer::on_answer`]).
-    pub fn on_reply(&mut self, controller: usize, reply: &MotionReply, at: MonoTime) {
+    pub(crate) fn on_reply(&mut self, controller: usize, reply: &MotionReply, at: MonoTime) {
         let state = &mut self.states[controller];
         state.reply = Some(Heard { value: reply.code, at });
         state.echoed = Some(Heard { value: reply.positions, at });
@@ -151,7 +152,7 @@ impl Observer {
     }
 
     /// Hears the first reply to a frame. One to a frame older than the newest that was answered says nothing new.
-    pub fn on_answer(&mut self, controller: usize, answer: &Answer, at: MonoTime) {
+    pub(crate) fn on_answer(&mut self, controller: usize, answer: &Answer, at: MonoTime) {
         let smc = self.is_smc(controller);
         let state = &mut self.states[controller];
         if state.answered.is_some_and(|newest| answer.frame.since(newest) <= 0) {
@@ -171,14 +172,14 @@ impl Observer {
 
     /// Hears the reply code of any answer, to a frame or to registers: an emergency stop begins with the first that says so.
     /// It ends by [`Observer::on_look`] alone: an answer may be from before it was pressed.
-    pub fn on_code(&mut self, controller: usize, code: ReplyCode, at: MonoTime) {
+    pub(crate) fn on_code(&mut self, controller: usize, code: ReplyCode, at: MonoTime) {
         if self.is_smc(controller) && code == ReplyCode::EmergencyStop {
             self.note_stop(controller, Cause::Reply, true, at);
         }
     }
 
     /// Hears what a whole look at a controller says of an emergency stop.
-    pub fn on_look(&mut self, controller: usize, look: Look, at: MonoTime) {
+    pub(crate) fn on_look(&mut self, controller: usize, look: Look, at: MonoTime) {
         if let Some(inputs) = look.inputs {
             self.note_inputs(controller, inputs, at);
         }
@@ -204,7 +205,7 @@ impl Observer {
     }
 
     /// Hears a status report; one of another station is not taken. Says whether it was.
-    pub fn on_status(&mut self, controller: usize, status: &Status, at: MonoTime) -> bool {
+    pub(crate) fn on_status(&mut self, controller: usize, status: &Status, at: MonoTime) -> bool {
         if status.station != self.watched[controller].station() {
             return false;
         }
@@ -227,7 +228,7 @@ impl Observer {
     }
 
     /// Hears registers that an IMAX or MBOX controller reports unasked.
-    pub fn on_report(&mut self, controller: usize, report: &Report<'_>, at: MonoTime) {
+    pub(crate) fn on_report(&mut self, controller: usize, report: &Report<'_>, at: MonoTime) {
         let state = &mut self.states[controller];
         state.reports += 1;
         state.heard_at = Some(at);
@@ -241,7 +242,7 @@ impl Observer {
     }
 
     /// Hears positions that were measured: position registers, or a status report.
-    pub fn on_positions(&mut self, controller: usize, positions: PerAxis<Pulses>, at: MonoTime) {
+    pub(crate) fn on_positions(&mut self, controller: usize, positions: PerAxis<Pulses>, at: MonoTime) {
         let state = &mut self.states[controller];
         state.measured = Some(Heard { value: positions, at });
         state.heard_at = Some(at);
@@ -250,7 +251,7 @@ impl Observer {
     /// Which controller sent a report from a port that is none of the frame ports: the one at that address, where there
     /// are several the one whose control ID it says. None where that leaves it open.
     #[must_use]
-    pub fn sender_of_report(&self, from: Ipv4Addr, station: Option<Code>) -> Option<usize> {
+    pub(crate) fn sender_of_report(&self, from: Ipv4Addr, station: Option<Code>) -> Option<usize> {
         let may_be =
             |one: &Watched| *one.address.ip() == from && station.is_none_or(|it| it == one.station());
         let mut found =

@@ -38,7 +38,7 @@ const WORDS: [&str; 10] = [
 /// bundle for a later time), `repeated` (the same go, resume or seek within a second), `done` and `not_done` (by the
 /// hall). `unsent`: feedback that the system did not take.
 #[derive(Debug, Default)]
-pub struct Counts([AtomicU64; WORDS.len()]);
+pub(crate) struct Counts([AtomicU64; WORDS.len()]);
 
 impl Counts {
     pub(super) fn add(&self, what: Count) {
@@ -47,13 +47,15 @@ impl Counts {
 
     /// All of them with their words.
     #[must_use]
-    pub fn all(&self) -> [(&'static str, u64); WORDS.len()] {
+    #[cfg(test)]
+    pub(crate) fn all(&self) -> [(&'static str, u64); WORDS.len()] {
         std::array::from_fn(|place| (WORDS[place], self.0[place].load(Ordering::Relaxed)))
     }
 
     /// One of them by its word; 0 if none is called so.
     #[must_use]
-    pub fn of(&self, word: &str) -> u64 {
+    #[cfg(test)]
+    pub(crate) fn of(&self, word: &str) -> u64 {
         self.all().iter().find(|(name, _)| *name == word).map_or(0, |&(_, count)| count)
     }
 }

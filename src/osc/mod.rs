@@ -25,7 +25,7 @@ use std::io;
 use std::net::{SocketAddrV4, UdpSocket};
 use std::sync::Arc;
 
-pub use counts::Counts;
+pub(crate) use counts::Counts;
 
 use crate::config::OscPort;
 use crate::control::Handle;
@@ -35,17 +35,17 @@ use port::Port;
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen for OSC at {address}; name an address of this machine and a free port in [osc]")]
 #[non_exhaustive]
-pub struct OscError {
+pub(crate) struct OscError {
     /// Where it was to listen.
-    pub address: SocketAddrV4,
+    pub(crate) address: SocketAddrV4,
     /// What the system said.
     #[source]
-    pub cause: io::Error,
+    pub(crate) cause: io::Error,
 }
 
 /// The port, open but not yet served.
 #[derive(Debug)]
-pub struct Osc {
+pub(crate) struct Osc {
     socket: UdpSocket,
     config: OscPort,
     hall: Handle,
@@ -56,7 +56,7 @@ pub struct Osc {
 ///
 /// # Errors
 /// [`OscError`] where the system does not give it.
-pub fn open(config: &OscPort, hall: Handle) -> Result<Osc, OscError> {
+pub(crate) fn open(config: &OscPort, hall: Handle) -> Result<Osc, OscError> {
     let refused = |cause| OscError { address: config.listen, cause };
     let socket = UdpSocket::bind(config.listen).map_err(refused)?;
     socket.set_nonblocking(true).map_err(refused)?;
@@ -68,13 +68,15 @@ impl Osc {
     ///
     /// # Errors
     /// If the system does not say.
-    pub fn address(&self) -> io::Result<std::net::SocketAddr> {
+    #[cfg(test)]
+    pub(crate) fn address(&self) -> io::Result<std::net::SocketAddr> {
         self.socket.local_addr()
     }
 
     /// What has come so far, for whoever counts.
     #[must_use]
-    pub fn counts(&self) -> Arc<Counts> {
+    #[cfg(test)]
+    pub(crate) fn counts(&self) -> Arc<Counts> {
         Arc::clone(&self.counts)
     }
 
@@ -82,7 +84,7 @@ impl Osc {
     ///
     /// # Errors
     /// If the socket fails; it never ends otherwise.
-    pub async fn serve(self) -> io::Result<std::convert::Infallible> {
+    pub(crate) async fn serve(self) -> io::Result<std::convert::Infallible> {
         let incoming = tokio::net::UdpSocket::from_std(self.socket.try_clone()?)?;
         Port::new(self.socket, self.config, self.hall, self.counts).serve(&incoming).await
     }

@@ -7,7 +7,7 @@ use crate::time::ShowTime;
 
 /// What comes after a lane's move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum After {
+pub(crate) enum After {
     /// The lane follows the cue.
     Cue,
     /// The lane rests where its move ended; without a move, in its park pose.
@@ -16,15 +16,15 @@ pub enum After {
 
 /// What one lane does.
 #[derive(Debug, Clone)]
-pub struct Leg {
+pub(crate) struct Leg {
     /// The show time at which its move starts.
-    pub start: ShowTime,
+    pub(crate) start: ShowTime,
     /// Its move; `None` if the lane goes on as `then` says at once.
-    pub plan: Option<Plan>,
+    pub(crate) plan: Option<Plan>,
     /// What comes after it.
-    pub then: After,
+    pub(crate) then: After,
     /// True if it is out: it rests in park while the others play.
-    pub out: bool,
+    pub(crate) out: bool,
 }
 
 impl Leg {
@@ -43,9 +43,9 @@ impl Leg {
 #[derive(Debug, Clone)]
 pub struct Course {
     /// Which course this is, so that the planner knows from which one it is asked to go on.
-    pub serial: u32,
+    pub(crate) serial: u32,
     /// The show time at which it takes over.
-    pub start: ShowTime,
+    pub(crate) start: ShowTime,
     legs: Vec<Leg>,
     settled: ShowTime,
 }
@@ -53,7 +53,7 @@ pub struct Course {
 impl Course {
     /// A course of one leg for each lane.
     #[must_use]
-    pub fn new(serial: u32, start: ShowTime, legs: Vec<Leg>) -> Self {
+    pub(crate) fn new(serial: u32, start: ShowTime, legs: Vec<Leg>) -> Self {
         let settled = legs.iter().map(Leg::settled).fold(start, ShowTime::max);
         Self { serial, start, legs, settled }
     }
@@ -66,13 +66,13 @@ impl Course {
 
     /// True if a lane follows the cue at a show time.
     #[must_use]
-    pub fn is_on_cue(&self, lane: usize, at: ShowTime) -> bool {
+    pub(crate) fn is_on_cue(&self, lane: usize, at: ShowTime) -> bool {
         self.legs[lane].then == After::Cue && at >= self.legs[lane].settled()
     }
 
     /// Where a lane's slots are at a show time, as fractions of the stroke; `cue` is the cue's pose then. Never
     /// allocates.
-    pub fn pose(&mut self, lane: usize, at: ShowTime, window: &Window, cue: &Pose) -> Pose {
+    pub(crate) fn pose(&mut self, lane: usize, at: ShowTime, window: &Window, cue: &Pose) -> Pose {
         let leg = &mut self.legs[lane];
         let seconds = leg.since_start(at);
         let Some(plan) = &mut leg.plan else {
@@ -86,7 +86,7 @@ impl Course {
 
     /// True if a lane's move is over at a show time.
     #[must_use]
-    pub fn is_settled(&self, lane: usize, at: ShowTime) -> bool {
+    pub(crate) fn is_settled(&self, lane: usize, at: ShowTime) -> bool {
         at >= self.legs[lane].settled()
     }
 
@@ -109,7 +109,7 @@ impl Course {
 
     /// The same for every slot, in frame order; those that do not move rest in park. Never allocates.
     #[must_use]
-    pub fn states_by_slot(
+    pub(crate) fn states_by_slot(
         &mut self,
         lane: usize,
         at: ShowTime,

@@ -8,7 +8,7 @@ use crate::motion::{Limits, Window};
 use crate::time::ShowTime;
 
 /// The shortest join, seconds.
-pub const JOIN_MIN: f64 = 1.5;
+pub(crate) const JOIN_MIN: f64 = 1.5;
 /// The longest join, seconds.
 const JOIN_MAX: f64 = 10.0;
 /// How much later the cue is met where it cannot be met yet, seconds.

@@ -12,10 +12,10 @@ mod seam;
 mod solve;
 mod states;
 
-pub use course::{After, Course, Leg};
-pub use join::JOIN_MIN;
-pub use park::{PARK_VELOCITY_MM_S, slow_park_time};
-pub use planner::{From, Planner, Request, To};
+pub(crate) use course::{After, Course, Leg};
+pub(crate) use park::{PARK_VELOCITY_MM_S, slow_park_time};
+pub(crate) use planner::Planner;
+pub use planner::{From, Request, To};
 pub use scene::{LaneScene, Place, Scene};
 
 use rsruckig::prelude::{DataArrayOrVec, Trajectory};
@@ -64,7 +64,7 @@ pub enum PlanError {
 
 /// A finished move of the moving slots of one lane: one trajectory, or a stop and what follows it.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub(crate) struct Plan {
     parts: Vec<Trajectory<0>>,
     positions: DataArrayOrVec<f64, 0>,
     velocities: DataArrayOrVec<f64, 0>,
@@ -85,13 +85,13 @@ impl Plan {
 
     /// How long the move takes, seconds.
     #[must_use]
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.parts.iter().map(Trajectory::get_duration).sum()
     }
 
     /// The positions `seconds` after its start, one for each moving slot, clamped to the move's own duration and to the
     /// stroke. Never allocates.
-    pub fn position_at(&mut self, seconds: f64) -> &[f64] {
+    pub(crate) fn position_at(&mut self, seconds: f64) -> &[f64] {
         let (part, t) = self.part_at(seconds);
         let positions = &mut self.positions;
         self.parts[part].at_time(t, &mut Some(positions), &mut None, &mut None, &mut None, &mut None);
@@ -113,7 +113,7 @@ impl Plan {
     }
 
     /// The state of each moving slot `seconds` after the start, clamped likewise. Never allocates.
-    pub fn states_at(&mut self, seconds: f64) -> impl Iterator<Item = AxisState> {
+    pub(crate) fn states_at(&mut self, seconds: f64) -> impl Iterator<Item = AxisState> {
         let (part, t) = self.part_at(seconds);
         let (p, v, a) = (&mut self.positions, &mut self.velocities, &mut self.accelerations);
         self.parts[part].at_time(t, &mut Some(p), &mut Some(v), &mut Some(a), &mut None, &mut None);

@@ -7,7 +7,7 @@ use crate::motion::{Limits, Window};
 use crate::time::ShowTime;
 
 /// The greatest speed of a seat on its way to park, mm/s.
-pub const PARK_VELOCITY_MM_S: f64 = 50.0;
+pub(crate) const PARK_VELOCITY_MM_S: f64 = 50.0;
 /// The longest Time that a controller executes as it is in the factory (PA0b, IMAX manual 2.3.1).
 const LONGEST_MS: u32 = 3_000;
 
@@ -85,7 +85,7 @@ fn stop_first(window: &Window, from: &[AxisState]) -> Result<Plan, String> {
     reason = "a saturating cast is what is wanted"
 )]
 #[must_use]
-pub fn slow_park_time(stroke_mm: f64) -> (u32, bool) {
+pub(crate) fn slow_park_time(stroke_mm: f64) -> (u32, bool) {
     let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
     (whole.min(LONGEST_MS), whole > LONGEST_MS)
 }

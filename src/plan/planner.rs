@@ -89,7 +89,7 @@ impl Task<'_> {
 impl Planner {
     /// A planner for lanes with these windows.
     #[must_use]
-    pub fn new(windows: Vec<Window>, rate_hz: f64) -> Self {
+    pub(crate) fn new(windows: Vec<Window>, rate_hz: f64) -> Self {
         Self { windows, rate_hz, given: VecDeque::new() }
     }
 

@@ -35,7 +35,7 @@ pub struct Scene {
 impl Scene {
     /// All lanes at rest in their park poses, at the levels of their windows.
     #[must_use]
-    pub fn parked(windows: &[Window]) -> Self {
+    pub(crate) fn parked(windows: &[Window]) -> Self {
         let lane = |window: &Window| LaneScene {
             place: Place::Still(window.park()),
             level: window.level(),

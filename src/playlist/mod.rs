@@ -11,8 +11,9 @@ mod shelf;
 #[cfg(test)]
 mod tests;
 
-pub use schedule::{LATEST, Schedule, due, next_start};
-pub use shelf::{PlaylistInfo, Shelf};
+pub(crate) use schedule::{Schedule, next_start};
+pub(crate) use shelf::PlaylistInfo;
+pub use shelf::Shelf;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -22,55 +23,55 @@ use jiff::tz::TimeZone;
 
 use crate::config::{Config, Preset};
 use crate::control::LevelsChange;
-pub use crate::control::Then;
+pub(crate) use crate::control::Then;
 use crate::library::{CueId, Id};
 
 /// The name of a playlist.
-pub type PlaylistId = Id;
+pub(crate) type PlaylistId = Id;
 
 /// The cues of a day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Playlist {
     /// Its file.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Its title.
-    pub title: String,
+    pub(crate) title: String,
     /// The zone of its times; none for that of the machine.
-    pub timezone: Option<TimeZone>,
+    pub(crate) timezone: Option<TimeZone>,
     /// Its entries, at least one.
-    pub entries: Vec<Entry>,
+    pub(crate) entries: Vec<Entry>,
 }
 
 /// One cue of a playlist, and how it is played. What it does not name stays as the hall has it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// The cue.
-    pub cue: CueId,
+    pub(crate) cue: CueId,
     /// The preset that is set before all else.
-    pub preset: Option<String>,
+    pub(crate) preset: Option<String>,
     /// Level of the motion, 0 to 1.
-    pub level: Option<f64>,
+    pub(crate) level: Option<f64>,
     /// Level of the vibration, 0 to 1.
-    pub vibration: Option<f64>,
+    pub(crate) vibration: Option<f64>,
     /// How much later than the film the motion is, ms, -500 to 500.
-    pub trim_ms: Option<i32>,
+    pub(crate) trim_ms: Option<i32>,
     /// True if an effect may be on, by its name.
-    pub effects: BTreeMap<String, bool>,
+    pub(crate) effects: BTreeMap<String, bool>,
     /// What follows its end.
-    pub then: Then,
+    pub(crate) then: Then,
     /// When it starts by the wall clock; `None` if a person starts it, or the entry before goes on to it.
-    pub at: Option<At>,
+    pub(crate) at: Option<At>,
     /// Where the file says what has to be looked up elsewhere.
     pub(crate) places: Places,
 }
 
 /// A time of day, on some days of the week.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct At {
+pub(crate) struct At {
     /// The time of day.
-    pub time: Time,
+    pub(crate) time: Time,
     /// On which days, as 0 for Monday to 6 for Sunday; at least one.
-    pub days: BTreeSet<i8>,
+    pub(crate) days: BTreeSet<i8>,
 }
 
 /// Lines and columns of an entry, counted from 1.
@@ -84,7 +85,7 @@ pub(crate) struct Places {
 impl At {
     /// True if it is a time of that day.
     #[must_use]
-    pub fn is_on(&self, day: Weekday) -> bool {
+    pub(crate) fn is_on(&self, day: Weekday) -> bool {
         self.days.contains(&day.to_monday_zero_offset())
     }
 }
@@ -93,7 +94,7 @@ impl Entry {
     /// What it sets of levels and effects: its preset, and over that its own. A preset that the configuration has not counts
     /// for nothing; [`Playlist::check`] names it.
     #[must_use]
-    pub fn levels(&self, config: &Config) -> LevelsChange {
+    pub(crate) fn levels(&self, config: &Config) -> LevelsChange {
         let preset: Option<&Preset> = self.preset.as_deref().and_then(|name| config.preset(name));
         let mut change = preset.map_or_else(LevelsChange::default, LevelsChange::from);
         change.motion = self.level.or(change.motion);

@@ -12,14 +12,14 @@ use jiff::{SignedDuration, Timestamp, ToSpan as _, Zoned};
 use super::{At, Playlist};
 
 /// A start that is longer past is let go: after a sleep, a step of the clock or a restart nothing is caught up.
-pub const LATEST: Duration = Duration::from_secs(2);
+pub(crate) const LATEST: Duration = Duration::from_secs(2);
 
 /// A clock is set back by less than that where it comes by the same times again; one that was further ahead was wrong.
 const WRONG: SignedDuration = SignedDuration::from_hours(24);
 
 /// Which starts have been seen, so that none comes twice, however the clock is set.
 #[derive(Debug, Clone, Default)]
-pub struct Schedule {
+pub(crate) struct Schedule {
     /// When it was last asked.
     asked: Option<Zoned>,
     /// The last start that was due.
@@ -29,7 +29,7 @@ pub struct Schedule {
 impl Schedule {
     /// The entry, counted from 0, that is due now, at most once for each of its starts. To be asked at least once a second,
     /// also while nothing may start, so that what became due meanwhile is let go. The first time nothing is due.
-    pub fn due(&mut self, playlist: &Playlist, now: &Zoned) -> Option<usize> {
+    pub(crate) fn due(&mut self, playlist: &Playlist, now: &Zoned) -> Option<usize> {
         let asked = self.asked.replace(now.clone())?;
         let (entry, start) = find_due(playlist, &asked, now)?;
         // A clock that was set back comes by the same start again.
@@ -44,7 +44,7 @@ impl Schedule {
 
 /// The entry, counted from 0, that starts next after `now`, and when. Of two at once the first of the list.
 #[must_use]
-pub fn next_start(playlist: &Playlist, now: &Zoned) -> Option<(usize, Zoned)> {
+pub(crate) fn next_start(playlist: &Playlist, now: &Zoned) -> Option<(usize, Zoned)> {
     let now = local(playlist, now);
     let today = now.date();
     let starts = timed(playlist).filter_map(|(index, at)| {
@@ -59,7 +59,8 @@ pub fn next_start(playlist: &Playlist, now: &Zoned) -> Option<(usize, Zoned)> {
 /// The entry, counted from 0, whose start came after `previous` and at or before `now`, no longer than [`LATEST`] before it.
 /// Of several the last; `None` if the clock went back.
 #[must_use]
-pub fn due(playlist: &Playlist, previous: &Zoned, now: &Zoned) -> Option<usize> {
+#[cfg(test)]
+pub(crate) fn due(playlist: &Playlist, previous: &Zoned, now: &Zoned) -> Option<usize> {
     find_due(playlist, previous, now).map(|(entry, _)| entry)
 }
 

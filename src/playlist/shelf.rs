@@ -23,15 +23,15 @@ pub struct Shelf {
 
 /// One playlist of the folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, ToSchema)]
-pub struct PlaylistInfo {
+pub(crate) struct PlaylistInfo {
     /// Its id.
-    pub id: String,
+    pub(crate) id: String,
     /// Its title; null if it has faults.
-    pub title: Option<String>,
+    pub(crate) title: Option<String>,
     /// The ids of its cues, in order.
-    pub cues: Vec<String>,
+    pub(crate) cues: Vec<String>,
     /// Every fault of its file. What the library and the configuration say of it shows when it is loaded.
-    pub faults: Vec<String>,
+    pub(crate) faults: Vec<String>,
 }
 
 impl Shelf {
@@ -43,7 +43,7 @@ impl Shelf {
 
     /// All playlists by their ids, also those with faults.
     #[must_use]
-    pub fn list(&self) -> Vec<PlaylistInfo> {
+    pub(crate) fn list(&self) -> Vec<PlaylistInfo> {
         let names = Folder::open(&self.dir).and_then(|folder| folder.names()).unwrap_or_default();
         let ids = names.iter().filter_map(|name| name.strip_suffix(ENDING)?.parse::<PlaylistId>().ok());
         ids.filter_map(|id| match self.read(&id) {
@@ -68,7 +68,7 @@ impl Shelf {
     ///
     /// # Errors
     /// [`Problem`] where there is none of that name, or it has faults, each with its place.
-    pub fn read(&self, id: &PlaylistId) -> Result<Playlist, Problem> {
+    pub(crate) fn read(&self, id: &PlaylistId) -> Result<Playlist, Problem> {
         let name = format!("{id}{ENDING}");
         let path = self.dir.join(&name);
         let text = match self.text(&name) {

@@ -6,6 +6,7 @@ use std::path::Path;
 use jiff::{SignedDuration, Timestamp, Zoned};
 use proptest::prelude::*;
 
+use super::schedule::due;
 use super::*;
 use crate::config::from_to_args;
 use crate::control::Code;

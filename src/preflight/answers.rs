@@ -13,7 +13,7 @@ const LOST: usize = 2;
 
 /// Median and maximum of round trips; `None` if there are none.
 #[must_use]
-pub fn round_trip(took: &[Duration]) -> Option<(Duration, Duration)> {
+pub(crate) fn round_trip(took: &[Duration]) -> Option<(Duration, Duration)> {
     let mut sorted = took.to_vec();
     sorted.sort_unstable();
     Some((*sorted.get(sorted.len().checked_sub(1)? / 2)?, *sorted.last()?))

@@ -28,33 +28,34 @@ use serde::Serialize;
 
 use crate::config::Acceptance;
 
-pub use crate::checks::{Check, Family, Severity, UnknownCheck};
-pub use answers::round_trip;
-pub use subject::{Subject, Terms, wanted};
+pub use crate::checks::Check;
+pub(crate) use crate::checks::{Family, Severity};
+pub(crate) use answers::round_trip;
+pub(crate) use subject::{Subject, Terms, wanted};
 
 /// One thing that was found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Finding {
+pub(crate) struct Finding {
     /// What was looked for.
-    pub check: Check,
+    pub(crate) check: Check,
     /// What was found, with the register and its value.
-    pub found: String,
+    pub(crate) found: String,
     /// What to do; empty if nothing is to be done.
-    pub remedy: String,
+    pub(crate) remedy: String,
     /// Why the site lives with it, where it does.
-    pub accepted: Option<String>,
+    pub(crate) accepted: Option<String>,
 }
 
 impl Finding {
     /// How grave it is, its acceptance left aside.
     #[must_use]
-    pub const fn severity(&self) -> Severity {
+    pub(crate) const fn severity(&self) -> Severity {
         self.check.severity()
     }
 
     /// True if preflight fails for it.
     #[must_use]
-    pub fn fails(&self) -> bool {
+    pub(crate) fn fails(&self) -> bool {
         self.severity() == Severity::Fail && self.accepted.is_none()
     }
 }
@@ -72,7 +73,7 @@ impl Notes {
 /// Judges all controllers: what was found of each, in the order of `subjects`, the gravest first. `accepted` is what the
 /// hall accepts of any of them.
 #[must_use]
-pub fn judge(subjects: &[Subject<'_>], terms: &Terms, accepted: &[Acceptance]) -> Vec<Vec<Finding>> {
+pub(crate) fn judge(subjects: &[Subject<'_>], terms: &Terms, accepted: &[Acceptance]) -> Vec<Vec<Finding>> {
     let mut all: Vec<Notes> = subjects.iter().map(|subject| one(subject, terms)).collect();
     identity::judge_together(subjects, &mut all);
     geometry::judge_together(subjects, &mut all);

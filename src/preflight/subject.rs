@@ -20,26 +20,26 @@ const HEADERS_LEN: usize = 28;
 
 /// What is known of one controller.
 #[derive(Debug)]
-pub struct Subject<'a> {
+pub(crate) struct Subject<'a> {
     /// What it should be.
-    pub controller: &'a Controller,
+    pub(crate) controller: &'a Controller,
     /// How many axes its seat has; `None` if nobody says.
-    pub axes: Option<usize>,
+    pub(crate) axes: Option<usize>,
     /// The way to it, or why there is none.
-    pub route: Result<Route, String>,
+    pub(crate) route: Result<Route, String>,
     /// What it told; `None` if it could not be asked.
-    pub survey: Option<&'a Survey>,
+    pub(crate) survey: Option<&'a Survey>,
 }
 
 /// What a show will ask of the controllers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Terms {
+pub(crate) struct Terms {
     /// The port that controllers answer to; 0 if it is another each time.
-    pub frame_port: u16,
+    pub(crate) frame_port: u16,
     /// Frames a second.
-    pub rate_hz: f64,
+    pub(crate) rate_hz: f64,
     /// The axes of the cue, and whether it vibrates; `None` if no cue is known.
-    pub cue: Option<(usize, bool)>,
+    pub(crate) cue: Option<(usize, bool)>,
 }
 
 /// Parameters that are judged.
@@ -63,7 +63,7 @@ const PARAMETERS: [RangeInclusive<u8>; 15] = [
 
 /// The registers that are judged of a controller, as far as its manual has them.
 #[must_use]
-pub fn wanted(controller: &Controller) -> Vec<Address> {
+pub(crate) fn wanted(controller: &Controller) -> Vec<Address> {
     let parameters = PARAMETERS.into_iter().flatten().map(Address::Pa);
     let monitors = [home::DPF0, Address::Dp(0xfe), Address::Dp(0xff)];
     let known =
@@ -74,32 +74,32 @@ pub fn wanted(controller: &Controller) -> Vec<Address> {
 impl Subject<'_> {
     /// True if it answered at all.
     #[must_use]
-    pub fn answered(&self) -> bool {
+    pub(crate) fn answered(&self) -> bool {
         self.survey.is_some_and(Survey::answered)
     }
 
     /// What a parameter holds, where the controller has it and told.
     #[must_use]
-    pub fn pa(&self, number: u8) -> Option<u16> {
+    pub(crate) fn pa(&self, number: u8) -> Option<u16> {
         self.register(Address::Pa(number))
     }
 
     /// What a register holds, where the controller has it and told.
     #[must_use]
-    pub fn register(&self, address: Address) -> Option<u16> {
+    pub(crate) fn register(&self, address: Address) -> Option<u16> {
         self.survey?.values.get(&address).copied()
     }
 
     /// An IPv4 address in four parameters; `None` if one is missing or no byte.
     #[must_use]
-    pub fn ip(&self, first: u8) -> Option<Ipv4Addr> {
+    pub(crate) fn ip(&self, first: u8) -> Option<Ipv4Addr> {
         let byte = |step| self.pa(first + step).and_then(|word| u8::try_from(word).ok());
         Some(Ipv4Addr::new(byte(0)?, byte(1)?, byte(2)?, byte(3)?))
     }
 
     /// Axes that it works with: the seat's, else what PA02 says.
     #[must_use]
-    pub fn working_axes(&self) -> usize {
+    pub(crate) fn working_axes(&self) -> usize {
         self.axes.or_else(|| self.pa(0x02).map(usize::from)).unwrap_or(MAX_AXES).min(MAX_AXES)
     }
 }
@@ -107,7 +107,7 @@ impl Subject<'_> {
 impl Terms {
     /// The largest Time of the show's own frames, ms.
     #[must_use]
-    pub fn frame_time_ms(&self) -> u32 {
+    pub(crate) fn frame_time_ms(&self) -> u32 {
         // The Times of one second hold every Time there is.
         let rate = Rate::from_hz(self.rate_hz);
         (0..1_000).map(|frame| rate.time_ms(frame)).max().unwrap_or(0)
@@ -115,7 +115,7 @@ impl Terms {
 
     /// The largest IP packet that goes to a controller or comes from it, bytes.
     #[must_use]
-    pub fn packet_len(&self, controller: &Controller) -> usize {
+    pub(crate) fn packet_len(&self, controller: &Controller) -> usize {
         let cue_axes = self.cue.map_or_else(|| most_axes(controller), |(axes, _)| axes);
         let (_, slots) = motion_channel_and_slots(controller.frame_axes(cue_axes));
         let vibrates = self.cue.is_none_or(|(_, vibrates)| vibrates)

@@ -14,33 +14,33 @@ use crate::timeline::{Figure, Timeline};
 
 /// What one axis does at most on a seat that takes it, at the level of the proof.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AxisProof {
+pub(crate) struct AxisProof {
     /// The axis of the cue, from 0.
-    pub axis: usize,
+    pub(crate) axis: usize,
     /// The seat that it was judged for.
-    pub seat: Arc<SeatType>,
+    pub(crate) seat: Arc<SeatType>,
     /// The lowest position that is sent, mm from the stroke's lower end.
-    pub lowest: Figure,
+    pub(crate) lowest: Figure,
     /// The highest position that is sent, mm from the stroke's lower end.
-    pub highest: Figure,
+    pub(crate) highest: Figure,
     /// The lowest position with vibration on top; `None` if the axis never vibrates.
-    pub lowest_shaken: Option<Figure>,
+    pub(crate) lowest_shaken: Option<Figure>,
     /// The highest position with vibration on top; `None` if the axis never vibrates.
-    pub highest_shaken: Option<Figure>,
+    pub(crate) highest_shaken: Option<Figure>,
     /// mm/s.
-    pub velocity: Worst,
+    pub(crate) velocity: Worst,
     /// Change of velocity from one frame to the next, mm/s.
-    pub step: Worst,
+    pub(crate) step: Worst,
     /// mm/s².
-    pub acceleration: Worst,
+    pub(crate) acceleration: Worst,
     /// mm/s³.
-    pub jerk: Worst,
+    pub(crate) jerk: Worst,
 }
 
 impl AxisProof {
     /// The figures that have a limit.
     #[must_use]
-    pub fn worst(&self) -> [(Quantity, Worst); 4] {
+    pub(crate) fn worst(&self) -> [(Quantity, Worst); 4] {
         [
             (Quantity::Velocity, self.velocity),
             (Quantity::Step, self.step),
@@ -52,7 +52,7 @@ impl AxisProof {
     /// How far what is sent stays from the nearer end of the stroke, vibration on top, as a part of the stroke; below 0
     /// past it.
     #[must_use]
-    pub fn position_margin(&self) -> f64 {
+    pub(crate) fn position_margin(&self) -> f64 {
         let low = self.lowest_shaken.map_or(self.lowest.value, |shaken| shaken.value.min(self.lowest.value));
         let high =
             self.highest_shaken.map_or(self.highest.value, |shaken| shaken.value.max(self.highest.value));

@@ -16,7 +16,7 @@ use crate::motion::{AxisState, Halt, Limits};
 
 // 2 % of the slew, and the slack on top (docs/limiter.md, section 5).
 /// The most that show time may run faster than the clock, as a factor: the last pose may be met with that much more speed.
-pub const HURRY: f64 = 1.021;
+pub(crate) const HURRY: f64 = 1.021;
 /// What of acceleration and jerk has to be enough to stay inside the stroke: moves that go on from the last pose are
 /// planned with nearly all.
 const ROOM_SHARE: f64 = 0.95;

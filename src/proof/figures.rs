@@ -16,7 +16,7 @@ pub struct AxisFigures {
     /// The seat that it was judged for.
     pub seat: Arc<SeatType>,
     /// The lowest position of the curve, mm from the stroke's lower end.
-    pub lowest: Figure,
+    pub(crate) lowest: Figure,
     /// The highest position of the curve, mm from the stroke's lower end.
     pub highest: Figure,
     /// The greatest speed, mm/s.

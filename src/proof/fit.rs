@@ -25,49 +25,49 @@ const HALVINGS: usize = 12;
 
 /// How a cue is made to fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Manner {
+pub(crate) struct Manner {
     /// True if each axis has its own amplitude; else all have the least of them, so that they keep their proportions.
-    pub per_axis: bool,
+    pub(crate) per_axis: bool,
     /// True if a low-pass may help.
-    pub smooth: bool,
+    pub(crate) smooth: bool,
 }
 
 /// A change of position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Change {
+pub(crate) struct Change {
     /// How far, mm.
-    pub mm: f64,
+    pub(crate) mm: f64,
     /// The axis, from 0.
-    pub axis: usize,
+    pub(crate) axis: usize,
     /// When.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
 }
 
 /// A cue that was made to fit, and what was done to it.
 #[derive(Debug)]
-pub struct Fitted {
+pub(crate) struct Fitted {
     /// The new cue.
-    pub timeline: Timeline,
+    pub(crate) timeline: Timeline,
     /// Amplitude of each axis about its neutral pose, 1 where it is as it was.
-    pub factors: Vec<f64>,
+    pub(crate) factors: Vec<f64>,
     /// In how many of its last seconds it is brought to rest, where it ended in motion that has no way to rest.
-    pub eased_s: Option<f64>,
+    pub(crate) eased_s: Option<f64>,
     /// The low-pass, where one was used.
-    pub smoothing: Option<Smoothing>,
+    pub(crate) smoothing: Option<Smoothing>,
     /// The largest change of a position.
-    pub change: Change,
+    pub(crate) change: Change,
     /// How many stretches of vibration swing less than they did.
-    pub lowered: usize,
+    pub(crate) lowered: usize,
     /// Of the cue as it was.
-    pub before: Proof,
+    pub(crate) before: Proof,
     /// Of the new cue.
-    pub after: Proof,
+    pub(crate) after: Proof,
 }
 
 /// Why a cue cannot be made to fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum FitError {
+pub(crate) enum FitError {
     /// What is broken is not motion.
     #[error("{}", list(.0))]
     NotMotion(Vec<String>),
@@ -94,7 +94,7 @@ fn list(broken: &[String]) -> String {
 ///
 /// # Errors
 /// [`FitError`].
-pub fn fit(timeline: Timeline, terms: &Terms, manner: Manner) -> Result<Fitted, FitError> {
+pub(crate) fn fit(timeline: Timeline, terms: &Terms, manner: Manner) -> Result<Fitted, FitError> {
     let before = prove(&timeline, terms.clone());
     refuse_others(&before)?;
     let mut best = best_of(&timeline, timeline.cue().clone(), terms, manner);

@@ -12,13 +12,13 @@ use crate::timeline::{Cubic, Timeline};
 const TOLERANCE: f64 = 0.02;
 /// The greatest sizes in stretches of equal length, in strokes and seconds; never less than they are.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Loads {
+pub(crate) struct Loads {
     /// Distance over Time.
-    pub velocity: Box<[f32]>,
+    pub(crate) velocity: Box<[f32]>,
     /// Acceleration; change of velocity from frame to frame counts as the part of its own limit that it is.
-    pub acceleration: Box<[f32]>,
+    pub(crate) acceleration: Box<[f32]>,
     /// Jerk.
-    pub jerk: Box<[f32]>,
+    pub(crate) jerk: Box<[f32]>,
 }
 
 impl Loads {
@@ -26,7 +26,14 @@ impl Loads {
     /// `span` nanoseconds. What is below `light` of a limit may be told as anything up to that. Takes time in proportion to the
     /// cue's rows, next to none where those are below `light`.
     #[must_use]
-    pub fn of(timeline: &Timeline, axis: usize, slot: &Slot, rate: Rate, span: i64, light: f64) -> Self {
+    pub(crate) fn of(
+        timeline: &Timeline,
+        axis: usize,
+        slot: &Slot,
+        rate: Rate,
+        span: i64,
+        light: f64,
+    ) -> Self {
         let stencils = Stencils::at(rate);
         Self::over(&Pieces::new(timeline, axis, slot), slot.limits, &stencils, rate, span, light)
     }

@@ -22,15 +22,16 @@ mod terms;
 mod tests;
 mod violation;
 
-pub use axis::AxisProof;
+pub(crate) use axis::AxisProof;
 pub use digest::Digest;
-pub use end::HURRY;
-pub use figures::{AxisFigures, figures};
-pub use fit::{Change, FitError, Fitted, Manner, fit};
-pub use loads::Loads;
-pub use smooth::Smoothing;
-pub use terms::{LimitedEffect, Part, Terms};
-pub use violation::{Breach, Quantity, Violation};
+pub(crate) use end::HURRY;
+pub(crate) use figures::AxisFigures;
+pub use figures::figures;
+pub(crate) use fit::{Fitted, Manner, fit};
+pub(crate) use loads::Loads;
+pub(crate) use terms::LimitedEffect;
+pub use terms::Terms;
+pub(crate) use violation::{Breach, Quantity, Violation};
 
 use std::num::NonZero;
 use std::sync::Arc;
@@ -44,25 +45,25 @@ use axis::Subject;
 use stencil::Stencils;
 
 /// What may be over a limit: 0.1 % of it.
-pub const SLACK: f64 = 1.001;
+pub(crate) const SLACK: f64 = 1.001;
 
 /// The greatest size of something that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Worst {
+pub(crate) struct Worst {
     /// In mm/s, mm/s² or mm/s³.
-    pub value: f64,
+    pub(crate) value: f64,
     /// The most that is allowed, in the same unit.
-    pub limit: f64,
+    pub(crate) limit: f64,
     /// Show time in the middle of the poses that gave it.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
     /// The line of the row at or before that; the number of its message where the file has no lines.
-    pub line: u64,
+    pub(crate) line: u64,
 }
 
 impl Worst {
     /// What is left of the limit, as a part of it; below 0 over it.
     #[must_use]
-    pub fn margin(&self) -> f64 {
+    pub(crate) fn margin(&self) -> f64 {
         1.0 - self.value / self.limit
     }
 }
@@ -71,13 +72,13 @@ impl Worst {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proof {
     /// What it was proved for.
-    pub terms: Terms,
+    pub(crate) terms: Terms,
     /// One entry for each axis on each different seat that takes it.
-    pub axes: Vec<AxisProof>,
+    pub(crate) axes: Vec<AxisProof>,
     /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
-    pub violations: Vec<Violation>,
+    pub(crate) violations: Vec<Violation>,
     /// How many there are beyond those.
-    pub more: u64,
+    pub(crate) more: u64,
 }
 
 impl Proof {
@@ -89,7 +90,8 @@ impl Proof {
 
     /// True if a play on these terms is proved to keep all limits.
     #[must_use]
-    pub fn covers(&self, terms: &Terms) -> bool {
+    #[cfg(test)]
+    pub(crate) fn covers(&self, terms: &Terms) -> bool {
         self.passed() && self.terms.cover(terms)
     }
 }

@@ -17,9 +17,9 @@ const CUT_OFF: f64 = 0.132_505;
 
 /// A low-pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Smoothing {
+pub(crate) struct Smoothing {
     /// Where it lets half the power through, Hz.
-    pub cut_off_hz: f64,
+    pub(crate) cut_off_hz: f64,
 }
 
 /// The curves of a cue at evenly spaced times.

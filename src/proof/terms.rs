@@ -10,41 +10,41 @@ use crate::time::Rate;
 
 /// Axes of the cue, and the seat type that takes them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Part {
+pub(crate) struct Part {
     /// The seat type.
-    pub seat: Arc<SeatType>,
+    pub(crate) seat: Arc<SeatType>,
     /// The cue's axes, from 0; the first of them is the seat's first.
-    pub axes: Range<usize>,
+    pub(crate) axes: Range<usize>,
 }
 
 /// An effect with limits.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LimitedEffect {
+pub(crate) struct LimitedEffect {
     /// Its limits.
-    pub limit: EffectLimit,
+    pub(crate) limit: EffectLimit,
     /// Its output, as a bit of the Port Out word.
-    pub output: u16,
+    pub(crate) output: u16,
 }
 
 /// What a cue is proved for. Two that are equal need one proof.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terms {
     /// The cue.
-    pub cue: Digest,
+    pub(crate) cue: Digest,
     /// The different parts of the hall; seats of one type that take the same axes are one.
-    pub parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
     /// The effects whose times are limited.
-    pub effects: Vec<LimitedEffect>,
+    pub(crate) effects: Vec<LimitedEffect>,
     /// Frames a second.
-    pub rate: Rate,
+    pub(crate) rate: Rate,
     /// Level of motion and vibration, 0 to 1.
-    pub level: f64,
+    pub(crate) level: f64,
 }
 
 impl Terms {
     /// The terms of a play in a hall.
     #[must_use]
-    pub fn of_hall(config: &Config, cue: Digest, rate: Rate, level: f64) -> Self {
+    pub(crate) fn of_hall(config: &Config, cue: Digest, rate: Rate, level: f64) -> Self {
         let mut parts: Vec<Part> = Vec::new();
         for part in config.controllers.iter().map(Part::of) {
             if !parts.contains(&part) {
@@ -68,7 +68,8 @@ impl Terms {
     /// True if what is proved for these terms holds for `other`: all is the same, but the level may be lower. Motion and
     /// vibration shrink in proportion to the level, about a pose inside the stroke.
     #[must_use]
-    pub fn cover(&self, other: &Self) -> bool {
+    #[cfg(test)]
+    pub(crate) fn cover(&self, other: &Self) -> bool {
         let same = Self { level: self.level, ..other.clone() } == *self;
         same && (0.0..=self.level).contains(&other.level)
     }

@@ -9,11 +9,11 @@ use crate::time::ShowTime;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Violation {
     /// The row that stands at or before the worst of it.
-    pub place: Place,
+    pub(crate) place: Place,
     /// The column of the file that it is about, or nothing.
-    pub column: String,
+    pub(crate) column: String,
     /// What is broken.
-    pub breach: Breach,
+    pub(crate) breach: Breach,
 }
 
 impl std::fmt::Display for Violation {
@@ -26,7 +26,7 @@ impl std::fmt::Display for Violation {
 impl Violation {
     /// What is broken, with the column that it is about.
     #[must_use]
-    pub fn message(&self) -> String {
+    pub(crate) fn message(&self) -> String {
         match self.column.as_str() {
             "" => self.breach.to_string(),
             column => format!("{column}: {}", self.breach),
@@ -36,7 +36,7 @@ impl Violation {
 
 /// A figure of motion that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// Distance over Time, mm/s.
     Velocity,
     /// Change of velocity from one frame to the next, mm/s.
@@ -50,7 +50,7 @@ pub enum Quantity {
 impl Quantity {
     /// What people call it.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Velocity => "velocity",
             Self::Step => "change of velocity from frame to frame",
@@ -61,7 +61,7 @@ impl Quantity {
 
     /// Its unit.
     #[must_use]
-    pub const fn unit(self) -> &'static str {
+    pub(crate) const fn unit(self) -> &'static str {
         match self {
             Self::Velocity | Self::Step => "mm/s",
             Self::Acceleration => "mm/s²",
@@ -73,7 +73,7 @@ impl Quantity {
 /// A limit that is broken.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Breach {
+pub(crate) enum Breach {
     /// An axis moves faster, or more roughly, than its seat may.
     #[error(
         "{} {value:.1} {} at {at} is over {limit:.1}, the limit of seat {seat} ({from} to {until})",

@@ -36,15 +36,15 @@ pub struct Accounts {
     /// Datagrams from nobody we sent to.
     pub strangers: u64,
     /// How the groups stood otherwise than before; the first 1,000 times.
-    pub changes: Vec<Change>,
+    pub(crate) changes: Vec<Change>,
     /// Controllers that were given up in the end.
-    pub gone: Vec<usize>,
+    pub(crate) gone: Vec<usize>,
 }
 
 impl Accounts {
     /// Empty accounts of these controllers, of which a reply is asked for in each of `ack_every` frames.
     #[must_use]
-    pub fn new(watched: Vec<Watched>, ack_every: u32) -> Self {
+    pub(crate) fn new(watched: Vec<Watched>, ack_every: u32) -> Self {
         Self {
             books: Books::new(Tracker::new(watched.len(), ack_every)),
             lateness: histogram(),
@@ -105,7 +105,7 @@ impl AckLoop {
 
     /// The same where frames were sent before: `firsts` are the numbers of the next.
     #[must_use]
-    pub fn going_on(mut self, firsts: &[FrameNo], ack_every: u32) -> Self {
+    pub(crate) fn going_on(mut self, firsts: &[FrameNo], ack_every: u32) -> Self {
         self.accounts.books = Books::new(Tracker::starting_at(firsts, ack_every));
         self
     }
@@ -116,12 +116,12 @@ impl AckLoop {
     }
 
     /// Its thread has no real-time service: a busy machine holds it up, as it does the tick thread.
-    pub fn shares_the_machine(&mut self) {
+    pub(crate) fn shares_the_machine(&mut self) {
         self.hangs_after = SHARED_HANGS_AFTER;
     }
 
     /// Has `watch` judge how the controllers stand.
-    pub fn watched_by(&mut self, watch: Watch) {
+    pub(crate) fn watched_by(&mut self, watch: Watch) {
         self.watch = Some(watch);
     }
 

@@ -45,7 +45,7 @@ const EXCUSED_FOR: Duration = Duration::from_millis(100);
 impl Conductor {
     /// One of a hall in that state.
     #[must_use]
-    pub const fn new(machine: Machine, attended: bool) -> Self {
+    pub(crate) const fn new(machine: Machine, attended: bool) -> Self {
         Self {
             machine,
             known: None,
@@ -102,7 +102,7 @@ impl Conductor {
 
     /// Whether the hall lives on when its show is over.
     #[must_use]
-    pub const fn stays(&self) -> bool {
+    pub(crate) const fn stays(&self) -> bool {
         self.stays
     }
 
@@ -156,7 +156,7 @@ impl Conductor {
     ///
     /// # Errors
     /// [`Refusal`] where the state does not allow it; nothing has changed then.
-    pub fn request(
+    pub(crate) fn request(
         &mut self,
         request: Transition,
         engine: &mut Engine,
@@ -172,7 +172,7 @@ impl Conductor {
     ///
     /// # Errors
     /// As [`Conductor::request`].
-    pub fn seek(&mut self, film: ShowTime, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
+    pub(crate) fn seek(&mut self, film: ShowTime, engine: &mut Engine, now: MonoTime) -> Result<(), Refusal> {
         if self.film.is_some() {
             let (state, asked, why) = (self.machine.state(), Transition::Seek, Why::FilmLeads);
             return Err(Refusal { state, asked, why });
@@ -184,13 +184,13 @@ impl Conductor {
     }
 
     /// Takes what the control plane has found out.
-    pub fn event(&mut self, event: Event, engine: &mut Engine, now: MonoTime) {
+    pub(crate) fn event(&mut self, event: Event, engine: &mut Engine, now: MonoTime) {
         self.machine.event(event, now);
         self.steer(engine);
     }
 
     /// Takes what was seen of a controller.
-    pub fn alarm(&mut self, alarm: Alarm, engine: &mut Engine, now: MonoTime) {
+    pub(crate) fn alarm(&mut self, alarm: Alarm, engine: &mut Engine, now: MonoTime) {
         match alarm {
             Alarm::Event(event) => self.machine.event(event, now),
             Alarm::Leave(lane) => engine.order(usize::from(lane), LaneOrder::Leave),
@@ -202,7 +202,7 @@ impl Conductor {
     }
 
     /// Somebody wants the program to end: the seats park, as far as the hall may move; where it may not, the play is over.
-    pub fn leave(&mut self, engine: &mut Engine, now: MonoTime) {
+    pub(crate) fn leave(&mut self, engine: &mut Engine, now: MonoTime) {
         self.left = true;
         match self.machine.state() {
             State::Playing(_) | State::Paused => {
@@ -215,13 +215,13 @@ impl Conductor {
     }
 
     /// Stops; never refused.
-    pub fn stop(&mut self, engine: &mut Engine, now: MonoTime) {
+    pub(crate) fn stop(&mut self, engine: &mut Engine, now: MonoTime) {
         let _ = self.machine.request(Transition::Stop, now);
         self.steer(engine);
     }
 
     /// Ends what has lasted too long; to be told every tick, before the engine's.
-    pub fn tick(&mut self, engine: &mut Engine, now: MonoTime) {
+    pub(crate) fn tick(&mut self, engine: &mut Engine, now: MonoTime) {
         self.machine.tick(now);
         if self.machine.state() == State::Parking && now.since(self.machine.since()) >= PLANNED_WITHIN {
             engine.rest_to_park();
@@ -242,7 +242,7 @@ impl Conductor {
     }
 
     /// Tells the machine what the engine does; to be called every tick, after the engine's. What happened comes before how far it is.
-    pub fn watch(&mut self, engine: &mut Engine, now: MonoTime) {
+    pub(crate) fn watch(&mut self, engine: &mut Engine, now: MonoTime) {
         let mut trouble = None;
         engine.events().take(|event| {
             match event {
@@ -290,7 +290,7 @@ impl Conductor {
     }
 
     /// What is new since it was asked last.
-    pub fn news(&mut self) -> Option<News> {
+    pub(crate) fn news(&mut self) -> Option<News> {
         let known = (self.machine.state(), self.machine.cause(), self.machine.since(), self.machine.next());
         if self.known.replace(known) == Some(known) {
             return None;

@@ -50,13 +50,13 @@ impl Desk {
 
     /// The same for a program that a signal ends by that flag.
     #[must_use]
-    pub fn ended_by(self, signal: Arc<AtomicBool>) -> Self {
+    pub(crate) fn ended_by(self, signal: Arc<AtomicBool>) -> Self {
         Self { ended: signal, ..self }
     }
 
     /// Whether a signal wants the program to end.
     #[must_use]
-    pub fn is_ended(&self) -> bool {
+    pub(crate) fn is_ended(&self) -> bool {
         self.ended.load(Ordering::Relaxed)
     }
 
@@ -101,7 +101,7 @@ impl Desk {
 
     /// How much later than the film the motion is to be, milliseconds.
     #[must_use]
-    pub fn trim_ms(&self) -> i32 {
+    pub(crate) fn trim_ms(&self) -> i32 {
         self.trim_ms.load(Ordering::Relaxed)
     }
 

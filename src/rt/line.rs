@@ -43,7 +43,7 @@ pub struct Line {
 
 /// The ack thread's end.
 #[derive(Debug)]
-pub struct LineEnd {
+pub(crate) struct LineEnd {
     answers: Producer<Answer>,
     shared: Arc<Shared>,
     /// What of the line's datagrams was counted already.
@@ -52,7 +52,7 @@ pub struct LineEnd {
 
 /// A line to that many controllers; it takes nothing before it is opened.
 #[must_use]
-pub fn line(sender: Sender, controllers: usize) -> (Line, LineEnd) {
+pub(crate) fn line(sender: Sender, controllers: usize) -> (Line, LineEnd) {
     let zeros = || (0..controllers).map(|_| AtomicU64::new(0)).collect();
     let shared = Arc::new(Shared {
         open: AtomicBool::new(false),
@@ -74,7 +74,7 @@ impl Line {
     }
 
     /// Has the ack thread ask nothing by itself while nothing moves, or lets it.
-    pub fn hush(&self, hushed: bool) {
+    pub(crate) fn hush(&self, hushed: bool) {
         self.shared.hushed.store(hushed, Ordering::Release);
     }
 
@@ -92,7 +92,7 @@ impl Line {
     }
 
     /// Gives all that came since this was asked last: from which controller, what, and when.
-    pub fn drain(&mut self, on: &mut dyn FnMut(usize, &[u8], MonoTime)) {
+    pub(crate) fn drain(&mut self, on: &mut dyn FnMut(usize, &[u8], MonoTime)) {
         while let Ok(answer) = self.answers.pop() {
             let octets = &answer.octets[..usize::from(answer.length)];
             on(usize::from(answer.controller), octets, answer.at);
@@ -101,7 +101,7 @@ impl Line {
 
     /// How often a controller's port was found closed so far.
     #[must_use]
-    pub fn port_closed(&self, lane: usize) -> u64 {
+    pub(crate) fn port_closed(&self, lane: usize) -> u64 {
         self.shared.closed[lane].load(Ordering::Relaxed)
     }
 }

@@ -119,14 +119,14 @@ impl Live {
 
     /// The instant up to which the ack thread has told all that arrived; the clock's zero before it did.
     #[must_use]
-    pub fn told(&self) -> MonoTime {
+    pub(crate) fn told(&self) -> MonoTime {
         // Acquire: whoever sees the instant sees the evidence from before it.
         MonoTime::from_nanos(self.told_ns.load(Ordering::Acquire))
     }
 
     /// Since when a reading of all seats is waited for; the clock's zero before one was.
     #[must_use]
-    pub fn wanted(&self) -> MonoTime {
+    pub(crate) fn wanted(&self) -> MonoTime {
         MonoTime::from_nanos(self.wanted_ns.load(Ordering::Acquire))
     }
 
@@ -146,13 +146,13 @@ impl Live {
     }
 
     /// Notes that all that arrived before an instant was told.
-    pub fn on_told(&self, until: MonoTime) {
+    pub(crate) fn on_told(&self, until: MonoTime) {
         self.told_ns.store(until.as_nanos(), Ordering::Release);
     }
 
     /// How often the limiter held a lane back since the program started; 0 where that is not told.
     #[must_use]
-    pub fn clamps(&self, lane: usize) -> u64 {
+    pub(crate) fn clamps(&self, lane: usize) -> u64 {
         self.clamps.get(lane).map_or(0, |clamps| clamps.load(Ordering::Relaxed))
     }
 
@@ -171,7 +171,7 @@ impl Live {
 
     /// Seats that are brought to park before the show, and how long the slowest of them takes to get there.
     #[must_use]
-    pub fn parking(&self) -> (u32, Duration) {
+    pub(crate) fn parking(&self) -> (u32, Duration) {
         let ms = self.parking_ms.load(Ordering::Relaxed);
         (self.parking.load(Ordering::Relaxed), Duration::from_millis(u64::from(ms)))
     }
@@ -184,13 +184,13 @@ impl Live {
 
     /// Ticks that sent so far.
     #[must_use]
-    pub fn ticks(&self) -> u64 {
+    pub(crate) fn ticks(&self) -> u64 {
         self.ticks.load(Ordering::Relaxed)
     }
 
     /// Ticks slept through so far.
     #[must_use]
-    pub fn missed(&self) -> u64 {
+    pub(crate) fn missed(&self) -> u64 {
         self.missed.load(Ordering::Relaxed)
     }
 
@@ -202,7 +202,7 @@ impl Live {
 
     /// The ticks so far, and up to when the ack thread has told all: both grow. None once the tick loop is over.
     #[must_use]
-    pub fn pulse(&self) -> Option<[u64; 2]> {
+    pub(crate) fn pulse(&self) -> Option<[u64; 2]> {
         let told = self.told().as_nanos();
         (!self.closed.load(Ordering::Relaxed)).then(|| [self.beats(), told])
     }
@@ -219,7 +219,7 @@ impl Live {
     }
 
     /// Notes that the tick loop is over.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         self.closed.store(true, Ordering::Relaxed);
     }
 
@@ -230,7 +230,7 @@ impl Live {
 
     /// A copy of the times as the ack thread last told them; empty where nobody asked it to.
     #[must_use]
-    pub fn times(&self) -> Times {
+    pub(crate) fn times(&self) -> Times {
         self.lock().clone()
     }
 
@@ -238,7 +238,7 @@ impl Live {
     ///
     /// # Panics
     /// Where they are not made as [`histogram()`] makes them.
-    pub fn on_times(&self, lateness: &Histogram, acks: &Histogram) {
+    pub(crate) fn on_times(&self, lateness: &Histogram, acks: &Histogram) {
         let Ok(mut times) = self.times.try_lock() else { return };
         let alike = "they have the same bounds";
         times.lateness.set_to(lateness).expect(alike);
@@ -299,7 +299,7 @@ impl Live {
     }
 
     /// Notes a tick that sent.
-    pub fn on_tick(&self, report: &TickReport) {
+    pub(crate) fn on_tick(&self, report: &TickReport) {
         self.ticks.fetch_add(1, Ordering::Relaxed);
         self.missed.fetch_add(report.missed, Ordering::Relaxed);
     }

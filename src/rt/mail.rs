@@ -73,7 +73,7 @@ pub struct TickReport {
     /// The instant before its first send, minus its deadline, nanoseconds.
     pub late_ns: u64,
     /// Ticks slept through before it.
-    pub missed: u64,
+    pub(crate) missed: u64,
 }
 
 /// The planner's answer.
@@ -112,9 +112,9 @@ pub struct Loaded {
     /// What the lanes do; it waits.
     pub engine: Engine,
     /// How they are sent to, in the order of the controllers.
-    pub lanes: Vec<Lane>,
+    pub(crate) lanes: Vec<Lane>,
     /// What the planner plans with from then on; none once it has it.
-    pub planning: Option<Box<Planning>>,
+    pub(crate) planning: Option<Box<Planning>>,
 }
 
 /// What the planner plans with.
@@ -299,7 +299,7 @@ impl Mail {
 
     /// Records that found no room so far.
     #[must_use]
-    pub const fn unposted(&self) -> u64 {
+    pub(crate) const fn unposted(&self) -> u64 {
         self.unposted
     }
 

@@ -21,20 +21,24 @@ pub use acks::{Accounts, AckLoop};
 pub use conductor::Conductor;
 pub use desk::Desk;
 pub use film::FilmLead;
-pub use line::{Line, line};
-pub use live::{Live, Times};
-pub(crate) use mail::Ticket;
+pub use line::Line;
+pub(crate) use line::line;
+pub use live::Live;
+pub(crate) use live::Times;
 pub use mail::{
-    Alarm, Answer, Command, Loaded, Mail, MailEnds, News, NewsIn, Planning, Sent, Task, TickReport, mailboxes,
+    Alarm, Answer, Command, Loaded, MailEnds, News, NewsIn, Planning, Sent, Task, TickReport, mailboxes,
 };
+pub(crate) use mail::{Mail, Ticket};
 #[cfg(test)]
 pub(crate) use mail::{NewsOut, news};
 pub use places::Places;
 pub use planning::PlanLoop;
-pub use spin::{Spinning, Spun};
-pub use standby::{Order, Standby};
-pub use table::{AckTimes, Row};
-pub use watch::Watch;
+pub use spin::Spinning;
+pub(crate) use spin::Spun;
+pub use standby::Order;
+pub(crate) use standby::Standby;
+pub(crate) use table::Row;
+pub(crate) use watch::Watch;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -68,9 +72,9 @@ const ALARMS_PER_TICK: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ticked {
     /// Ticks that sent.
-    pub ticks: u64,
+    pub(crate) ticks: u64,
     /// Ticks slept through.
-    pub missed: u64,
+    pub(crate) missed: u64,
 }
 
 /// What the loop did.

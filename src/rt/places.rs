@@ -73,12 +73,12 @@ impl Places {
     /// # Panics
     /// Where there is no such lane.
     #[must_use]
-    pub fn belief(&self, lane: usize) -> &Belief {
+    pub(crate) fn belief(&self, lane: usize) -> &Belief {
         &self.lanes[lane].belief
     }
 
     /// What was withheld, lane by lane.
-    pub fn tallies(&self) -> impl Iterator<Item = Tally> {
+    pub(crate) fn tallies(&self) -> impl Iterator<Item = Tally> {
         self.lanes.iter().map(|place| *place.belief.tally())
     }
 

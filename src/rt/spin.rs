@@ -22,7 +22,7 @@ fn spin_after(work: Duration, asked: Duration, period: Duration) -> Duration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Spun {
     /// What was asked for.
-    pub asked: Duration,
+    pub(crate) asked: Duration,
     /// What was left of that, the work of the ticks and the limit of 90 % taken off: the mean of all ticks but the first.
     pub granted: Duration,
 }

@@ -22,7 +22,7 @@ pub enum Order {
 
 /// What a hall has beside a play.
 #[derive(Debug)]
-pub struct Standby {
+pub(crate) struct Standby {
     line: LineEnd,
     desk: Arc<Desk>,
     orders: Consumer<Order>,
@@ -35,7 +35,7 @@ pub struct Standby {
 impl Standby {
     /// For a hall that has just started; `crashed` says whether the mark of a crash was there.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         controllers: &[Controller],
         line: LineEnd,
         desk: Arc<Desk>,

@@ -12,28 +12,28 @@ const AT_A_TIME: usize = 32;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
     /// Its accounts since the program started.
-    pub counts: Counts,
+    pub(crate) counts: Counts,
     /// Latency of its acks, ns; none where there were none.
-    pub ack_ns: Option<AckTimes>,
+    pub(crate) ack_ns: Option<AckTimes>,
     /// How its group stands.
     pub standing: HealthState,
     /// Why.
     pub why: Why,
     /// What it said of itself.
-    pub state: ControllerState,
+    pub(crate) state: ControllerState,
     /// Whether it knows its position; none where it never told.
-    pub homed: Option<bool>,
+    pub(crate) homed: Option<bool>,
     /// When this was told.
     pub at: MonoTime,
 }
 
 /// Percentiles of ack latency, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct AckTimes {
+pub(crate) struct AckTimes {
     /// Half of them are no longer.
-    pub p50: u64,
+    pub(crate) p50: u64,
     /// 99 of 100.
-    pub p99: u64,
+    pub(crate) p99: u64,
 }
 
 /// Whose percentiles are looked up next.

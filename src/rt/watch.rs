@@ -34,7 +34,7 @@ const SILENT_AFTER: Duration = Duration::from_secs(3);
 
 /// The watch over the controllers of one play.
 #[derive(Debug)]
-pub struct Watch {
+pub(crate) struct Watch {
     health: HealthTable,
     peers: Vec<Peer>,
     /// What the message says that is being heard.
@@ -76,7 +76,7 @@ pub struct Watch {
 impl Watch {
     /// A watch over controllers, in the order of their lanes; `health` is of as many.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         health: HealthTable,
         controllers: &[Controller],
         lanes: &[Lane],
@@ -118,7 +118,7 @@ impl Watch {
 
     /// The same for a hall that lives on between shows: at first it finds out where all seats stand.
     #[must_use]
-    pub fn of_a_hall(mut self, standby: Standby) -> Self {
+    pub(crate) fn of_a_hall(mut self, standby: Standby) -> Self {
         (0..self.health.groups().len()).for_each(|group| self.health.look_anew(group));
         self.standby = Some(standby);
         self
@@ -126,7 +126,7 @@ impl Watch {
 
     /// How the groups stood otherwise than before, the first 1,000 times; and the controllers that were given up in the end.
     #[must_use]
-    pub fn into_outcome(self) -> (Vec<Change>, Vec<usize>) {
+    pub(crate) fn into_outcome(self) -> (Vec<Change>, Vec<usize>) {
         let groups = self.health.groups();
         let is_gone = |controller: &usize| {
             matches!(

@@ -12,7 +12,7 @@ use crate::time::MonoTime;
 
 mod watchdog;
 
-pub use watchdog::{FeedDecision, Pulse, WatchdogThread};
+pub(crate) use watchdog::WatchdogThread;
 
 /// How often the line in `systemctl status` changes at the most.
 const STATUS_EVERY: Duration = Duration::from_secs(1);
@@ -21,42 +21,34 @@ const STATUS_LEN: usize = 1_024;
 
 /// Tells the service manager how the hall is. Of one thread, which owns it.
 #[derive(Debug, Default)]
-pub struct Notifier {
+pub(crate) struct Notifier {
     line: StatusLine,
 }
 
 impl Notifier {
-    /// The hall is ready: controllers were asked once, and the surfaces are open. Also the end of [`Self::reloading`].
+    /// The hall is ready: controllers were asked once, and the surfaces are open.
     ///
     /// # Errors
     /// That of the socket; the service manager will take the start for a failed one.
-    pub fn ready(&mut self, text: &str, now: MonoTime) -> io::Result<()> {
+    pub(crate) fn ready(&mut self, text: &str, now: MonoTime) -> io::Result<()> {
         self.line.is(text, now);
         notify(&[NotifyState::Ready, NotifyState::Status(&line(text))])
     }
 
     /// What the hall does, in a line. Told once a second at the most, and only where it differs from what was told before;
     /// to be called again with every new status, so that what came too early is told then.
-    pub fn status(&mut self, text: &str, now: MonoTime) {
+    pub(crate) fn status(&mut self, text: &str, now: MonoTime) {
         if self.line.is(text, now) {
             // Whoever looks sees the line before this one; the next second tries again.
             let _ = notify(&[NotifyState::Status(&line(text))]);
         }
     }
 
-    /// The configuration is read anew; [`Self::ready`] ends it, whatever came of it.
-    ///
-    /// # Errors
-    /// That of the socket or the clock.
-    pub fn reloading(&self) -> io::Result<()> {
-        notify(&[NotifyState::Reloading, NotifyState::monotonic_usec_now()?])
-    }
-
     /// The hall parks its seats and ends.
     ///
     /// # Errors
     /// That of the socket.
-    pub fn stopping(&mut self, text: &str, now: MonoTime) -> io::Result<()> {
+    pub(crate) fn stopping(&mut self, text: &str, now: MonoTime) -> io::Result<()> {
         self.line.is(text, now);
         notify(&[NotifyState::Stopping, NotifyState::Status(&line(text))])
     }
@@ -64,7 +56,7 @@ impl Notifier {
 
 /// How long the service manager waits for a sign of life, if it waits for any (`WATCHDOG_USEC`, meant for this process).
 #[must_use]
-pub fn watchdog() -> Option<Duration> {
+pub(crate) fn watchdog() -> Option<Duration> {
     sd_notify::watchdog_enabled().filter(|interval| !interval.is_zero())
 }
 

@@ -19,11 +19,11 @@ const LOOKS: u32 = 4;
 const BETWEEN: Duration = Duration::from_secs(10);
 
 /// What counts the ticks, and the drains of the ack thread.
-pub type Pulse = [u64; 2];
+pub(crate) type Pulse = [u64; 2];
 
 /// True if the watchdog is to be fed, by counters of ticks and of drains; told the time.
 #[derive(Debug)]
-pub struct FeedDecision {
+pub(crate) struct FeedDecision {
     patience: Duration,
     seen: Option<Pulse>,
     /// When each counter moved last, or was there, or went.
@@ -34,14 +34,14 @@ impl FeedDecision {
     /// One for a service manager that waits `interval` long, and ticks every `period`. No counter may stand still from one
     /// look to the next no longer than a quarter of the interval, or two periods where ticks are rare.
     #[must_use]
-    pub fn new(interval: Duration, period: Duration, beats: Option<Pulse>, now: MonoTime) -> Self {
+    pub(crate) fn new(interval: Duration, period: Duration, beats: Option<Pulse>, now: MonoTime) -> Self {
         Self { patience: (interval / LOOKS).max(2 * period), seen: beats, moved: [now; 2] }
     }
 
     /// True if all goes on: to be asked four times within the interval. Where there is no counter, because a hall closes
     /// or opens, that is as good for ten seconds.
     #[must_use]
-    pub fn feed(&mut self, beats: Option<Pulse>, now: MonoTime) -> bool {
+    pub(crate) fn feed(&mut self, beats: Option<Pulse>, now: MonoTime) -> bool {
         for (counter, moved) in self.moved.iter_mut().enumerate() {
             let count = |pulse: Option<Pulse>| pulse.map(|pulse| pulse[counter]);
             if count(beats) != count(self.seen) {
@@ -56,7 +56,7 @@ impl FeedDecision {
 
 /// The thread that feeds the watchdog. It ends when this is dropped.
 #[derive(Debug)]
-pub struct WatchdogThread {
+pub(crate) struct WatchdogThread {
     done: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -68,7 +68,7 @@ impl WatchdogThread {
     ///
     /// # Errors
     /// If the system starts no further thread.
-    pub fn start(
+    pub(crate) fn start(
         interval: Duration,
         period: Duration,
         beats: impl Fn() -> Option<Pulse> + Send + 'static,

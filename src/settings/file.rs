@@ -25,16 +25,16 @@ const AGAIN: Duration = Duration::from_secs(10);
 
 /// What was found at the start.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Kept {
+pub(crate) struct Kept {
     /// What was set; `None` if nobody has set anything, or it cannot be read.
-    pub settings: Option<Settings>,
+    pub(crate) settings: Option<Settings>,
     /// What a person should know of it.
-    pub said: Vec<String>,
+    pub(crate) said: Vec<String>,
 }
 
 /// Where settings go. Dropped, it writes what still waits.
 #[derive(Debug)]
-pub struct SettingsFile {
+pub(crate) struct SettingsFile {
     folder: PathBuf,
     given: Option<Settings>,
     exchange: Arc<Exchange>,
@@ -60,7 +60,7 @@ struct Tray {
 /// That something is being loaded because it was before the start. Where the program ends meanwhile other than in order, it is
 /// not loaded at the next start: what ends a service must not end it each time. Dropped, it is over.
 #[derive(Debug)]
-pub struct Loading(PathBuf);
+pub(crate) struct Loading(PathBuf);
 
 impl Drop for Loading {
     fn drop(&mut self) {
@@ -71,7 +71,7 @@ impl Drop for Loading {
 impl SettingsFile {
     /// Opens that of a folder, and reads what is there. Cannot fail: what is wrong is said.
     #[must_use]
-    pub fn open(folder: &Path) -> (Self, Kept) {
+    pub(crate) fn open(folder: &Path) -> (Self, Kept) {
         let mut kept = read(folder);
         let loading = folder.join(LOADING);
         let show = kept.settings.as_mut().and_then(|settings| settings.show.take_if(|_| loading.exists()));
@@ -91,7 +91,7 @@ impl SettingsFile {
     }
 
     /// Has it kept, where it is another than before. Waits for nothing.
-    pub fn put(&mut self, settings: Settings) {
+    pub(crate) fn put(&mut self, settings: Settings) {
         if self.given.as_ref() == Some(&settings) {
             return;
         }
@@ -101,7 +101,7 @@ impl SettingsFile {
     }
 
     /// Marks that what was loaded before the start is being loaded; to be called on a thread that may wait for the disk.
-    pub fn loading(folder: &Path) -> Loading {
+    pub(crate) fn loading(folder: &Path) -> Loading {
         let path = folder.join(LOADING);
         let _ = File::create(&path); // without it, nothing warns the next start
         Loading(path)
@@ -109,18 +109,18 @@ impl SettingsFile {
 
     /// The folder.
     #[must_use]
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Why it cannot be kept at present, and what to do; `None` if it can.
     #[must_use]
-    pub fn trouble(&self) -> Option<String> {
+    pub(crate) fn trouble(&self) -> Option<String> {
         self.exchange.lock().trouble.clone()
     }
 
     /// True if trouble has ended since this was last asked.
-    pub fn take_mended(&mut self) -> bool {
+    pub(crate) fn take_mended(&mut self) -> bool {
         std::mem::take(&mut self.exchange.lock().mended)
     }
 }

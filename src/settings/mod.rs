@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-pub use file::{Kept, Loading, SettingsFile};
-pub use words::seats_out;
+pub(crate) use file::{Kept, SettingsFile};
+pub(crate) use words::seats_out;
 
 use crate::control::{Levels, Surface};
 use crate::journal::PlaylistPlace;
@@ -23,19 +23,19 @@ use crate::time::TRIM_MS;
 /// What the text says of itself. One of another number is put aside: nobody guesses what it meant.
 const VERSION: u32 = 1;
 /// The longest reason, characters.
-pub const LONGEST_WHY: usize = 200;
+pub(crate) const LONGEST_WHY: usize = 200;
 
 /// What people have set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Levels and effects.
-    pub levels: Levels,
+    pub(crate) levels: Levels,
     /// How much later than the film the motion is, ms.
-    pub trim_ms: i32,
+    pub(crate) trim_ms: i32,
     /// The groups of seats that are out.
-    pub out: BTreeMap<String, Out>,
+    pub(crate) out: BTreeMap<String, Out>,
     /// What is loaded.
-    pub show: Option<LoadedShow>,
+    pub(crate) show: Option<LoadedShow>,
 }
 
 impl Default for Settings {
@@ -48,28 +48,28 @@ impl Default for Settings {
 
 /// Who took a group of seats out, when and why.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Out {
+pub(crate) struct Out {
     /// Who, as the journal has it.
-    pub who: String,
+    pub(crate) who: String,
     /// Which way they came.
-    pub surface: Surface,
+    pub(crate) surface: Surface,
     /// When, RFC 3339.
-    pub at: String,
+    pub(crate) at: String,
     /// Why; `None` if nobody said.
-    pub why: Option<String>,
+    pub(crate) why: Option<String>,
 }
 
 /// What is loaded, and where in it people were left.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LoadedShow {
+pub(crate) struct LoadedShow {
     /// The id of the cue.
-    pub cue: String,
+    pub(crate) cue: String,
     /// SHA-256 of its file, hexadecimal: a place in another cue is none in this one.
-    pub sha256: String,
+    pub(crate) sha256: String,
     /// The playlist that is loaded, and its entry.
-    pub playlist: Option<PlaylistPlace>,
+    pub(crate) playlist: Option<PlaylistPlace>,
     /// Where the film was when its last show ended before the cue did, ms.
-    pub film_ms: Option<i64>,
+    pub(crate) film_ms: Option<i64>,
 }
 
 /// The whole text, as far as it says what it is.
@@ -89,7 +89,7 @@ struct Whole<'s> {
 impl Settings {
     /// The text of it.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let whole = Whole { head: Head { version: VERSION }, settings: self };
         serde_json::to_string_pretty(&whole).expect("names and numbers have words") + "\n"
     }
@@ -98,7 +98,7 @@ impl Settings {
     ///
     /// # Errors
     /// Why it is none, for a person.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let Head { version } = serde_json::from_str(text).map_err(|error| error.to_string())?;
         if version != VERSION {
             return Err(format!("it is of version {version}, and this program writes version {VERSION}"));

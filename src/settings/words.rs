@@ -11,7 +11,7 @@ use crate::time::ShowTime;
 impl Out {
     /// Since when, by whom and why: `out since yesterday 21:14, by anna: broken leg`.
     #[must_use]
-    pub fn words(&self, now: &Zoned) -> String {
+    pub(crate) fn words(&self, now: &Zoned) -> String {
         let why = self.why.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
         format!("out since {}, by {}{why}", since(&self.at, now), self.who)
     }
@@ -20,7 +20,7 @@ impl Out {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn reason(why: &str) -> Result<Option<String>, String> {
+    pub(crate) fn reason(why: &str) -> Result<Option<String>, String> {
         let why = why.trim();
         if why.chars().any(char::is_control) {
             return Err("the reason has control characters".to_owned());
@@ -35,7 +35,7 @@ impl Out {
 
 /// `NAMES is out since …`, of the seats that these names are of.
 #[must_use]
-pub fn seats_out(names: &[&str], out: &Out, now: &Zoned) -> String {
+pub(crate) fn seats_out(names: &[&str], out: &Out, now: &Zoned) -> String {
     let is = if names.len() > 1 { "are" } else { "is" };
     format!("{} {is} {}", names.join(", "), out.words(now))
 }
@@ -61,7 +61,7 @@ impl Settings {
     /// What of levels, effects, trim and what is loaded is otherwise than in a hall in which nobody has set anything; none
     /// where nothing is.
     #[must_use]
-    pub fn words(&self) -> Option<String> {
+    pub(crate) fn words(&self) -> Option<String> {
         let Levels { motion, vibration, effects, rows } = &self.levels;
         let mut words = Vec::new();
         let levels = [("motion".to_owned(), *motion), ("vibration".to_owned(), *vibration)];

@@ -74,7 +74,7 @@ impl Action {
     ///
     /// # Errors
     /// What there is not: an input, an error, a chance.
-    pub fn check(&self) -> Result<(), CommandError> {
+    pub(crate) fn check(&self) -> Result<(), CommandError> {
         match *self {
             Self::Switch { input, .. } if !(1..=INPUTS).contains(&usize::from(input)) => {
                 Err(CommandError::Input(input))

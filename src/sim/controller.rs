@@ -70,16 +70,16 @@ pub struct Handled<'b> {
     /// The answer, where it gives one.
     pub reply: Option<&'b [u8]>,
     /// The motion frame, where it was a whole one that was meant for it.
-    pub motion: Option<MotionSeen>,
+    pub(crate) motion: Option<MotionSeen>,
 }
 
 /// A motion frame that reached a controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MotionSeen {
+pub(crate) struct MotionSeen {
     /// The frame.
-    pub request: MotionRequest,
+    pub(crate) request: MotionRequest,
     /// The x that the controller answers it with, whether it may answer or not.
-    pub code: ReplyCode,
+    pub(crate) code: ReplyCode,
 }
 
 impl Controller {
@@ -287,13 +287,13 @@ impl Controller {
     }
 
     /// Where the axes that work are.
-    pub fn positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
+    pub(crate) fn positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
         self.advance(at);
         PerAxis::new(&self.player.positions(at)[..self.axes()])
     }
 
     /// Where the axes that work are, with what shakes them.
-    pub fn shaken_positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
+    pub(crate) fn shaken_positions(&mut self, at: MonoTime) -> PerAxis<Pulses> {
         self.advance(at);
         PerAxis::new(&self.player.shaken(at)[..self.axes()])
     }
@@ -321,13 +321,13 @@ impl Controller {
 
     /// The outputs that are on, bit 0 = Y01.
     #[must_use]
-    pub const fn outputs(&self) -> u16 {
+    pub(crate) const fn outputs(&self) -> u16 {
         self.outputs
     }
 
     /// Its analogue outputs, as Extend has them.
     #[must_use]
-    pub const fn extend(&self) -> u32 {
+    pub(crate) const fn extend(&self) -> u32 {
         self.extend
     }
 

@@ -10,7 +10,7 @@ pub struct Counts {
     /// Requests that it obeyed.
     pub accepted: u64,
     /// Of these, motion frames.
-    pub motion: u64,
+    pub(crate) motion: u64,
     /// Datagrams that it did not obey, by reason.
     pub refused: Refused,
     /// Answers that it gave, those lost on purpose included.
@@ -26,32 +26,32 @@ pub struct Counts {
     /// Answers that the system would not send.
     pub send_failed: u64,
     /// Moves that reached their end.
-    pub executed: u64,
+    pub(crate) executed: u64,
     /// Moves that ran in less than their time, since more than two were waiting.
-    pub fast_forwarded: u64,
+    pub(crate) fast_forwarded: u64,
     /// Times that the queue of moves ran over (Err21).
-    pub queue_overflows: u64,
+    pub(crate) queue_overflows: u64,
 }
 
 /// Datagrams that were not obeyed, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Refused {
     /// No message, or none that a host sends.
-    pub malformed: u64,
+    pub(crate) malformed: u64,
     /// From another port than PA24 says.
-    pub source_port: u64,
+    pub(crate) source_port: u64,
     /// For other stations.
-    pub not_addressed: u64,
+    pub(crate) not_addressed: u64,
     /// While it was starting again (DPF2, or its power).
-    pub rebooting: u64,
+    pub(crate) rebooting: u64,
     /// Motion while it was homing; answered with x = 2.
-    pub homing: u64,
+    pub(crate) homing: u64,
     /// Motion while it had an error, or that made one; x = 3.
-    pub fault: u64,
+    pub(crate) fault: u64,
     /// Motion or reset while an emergency stop was in effect; x = 4.
-    pub emergency_stop: u64,
+    pub(crate) emergency_stop: u64,
     /// Commands that name what it has not; x = 5.
-    pub command: u64,
+    pub(crate) command: u64,
 }
 
 impl Refused {

@@ -56,16 +56,16 @@ pub enum FarmError {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Outcome {
     /// Where it listened.
-    pub address: SocketAddrV4,
+    pub(crate) address: SocketAddrV4,
     /// What became of its datagrams and moves.
     #[serde(flatten)]
     pub counts: Counts,
     /// Where its working axes ended, pulses.
-    pub positions: Vec<i32>,
+    pub(crate) positions: Vec<i32>,
     /// Its outputs at the end, bit 0 = Y01.
-    pub outputs: u16,
+    pub(crate) outputs: u16,
     /// Its analogue outputs at the end, as the last frame without vibration had them in Extend.
-    pub extend: u32,
+    pub(crate) extend: u32,
 }
 
 /// Virtual controllers at work on a thread of their own, until they are stopped or dropped.

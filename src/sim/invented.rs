@@ -8,41 +8,41 @@ use crate::wire::VibrationPort;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Invented {
     /// Commands that can be queued; one more is Err21.
-    pub queue_depth: usize,
+    pub(crate) queue_depth: usize,
     /// How long a controller homes.
-    pub homing: Duration,
+    pub(crate) homing: Duration,
     /// By what the time of a move is divided in fast forward (PA06).
-    pub fast_forward: u32,
+    pub(crate) fast_forward: u32,
     /// The greatest Time of a first absolute frame, ms; a longer one is Err17 where PA0d = 0.
-    pub first_time_max_ms: u32,
+    pub(crate) first_time_max_ms: u32,
     /// Datagrams within 100 ms that fill the UDP memory; one more is Err20, until 100 ms have passed without one too
     /// many.
-    pub udp_memory: u32,
+    pub(crate) udp_memory: u32,
     /// What the automatic reset (PA0d) counts in.
-    pub auto_reset_unit: Duration,
+    pub(crate) auto_reset_unit: Duration,
     /// Which commands put off the automatic reset (PA0d).
-    pub auto_reset: Commands,
+    pub(crate) auto_reset: Commands,
     /// True if registers that the manuals do not name can be read, as 0.
-    pub unused_read: bool,
+    pub(crate) unused_read: bool,
     /// Pulses in one turn of a motor.
-    pub pulses_per_turn: u16,
+    pub(crate) pulses_per_turn: u16,
     /// Speed after the release of an emergency stop where PA94 is 0, rpm; no limit where there is none.
-    pub release_rpm: Option<u16>,
+    pub(crate) release_rpm: Option<u16>,
     /// Speed of jogging where PA70 to PA75 set none, rpm.
-    pub jog_rpm: u16,
+    pub(crate) jog_rpm: u16,
     /// What a drive reports as its error while it has an alarm.
-    pub servo_alarm: u16,
+    pub(crate) servo_alarm: u16,
     /// Registers of a drive, from 0 on.
-    pub servo_registers: u16,
+    pub(crate) servo_registers: u16,
     /// How many bytes Port Out takes in vibration frames, and the inputs in the answers.
-    pub vibration_port: VibrationPort,
+    pub(crate) vibration_port: VibrationPort,
     /// Major and minor version (DPFF, DPFE).
-    pub version: [u16; 2],
+    pub(crate) version: [u16; 2],
 }
 
 /// Commands that put off the automatic reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Commands {
+pub(crate) enum Commands {
     /// Motion frames alone.
     #[default]
     Motion,

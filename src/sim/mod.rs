@@ -30,8 +30,10 @@ mod sheet;
 mod station;
 
 pub use command::{Action, Command, CommandError};
-pub use controller::{Controller, Handled, MotionSeen};
-pub use counts::{Counts, Refused};
-pub use farm::{Farm, FarmError, Outcome, Remote};
-pub use invented::{Commands, Invented};
+pub use controller::Controller;
+pub(crate) use controller::MotionSeen;
+pub(crate) use counts::Counts;
+pub use farm::{Farm, FarmError};
+pub(crate) use farm::{Outcome, Remote};
+pub(crate) use invented::{Commands, Invented};
 pub use setup::{LinkFaults, Options, Setup};

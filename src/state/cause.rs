@@ -92,7 +92,7 @@ pub enum Trouble {
 
 /// What a cause speaks of, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Whose {
+pub(crate) enum Whose {
     /// A controller.
     Controller(usize),
     /// A group of seats.
@@ -102,7 +102,7 @@ pub enum Whose {
 impl Cause {
     /// Which controller or group it speaks of; `None` if it is the whole hall.
     #[must_use]
-    pub const fn whose(self) -> Option<Whose> {
+    pub(crate) const fn whose(self) -> Option<Whose> {
         match self {
             Self::Rebooted(controller) | Self::EmergencyStop(controller) => {
                 Some(Whose::Controller(controller))
@@ -127,7 +127,7 @@ impl Trouble {
 
     /// True if it goes on until [`super::Event::ErrorsGone`]; else it is over as soon as it has happened.
     #[must_use]
-    pub const fn lasts(self) -> bool {
+    pub(crate) const fn lasts(self) -> bool {
         matches!(self, Self::Controller { .. } | Self::Drive { .. })
     }
 }

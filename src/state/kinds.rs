@@ -47,7 +47,7 @@ pub enum PlayMode {
 
 impl State {
     /// Every state there is, in the order of a show.
-    pub const ALL: [Self; 14] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Boot,
         Self::Recovering,
         Self::Parked,
@@ -66,7 +66,7 @@ impl State {
 
     /// How long it lasts at the most; `None` if it does not end by itself.
     #[must_use]
-    pub const fn lasts(self) -> Option<Duration> {
+    pub(crate) const fn lasts(self) -> Option<Duration> {
         Some(match self {
             Self::Armed => super::ARMED_FOR,
             Self::Paused => super::PAUSED_FOR,
@@ -85,7 +85,7 @@ impl State {
 
     /// True if only a person gets the hall out of it.
     #[must_use]
-    pub const fn is_latched(self) -> bool {
+    pub(crate) const fn is_latched(self) -> bool {
         matches!(self, Self::Stopped | Self::Fault)
     }
 }

@@ -23,28 +23,30 @@ mod words;
 
 use std::time::Duration;
 
-pub use cause::{Cause, Trouble, Whose};
-pub use kinds::{Demand, Event, Finding, Latch, PlayMode, Readiness, State, Transition};
-pub use next::Next;
+pub(crate) use cause::Whose;
+pub use cause::{Cause, Trouble};
+pub(crate) use kinds::{Demand, Latch};
+pub use kinds::{Event, Finding, PlayMode, Readiness, State, Transition};
+pub(crate) use next::Next;
 pub use refusal::{Refusal, Why};
 
 use crate::time::MonoTime;
 
 /// How long a hall stays armed.
-pub const ARMED_FOR: Duration = Duration::from_mins(10);
+pub(crate) const ARMED_FOR: Duration = Duration::from_mins(10);
 /// How long a pause lasts before the seats park.
-pub const PAUSED_FOR: Duration = Duration::from_mins(5);
+pub(crate) const PAUSED_FOR: Duration = Duration::from_mins(5);
 /// How long homing may take. Whoever homes gives up after a minute; this is for when no word of that comes.
-pub const HOMING_FOR: Duration = Duration::from_secs(65);
+pub(crate) const HOMING_FOR: Duration = Duration::from_secs(65);
 /// How long the seats may decelerate before frames end without word that they are at rest.
-pub const STOPPING_FOR: Duration = Duration::from_secs(5);
+pub(crate) const STOPPING_FOR: Duration = Duration::from_secs(5);
 /// How long parking may take: a stroke of 5 m at 50 mm/s, and then some.
-pub const PARKING_FOR: Duration = Duration::from_mins(2);
+pub(crate) const PARKING_FOR: Duration = Duration::from_mins(2);
 
 /// After a sleep that was longer nothing goes on by itself.
-pub const SLEPT: Duration = Duration::from_secs(2);
+pub(crate) const SLEPT: Duration = Duration::from_secs(2);
 /// After a sleep that was longer whatever was under way is over.
-pub const SLEPT_LONG: Duration = Duration::from_mins(5);
+pub(crate) const SLEPT_LONG: Duration = Duration::from_mins(5);
 
 /// The state of one hall.
 #[derive(Debug, Clone)]
@@ -128,67 +130,45 @@ impl Machine {
 
     /// Since when.
     #[must_use]
-    pub const fn since(&self) -> MonoTime {
+    pub(crate) const fn since(&self) -> MonoTime {
         self.since
     }
 
     /// True if motion frames may leave.
     #[must_use]
-    pub const fn may_send_motion(&self) -> bool {
+    pub(crate) const fn may_send_motion(&self) -> bool {
         self.state.may_send_motion()
     }
 
     /// What is wrong, whatever the state: beside a stop, or while the seats still decelerate.
     #[must_use]
-    pub const fn fault(&self) -> Option<Trouble> {
+    pub(crate) const fn fault(&self) -> Option<Trouble> {
         self.fault
-    }
-
-    /// True if a cue can be armed, as far as files, limits and preflight tell.
-    #[must_use]
-    pub const fn readiness(&self) -> Readiness {
-        self.facts.readiness
-    }
-
-    /// True if every controller has said what it is.
-    #[must_use]
-    pub const fn is_identified(&self) -> bool {
-        self.facts.identified
     }
 
     /// True if every controller knows its position.
     #[must_use]
-    pub const fn is_homed(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) const fn is_homed(&self) -> bool {
         self.facts.homed
     }
 
     /// True if the positions were read since the program started or the hall was cleared.
     #[must_use]
-    pub const fn is_measured(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) const fn is_measured(&self) -> bool {
         self.facts.measured
-    }
-
-    /// True if an emergency stop is in effect.
-    #[must_use]
-    pub const fn is_pressed(&self) -> bool {
-        self.facts.pressed
-    }
-
-    /// True if a controller or a drive still has an error.
-    #[must_use]
-    pub const fn has_errors(&self) -> bool {
-        self.facts.errors
     }
 
     /// How often a person has cleared: whoever looks at the controllers looks anew each time.
     #[must_use]
-    pub const fn clears(&self) -> u32 {
+    pub(crate) const fn clears(&self) -> u32 {
         self.clears
     }
 
     /// When the state ends by itself; `None` if it does not. For a hall that is armed or paused, worth showing.
     #[must_use]
-    pub fn lapses(&self) -> Option<MonoTime> {
+    pub(crate) fn lapses(&self) -> Option<MonoTime> {
         Some(self.since + self.state.lasts()?)
     }
 

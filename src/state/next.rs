@@ -59,7 +59,8 @@ pub enum Next {
 
 impl Next {
     /// All there are.
-    pub const ALL: [Self; 25] = [
+    #[cfg(test)]
+    pub(crate) const ALL: [Self; 25] = [
         Self::AwaitAnswers,
         Self::AwaitPositions,
         Self::AwaitHome,
@@ -91,7 +92,7 @@ impl Next {
 impl Machine {
     /// What a person does next.
     #[must_use]
-    pub const fn next(&self) -> Next {
+    pub(crate) const fn next(&self) -> Next {
         match self.state {
             State::Boot => Next::AwaitAnswers,
             State::Recovering => self.next_recovering(),

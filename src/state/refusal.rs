@@ -8,7 +8,7 @@ use super::{State, Transition};
 #[error("cannot {asked} while {state}: {}; {}", why.words(), why.remedy())]
 pub struct Refusal {
     /// The state it met.
-    pub state: State,
+    pub(crate) state: State,
     /// What was asked.
     pub asked: Transition,
     /// Why not.

@@ -11,7 +11,7 @@ use super::{Cause, Next, PlayMode, Readiness, Refusal, State, Transition, Troubl
 impl State {
     /// The state in one word, as every surface shows it.
     #[must_use]
-    pub const fn word(self) -> &'static str {
+    pub(crate) const fn word(self) -> &'static str {
         match self {
             Self::Boot => "boot",
             Self::Recovering => "recovering",
@@ -113,7 +113,7 @@ impl fmt::Display for Next {
 impl Next {
     /// The same where a play in the foreground is led by keys, which neither home nor take out a seat.
     #[must_use]
-    pub const fn by_keys(self) -> Option<&'static str> {
+    pub(crate) const fn by_keys(self) -> Option<&'static str> {
         Some(match self {
             Self::Home | Self::ArmAndHome => "leave, then `kinocue home` with nobody on the seats",
             Self::ParkOrHome => "park",
@@ -131,7 +131,7 @@ impl Next {
 impl Refusal {
     /// The same where a play in the foreground is led by keys, which neither home nor take out a seat.
     #[must_use]
-    pub fn by_keys(&self) -> String {
+    pub(crate) fn by_keys(&self) -> String {
         let remedy = match self.why {
             Why::PositionUnknown | Why::HomesFirst => "leave, then `kinocue home` with nobody on the seats",
             Why::StillPressed => "release its button",
@@ -173,7 +173,7 @@ impl Readiness {
 impl Cause {
     /// The cause in words, without the name of whom it speaks of.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Started => "the program has started",
             Self::Crashed => "the program ended without parking the last time",
@@ -230,7 +230,7 @@ impl fmt::Display for Cause {
 impl Why {
     /// What stands against the request.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::NotIdentified => "not every controller has been identified",
             Self::PositionsNotRead => "the seats' positions have not been read since they stopped",
@@ -259,7 +259,7 @@ impl Why {
 
     /// What would have to be done first.
     #[must_use]
-    pub const fn remedy(self) -> &'static str {
+    pub(crate) const fn remedy(self) -> &'static str {
         match self {
             Self::NotIdentified => "wait until they answer, or disable the seat that does not",
             Self::PositionsNotRead => "wait until the controllers have answered",

@@ -10,7 +10,7 @@ use std::ptr;
 pub const SLOTS: usize = 32;
 
 /// Bytes kept of each datagram; the protocol's longest is far shorter, and a longer one is marked as truncated.
-pub const DATAGRAM_LEN: usize = 2_048;
+pub(crate) const DATAGRAM_LEN: usize = 2_048;
 
 /// Room for the one control message asked for, a `timespec`, twice over.
 const CONTROL_LEN: usize = 64;
@@ -28,7 +28,7 @@ pub struct Datagram<'a> {
     /// What was sent; the first [`DATAGRAM_LEN`] bytes where there were more.
     pub bytes: &'a [u8],
     /// True if bytes past [`DATAGRAM_LEN`] were thrown away.
-    pub truncated: bool,
+    pub(crate) truncated: bool,
     /// Wall clock at which the kernel received it, nanoseconds since 1970; only from a socket given to
     /// [`stamp_arrivals`].
     pub stamp_ns: Option<u64>,

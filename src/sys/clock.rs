@@ -38,7 +38,7 @@ pub fn wall_now_ns() -> u64 {
 
 /// The wall clock in the machine's time zone, for people: schedules, journals, reports. It may step at any time.
 #[must_use]
-pub fn local_now() -> Zoned {
+pub(crate) fn local_now() -> Zoned {
     let now = Timestamp::from_nanosecond(i128::from(wall_now_ns())).unwrap_or(Timestamp::UNIX_EPOCH);
     now.to_zoned(TimeZone::system())
 }

@@ -11,18 +11,18 @@ use super::realtime::set_scheduler;
 
 /// What the process may take from now on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// Address space, bytes.
-    pub memory: u64,
+    pub(crate) memory: u64,
     /// Processor time of all its threads, s.
-    pub cpu_s: u64,
+    pub(crate) cpu_s: u64,
 }
 
 /// Lowers the calling process for good; to be called before it starts a thread. It writes no files and dumps no core.
 ///
 /// # Errors
 /// If the system refuses a bound. A refused priority is no error: nothing is at stake but the time of others.
-pub fn lower(bounds: Bounds) -> io::Result<()> {
+pub(crate) fn lower(bounds: Bounds) -> io::Result<()> {
     let _ = set_scheduler(libc::SCHED_IDLE, 0);
     let _ = setpriority_process(None, 19);
     let _ = fs::write("/proc/self/oom_score_adj", "1000");

@@ -13,17 +13,17 @@ use super::realtime::{PRIORITY, Policy, scheduler, set_scheduler};
 
 /// What came of asking for real-time scheduling, on a thread that has ended since.
 #[derive(Debug)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// True if whoever started the process gave the asking thread a real-time policy; then none was asked for.
-    pub given: bool,
+    pub(crate) given: bool,
     /// Policy and priority that a play would have; the priority is 0 where the policy has none.
-    pub in_force: (Policy, u8),
+    pub(crate) in_force: (Policy, u8),
     /// Why the kernel refused; `None` where it did not.
-    pub refusal: Option<io::Error>,
+    pub(crate) refusal: Option<io::Error>,
     /// Timer slack that a thread of this process begins with, ns; `None` where the kernel does not tell.
-    pub slack_ns: Option<u64>,
+    pub(crate) slack_ns: Option<u64>,
     /// True if a timer slack of 1 ns was accepted.
-    pub slack_settable: bool,
+    pub(crate) slack_settable: bool,
 }
 
 /// Tries on a thread of its own what a play asks for: `SCHED_FIFO` at [`PRIORITY`], and a timer slack of 1 ns. A
@@ -35,7 +35,7 @@ pub struct Trial {
 ///
 /// # Panics
 /// If the thread panicked, which nothing in it does.
-pub fn try_realtime() -> io::Result<Trial> {
+pub(crate) fn try_realtime() -> io::Result<Trial> {
     let own = scheduler();
     let given = own.0 != Policy::Other;
     let trial = thread::Builder::new().spawn(move || {
@@ -54,7 +54,7 @@ pub fn try_realtime() -> io::Result<Trial> {
 ///
 /// # Errors
 /// If the kernel refuses.
-pub fn try_memory_lock() -> io::Result<()> {
+pub(crate) fn try_memory_lock() -> io::Result<()> {
     mlockall(MlockAllFlags::CURRENT)?;
     munlockall()?;
     Ok(())
@@ -62,27 +62,27 @@ pub fn try_memory_lock() -> io::Result<()> {
 
 /// A limit of this process; `None` where there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limit {
+pub(crate) struct Limit {
     /// What holds now.
-    pub soft: Option<u64>,
+    pub(crate) soft: Option<u64>,
     /// As far as the process may raise it.
-    pub hard: Option<u64>,
+    pub(crate) hard: Option<u64>,
 }
 
 /// The limits that matter to a play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// The highest real-time priority without a right (`RLIMIT_RTPRIO`).
-    pub priority: Limit,
+    pub(crate) priority: Limit,
     /// Bytes that may be locked without a right (`RLIMIT_MEMLOCK`).
-    pub locked: Limit,
+    pub(crate) locked: Limit,
     /// Files open at once (`RLIMIT_NOFILE`).
-    pub files: Limit,
+    pub(crate) files: Limit,
 }
 
 /// Reads the limits of this process.
 #[must_use]
-pub fn limits() -> Limits {
+pub(crate) fn limits() -> Limits {
     let limit = |resource| {
         let told = getrlimit(resource);
         Limit { soft: told.current, hard: told.maximum }
@@ -96,11 +96,11 @@ pub fn limits() -> Limits {
 
 /// How well the wall clock is held to the true time, as the kernel has it from whoever disciplines it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ClockSync {
+pub(crate) struct ClockSync {
     /// True if anything disciplines it: neither `TIME_ERROR` nor `STA_UNSYNC`.
-    pub synchronised: bool,
+    pub(crate) synchronised: bool,
     /// The most that it may be wrong by, µs; grows while nobody disciplines it.
-    pub max_error_us: u64,
+    pub(crate) max_error_us: u64,
 }
 
 /// Asks how well the wall clock is held; sets nothing (`adjtimex` with no modes).
@@ -108,7 +108,7 @@ pub struct ClockSync {
 /// # Errors
 /// If the kernel, or a filter of the container, refuses to tell.
 #[expect(unsafe_code, reason = "no safe wrapper of this call exists among our dependencies")]
-pub fn clock_sync() -> io::Result<ClockSync> {
+pub(crate) fn clock_sync() -> io::Result<ClockSync> {
     // SAFETY: `timex` is a plain C structure of integers, for which all-zero bytes are a valid value; so `modes` is 0.
     let mut told: libc::timex = unsafe { mem::zeroed() };
     // SAFETY: `told` is a live, writable `timex` and outlives the call.
@@ -124,7 +124,7 @@ pub fn clock_sync() -> io::Result<ClockSync> {
 
 /// The finest step of a sleep on the monotonic clock, ns: 1 with high-resolution timers, a kernel tick without.
 #[must_use]
-pub fn timer_resolution_ns() -> u64 {
+pub(crate) fn timer_resolution_ns() -> u64 {
     let step = clock_getres(ClockId::Boottime);
     let part = |part: i64| u64::try_from(part).unwrap_or(0);
     part(step.tv_sec).saturating_mul(1_000_000_000).saturating_add(part(step.tv_nsec))

@@ -2,12 +2,12 @@
 //! Linux only. Any thread; nothing here allocates except where a refusal is put into words, and in `file` and `folder`, which are of the
 //! control plane.
 
-pub mod batch;
-pub mod clock;
+pub(crate) mod batch;
+pub(crate) mod clock;
 pub(crate) mod file;
 pub(crate) mod folder;
-pub mod humble;
-pub mod machine;
-pub mod realtime;
-pub mod signal;
-pub mod terminal;
+pub(crate) mod humble;
+pub(crate) mod machine;
+pub(crate) mod realtime;
+pub(crate) mod signal;
+pub(crate) mod terminal;

@@ -9,7 +9,7 @@ use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use rustix::thread::set_current_timer_slack;
 
 /// The priority asked for: above every ordinary program, with room for an operator to put something above it.
-pub const PRIORITY: u8 = 50;
+pub(crate) const PRIORITY: u8 = 50;
 
 /// How far below the tick thread the thread is that watches over it.
 const BELOW: u8 = 10;
@@ -42,11 +42,11 @@ pub struct RealTime {
     /// Scheduling policy of the calling thread.
     pub policy: Policy,
     /// Its real-time priority, 1 to 99; 0 if the policy has none.
-    pub priority: u8,
+    pub(crate) priority: u8,
     /// True if the memory of the process is kept from being paged out.
     pub memory_locked: bool,
     /// Each thing that was refused: what, why, and what to change; a sentence for a person.
-    pub refusals: Vec<String>,
+    pub(crate) refusals: Vec<String>,
 }
 
 impl RealTime {
@@ -85,7 +85,7 @@ pub fn normal_priority() -> io::Result<()> {
 /// Gives the calling thread real-time service below a thread of that priority, so that what it watches over does not hang on how
 /// busy the machine is; says whether it has it. Where the kernel refuses, or that thread has none, it is an ordinary one.
 #[must_use]
-pub fn request_below(priority: u8) -> bool {
+pub(crate) fn request_below(priority: u8) -> bool {
     let below = libc::c_int::from(priority.saturating_sub(BELOW).max(1));
     if priority > 1 && set_scheduler(libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, below).is_ok() {
         return scheduler().0 == Policy::Fifo;
@@ -99,7 +99,7 @@ pub fn request_below(priority: u8) -> bool {
 ///
 /// # Errors
 /// A sentence for a person, where the kernel refuses.
-pub fn raise_open_files() -> Result<u64, String> {
+pub(crate) fn raise_open_files() -> Result<u64, String> {
     let limit = getrlimit(Resource::Nofile);
     if limit.current != limit.maximum {
         setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit }).map_err(|cause| {

@@ -8,7 +8,7 @@ use std::{io, ptr};
 /// # Errors
 /// If there is no such signal.
 #[expect(unsafe_code, reason = "no safe wrapper of sigaction exists among our dependencies")]
-pub fn is_ignored(signal: i32) -> io::Result<bool> {
+pub(crate) fn is_ignored(signal: i32) -> io::Result<bool> {
     let mut present = MaybeUninit::<libc::sigaction>::uninit();
     // SAFETY: with no new action the call only writes the present one to `present`, which is of its type.
     let result = unsafe { libc::sigaction(signal, ptr::null(), present.as_mut_ptr()) };

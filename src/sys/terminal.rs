@@ -23,13 +23,13 @@ static BEFORE: OnceLock<Termios> = OnceLock::new();
 /// Ctrl-C and Ctrl-\ are signals as ever, and output is as it was: a program that is killed leaves at worst a terminal
 /// that shows nothing typed. Ctrl-Z is off: it would leave the seats without frames in the middle of a move.
 #[derive(Debug)]
-pub struct Keyboard(());
+pub(crate) struct Keyboard(());
 
 impl Keyboard {
     /// Takes the terminal over, and forgets what was typed so far. None where standard input is none, or where it belongs
     /// to another job, which a program in the background must not touch.
     #[must_use]
-    pub fn take() -> Option<Self> {
+    pub(crate) fn take() -> Option<Self> {
         if !isatty(stdin()) || !is_ours() {
             return None;
         }
@@ -55,7 +55,7 @@ impl Keyboard {
     ///
     /// # Errors
     /// [`ErrorKind::UnexpectedEof`] where the terminal is gone, else that of the system.
-    pub fn read(&self, keys: &mut [u8], wait: Duration) -> io::Result<usize> {
+    pub(crate) fn read(&self, keys: &mut [u8], wait: Duration) -> io::Result<usize> {
         if !is_ours() {
             std::thread::park_timeout(wait);
             return Ok(0);
@@ -104,7 +104,7 @@ fn restore() {
 /// # Errors
 /// If the signal cannot be handled.
 #[expect(unsafe_code, reason = "a program that a signal ends at once drops nothing")]
-pub fn restore_on(signal: i32, when: Arc<AtomicBool>) -> io::Result<()> {
+pub(crate) fn restore_on(signal: i32, when: Arc<AtomicBool>) -> io::Result<()> {
     let act = move || {
         if when.load(Ordering::Relaxed) {
             restore();

@@ -40,17 +40,17 @@ const BREATH: Duration = Duration::from_millis(100);
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen for text at {address}; name an address of this machine and a free port in [text]")]
 #[non_exhaustive]
-pub struct TextError {
+pub(crate) struct TextError {
     /// Where it was to listen.
-    pub address: SocketAddrV4,
+    pub(crate) address: SocketAddrV4,
     /// What the system said.
     #[source]
-    pub cause: io::Error,
+    pub(crate) cause: io::Error,
 }
 
 /// The port, open but not yet served.
 #[derive(Debug)]
-pub struct Text {
+pub(crate) struct Text {
     listener: TcpListener,
     config: TextPort,
     hall: Handle,
@@ -61,7 +61,7 @@ pub struct Text {
 ///
 /// # Errors
 /// [`TextError`] where the system does not give it.
-pub fn open(config: &TextPort, hall: Handle) -> Result<Text, TextError> {
+pub(crate) fn open(config: &TextPort, hall: Handle) -> Result<Text, TextError> {
     let refused = |cause| TextError { address: config.listen, cause };
     let listener = TcpListener::bind(config.listen).map_err(refused)?;
     listener.set_nonblocking(true).map_err(refused)?;
@@ -73,7 +73,8 @@ impl Text {
     ///
     /// # Errors
     /// If the system does not say.
-    pub fn address(&self) -> io::Result<SocketAddr> {
+    #[cfg(test)]
+    pub(crate) fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
 
@@ -82,7 +83,7 @@ impl Text {
     ///
     /// # Errors
     /// If the socket cannot be served; it never ends otherwise.
-    pub async fn serve(self) -> io::Result<Infallible> {
+    pub(crate) async fn serve(self) -> io::Result<Infallible> {
         let Self { listener, config, hall, idle } = self;
         let listener = tokio::net::TcpListener::from_std(listener)?;
         let (mut talks, places) = (JoinSet::new(), Places::new(CONNECTIONS));

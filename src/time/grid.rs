@@ -52,7 +52,7 @@ impl Rate {
     /// The Time of frame `index`, counted from 0: whole milliseconds, never 0. The sum over all frames before it stays
     /// within half a millisecond of the exact grid.
     #[must_use]
-    pub fn time_ms(self, index: u64) -> u32 {
+    pub(crate) fn time_ms(self, index: u64) -> u32 {
         self.span_ms(index, 1)
     }
 
@@ -61,7 +61,7 @@ impl Rate {
     /// # Panics
     /// Where they are longer than 49 days.
     #[must_use]
-    pub fn span_ms(self, index: u64, frames: u32) -> u32 {
+    pub(crate) fn span_ms(self, index: u64, frames: u32) -> u32 {
         let span = self.sum_ms(index + u64::from(frames)) - self.sum_ms(index);
         u32::try_from(span).expect("a period is at most a second, and no Time is longer than days")
     }
@@ -102,7 +102,7 @@ impl TickGrid {
 
     /// Its rate.
     #[must_use]
-    pub const fn rate(&self) -> Rate {
+    pub(crate) const fn rate(&self) -> Rate {
         self.rate
     }
 
@@ -114,7 +114,7 @@ impl TickGrid {
 
     /// The newest tick due at `now`, which is not before [`Self::next_deadline`]; those slept through are counted, never
     /// served.
-    pub fn take(&mut self, now: MonoTime) -> Tick {
+    pub(crate) fn take(&mut self, now: MonoTime) -> Tick {
         let index = self.rate.due(now.since(self.origin)).max(self.next);
         let deadline = self.origin + self.rate.offset(index);
         let tick = Tick { index, deadline, late: now.since(deadline), missed: index - self.next };

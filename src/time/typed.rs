@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::ShowTime;
 
 /// The furthest that motion may be moved against the film, either way, milliseconds.
-pub const TRIM_MS: i32 = 500;
+pub(crate) const TRIM_MS: i32 = 500;
 
 const SECOND: u128 = 1_000_000_000;
 
@@ -16,7 +16,7 @@ const FRAME_RATES: std::ops::RangeInclusive<u128> = 1..=120;
 ///
 /// # Errors
 /// What is wrong with the text, for a person.
-pub fn parse_time(text: &str) -> Result<ShowTime, String> {
+pub(crate) fn parse_time(text: &str) -> Result<ShowTime, String> {
     let refuse = |why: &str| format!("{why}; write SS[.mmm], MM:SS, HH:MM:SS[.mmm] or HH:MM:SS:FF@24");
     let parts: Vec<&str> = text.split(':').collect();
     let nanos = match parts[..] {
@@ -37,7 +37,7 @@ pub fn parse_time(text: &str) -> Result<ShowTime, String> {
 ///
 /// # Errors
 /// What is wrong with the text, for a person.
-pub fn parse_duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let refuse = |why: &str| format!("{why}; write a number and its unit, as 80ms, 1.5s, 100us, 5min or 2h");
     let unit_at = text.find(|c: char| c.is_ascii_alphabetic()).ok_or_else(|| refuse("no unit"))?;
     let (number, unit) = text.split_at(unit_at);
@@ -59,7 +59,7 @@ pub fn parse_duration(text: &str) -> Result<Duration, String> {
 ///
 /// # Errors
 /// What is wrong with the text, for a person.
-pub fn parse_trim(text: &str) -> Result<i32, String> {
+pub(crate) fn parse_trim(text: &str) -> Result<i32, String> {
     let digits = text.strip_suffix("ms").unwrap_or(text);
     let trim = digits.parse().ok().filter(|ms| (-TRIM_MS..=TRIM_MS).contains(ms));
     trim.ok_or_else(|| format!("a trim is -{TRIM_MS}ms to {TRIM_MS}ms, in whole milliseconds"))

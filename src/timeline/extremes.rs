@@ -5,22 +5,22 @@ use crate::time::ShowTime;
 
 /// A value that a curve takes, and where.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Extreme {
+pub(crate) struct Extreme {
     /// In the cue's unit.
-    pub value: f64,
+    pub(crate) value: f64,
     /// When it is first taken.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
     /// The line of the row at or before it; the number of its message where the file has no lines.
-    pub line: u64,
+    pub(crate) line: u64,
 }
 
 /// The ends of what an axis does.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct AxisExtremes {
+pub(crate) struct AxisExtremes {
     /// The least value.
-    pub min: Extreme,
+    pub(crate) min: Extreme,
     /// The greatest value.
-    pub max: Extreme,
+    pub(crate) max: Extreme,
 }
 
 /// The extremes of every axis.

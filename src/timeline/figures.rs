@@ -13,22 +13,22 @@ pub struct Figure {
     /// In mm, mm/s, mm/s² or mm/s³.
     pub value: f64,
     /// Show time of the worst.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
     /// The line of the row at or before it; the number of its message where the file has no lines.
-    pub line: u64,
+    pub(crate) line: u64,
 }
 
 /// How much an effect or an output is used.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EffectUse {
+pub(crate) struct EffectUse {
     /// The effect's name; `Y01` to `Y12` for a bit of a raw output word.
-    pub name: String,
+    pub(crate) name: String,
     /// How often it goes on.
-    pub times: usize,
+    pub(crate) times: usize,
     /// How long it is on in all.
-    pub on: Duration,
+    pub(crate) on: Duration,
     /// When it first goes on.
-    pub first: Option<ShowTime>,
+    pub(crate) first: Option<ShowTime>,
 }
 
 /// How much an output of the table is used.
@@ -55,7 +55,7 @@ impl Timeline {
 
     /// How much each effect that the cue names, or each bit of its raw output words, is used.
     #[must_use]
-    pub fn effect_uses(&self) -> Vec<EffectUse> {
+    pub(crate) fn effect_uses(&self) -> Vec<EffectUse> {
         let end = self.duration();
         match self.cue().effects() {
             Effects::Named { names, steps } => names
@@ -72,7 +72,7 @@ impl Timeline {
 
     /// The median time between rows.
     #[must_use]
-    pub fn row_interval(&self) -> Duration {
+    pub(crate) fn row_interval(&self) -> Duration {
         let times = self.cue().times();
         let mut spans: Vec<u64> =
             times.windows(2).map(|pair| pair[1].as_nanos().abs_diff(pair[0].as_nanos())).collect();

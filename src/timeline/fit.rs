@@ -9,7 +9,7 @@ use crate::time::ShowTime;
 
 /// The part of the stroke by which a curve may leave it between rows, to be held at its end there: a spline out of rest
 /// at an end always dips.
-pub const HELD_BACK: f64 = 0.001;
+pub(crate) const HELD_BACK: f64 = 0.001;
 
 /// True if a cue's axes stay within a stroke.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,22 +17,22 @@ pub struct StrokeFit {
     /// Rows outside the stroke, and stretches between rows more than [`HELD_BACK`] of it outside.
     pub faults: Option<CueFaults>,
     /// Axes whose curve is held at an end of the stroke somewhere.
-    pub held: Vec<Held>,
+    pub(crate) held: Vec<Held>,
 }
 
 /// An axis whose curve is held at an end of the stroke between some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub(crate) struct Held {
     /// The axis, from 0.
-    pub axis: usize,
+    pub(crate) axis: usize,
     /// Between how many pairs of rows.
-    pub stretches: usize,
+    pub(crate) stretches: usize,
     /// How far the curve would go over the end at the most, in the cue's unit.
-    pub over: f64,
+    pub(crate) over: f64,
     /// When it would.
-    pub at: ShowTime,
+    pub(crate) at: ShowTime,
     /// The line of the row before that, or the number of its message.
-    pub line: u64,
+    pub(crate) line: u64,
 }
 
 impl Timeline {

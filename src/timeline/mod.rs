@@ -9,10 +9,9 @@ mod fit;
 mod spline;
 
 pub(crate) use cubic::Cubic;
-pub use extremes::{AxisExtremes, Extreme};
-pub(crate) use figures::LevelUse;
-pub use figures::{EffectUse, Figure};
-pub use fit::{HELD_BACK, Held, StrokeFit};
+pub(crate) use extremes::{AxisExtremes, Extreme};
+pub(crate) use figures::{EffectUse, Figure, LevelUse};
+pub(crate) use fit::{HELD_BACK, Held};
 
 use crate::channel::{self, Sample, Samples, TRACKS, TrackId};
 use crate::cue::{Cue, Effects, Unit, Vibration};
@@ -73,7 +72,7 @@ impl Timeline {
 
     /// The unit of poses and amplitudes.
     #[must_use]
-    pub const fn unit(&self) -> Unit {
+    pub(crate) const fn unit(&self) -> Unit {
         self.cue.unit()
     }
 
@@ -124,7 +123,7 @@ impl Timeline {
 
     /// The row at or before a show time; the first one before it.
     #[must_use]
-    pub fn row_before(&self, at: ShowTime) -> usize {
+    pub(crate) fn row_before(&self, at: ShowTime) -> usize {
         self.cue.times().partition_point(|time| *time <= at).saturating_sub(1)
     }
 
@@ -146,7 +145,7 @@ impl Timeline {
 
     /// True if an axis, counted from 0, ever vibrates.
     #[must_use]
-    pub fn vibrates(&self, axis: usize) -> bool {
+    pub(crate) fn vibrates(&self, axis: usize) -> bool {
         self.cue.tracks().vibration(axis).as_slice().iter().any(|step| moves(step.value))
     }
 
@@ -160,7 +159,7 @@ impl Timeline {
     /// The farthest swing of an axis, counted from 0, and the first show time from which it holds; `None` if the axis
     /// never vibrates.
     #[must_use]
-    pub fn strongest_vibration(&self, axis: usize) -> Option<(ShowTime, Vibration)> {
+    pub(crate) fn strongest_vibration(&self, axis: usize) -> Option<(ShowTime, Vibration)> {
         let steps = self.cue.tracks().vibration(axis).as_slice().iter().filter(|step| moves(step.value));
         let vibrations = steps.map(|step| (step.at, Vibration::from(step.value)));
         vibrations.reduce(|most, step| if step.1.amplitude > most.1.amplitude { step } else { most })
@@ -177,7 +176,7 @@ impl Timeline {
 
     /// The names of the effects, in the order of their bits; `None` if the cue carries raw output words.
     #[must_use]
-    pub fn effect_names(&self) -> &[String] {
+    pub(crate) fn effect_names(&self) -> &[String] {
         match self.cue.effects() {
             Effects::Named { names, .. } => names,
             Effects::Words(_) => &[],
@@ -196,7 +195,7 @@ impl Timeline {
     /// The least and greatest value of each axis's curve, exact also between rows, and before anything is held at
     /// the stroke's ends.
     #[must_use]
-    pub fn extremes(&self) -> &[AxisExtremes] {
+    pub(crate) fn extremes(&self) -> &[AxisExtremes] {
         &self.extremes
     }
 }

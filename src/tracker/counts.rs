@@ -28,7 +28,7 @@ pub struct Counts {
     /// Frames that the kernel did not take.
     pub send_failed: u64,
     /// How often the kernel reported that the controller's port is closed.
-    pub port_closed: u64,
+    pub(crate) port_closed: u64,
 }
 
 impl Counts {

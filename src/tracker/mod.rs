@@ -12,8 +12,10 @@ mod latency;
 
 use std::time::Duration;
 
-pub use books::{Books, Ledger, Reply};
-pub use counts::{Counts, Fate};
+pub(crate) use books::Ledger;
+pub use books::{Books, Reply};
+pub use counts::Counts;
+pub(crate) use counts::Fate;
 pub use in_flight::KEPT;
 pub use latency::{Histogram, histogram};
 
@@ -38,7 +40,7 @@ impl Tracker {
     /// Empty books for a number of controllers whose first frames have the number [`FrameNo::FIRST`]. A reply is asked
     /// for in each of `ack_every` frames, as [`FrameNo::asks`] has it; 0 never asks.
     #[must_use]
-    pub fn new(controllers: usize, ack_every: u32) -> Self {
+    pub(crate) fn new(controllers: usize, ack_every: u32) -> Self {
         Self::starting_at(&vec![FrameNo::FIRST; controllers], ack_every)
     }
 
@@ -49,12 +51,6 @@ impl Tracker {
             accounts: first.iter().map(|&first| Account::new(first, ack_every)).collect(),
             latency: histogram(),
         }
-    }
-
-    /// How many controllers there are.
-    #[must_use]
-    pub fn controllers(&self) -> usize {
-        self.accounts.len()
     }
 
     /// A frame is about to be handed to the kernel at `at`; `asked` says whether it requests a reply.
@@ -90,12 +86,12 @@ impl Tracker {
     }
 
     /// A datagram from a controller that is no reply to a frame.
-    pub fn on_stray(&mut self, controller: usize) {
+    pub(crate) fn on_stray(&mut self, controller: usize) {
         self.accounts[controller].counts.stray += 1;
     }
 
     /// How often, in all, the kernel has reported that the controller's port is closed.
-    pub fn on_port_closed(&mut self, controller: usize, total: u64) {
+    pub(crate) fn on_port_closed(&mut self, controller: usize, total: u64) {
         self.accounts[controller].counts.port_closed = total;
     }
 
@@ -108,7 +104,7 @@ impl Tracker {
     }
 
     /// Gives up every frame that is still unanswered: there will be no more replies.
-    pub fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         for account in &mut self.accounts {
             account.finish();
         }
@@ -116,7 +112,7 @@ impl Tracker {
 
     /// True if a record of this frame, or of one after it, has come.
     #[must_use]
-    pub fn recorded(&self, controller: usize, frame: FrameNo) -> bool {
+    pub(crate) fn recorded(&self, controller: usize, frame: FrameNo) -> bool {
         self.accounts[controller].recorded(frame)
     }
 
@@ -135,13 +131,14 @@ impl Tracker {
 
     /// The same of all controllers together.
     #[must_use]
-    pub const fn latency_of_all(&self) -> &Histogram {
+    pub(crate) const fn latency_of_all(&self) -> &Histogram {
         &self.latency
     }
 
     /// The newest frame that was acked, and when its ack was received.
     #[must_use]
-    pub fn last_ack(&self, controller: usize) -> Option<(FrameNo, MonoTime)> {
+    #[cfg(test)]
+    pub(crate) fn last_ack(&self, controller: usize) -> Option<(FrameNo, MonoTime)> {
         self.accounts[controller].last_ack
     }
 

@@ -87,7 +87,7 @@ impl WireError {
 
 /// An error number of a controller, shown in words (chapter 6 of both manuals).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DeviceError(pub u16);
+pub struct DeviceError(pub(crate) u16);
 
 impl fmt::Display for DeviceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

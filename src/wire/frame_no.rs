@@ -21,13 +21,13 @@ impl FrameNo {
     /// True if this is one of the frames that ask, where each `every`-th does from the first on; where 0, none does.
     /// It hangs on nothing but the number, so that whoever missed the frame knows it too.
     #[must_use]
-    pub const fn asks(self, every: u32) -> bool {
+    pub(crate) const fn asks(self, every: u32) -> bool {
         every > 0 && self.0.wrapping_sub(1).is_multiple_of(every)
     }
 
     /// How many of the `count` frames from this one on ask, where each `every`-th does.
     #[must_use]
-    pub fn asking(self, count: u32, every: u32) -> u32 {
+    pub(crate) fn asking(self, count: u32, every: u32) -> u32 {
         const ROUND: u64 = 1 << 32;
         let first = u64::from(self.0.wrapping_sub(1));
         let end = first + u64::from(count);
@@ -39,7 +39,7 @@ impl FrameNo {
     /// How many numbers this one is after `other`; below 0 where it is before it. Right as long as they are less
     /// than 2,147,483,648 apart.
     #[must_use]
-    pub const fn since(self, other: Self) -> i32 {
+    pub(crate) const fn since(self, other: Self) -> i32 {
         self.0.wrapping_sub(other.0).cast_signed()
     }
 }

@@ -43,7 +43,7 @@ impl Code {
 
     /// True if this code means `station`.
     #[must_use]
-    pub const fn matches(self, station: Self) -> bool {
+    pub(crate) const fn matches(self, station: Self) -> bool {
         let ([column, row], [own_column, own_row]) = (self.0.to_be_bytes(), station.0.to_be_bytes());
         self.0 != 0 && (column == 0xff || column == own_column) && (row == 0xff || row == own_row)
     }
@@ -85,7 +85,7 @@ impl ReplyCode {
 
     /// True if the frame was refused (x = 3, 4, 5).
     #[must_use]
-    pub const fn refused(self) -> bool {
+    pub(crate) const fn refused(self) -> bool {
         !matches!(self, Self::Running)
     }
 }
@@ -104,15 +104,15 @@ pub enum Dialect {
 /// The first 12 bytes of a message, pass code and confirm code checked; tells whom even a message is for that is
 /// broken after them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Header {
+pub(crate) struct Header {
     /// High byte: the function; low byte: 1 for a request or report, else the reply code.
-    pub function: u16,
+    pub(crate) function: u16,
     /// Object channel, servo number, or the error number of an SMC reply with x over 2.
-    pub slot: u16,
+    pub(crate) slot: u16,
     /// Who is meant.
-    pub accept: Code,
+    pub(crate) accept: Code,
     /// Who shall answer.
-    pub reply: Code,
+    pub(crate) reply: Code,
 }
 
 impl Header {
@@ -120,7 +120,7 @@ impl Header {
     ///
     /// # Errors
     /// [`WireError::Short`], [`WireError::Confirm`] or [`WireError::Pass`].
-    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+    pub(crate) fn parse(bytes: &[u8]) -> Result<Self, WireError> {
         if bytes.len() < LEN {
             return Err(WireError::Short { len: bytes.len(), need: LEN });
         }

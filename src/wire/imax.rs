@@ -23,9 +23,9 @@ pub struct ImaxMotion {
     /// Object channel, kept in every reply.
     pub channel: u16,
     /// Who shall obey.
-    pub accept: Code,
+    pub(crate) accept: Code,
     /// Who shall answer.
-    pub reply: Code,
+    pub(crate) reply: Code,
     /// Time to reach the positions, ms.
     pub time_ms: u32,
     /// Where each axis shall be.
@@ -77,7 +77,7 @@ impl ImaxMotion {
 
     /// Bytes for `axes` axes: 36 for three, 48 for six.
     #[must_use]
-    pub const fn len(axes: usize) -> usize {
+    pub(crate) const fn len(axes: usize) -> usize {
         field::POSITIONS + 4 * axes + field::TAIL_LEN
     }
 }
@@ -95,15 +95,15 @@ fn axes(channel: u16, bytes: usize) -> Result<usize, WireError> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImaxRegisters<'a> {
     /// What it answers.
-    pub access: Access,
+    pub(crate) access: Access,
     /// What became of the request.
-    pub code: ReplyCode,
+    pub(crate) code: ReplyCode,
     /// Object channel, kept in every reply.
-    pub channel: u16,
+    pub(crate) channel: u16,
     /// The first register.
-    pub start: u16,
+    pub(crate) start: u16,
     /// How many were asked for.
-    pub num: u16,
+    pub(crate) num: u16,
     data: &'a [u8],
 }
 

@@ -23,24 +23,31 @@ mod word_order;
 mod words;
 
 pub use analogue::Analogue;
-pub use error::{DeviceError, WireError};
+pub(crate) use error::DeviceError;
+pub use error::WireError;
 pub use frame_no::FrameNo;
 pub use from_controller::FromController;
-pub use header::{Code, Dialect, Header, ReplyCode};
+pub(crate) use header::Header;
+pub use header::{Code, Dialect, ReplyCode};
 pub use imax::{ImaxMotion, ImaxRegisters};
-pub use motion::{Motion, MotionReply, MotionRequest, Timing, motion_channel_and_slots, motion_len};
+pub use motion::{Motion, MotionReply, MotionRequest, Timing};
+pub(crate) use motion::{motion_channel_and_slots, motion_len};
 pub use per_axis::PerAxis;
-pub use position::{
-    AXES_PER_BLOCK, DP_INPUTS, DP_POSITIONS, position, position_reads, position_words, positions,
-};
-pub use register::{Access, ReadRequest, RegisterReply, Space, WriteRequest};
-pub use report::{DPFE, Report};
-pub use servo::{MAX_SERVO_READ, ServoRead, ServoReply, ServoWrite};
+#[cfg(test)]
+pub(crate) use position::AXES_PER_BLOCK;
+pub(crate) use position::{DP_INPUTS, DP_POSITIONS, position_reads, positions};
+pub use position::{position, position_words};
+pub(crate) use register::Space;
+pub use register::{Access, ReadRequest, RegisterReply, WriteRequest};
+pub(crate) use report::DPFE;
+pub use report::Report;
+pub(crate) use servo::MAX_SERVO_READ;
+pub use servo::{ServoRead, ServoReply, ServoWrite};
 pub use status::Status;
 pub use vibration::{Vibration, VibrationPort};
-pub(crate) use word_order::in_other_order;
-pub use word_order::{WordOrder, word_order};
-pub use words::{MAX_WORDS, Words};
+pub(crate) use word_order::{WordOrder, in_other_order, word_order};
+pub(crate) use words::MAX_WORDS;
+pub use words::Words;
 
 /// Bytes that hold any message we write; the longest carries a whole table of registers.
 pub const MAX_LEN: usize = words::HEAD_LEN + 2 * MAX_WORDS;

@@ -33,7 +33,7 @@ pub enum Timing {
 
 /// The object channel and the number of positions for a controller of `axes` axes: padded to 3, 6 or 10, and 12.
 #[must_use]
-pub const fn motion_channel_and_slots(axes: usize) -> (u16, usize) {
+pub(crate) const fn motion_channel_and_slots(axes: usize) -> (u16, usize) {
     match axes {
         0..=3 => (0, 3),
         4..=6 => (1, 6),
@@ -129,7 +129,7 @@ impl MotionRequest {
     ///
     /// # Errors
     /// As [`MotionRequest::parse`].
-    pub fn parse_as(port: VibrationPort, bytes: &[u8]) -> Result<Self, WireError> {
+    pub(crate) fn parse_as(port: VibrationPort, bytes: &[u8]) -> Result<Self, WireError> {
         let header = Header::parse(bytes)?;
         let (timing, vibrating) = layout(header.family()).ok_or(header.foreign())?;
         let vibrating = vibrating.then_some(port);
@@ -153,7 +153,7 @@ impl MotionRequest {
     }
 
     /// Writes the frame to the front of `buf` and returns it, Extend as it is.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         self.emit_as(VibrationPort::Two, buf)
     }
 
@@ -174,7 +174,7 @@ impl MotionRequest {
 
     /// Its function code.
     #[must_use]
-    pub const fn function(&self) -> u16 {
+    pub(crate) const fn function(&self) -> u16 {
         request_function(family(self.timing, self.vibration.is_some()))
     }
 
@@ -249,7 +249,7 @@ impl MotionReply {
     /// The answer to a frame that is broken, but not before its Time ends: its number, and zeros for positions. None
     /// for anything else.
     #[must_use]
-    pub fn to_broken(bytes: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
+    pub(crate) fn to_broken(bytes: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
         let header = Header::parse(bytes).ok().filter(|header| header.is_request())?;
         let (timing, vibrating) = layout(header.family())?;
         if bytes.len() < field::POSITIONS {
@@ -300,7 +300,7 @@ impl MotionReply {
 /// Bytes of a motion frame, or of its reply, with so many positions, and with vibration where `vibrating` says how wide its
 /// port is.
 #[must_use]
-pub const fn motion_len(axes: usize, vibrating: Option<VibrationPort>) -> usize {
+pub(crate) const fn motion_len(axes: usize, vibrating: Option<VibrationPort>) -> usize {
     let tail = if vibrating.is_some() { vibration::LEN * axes } else { field::EXTEND_LEN };
     field::POSITIONS + 4 * axes + port_len(vibrating) + tail
 }

@@ -5,17 +5,17 @@ use super::{Code, Dialect, PerAxis, ReadRequest, Words};
 use crate::motion::Pulses;
 
 /// The monitor register at which the position of each of axes 1 to 6 begins.
-pub const DP_POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
+pub(crate) const DP_POSITIONS: [u16; 6] = [0x06, 0x08, 0x0a, 0x21, 0x23, 0x25];
 
 /// The monitor register of the active inputs, bit 0 = X01.
-pub const DP_INPUTS: u16 = 0x5e;
+pub(crate) const DP_INPUTS: u16 = 0x5e;
 
 /// Axes of one block of position registers.
-pub const AXES_PER_BLOCK: usize = 3;
+pub(crate) const AXES_PER_BLOCK: usize = 3;
 
 /// The reads that tell the position of axes 1 to `axes`: DP06.. for axes 1 to 3, and DP21.. for 4 to 6 where there are
 /// as many. The words of each answer go to [`positions`].
-pub fn position_reads(axes: usize, accept: Code, reply: Code) -> impl Iterator<Item = ReadRequest> {
+pub(crate) fn position_reads(axes: usize, accept: Code, reply: Code) -> impl Iterator<Item = ReadRequest> {
     let axes = axes.min(DP_POSITIONS.len());
     (0..axes).step_by(AXES_PER_BLOCK).map(move |first| {
         let num = if axes - first < AXES_PER_BLOCK { axes - first } else { AXES_PER_BLOCK };
@@ -26,7 +26,7 @@ pub fn position_reads(axes: usize, accept: Code, reply: Code) -> impl Iterator<I
 
 /// The positions that position registers hold, first axis first; an odd word at the end is left out.
 #[must_use]
-pub fn positions(words: Words<'_>, dialect: Dialect) -> PerAxis<Pulses> {
+pub(crate) fn positions(words: Words<'_>, dialect: Dialect) -> PerAxis<Pulses> {
     PerAxis::from_fn(words.len() / 2, |axis| {
         let word = |index| words.get(index).unwrap_or(0);
         position([word(2 * axis), word(2 * axis + 1)], dialect)

@@ -9,7 +9,7 @@ pub(super) const WRITE: u8 = 0x12;
 
 /// A table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Space {
+pub(crate) enum Space {
     /// DP00 to DPFF: what the controller sees and does.
     Monitor,
     /// PA00 to PAFF: its parameters.
@@ -21,7 +21,7 @@ pub enum Space {
 impl Space {
     /// The table that an object channel means in a read.
     #[must_use]
-    pub const fn of_read(channel: u16) -> Option<Self> {
+    pub(crate) const fn of_read(channel: u16) -> Option<Self> {
         match channel {
             0 => Some(Self::Monitor),
             1 => Some(Self::Parameter),
@@ -32,7 +32,7 @@ impl Space {
     /// The table that an object channel means in a write. Channel 0 is parameters that are not kept over a power
     /// cycle on MBOX.
     #[must_use]
-    pub const fn of_write(channel: u16, dialect: Dialect) -> Option<Self> {
+    pub(crate) const fn of_write(channel: u16, dialect: Dialect) -> Option<Self> {
         match (channel, dialect) {
             (0, Dialect::Smc) => Some(Self::Monitor),
             (0, Dialect::Mbox) | (1, _) => Some(Self::Parameter),
@@ -96,7 +96,7 @@ pub struct WriteRequest<'a> {
 
 impl<'a> WriteRequest<'a> {
     /// Writes the request to the front of `buf` and returns it.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(WRITE);
         Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
         words::emit_all(buf, self.start, self.data)
@@ -107,7 +107,7 @@ impl<'a> WriteRequest<'a> {
     /// # Errors
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
-    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
         let header = Header::parse(bytes)?;
         if header.family() != WRITE || !header.is_request() {
             return Err(header.foreign());
@@ -148,7 +148,7 @@ pub struct RegisterReply<'a> {
 impl<'a> RegisterReply<'a> {
     /// The answer to a request that is broken, but not before its count ends. None for anything else.
     #[must_use]
-    pub fn to_broken(bytes: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
+    pub(crate) fn to_broken(bytes: &[u8], code: ReplyCode, error: u16) -> Option<Self> {
         let header = Header::parse(bytes).ok().filter(|header| header.is_request())?;
         let access = match header.family() {
             READ => Access::Read,
@@ -174,7 +174,7 @@ impl<'a> RegisterReply<'a> {
     /// The registers that it tells. A refusal of an MBOX controller tells none: what stands there is an error number (IMAX
     /// manual 2.2.2.3). SMC controllers answer in every state, and x over 2 says which.
     #[must_use]
-    pub fn values(&self, dialect: Dialect) -> Words<'a> {
+    pub(crate) fn values(&self, dialect: Dialect) -> Words<'a> {
         match dialect {
             Dialect::Mbox if self.code.refused() => Words::EMPTY,
             _ => self.data,

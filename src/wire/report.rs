@@ -9,7 +9,7 @@ pub(super) const FAMILY: u8 = 0x10;
 
 /// The monitor register DPFE: which alarm the drives of an IMAX or MBOX controller have, 0 for none. On SMC it is the minor
 /// version (2.3.3 of both manuals).
-pub const DPFE: u16 = 0xfe;
+pub(crate) const DPFE: u16 = 0xfe;
 
 /// Controller to host: what stands in these registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub struct Report<'a> {
 
 impl<'a> Report<'a> {
     /// Writes the report to the front of `buf` and returns it.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(FAMILY);
         Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
         words::emit_all(buf, self.start, self.data)

@@ -9,7 +9,7 @@ pub(super) const READ: u8 = 0x21;
 pub(super) const WRITE: u8 = 0x22;
 
 /// The most registers of a drive that one message may read.
-pub const MAX_SERVO_READ: u16 = 6;
+pub(crate) const MAX_SERVO_READ: u16 = 6;
 
 /// Host to controller, 0x2101: what stands in these registers of a drive?
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub struct ServoRead {
 
 impl ServoRead {
     /// Writes the request to the front of `buf` and returns it.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(READ);
         Header { function, slot: self.servo, accept: self.accept, reply: self.reply }.emit(buf);
         words::emit_ask(buf, self.start, self.num)
@@ -38,7 +38,7 @@ impl ServoRead {
     ///
     /// # Errors
     /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
-    pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
+    pub(crate) fn parse(bytes: &[u8]) -> Result<Self, WireError> {
         let header = Header::parse(bytes)?;
         if header.family() != READ || !header.is_request() {
             return Err(header.foreign());
@@ -65,7 +65,7 @@ pub struct ServoWrite<'a> {
 
 impl<'a> ServoWrite<'a> {
     /// Writes the request to the front of `buf` and returns it.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let function = request_function(WRITE);
         Header { function, slot: self.servo, accept: self.accept, reply: self.reply }.emit(buf);
         words::emit_all(buf, self.start, self.data)
@@ -76,7 +76,7 @@ impl<'a> ServoWrite<'a> {
     /// # Errors
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
-    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
         let header = Header::parse(bytes)?;
         if header.family() != WRITE || !header.is_request() {
             return Err(header.foreign());
@@ -107,7 +107,7 @@ pub struct ServoReply<'a> {
 
 impl<'a> ServoReply<'a> {
     /// Writes the reply to the front of `buf` and returns it.
-    pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
+    pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
         let family = match self.access {
             Access::Read => READ,
             Access::Write => WRITE,
@@ -123,7 +123,7 @@ impl<'a> ServoReply<'a> {
     /// # Errors
     /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Count`] for more than 256,
     /// and those of a broken header or another function.
-    pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
+    pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
         let header = Header::parse(bytes)?;
         let access = match header.family() {
             READ => Access::Read,

@@ -38,7 +38,7 @@ pub struct Status {
 impl Status {
     /// Bytes for `axes` axes: 40 for three, 64 for six, 112 for twelve.
     #[must_use]
-    pub const fn len(axes: usize) -> usize {
+    pub(crate) const fn len(axes: usize) -> usize {
         field::POSITIONS + 8 * axes + field::TAIL_LEN
     }
 

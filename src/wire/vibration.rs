@@ -22,7 +22,7 @@ pub enum VibrationPort {
 impl VibrationPort {
     /// The one of so many bytes; `None` if that is neither 2 nor 4.
     #[must_use]
-    pub const fn of_bytes(bytes: u8) -> Option<Self> {
+    pub(crate) const fn of_bytes(bytes: u8) -> Option<Self> {
         match bytes {
             2 => Some(Self::Two),
             4 => Some(Self::Four),
@@ -51,7 +51,7 @@ impl Vibration {
     /// No vibration.
     pub const NONE: Self = Self { period: 0, amplitude: 0 };
     /// The farthest swing that a frame can ask for, pulses.
-    pub const MAX_AMPLITUDE: u16 = u16::MAX;
+    pub(crate) const MAX_AMPLITUDE: u16 = u16::MAX;
 
     /// The vibration of `hz` and `amplitude_pulses`, both rounded to what the wire can say: 0.122 to 8,000 Hz, at most
     /// 65,535 pulses. None where either is not above 0.
@@ -61,7 +61,7 @@ impl Vibration {
         clippy::cast_sign_loss,
         reason = "clamped to the range of u16 before"
     )]
-    pub fn from_hz(hz: f64, amplitude_pulses: f64) -> Self {
+    pub(crate) fn from_hz(hz: f64, amplitude_pulses: f64) -> Self {
         let amplitude = amplitude_pulses.round().clamp(0.0, f64::from(Self::MAX_AMPLITUDE)) as u16;
         if hz.is_nan() || hz <= 0.0 || amplitude == 0 {
             return Self::NONE;

@@ -10,7 +10,7 @@ const AGREE: f64 = 0.02;
 
 /// Which order of words the positions of a controller fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WordOrder {
+pub(crate) enum WordOrder {
     /// That of its dialect alone.
     Configured,
     /// The other one alone: the dialect is wrong, or this firmware goes by the other manual.
@@ -29,7 +29,7 @@ pub enum WordOrder {
 ///
 /// One axis that tells settles it for all, since a controller has one order; axes that tell different ones fit neither.
 #[must_use]
-pub fn word_order(
+pub(crate) fn word_order(
     words: &[[u16; 2]],
     dialect: Dialect,
     stroke: f64,

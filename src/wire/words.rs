@@ -13,7 +13,7 @@ mod field {
 /// Bytes up to the words.
 pub(super) const HEAD_LEN: usize = field::DATA;
 /// The most words of one message: a whole table of registers.
-pub const MAX_WORDS: usize = 256;
+pub(crate) const MAX_WORDS: usize = 256;
 
 /// 16-bit words, borrowed from a message as it came or from whoever fills one; at most [`MAX_WORDS`] are sent.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use kinocue::state::{State, Transition};
+use kinocue::harness::state::{State, Transition};
 
 use super::cues::{KINDS, Kind};
 use super::ether::{Ether, Weather};

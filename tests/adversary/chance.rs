@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
-use kinocue::sys::clock::wall_now_ns;
+use kinocue::harness::sys::clock::wall_now_ns;
 
 use super::bent::Bent;
 use super::cues::KINDS;

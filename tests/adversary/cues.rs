@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use kinocue::app::staged::headroom;
-use kinocue::config::{Config, LossPolicy, from_to_args};
 use kinocue::cue::{self, Source};
-use kinocue::engine::Headroom;
-use kinocue::motion::Pose;
-use kinocue::time::Rate;
-use kinocue::timeline::Timeline;
+use kinocue::harness::app::staged::headroom;
+use kinocue::harness::config::{Config, LossPolicy, from_to_args};
+use kinocue::harness::engine::Headroom;
+use kinocue::harness::motion::Pose;
+use kinocue::harness::time::Rate;
+use kinocue::harness::timeline::Timeline;
 use kinocue::wire::{Dialect, Timing};
 
 /// Seats of a hall, how fast it sends, and how.

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use kinocue::net::{Delivery, Network, Origin, SendFault};
-use kinocue::time::{Clock, MonoTime};
+use kinocue::harness::net::{Delivery, Network, Origin, SendFault};
+use kinocue::harness::time::{Clock, MonoTime};
 
 use super::dice::Dice;
 use super::master::{Master, UNKNOWN};

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use kinocue::engine::Mix;
-use kinocue::state::{PlayMode, State, Transition};
+use kinocue::harness::engine::Mix;
+use kinocue::harness::state::{PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind, OTHERS};
 use super::dice::Dice;

@@ -1,12 +1,12 @@
 //! A hall in virtual time: the loops of the program, stepped by turns, and what a supervisor does beside them.
 
-use kinocue::app::StagedShow;
-use kinocue::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
-use kinocue::engine::{Mix, Show};
-use kinocue::net::{DrainGrid, over};
-use kinocue::rt::{Command, Line, News, Order, Ticked};
-use kinocue::state::{Event, Readiness, State, Transition, Trouble};
-use kinocue::time::{MonoTime, Rate, ShowTime};
+use kinocue::harness::app::StagedShow;
+use kinocue::harness::app::runtime::{Loops, Numbers, Purpose, Runtime, RuntimeHandle};
+use kinocue::harness::engine::{Mix, Show};
+use kinocue::harness::net::{DrainGrid, over};
+use kinocue::harness::rt::{Command, Line, News, Order, Ticked};
+use kinocue::harness::state::{Event, Readiness, State, Transition, Trouble};
+use kinocue::harness::time::{MonoTime, Rate, ShowTime};
 use kinocue::wire::Dialect;
 
 use std::sync::Arc;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use kinocue::engine::Mix;
-use kinocue::state::{PlayMode, State, Transition};
+use kinocue::harness::engine::Mix;
+use kinocue::harness::state::{PlayMode, State, Transition};
 
 use super::cues::{KINDS, Kind};
 use super::ether::{Ether, Weather};

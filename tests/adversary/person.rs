@@ -1,7 +1,7 @@
 //! A person, or a day, of whom nothing sensible can be expected.
 
-use kinocue::engine::Mix;
-use kinocue::state::{State, Transition};
+use kinocue::harness::engine::Mix;
+use kinocue::harness::state::{State, Transition};
 
 use super::bent::Bent;
 use super::dice::Dice;

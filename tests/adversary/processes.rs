@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::Clock as _;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::Clock as _;
 use serde_json::Value;
 use tempfile::TempDir;
 

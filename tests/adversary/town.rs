@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use kinocue::sys::batch::{Batch, stamp_arrivals};
-use kinocue::sys::clock::{Monotonic, wall_now_ns};
-use kinocue::time::{Clock as _, nanos};
+use kinocue::harness::sys::batch::{Batch, stamp_arrivals};
+use kinocue::harness::sys::clock::{Monotonic, wall_now_ns};
+use kinocue::harness::time::{Clock as _, nanos};
 
 use super::ether::Ether;
 use super::seat::Settings;

@@ -1,6 +1,6 @@
 //! Who may do what, and from where.
 
-use kinocue::control::{Command, Role, Surface};
+use kinocue::harness::control::{Command, Role, Surface};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::{Hall, TOKENS};
@@ -61,7 +61,7 @@ fn without_a_token_there_is_nothing_but_the_page_and_whether_it_is_well() {
 
 #[test]
 fn who_may_look_without_a_token_may_stop_too_and_nothing_else() {
-    let hall = Hall::with(crate::hall::with_controller(), |api| kinocue::config::Api {
+    let hall = Hall::with(crate::hall::with_controller(), |api| kinocue::harness::config::Api {
         open_role: Some(Role::View),
         ..api
     });

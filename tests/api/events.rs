@@ -89,8 +89,8 @@ fn there_is_room_for_so_many_and_a_place_is_free_again_when_one_goes() {
 
 #[test]
 fn viewers_who_watch_do_not_shut_the_booth_out() {
-    let hall = Hall::with(long_status(), |api| kinocue::config::Api {
-        open_role: Some(kinocue::control::Role::View),
+    let hall = Hall::with(long_status(), |api| kinocue::harness::config::Api {
+        open_role: Some(kinocue::harness::control::Role::View),
         ..api
     });
     let watch = |token: Option<&str>| {

@@ -8,17 +8,17 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use kinocue::api::{self, Running, Setup, StopSocket};
-use kinocue::config::{self, ApiToken};
-use kinocue::control::{
+use kinocue::harness::api::{self, Running, Setup, StopSocket};
+use kinocue::harness::config::{self, ApiToken};
+use kinocue::harness::control::{
     Code, Command, ControllerStatus, Desired, Handle, Health, Inbox, JournalLine, Problem, Role, Status,
     StatusSource, handle,
 };
-use kinocue::library::{self, Bounds, Library};
-use kinocue::log::Log;
-use kinocue::playlist::Shelf;
-use kinocue::rt::Desk;
-use kinocue::state::{PlayMode, State};
+use kinocue::harness::library::{self, Bounds, Library};
+use kinocue::harness::log::Log;
+use kinocue::harness::playlist::Shelf;
+use kinocue::harness::rt::Desk;
+use kinocue::harness::state::{PlayMode, State};
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 

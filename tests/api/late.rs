@@ -1,6 +1,6 @@
 //! What comes twice, and what comes late.
 
-use kinocue::control::Command;
+use kinocue::harness::control::Command;
 
 use crate::client::{Request, problem};
 use crate::hall::Hall;

@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::thread;
 
-use kinocue::control::{Command, Role};
+use kinocue::harness::control::{Command, Role};
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::Hall;
@@ -77,7 +77,7 @@ fn a_head_that_does_not_come_is_not_waited_for() {
 
 #[test]
 fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
-    let hall = Hall::with(crate::hall::with_controller(), |api| kinocue::config::Api {
+    let hall = Hall::with(crate::hall::with_controller(), |api| kinocue::harness::config::Api {
         open_role: Some(Role::View),
         ..api
     });
@@ -104,10 +104,10 @@ fn a_stop_passes_a_control_plane_that_is_stuffed_in_every_way() {
     });
 }
 
-fn engineer() -> kinocue::control::Who {
-    kinocue::control::Who {
+fn engineer() -> kinocue::harness::control::Who {
+    kinocue::harness::control::Who {
         role: Role::Engineer,
-        surface: kinocue::control::Surface::Schedule,
+        surface: kinocue::harness::control::Surface::Schedule,
         name: "test".to_owned(),
     }
 }

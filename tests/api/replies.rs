@@ -2,8 +2,8 @@
 
 use std::io::Write as _;
 
-use kinocue::control::{Command, LevelsChange, Role, Surface};
-use kinocue::time::ShowTime;
+use kinocue::harness::control::{Command, LevelsChange, Role, Surface};
+use kinocue::harness::time::ShowTime;
 
 use crate::client::{Reply, Request, problem};
 use crate::hall::{Hall, with_controller};

@@ -6,7 +6,7 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use kinocue::sys::clock::wall_now_ns;
+use kinocue::harness::sys::clock::wall_now_ns;
 use serde_json::Value;
 
 /// Longer than anything here takes.

@@ -10,15 +10,15 @@ use std::thread;
 use std::time::Duration;
 
 use counting::Calls;
-use kinocue::config::LossPolicy;
-use kinocue::engine::{Ending, Mix};
-use kinocue::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
-use kinocue::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
-use kinocue::health::{Groups, HealthTable, Notice};
-use kinocue::motion::MAX_AXES;
-use kinocue::rt::{Alarm, News};
-use kinocue::state::{Event, Machine, PlayMode, State, Transition, Why};
-use kinocue::time::{MonoTime, ShowTime, Tick};
+use kinocue::harness::config::LossPolicy;
+use kinocue::harness::engine::{Ending, Mix};
+use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
+use kinocue::harness::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
+use kinocue::harness::health::{Groups, HealthTable, Notice};
+use kinocue::harness::motion::MAX_AXES;
+use kinocue::harness::rt::{Alarm, News};
+use kinocue::harness::state::{Event, Machine, PlayMode, State, Transition, Why};
+use kinocue::harness::time::{MonoTime, ShowTime, Tick};
 use kinocue::wire::FrameNo;
 use stage::{CONTROLLERS, Deed, Outcome, PERIOD, play};
 

@@ -8,23 +8,23 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use kinocue::app::StagedShow;
-use kinocue::belief::Reading;
-use kinocue::config::from_to_args;
 use kinocue::cue::{Source, read};
-use kinocue::drive::{Lane, Manner};
-use kinocue::engine::{Mix, Show};
-use kinocue::motion::{MAX_AXES, Pose};
-use kinocue::net::{Delivery, DrainGrid, Ports, Sender};
-use kinocue::observe::Watched;
-use kinocue::rt::{
+use kinocue::harness::app::StagedShow;
+use kinocue::harness::belief::Reading;
+use kinocue::harness::config::from_to_args;
+use kinocue::harness::drive::{Lane, Manner};
+use kinocue::harness::engine::{Mix, Show};
+use kinocue::harness::motion::{MAX_AXES, Pose};
+use kinocue::harness::net::{Delivery, DrainGrid, Ports, Sender};
+use kinocue::harness::observe::Watched;
+use kinocue::harness::rt::{
     Accounts, AckLoop, Alarm, Command, Conductor, Desk, Ended, FrameSink, Live, Loaded, MailEnds, News,
     Places, PlanLoop, Planning, Spinning, TickLoop, mailboxes,
 };
-use kinocue::state::Transition;
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
-use kinocue::timeline::Timeline;
+use kinocue::harness::state::Transition;
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock, MonoTime, Rate, ShowTime, TickGrid};
+use kinocue::harness::timeline::Timeline;
 use kinocue::wire::{MAX_LEN, MotionReply, MotionRequest, ReplyCode, Timing};
 use rtrb::Producer;
 

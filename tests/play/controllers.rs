@@ -2,7 +2,7 @@
 
 use std::net::UdpSocket;
 
-use kinocue::motion::Pulses;
+use kinocue::harness::motion::Pulses;
 use kinocue::wire::{Analogue, Code, FrameNo, MAX_LEN, Motion, Timing};
 use serde_json::Value;
 

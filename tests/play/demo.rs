@@ -6,8 +6,8 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Stdio;
 
-use kinocue::sys::clock::{Monotonic, wall_now_ns};
-use kinocue::time::Clock as _;
+use kinocue::harness::sys::clock::{Monotonic, wall_now_ns};
+use kinocue::harness::time::Clock as _;
 use rustix::process::Signal;
 use serde_json::Value;
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-use kinocue::sys::clock::Monotonic;
-use kinocue::time::{Clock as _, MonoTime};
+use kinocue::harness::sys::clock::Monotonic;
+use kinocue::harness::time::{Clock as _, MonoTime};
 
 use serde_json::{Value, json};
 

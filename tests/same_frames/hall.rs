@@ -5,20 +5,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use kinocue::belief::Reading;
-use kinocue::engine::Mix;
-use kinocue::film::chase::ChaseRules;
-use kinocue::film::point::{FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::ORIGIN;
 use kinocue::harness::asked::Chance;
-use kinocue::motion::{MAX_AXES, Pose};
-use kinocue::net::Delivery;
-use kinocue::rt::{
+use kinocue::harness::belief::Reading;
+use kinocue::harness::engine::Mix;
+use kinocue::harness::film::chase::ChaseRules;
+use kinocue::harness::film::point::{FilmPoint, FilmState, PublishedPoint};
+use kinocue::harness::motion::{MAX_AXES, Pose};
+use kinocue::harness::net::Delivery;
+use kinocue::harness::rt::{
     Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, NewsIn, Places, PlanLoop,
     Planning, Sent, Task, TickLoop, Ticked, mailboxes,
 };
-use kinocue::state::{Event, Finding, Readiness, State, Transition};
-use kinocue::time::{Clock, MonoTime, ShowTime, TickGrid};
+use kinocue::harness::state::{Event, Finding, Readiness, State, Transition};
+use kinocue::harness::time::{Clock, MonoTime, ShowTime, TickGrid};
 use kinocue::wire::MotionRequest;
 use rtrb::{Consumer, Producer};
 

@@ -3,15 +3,15 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use kinocue::app::StagedShow;
-use kinocue::config::{Config, from_to_args};
 use kinocue::cue::{self, Source};
-use kinocue::drive::Manner;
-use kinocue::engine::{Headroom, Mix, Show};
+use kinocue::harness::app::StagedShow;
 use kinocue::harness::asked::Chance;
+use kinocue::harness::config::{Config, from_to_args};
+use kinocue::harness::drive::Manner;
+use kinocue::harness::engine::{Headroom, Mix, Show};
 use kinocue::harness::swell;
-use kinocue::time::{Rate, ShowTime};
-use kinocue::timeline::Timeline;
+use kinocue::harness::time::{Rate, ShowTime};
+use kinocue::harness::timeline::Timeline;
 use kinocue::wire::Timing;
 
 /// A cue on the seats of a hall at a rate.

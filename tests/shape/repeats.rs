@@ -49,7 +49,7 @@ fn pairs(files: &[File], letters: usize, reduce: impl Fn(&str) -> String) -> (f6
     (f64::from(u32::try_from(begun.len()).expect("there are fewer lines")), few.join("; "))
 }
 
-/// The lines of a file that tell something: no imports, no attributes, no comments behind them.
+/// The lines of a file that tell something: no imports, no attributes, no comments behind them, nor who may see them.
 fn telling(file: &File) -> Vec<&str> {
     let mut importing = false;
     let mut lines = Vec::new();
@@ -61,7 +61,7 @@ fn telling(file: &File) -> Vec<&str> {
             importing = !line.ends_with(';') && !line.ends_with('{');
             importing |= line.ends_with('{') && unveiled.starts_with("use ");
         } else if !line.starts_with("#[") {
-            lines.push(line.split(" // ").next().unwrap_or(line));
+            lines.push(unveiled.split(" // ").next().unwrap_or(unveiled));
         }
     }
     lines

@@ -14,8 +14,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-pub use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
-pub use source::{FilmArgError, FilmArgs, FilmSource, LtcInput};
+pub(crate) use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
+pub(crate) use source::{FilmArgs, FilmSource};
 
 use crate::film::follower::PaceLimits;
 use crate::film::observation::Observation;
@@ -32,7 +32,7 @@ const WAITING: usize = 512;
 /// Why a source is not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum FilmError {
+pub(crate) enum FilmError {
     /// A file, a FIFO or a socket does not open.
     #[error("{what} cannot be opened")]
     Open {
@@ -56,7 +56,7 @@ pub enum FilmError {
 
 /// A source that is being read.
 #[derive(Debug)]
-pub struct FilmReader {
+pub(crate) struct FilmReader {
     point: Arc<PublishedPoint>,
     /// The command that gives the sound.
     child: Arc<Mutex<Option<Child>>>,
@@ -67,7 +67,7 @@ impl FilmReader {
     ///
     /// # Errors
     /// [`FilmError`] where it cannot be had at all. One that ends later is looked for again.
-    pub fn start(args: &FilmArgs) -> Result<Self, FilmError> {
+    pub(crate) fn start(args: &FilmArgs) -> Result<Self, FilmError> {
         let point = Arc::new(PublishedPoint::default());
         let (told, heard) = sync_channel(WAITING);
         let published = Arc::clone(&point);
@@ -84,7 +84,7 @@ impl FilmReader {
 
     /// Where the film is, for whoever follows it.
     #[must_use]
-    pub fn point(&self) -> Arc<PublishedPoint> {
+    pub(crate) fn point(&self) -> Arc<PublishedPoint> {
         Arc::clone(&self.point)
     }
 }

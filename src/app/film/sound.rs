@@ -8,20 +8,20 @@ use crate::film::ltc::{LtcDecoder, LtcFrame, LtcGenerator};
 use crate::film::timecode::{FrameRate, Timecode};
 
 /// SampleStream a second of the sound that is made.
-pub const SAMPLES_PER_S: u32 = 48_000;
+pub(crate) const SAMPLES_PER_S: u32 = 48_000;
 /// A fifth of full scale, about as loud as a line is driven.
 const LEVEL: f64 = 0.2;
 
 /// The samples of LTC, without an end.
 #[derive(Debug)]
-pub struct LtcSound(LtcGenerator);
+pub(crate) struct LtcSound(LtcGenerator);
 
 impl LtcSound {
     /// From a label on, at so many frames a second.
     ///
     /// # Errors
     /// [`FilmArgError`] where there is no such rate, or no such label at it.
-    pub fn new(fps: &str, start: &str) -> Result<Self, FilmArgError> {
+    pub(crate) fn new(fps: &str, start: &str) -> Result<Self, FilmArgError> {
         let words = |error: crate::film::timecode::TimecodeError| FilmArgError::of(&error);
         let rate: FrameRate = fps.parse().map_err(words)?;
         let frame = Timecode::parse(start, rate).map_err(words)?;
@@ -39,7 +39,7 @@ impl Iterator for LtcSound {
 
 /// The header of a WAV file of one channel and so many samples, or of a stream of nobody knows how many.
 #[must_use]
-pub fn wav_header(samples: Option<u32>) -> Vec<u8> {
+pub(crate) fn wav_header(samples: Option<u32>) -> Vec<u8> {
     let octets = samples.map_or(u32::MAX, |samples| 2 * samples);
     let mut header = b"RIFF".to_vec();
     header.extend(octets.saturating_add(36).to_le_bytes());
@@ -53,30 +53,32 @@ pub fn wav_header(samples: Option<u32>) -> Vec<u8> {
 
 /// What timecode is in a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LtcFound {
+pub(crate) struct LtcFound {
     /// How long the recording is.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// Frames whose labels are sure.
-    pub frames: u64,
+    pub(crate) frames: u64,
     /// The first label, and the last.
-    pub first: Option<String>,
+    pub(crate) first: Option<String>,
     /// See above.
-    pub last: Option<String>,
+    pub(crate) last: Option<String>,
     /// Frames a second, by their labels over the samples between them.
-    pub fps: Option<f64>,
+    pub(crate) fps: Option<f64>,
     /// How loud the signal is at the end, of full scale, dB.
-    pub level_db: f64,
+    pub(crate) level_db: f64,
     /// How often a label did not follow the one before it.
-    pub jumps: u64,
+    pub(crate) jumps: u64,
     /// Frames that were played backwards.
-    pub backwards: u64,
+    pub(crate) backwards: u64,
 }
 
 /// Looks for timecode in the octets of a WAV file.
 ///
 /// # Errors
 /// In words, where it is none that can be read.
-pub fn look_for_ltc(octets: &[u8]) -> Result<LtcFound, impl std::error::Error + Send + Sync + 'static> {
+pub(crate) fn look_for_ltc(
+    octets: &[u8],
+) -> Result<LtcFound, impl std::error::Error + Send + Sync + 'static> {
     let (mut samples, mut sound) = (SampleStream::default(), Vec::new());
     samples.push(octets, &mut sound)?;
     let per_s = samples.samples_per_s().ok_or(RiffFault::NoData)?;

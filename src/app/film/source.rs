@@ -9,7 +9,7 @@ use crate::time::ShowTime;
 
 /// Where LTC comes from: sound, the first channel of it, 16 bits, raw at 48,000 samples a second or behind a RIFF header.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum LtcInput {
+pub(crate) enum LtcInput {
     /// What a command writes.
     Pipe(String),
     /// A FIFO; it is opened anew when its writer is gone.
@@ -24,7 +24,7 @@ pub enum LtcInput {
 
 /// Who says where the film is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FilmSource {
+pub(crate) enum FilmSource {
     /// Linear timecode.
     Ltc(LtcInput),
     /// mpv, by its socket (`--input-ipc-server`).
@@ -33,9 +33,9 @@ pub enum FilmSource {
 
 /// How a film is read.
 #[derive(Debug, Clone)]
-pub struct FilmArgs {
+pub(crate) struct FilmArgs {
     /// Its source.
-    pub source: FilmSource,
+    pub(crate) source: FilmSource,
     /// Frames a second; found where none are given.
     pub(crate) rate: Option<FrameRate>,
     /// The timecode of the cue's beginning.
@@ -45,7 +45,7 @@ pub struct FilmArgs {
 /// Why something that was written is none of this.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
-pub struct FilmArgError(String);
+pub(crate) struct FilmArgError(String);
 
 impl FilmArgError {
     pub(super) fn of(error: &TimecodeError) -> Self {
@@ -65,7 +65,11 @@ impl FilmArgs {
     ///
     /// # Errors
     /// [`FilmArgError`] where one of them is nothing known.
-    pub fn new(source: FilmSource, rate: Option<&str>, start: Option<&str>) -> Result<Self, FilmArgError> {
+    pub(crate) fn new(
+        source: FilmSource,
+        rate: Option<&str>,
+        start: Option<&str>,
+    ) -> Result<Self, FilmArgError> {
         let rate = rate.map(FrameRate::from_str).transpose().map_err(|error| FilmArgError::of(&error))?;
         let start = start.map(Label::from_str).transpose().map_err(|error| FilmArgError::of(&error))?;
         if let (Some(start), Some(rate)) = (start, rate) {

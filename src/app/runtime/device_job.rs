@@ -21,7 +21,7 @@ const SETTLE: Duration = Duration::from_millis(100);
 
 /// What is asked.
 #[derive(Debug, Clone)]
-pub enum DeviceJob {
+pub(crate) enum DeviceJob {
     /// All that preflight judges, of all controllers.
     Survey,
     /// Controllers are to home.
@@ -36,7 +36,7 @@ pub enum DeviceJob {
 
 /// What came of it.
 #[derive(Debug)]
-pub enum Finding {
+pub(crate) enum Finding {
     /// What each controller told.
     Surveyed(Vec<Survey>),
     /// True if each of these controllers is home; where one would go there without a search, those alone that would, and
@@ -68,7 +68,7 @@ impl Link for OverLine<'_> {
 }
 
 /// Asks, and waits for what comes; `tell` hears in words how far it is.
-pub fn run_on_devices(
+pub(crate) fn run_on_devices(
     line: &mut Line,
     controllers: &[Controller],
     job: DeviceJob,

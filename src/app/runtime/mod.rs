@@ -4,7 +4,7 @@
 mod boot;
 mod device_job;
 
-pub use device_job::{DeviceJob, Finding, run_on_devices};
+pub(crate) use device_job::{DeviceJob, Finding, run_on_devices};
 
 use std::collections::BTreeMap;
 use std::io;
@@ -120,7 +120,7 @@ pub struct Control {
 #[derive(Debug)]
 pub struct RuntimeHandle {
     /// Whose hall it is.
-    pub config: Arc<Config>,
+    pub(crate) config: Arc<Config>,
     /// Where levels, effects, seats, trim and the stop are set.
     pub desk: Arc<Desk>,
     /// How far the show is, and how the controllers stand.
@@ -134,16 +134,16 @@ pub struct RuntimeHandle {
     /// What the ack thread is told.
     pub orders: Producer<Order>,
     /// What the system granted the tick thread.
-    pub granted: RealTime,
+    pub(crate) granted: RealTime,
 }
 
 /// What a hall came to when it closed.
 #[derive(Debug)]
-pub struct RuntimeEnd {
+pub(crate) struct RuntimeEnd {
     /// What its threads came back with.
-    pub run: Run,
+    pub(crate) run: Run,
     /// From where frame numbers go on.
-    pub numbers: Numbers,
+    pub(crate) numbers: Numbers,
 }
 
 impl Runtime {
@@ -152,7 +152,7 @@ impl Runtime {
     ///
     /// # Errors
     /// Why not.
-    pub fn open(
+    pub(crate) fn open(
         config: Arc<Config>,
         purpose: Purpose,
         numbers: &Numbers,
@@ -211,14 +211,14 @@ impl Runtime {
 
     /// What it is led and watched by.
     #[must_use]
-    pub fn control(&self) -> Control {
+    pub(crate) fn control(&self) -> Control {
         let RuntimeHandle { desk, live, leave, .. } = &self.handle;
         Control { desk: Arc::clone(desk), live: Arc::clone(live), leave: Arc::clone(leave) }
     }
 
     /// Whose hall it is.
     #[must_use]
-    pub const fn config(&self) -> &Arc<Config> {
+    pub(crate) const fn config(&self) -> &Arc<Config> {
         &self.handle.config
     }
 
@@ -243,7 +243,7 @@ impl Runtime {
     ///
     /// # Panics
     /// If one of its threads panicked.
-    pub fn run(
+    pub(crate) fn run(
         mut self,
         lead: impl FnOnce(RuntimeHandle, Line) -> Option<Thread>,
     ) -> Result<RuntimeEnd, RuntimeError> {

@@ -37,8 +37,7 @@ mod testing;
 mod tests;
 mod warnings;
 
-pub(crate) use reload::Carryover;
-pub use reload::Signals;
+pub(crate) use reload::{Carryover, Signals};
 pub(crate) use service_log::ServiceLog;
 
 use std::collections::VecDeque;

@@ -55,17 +55,17 @@ impl Carryover {
 
 /// What the system asks of the program; set by signals.
 #[derive(Debug, Clone, Default)]
-pub struct Signals {
+pub(crate) struct Signals {
     /// Park, and end.
-    pub leave: Arc<AtomicBool>,
+    pub(crate) leave: Arc<AtomicBool>,
     /// Read the configuration anew.
-    pub reload: Arc<AtomicBool>,
+    pub(crate) reload: Arc<AtomicBool>,
 }
 
 impl Signals {
     /// True if the program is to end.
     #[must_use]
-    pub fn is_leaving(&self) -> bool {
+    pub(crate) fn is_leaving(&self) -> bool {
         self.leave.load(Ordering::Acquire)
     }
 }

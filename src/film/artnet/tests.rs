@@ -1,7 +1,7 @@
 use std::net::Ipv4Addr;
 
 use super::*;
-use crate::harness::film::{Luck, mono};
+use crate::harness::shown::{Luck, mono};
 use crate::time::ShowTime;
 
 /// As `ola_timecode` sends 01:02:03:04 of type 1.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::film::follower::tests::tries;
-use crate::harness::film::{Luck, mono};
+use crate::harness::shown::{Luck, mono};
 
 const FRAME: Duration = Duration::from_millis(10);
 

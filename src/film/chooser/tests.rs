@@ -1,5 +1,5 @@
 use super::*;
-use crate::harness::film::{Luck, mono};
+use crate::harness::shown::{Luck, mono};
 
 fn view(t: f64, ahead_s: f64, state: FilmState) -> SourceView {
     let media = ShowTime::from_secs_f64(t + ahead_s);

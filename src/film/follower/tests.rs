@@ -1,6 +1,6 @@
 use super::*;
 use crate::film::point::FilmState;
-use crate::harness::film::{Luck, mono};
+use crate::harness::shown::{Luck, mono};
 
 fn point(t: f64, media_s: f64, rate: f64) -> FilmPoint {
     FilmPoint {

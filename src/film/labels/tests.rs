@@ -1,5 +1,5 @@
 use super::*;
-use crate::harness::film::{Luck, mono};
+use crate::harness::shown::{Luck, mono};
 
 const START: &str = "01:00:00:00";
 

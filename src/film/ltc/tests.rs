@@ -7,7 +7,7 @@ use crate::film::follower::tests::tries;
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::timecode::FrameRate;
 use crate::film::tracker::{SourceKind, SourceTracker};
-use crate::harness::film::{Luck, TrueFilm, mono};
+use crate::harness::shown::{Luck, TrueFilm, mono};
 use crate::time::MonoTime;
 
 const SAMPLES: u32 = 48_000;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::film::point::FilmState;
 use crate::film::tracker::{SourceKind, SourceTracker};
-use crate::harness::film::{Luck, TrueFilm, mono};
+use crate::harness::shown::{Luck, TrueFilm, mono};
 
 /// What a client makes of lines that come at 1 s.
 fn told(client: &mut MpvClient, lines: &str) -> Vec<FilmWord> {

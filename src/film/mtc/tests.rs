@@ -1,6 +1,6 @@
 use super::*;
 use crate::film::tracker::{SourceKind, SourceTracker};
-use crate::harness::film::{Luck, TrueFilm, mono};
+use crate::harness::shown::{Luck, TrueFilm, mono};
 use crate::time::ShowTime;
 
 fn start() -> Label {

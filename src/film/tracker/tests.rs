@@ -1,7 +1,7 @@
 //! Each kind of source in virtual time, with goals (F1 to F8 of the chase), and what is told beside positions.
 
 use super::*;
-use crate::harness::film::{Luck, SOURCES, Told, TrueFilm, mono};
+use crate::harness::shown::{Luck, SOURCES, Told, TrueFilm, mono};
 
 /// What the seats may be asked to follow without anybody having configured more.
 const BAND: f64 = 0.0015;

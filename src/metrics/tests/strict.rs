@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Default)]
 pub(super) struct Page {
     /// The families that were declared.
-    pub families: BTreeSet<String>,
+    pub(crate) families: BTreeSet<String>,
     /// Each series as it is written, labels included, with its value.
-    pub samples: BTreeMap<String, f64>,
+    pub(crate) samples: BTreeMap<String, f64>,
 }
 
 struct Family {

@@ -12,7 +12,7 @@ use crate::wire::{Code, Dialect, MAX_LEN, PerAxis, Report, Status, Words};
 impl Controller {
     /// When it says something unasked next; `None` where it does not.
     #[must_use]
-    pub fn report_due(&self) -> Option<MonoTime> {
+    pub(crate) fn report_due(&self) -> Option<MonoTime> {
         (self.report_at != NEVER).then_some(self.report_at)
     }
 

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::sim::Refused;
+use crate::sim::counts::Refused;
 use crate::wire::{
     Analogue, FrameNo, Motion, MotionReply, ReadRequest, RegisterReply, Timing, Vibration, VibrationPort,
     Words, WriteRequest,
