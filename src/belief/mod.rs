@@ -274,7 +274,9 @@ impl Belief {
     /// The same where a frame is to go there next: it was known only just now, whichever way the answer took.
     #[must_use]
     pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
-        self.pose(now).filter(|_| self.is_of_now(now, 1))
+        // Where no acks are asked for nobody reads either.
+        let within = if self.asks { BEGINS + self.period } else { FRESH };
+        self.pose(now).filter(|_| self.is_recent(now, within))
     }
 
     fn is_a_point(&self) -> bool {
@@ -284,9 +286,8 @@ impl Belief {
     /// The pose about which a seat vibrates on that was cut off; none where it is not known to be there and to do nothing else.
     #[must_use]
     pub(crate) fn vibrates_about(&self, now: MonoTime) -> Option<&Pose> {
-        let is_known = self.within == self.own && self.sways > 0.0;
-        let begins = is_known && self.is_of_now(now, 1);
-        begins.then(|| self.spans.last())
+        let is_known = self.within == self.own && self.sways > 0.0 && self.is_fresh(now);
+        is_known.then(|| self.spans.last())
     }
 
     /// The amplitude, strokes, with which a seat may vibrate by the frames that it was sent; 0 once one without is known to have arrived.
@@ -332,12 +333,6 @@ impl Belief {
         self.is_recent(now, FRESH)
     }
 
-    /// Whether a motion may begin from what is known; so many periods after it may pass until the frame leaves. Where no acks are
-    /// asked for nobody reads either.
-    fn is_of_now(&self, now: MonoTime, periods: u32) -> bool {
-        self.is_recent(now, if self.asks { BEGINS + periods * self.period } else { FRESH })
-    }
-
     fn is_recent(&self, now: MonoTime, within: Duration) -> bool {
         match self.known {
             Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= within,
@@ -357,7 +352,7 @@ impl Belief {
     #[must_use]
     pub(crate) fn allows(&self, pose: &Pose, lasts_ms: u32, now: MonoTime) -> bool {
         let time = f64::from(lasts_ms);
-        if self.within != 0 && self.is_quiet(now) && !self.is_of_now(now, 2) {
+        if self.is_quiet(now) && !self.is_fresh(now) && self.within != 0 {
             return false;
         }
         let from_all = self.may_be_anywhere_between(now);

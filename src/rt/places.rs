@@ -99,7 +99,7 @@ impl Places {
             if !is_unseen && !engine.rests_at(lane).is_some_and(|pose| belief.contradicts(pose)) {
                 continue;
             }
-            let flows = moving && self.moved;
+            let flows = moving && self.moved && mail.live().has_reader();
             if let Some(known) = if flows { belief.start(now) } else { belief.pose(now) } {
                 engine.found(lane, &known, belief.near());
             } else if is_unseen && moving && self.waits.is_none() {
@@ -163,10 +163,13 @@ impl Places {
 
     /// Whether a lane's seat is still to be read.
     fn is_open(&self, lane: usize, wait: &Wait, engine: &Engine, now: MonoTime) -> bool {
+        let motion = engine.lane(lane);
         if wait.begins {
-            engine.lane(lane).takes_part() && !self.lanes[lane].belief.may_begin(wait.since, now)
+            // The way of one that is blind is slow enough from wherever it is.
+            let is_led = motion.takes_part() && !motion.is_blind();
+            is_led && !self.lanes[lane].belief.may_begin(wait.since, now)
         } else {
-            engine.lane(lane).is_unseen()
+            motion.is_unseen()
         }
     }
 
@@ -179,7 +182,8 @@ impl Places {
         }
         let belief = &self.lanes[lane].belief;
         // What begins meanwhile has it read once more.
-        match if self.moved { belief.start(now) } else { belief.pose(now) } {
+        let flows = self.moved && mail.live().has_reader();
+        match if flows { belief.start(now) } else { belief.pose(now) } {
             Some(known) => engine.found(lane, &known, belief.near()),
             None if let Some(pose) = belief.vibrates_about(now) => engine.still(lane, pose),
             None if belief.is_measured_in_part() => {

@@ -49,7 +49,8 @@ impl<F: FnMut(&mut Tracker)> Ledger for F {
 #[derive(Debug)]
 pub struct Books {
     tracker: Tracker,
-    waiting: Vec<Reply>,
+    /// Each, and whether it was there before the record of its frame.
+    waiting: Vec<(Reply, bool)>,
 }
 
 impl Books {
@@ -80,7 +81,7 @@ impl Books {
                 self.give_up_waiting(ledger);
             }
         }
-        self.waiting.push(reply);
+        self.waiting.push((reply, false));
     }
 
     /// Ends a drain that began at `began`: matches all replies, then expires the frames that are too old.
@@ -101,18 +102,24 @@ impl Books {
     /// one will tell.
     fn match_all(&mut self, now: MonoTime, ledger: &mut impl Ledger) {
         let tracker = &mut self.tracker;
-        self.waiting.retain(|reply| {
+        self.waiting.retain_mut(|(reply, is_early)| {
             let early = !tracker.recorded(reply.controller, reply.frame);
             if early && now.since(reply.at) <= ACK_TIMEOUT {
+                *is_early = true;
                 return true;
             }
-            ledger.on_fate(reply, tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at));
+            let fate = if *is_early {
+                tracker.on_early_reply(reply)
+            } else {
+                tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at)
+            };
+            ledger.on_fate(reply, fate);
             false
         });
     }
 
     fn give_up_waiting(&mut self, ledger: &mut impl Ledger) {
-        for reply in self.waiting.drain(..) {
+        for (reply, _) in self.waiting.drain(..) {
             let fate = self.tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
             ledger.on_fate(&reply, fate);
         }

@@ -82,6 +82,16 @@ struct Command {
     foreign: bool,
 }
 
+/// A frame that was executed.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    sent_ns: u64,
+    time_ms: f64,
+    number: u32,
+    /// That of the newest: this may be an old one that the network repeats.
+    newest: u32,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Move {
     from: [f64; 12],
@@ -124,8 +134,8 @@ pub(crate) struct Seat {
     jogged: bool,
     queue: VecDeque<Command>,
     last_absolute: Option<u32>,
-    /// When the frame was sent that was executed last, its number, and that of the newest: it may be an old one that the network repeats.
-    executed: Option<(u64, u32, u32)>,
+    /// What was executed last.
+    executed: Option<Last>,
     /// Where somebody moved it by hand last: how fast, pulses a nanosecond, from when to when.
     by_hand: ([f64; 12], u64, u64),
     came: Option<(u64, u64)>,
@@ -363,26 +373,31 @@ impl Seat {
         }
         // The first frame that comes ends it.
         self.by_hand = ([0.0; 12], 0, 0);
-        let newest = self.last_of_motion(&command).map_or(0, |(.., newest)| newest).max(command.number);
-        self.executed = Some((command.sent_ns, command.number, newest));
+        let newest = self.last_of_motion(&command).map_or(0, |last| last.newest).max(command.number);
+        let (sent_ns, time_ms, number) = (command.sent_ns, executed.time_ms, command.number);
+        self.executed = Some(Last { sent_ns, time_ms, number, newest });
     }
 
     /// What was executed last, if the command goes on with that motion.
-    fn last_of_motion(&self, command: &Command) -> Option<(u64, u32, u32)> {
-        self.executed.filter(|(sent, ..)| sent.abs_diff(command.sent_ns) < ONE_MOTION)
+    fn last_of_motion(&self, command: &Command) -> Option<Last> {
+        self.executed.filter(|last| last.sent_ns.abs_diff(command.sent_ns) < ONE_MOTION)
     }
 
     /// How long that took, as far as README admits it, which the command makes up for: the frames that were lost since the newest, and
-    /// those by which an older one took the seat back that the network repeated; or the first of a motion. While the program stands
+    /// those by which an older one takes the seat back that the network repeats; or the first of a motion. While the program stands
     /// still it sends none that could be lost.
     fn makes_up_ms(&self, command: &Command) -> f64 {
         let (period_ms, admitted_ms) = (self.settings.period_ms, self.admitted_ms(command));
+        let repeated_ms = ADMITTED as f64 / MS as f64;
         let frames = |one: u32, other: u32| f64::from(one.abs_diff(other)) * period_ms;
-        if let Some((_, number, newest)) = self.last_of_motion(command)
+        if let Some(Last { time_ms, number, newest, .. }) = self.last_of_motion(command)
             && frames(newest, command.number) <= admitted_ms
-            && frames(newest, number) <= ADMITTED as f64 / MS as f64
+            && frames(newest, number) <= repeated_ms
         {
-            return frames(number, command.number);
+            // The last one may have taken longer than others.
+            let longer_ms = if command.number < number { time_ms - period_ms } else { 0.0 };
+            let apart_ms = frames(number, command.number);
+            return apart_ms + longer_ms.clamp(0.0, (repeated_ms - apart_ms).max(0.0));
         }
         let apart_ms = (command.sent_ns - command.lost_since) as f64 / MS as f64 + period_ms;
         if apart_ms <= admitted_ms { apart_ms } else { 0.0 }
