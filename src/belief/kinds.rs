@@ -54,6 +54,8 @@ pub enum Fall {
     Astray,
     /// It was out, and is to take part again.
     PutBack,
+    /// It was found, but what was read of it is not of now.
+    Stale,
 }
 
 /// A frame that the kernel took.

@@ -35,6 +35,9 @@ const GAP_UNTOLD: Duration = Duration::from_millis(100);
 /// LaneEvidence of a seat to which no frames go is too old for a motion to begin after this: beats come four times a second,
 /// three axes each, and one of them may be lost.
 pub(crate) const FRESH: Duration = Duration::from_millis(1_500);
+/// The first frame of a motion leaves so long after its seat was read, and two periods, at the most: an answer may be held back on its
+/// way, and meanwhile the seat is moved by hand.
+const BEGINS: Duration = Duration::from_millis(100);
 /// Frames further apart are not one motion: what comes after begins anew, from evidence. Hold frames are 100 ms apart.
 const QUIET: Duration = Duration::from_millis(500);
 /// What a seat may take to come to rest after the Time of its last frame is over; a reading before that is of a motion.
@@ -140,7 +143,6 @@ impl Belief {
 
     /// What is known, and from which evidence.
     #[must_use]
-    #[cfg(test)]
     pub(crate) const fn known(&self) -> Known {
         self.known
     }
@@ -269,6 +271,14 @@ impl Belief {
         is_known.then(|| KnownPose(*self.spans.last()))
     }
 
+    /// The same where a frame is to go there next: it was known only just now, whichever way the answer took.
+    #[must_use]
+    pub(crate) fn start(&self, now: MonoTime) -> Option<KnownPose> {
+        // Where no acks are asked for nobody reads either.
+        let within = if self.asks { BEGINS + self.period } else { FRESH };
+        self.pose(now).filter(|_| self.is_recent(now, within))
+    }
+
     fn is_a_point(&self) -> bool {
         self.sways == 0.0 && self.spans.is_a_point()
     }
@@ -286,11 +296,12 @@ impl Belief {
         self.shaking.amplitude()
     }
 
-    /// Whether the seat was read since then and is known to be at rest; where no acks are asked for, whether it is known at all.
+    /// Whether a motion that was asked for at `since` may begin: the seat was read since then, and only just now, and is known to be at
+    /// rest; where no acks are asked for, whether it is known at all.
     #[must_use]
-    pub(crate) fn is_known_since(&self, since: MonoTime, now: MonoTime) -> bool {
+    pub(crate) fn may_begin(&self, since: MonoTime, now: MonoTime) -> bool {
         let read = !self.asks || matches!(self.known, Known::Measured(at, _) if at >= since);
-        read && self.pose(now).is_some()
+        read && self.start(now).is_some()
     }
 
     /// Whether a reading told where some axes are, and of others nothing is known.
@@ -319,8 +330,12 @@ impl Belief {
     }
 
     fn is_fresh(&self, now: MonoTime) -> bool {
+        self.is_recent(now, FRESH)
+    }
+
+    fn is_recent(&self, now: MonoTime, within: Duration) -> bool {
         match self.known {
-            Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= FRESH,
+            Known::Measured(at, _) | Known::Confirmed(at) => now.since(at) <= within,
             Known::Commanded(_) => !self.asks,
             Known::Nothing | Known::Contradicted(_) => false,
         }

@@ -184,6 +184,16 @@ fn a_motion_begins_from_evidence_after_half_a_second_without_frames() {
 }
 
 #[test]
+fn a_motion_that_was_asked_for_may_begin_a_tenth_of_a_second_and_a_period_after_a_reading_since_then_and_no_later()
+ {
+    let mut bench = Bench::found(0.5);
+    bench.read(0.5, 300, true);
+    let may_begin = |since, now| bench.belief.may_begin(ms(since), ms(now));
+    assert!(may_begin(300, 410) && !may_begin(300, 411) && !may_begin(301, 310));
+    assert!(bench.belief.pose(ms(411)).is_some() && bench.belief.start(ms(411)).is_none());
+}
+
+#[test]
 fn a_frame_that_waits_for_another_is_counted_as_late_and_one_that_waits_for_several_as_hurried() {
     let mut bench = Bench::found(0.0);
     bench.send(0.0, 100, 0);

@@ -93,7 +93,7 @@ impl Engine {
 
     /// True if no frame tells a lane that it is to rest: lanes in a lasting rest were told so, or so often that it is known which of
     /// them have not heard of it.
-    pub(super) fn sends_nothing(&self) -> bool {
+    pub(crate) fn sends_nothing(&self) -> bool {
         match &self.phase {
             Phase::Waiting(_) | Phase::Done => true,
             Phase::Holding(Holding { why: Rest::Paused | Rest::Stopped, frames, .. }) => {

@@ -330,7 +330,7 @@ impl Member {
         let why = match why {
             Fall::Gap => Why::Unsure(self.controller),
             Fall::Astray => Why::Astray(self.controller),
-            Fall::PutBack => Why::NotSeenYet,
+            Fall::PutBack | Fall::Stale => Why::NotSeenYet,
         };
         (self.unsure, self.seen, self.reading) = (Some(why), None, false);
         if why == Why::NotSeenYet {

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
-use crate::belief::{Belief, Fall, Found, Taken, Tally};
+use crate::belief::{Belief, Fall, Found, Known, Taken, Tally};
 use crate::drive::Lane;
 use crate::engine::{Beat, Engine, LaneOrder};
 use crate::net::Delivery;
@@ -32,12 +32,14 @@ struct Wait {
     since: MonoTime,
     /// When that was asked for last.
     asked: MonoTime,
+    /// When no seat was waited for last.
+    met: MonoTime,
     /// Whether nothing has begun yet: else the film runs on meanwhile.
     begins: bool,
 }
 
 /// How often seats are read that a motion waits for, and for how long it waits.
-const READ_EVERY: Duration = Duration::from_millis(110);
+const READ_EVERY: Duration = Duration::from_millis(50);
 const WAITS_FOR: Duration = Duration::from_millis(400);
 /// A seat to which no frame went for so long may have been moved by hand.
 const ASLEEP: Duration = Duration::from_millis(250);
@@ -97,7 +99,8 @@ impl Places {
             if !is_unseen && !engine.rests_at(lane).is_some_and(|pose| belief.contradicts(pose)) {
                 continue;
             }
-            if let Some(known) = belief.pose(now) {
+            let flows = moving && self.moved && mail.live().has_reader();
+            if let Some(known) = if flows { belief.start(now) } else { belief.pose(now) } {
                 engine.found(lane, &known, belief.near());
             } else if is_unseen && moving && self.waits.is_none() {
                 engine.order(lane, LaneOrder::FallOut(Fall::Gap));
@@ -113,16 +116,16 @@ impl Places {
             place.belief.forget();
             engine.order(lane, LaneOrder::LoseSight);
         }
-        self.wait(mail, now, false);
+        self.wait(mail, now, self.waits.is_some_and(|wait| wait.begins));
     }
 
     fn wait(&mut self, mail: &Mail, now: MonoTime, begins: bool) {
-        self.waits = Some(Wait { since: now, asked: now, begins });
+        self.waits = Some(Wait { since: now, asked: now, met: now, begins });
         mail.live().want(now);
     }
 
-    /// Whether a motion may go on. One that begins waits until all seats were read since it was asked for, some milliseconds; a seat
-    /// that moves meanwhile, or does not answer, is left out.
+    /// Whether a motion may go on. One that begins waits until all seats were read since it was asked for, some milliseconds, and goes on
+    /// reading them until its way is planned and its first frame leaves; a seat that moves meanwhile, or does not answer, is left out.
     pub(super) fn may_go_on(
         &mut self,
         engine: &mut Engine,
@@ -131,30 +134,43 @@ impl Places {
         moving: bool,
     ) -> bool {
         let moved = std::mem::replace(&mut self.moved, moving);
-        if moving && !moved && mail.live().has_reader() {
+        // Whoever parks may rest until one comes back that is waited for, and go on then.
+        let rests = self.waits.is_none() && engine.sends_nothing();
+        if moving && (!moved || rests) && mail.live().has_reader() {
             self.wait(mail, now, true);
         }
-        let Some(Wait { since, asked, begins }) = self.waits.filter(|_| moving) else {
-            self.waits = None;
-            return true;
-        };
-        let is_open = |(lane, place): (usize, &Place)| {
-            engine.lane(lane).takes_part() && !place.belief.is_known_since(since, now)
-        };
-        if now.since(since) < WAITS_FOR && self.lanes.iter().enumerate().any(is_open) {
-            if now.since(asked) >= READ_EVERY {
-                self.waits = Some(Wait { asked: now, since, begins });
-                mail.live().want(now);
-            }
-            return !begins;
-        }
-        self.waits = None;
-        for (lane, Place { belief, .. }) in self.lanes.iter().enumerate() {
-            if engine.lane(lane).takes_part() && !belief.is_known_since(since, now) {
+        let Some(mut wait) = self.waits.take().filter(|_| moving) else { return true };
+        let is_over = now.since(wait.met) >= WAITS_FOR;
+        let mut goes_on = true;
+        for lane in 0..self.lanes.len() {
+            let is_open = self.is_open(lane, &wait, engine, now);
+            if is_open && is_over {
                 engine.order(lane, LaneOrder::FallOut(Fall::Gap));
             }
+            goes_on &= is_over || !is_open;
         }
-        true
+        if goes_on {
+            wait.met = now;
+        }
+        if now.since(wait.asked) >= READ_EVERY {
+            wait.asked = now;
+            mail.live().want(now);
+        }
+        // One that begins is over with the first frame.
+        self.waits = Some(wait).filter(|wait| wait.begins || !goes_on);
+        goes_on || !wait.begins
+    }
+
+    /// Whether a lane's seat is still to be read.
+    fn is_open(&self, lane: usize, wait: &Wait, engine: &Engine, now: MonoTime) -> bool {
+        let motion = engine.lane(lane);
+        if wait.begins {
+            // The way of one that is blind is slow enough from wherever it is.
+            let is_led = motion.takes_part() && !motion.is_blind();
+            is_led && !self.lanes[lane].belief.may_begin(wait.since, now)
+        } else {
+            motion.is_unseen()
+        }
     }
 
     /// A controller takes part again. Where its seat stands is known by what was read since the last frame went to it; else it
@@ -165,12 +181,17 @@ impl Places {
             return; // it is looked at again as soon as it is away
         }
         let belief = &self.lanes[lane].belief;
-        match belief.pose(now) {
+        // What begins meanwhile has it read once more.
+        let flows = self.moved && mail.live().has_reader();
+        match if flows { belief.start(now) } else { belief.pose(now) } {
             Some(known) => engine.found(lane, &known, belief.near()),
             None if let Some(pose) = belief.vibrates_about(now) => engine.still(lane, pose),
             None if belief.is_measured_in_part() => {
                 engine.order(lane, LaneOrder::Cut);
                 mail.post(Sent::Unread { lane: number(lane) });
+            }
+            None if matches!(belief.known(), Known::Measured(..)) => {
+                engine.order(lane, LaneOrder::FallOut(Fall::Stale));
             }
             None => engine.order(lane, LaneOrder::FallOut(Fall::Gap)),
         }
@@ -217,6 +238,7 @@ impl Places {
     /// Notes what became of a frame.
     #[inline]
     pub fn sent(&mut self, lane: usize, taken: &Taken<'_>, delivery: Delivery) {
+        self.waits = self.waits.filter(|wait| !wait.begins);
         let belief = &mut self.lanes[lane].belief;
         match delivery {
             Delivery::Sent | Delivery::SentAfterRefusal => belief.taken(taken),

@@ -46,6 +46,11 @@ impl Account {
         self.ring.ahead(frame) == 0
     }
 
+    /// Whether a frame waits for its reply of which it is known when it was sent.
+    pub(super) fn is_timed(&self, frame: FrameNo) -> bool {
+        matches!(self.ring.find(frame), Place::Kept(index) if self.ring.get(index).state == State::InFlight)
+    }
+
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         let Some(unrecorded) = self.ring.ahead(frame).checked_sub(1) else { return };
         self.recorded_at = at;

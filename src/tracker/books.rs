@@ -49,7 +49,8 @@ impl<F: FnMut(&mut Tracker)> Ledger for F {
 #[derive(Debug)]
 pub struct Books {
     tracker: Tracker,
-    waiting: Vec<Reply>,
+    /// Each, and whether it was there before the record of its frame.
+    waiting: Vec<(Reply, bool)>,
 }
 
 impl Books {
@@ -80,7 +81,7 @@ impl Books {
                 self.give_up_waiting(ledger);
             }
         }
-        self.waiting.push(reply);
+        self.waiting.push((reply, false));
     }
 
     /// Ends a drain that began at `began`: matches all replies, then expires the frames that are too old.
@@ -101,18 +102,24 @@ impl Books {
     /// one will tell.
     fn match_all(&mut self, now: MonoTime, ledger: &mut impl Ledger) {
         let tracker = &mut self.tracker;
-        self.waiting.retain(|reply| {
+        self.waiting.retain_mut(|(reply, is_early)| {
             let early = !tracker.recorded(reply.controller, reply.frame);
             if early && now.since(reply.at) <= ACK_TIMEOUT {
+                *is_early = true;
                 return true;
             }
-            ledger.on_fate(reply, tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at));
+            let fate = if *is_early {
+                tracker.on_early_reply(reply)
+            } else {
+                tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at)
+            };
+            ledger.on_fate(reply, fate);
             false
         });
     }
 
     fn give_up_waiting(&mut self, ledger: &mut impl Ledger) {
-        for reply in self.waiting.drain(..) {
+        for (reply, _) in self.waiting.drain(..) {
             let fate = self.tracker.on_reply(reply.controller, reply.frame, reply.code, reply.at);
             ledger.on_fate(&reply, fate);
         }
@@ -160,6 +167,19 @@ mod tests {
         books.settle(ms(15), &mut |tracker: &mut Tracker| tracker.on_sent(0, FrameNo(2), true, ms(11)));
         let counts = books.tracker().counts(0);
         assert_eq!((counts.asked, counts.acked, counts.stray), (2, 1, 0));
+    }
+
+    #[test]
+    fn a_reply_that_came_before_its_frame_was_sent_is_to_none_of_these() {
+        let mut books = books();
+        let sent = &mut |tracker: &mut Tracker| tracker.on_sent(0, FrameNo(1), true, ms(500));
+        books.on_reply(reply(1, ms(3)), &mut |_: &mut Tracker| ());
+        books.settle(ms(5), &mut |_: &mut Tracker| ());
+        books.settle(ms(501), sent);
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (0, 1));
+        books.on_reply(reply(1, ms(501)), &mut |_: &mut Tracker| ());
+        books.settle(ms(502), &mut |_: &mut Tracker| ());
+        assert_eq!((books.tracker().counts(0).acked, books.tracker().counts(0).stray), (1, 1));
     }
 
     #[test]

@@ -85,6 +85,17 @@ impl Tracker {
         self.accounts[controller].on_reply(frame, code, at, &mut self.latency)
     }
 
+    /// A reply that was there before the record of its frame: it is to one that this program sent before it was started anew, unless the
+    /// record itself was dropped.
+    fn on_early_reply(&mut self, reply: &Reply) -> Fate {
+        let Reply { controller, frame, code, at, .. } = *reply;
+        if !self.accounts[controller].is_timed(frame) {
+            return self.on_reply(controller, frame, code, at);
+        }
+        self.on_stray(controller);
+        Fate::Stray
+    }
+
     /// A datagram from a controller that is no reply to a frame.
     pub(crate) fn on_stray(&mut self, controller: usize) {
         self.accounts[controller].counts.stray += 1;

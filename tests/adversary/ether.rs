@@ -263,6 +263,8 @@ impl Line {
 
     fn take(&mut self, octets: &[u8], (now, sent): (u64, u64), asked: bool, dice: &mut Dice) -> Delivery {
         let moves = matches!(octets.get(4), Some(0x13 | 0x14 | 0x18 | 0x19));
+        // What was lost of an earlier motion is none of this.
+        self.lost_since = self.lost_since.filter(|_| !moves || now <= self.newest + JUST);
         let lost_since = if moves { *self.lost_since.get_or_insert(sent) } else { sent };
         if moves {
             if now > self.newest + JUST && self.seat.is_just_disturbed(now) {

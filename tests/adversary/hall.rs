@@ -72,6 +72,8 @@ pub(crate) struct Hall<'h, 'l> {
     /// Orders to home that each seat had heard before the last homing.
     homings: Vec<u32>,
     ready: bool,
+    /// What somebody wanted last that moves seats.
+    wanted: Option<Transition>,
     show_over: bool,
     pub(crate) closed: bool,
     pub(crate) diary: Option<Vec<String>>,
@@ -118,6 +120,7 @@ pub(crate) fn open<T>(
             homing: None,
             homings: Vec::new(),
             ready: false,
+            wanted: None,
             show_over: false,
             closed: false,
             diary: None,
@@ -223,7 +226,8 @@ impl Hall<'_, '_> {
         while let Ok(news) = self.runtime.news.pop() {
             match news {
                 News::Refused(refusal) => {
-                    if !self.state.may_send_motion() {
+                    // Another thing may be asked for since.
+                    if !self.state.may_send_motion() && self.wanted == Some(refusal.asked) {
                         self.ether.world().asked = false;
                     }
                     self.note(|| format!("refused: {:?}, {:?}", refusal.asked, refusal.why));
@@ -346,14 +350,20 @@ impl Hall<'_, '_> {
     pub(crate) fn ask(&mut self, request: Transition) {
         self.note(|| format!("asks: {request:?}"));
         if matches!(request, Transition::Go | Transition::Resume | Transition::Park) {
-            let (now, world) = (self.ether.ns(), &mut *self.ether.world());
-            (world.asked, world.asked_at) = (true, now);
+            self.wants(request);
         }
         if request == Transition::Stop {
             self.runtime.desk.stop();
         } else {
             self.command(Command::Request(request));
         }
+    }
+
+    /// Somebody wants the seats to move.
+    fn wants(&mut self, request: Transition) {
+        self.wanted = Some(request);
+        let (now, world) = (self.ether.ns(), &mut *self.ether.world());
+        (world.asked, world.asked_at) = (true, now);
     }
 
     pub(crate) fn seek(&mut self, ms: i64) {
@@ -404,6 +414,10 @@ impl Hall<'_, '_> {
     /// Somebody wants the hall to close.
     pub(crate) fn leave(&mut self) {
         self.note(|| "the hall is to close".to_owned());
+        // It parks first.
+        if matches!(self.state, State::Playing(_) | State::Paused) {
+            self.wants(Transition::Park);
+        }
         self.runtime.leave.store(true, Ordering::Relaxed);
     }
 }

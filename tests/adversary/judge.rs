@@ -5,8 +5,12 @@ use std::fmt;
 /// Losses, repeats and changes of order within this long are what README admits: what was to take so long is made up for in
 /// one frame.
 const ADMITTED_MS: f64 = 50.0;
+/// Replies are read so often.
+const UNREAD_MS: f64 = 5.0;
 /// How much faster than its type allows a seat may be: roundings of pulses and milliseconds.
 const SLACK: f64 = 1.01;
+/// So long before its first frame, and two periods, a hall may have read a seat that is moved by hand meanwhile.
+const READ_BEFORE_MS: f64 = 100.0;
 /// Pulses that rounding may add to a distance.
 const ROUNDING: f64 = 2.0;
 /// Pulses of the axes that are judged: 5 mm a turn of 10,000 pulses.
@@ -55,7 +59,12 @@ impl fmt::Display for Breach {
 /// It is twice as much where nobody told the hall which frames had come.
 pub(crate) fn admitted_ms(period_ms: f64, jitter_ms: f64, is_untold: bool) -> f64 {
     let lost = if is_untold { 2.0 * ADMITTED_MS } else { ADMITTED_MS };
-    lost + 2.0 * period_ms + jitter_ms
+    lost + UNREAD_MS + 2.0 * period_ms + jitter_ms
+}
+
+/// How long before it sends the first frame of a motion a hall may have read the seat.
+pub(crate) fn read_before_ns(period_ms: f64) -> u64 {
+    ((READ_BEFORE_MS + 2.0 * period_ms) * 1e6) as u64
 }
 
 /// One move of one frame, as the seat executes it.
@@ -67,12 +76,12 @@ pub(crate) struct Executed {
     pub(crate) ms: f64,
     /// What its Time said.
     pub(crate) time_ms: f64,
-    /// From the sending of the frame that was executed before to that of this one.
-    pub(crate) apart_ms: f64,
+    /// How long what was lost or repeated took that it makes up for, and that is admitted.
+    pub(crate) makes_up_ms: f64,
     /// Whether the network brought frames closer together than they were sent.
     pub(crate) bunched: bool,
-    /// How far apart they may have been sent.
-    pub(crate) admitted_ms: f64,
+    /// How far each axis was moved by hand since it may have been read last, pulses.
+    pub(crate) by_hand: [f64; 12],
     /// Whether somebody had asked for motion when it was sent.
     pub(crate) asked: bool,
 }
@@ -80,17 +89,16 @@ pub(crate) struct Executed {
 impl Executed {
     /// The first axis that goes too far, how far, mm, and in which way.
     pub(crate) fn verdict(&self, mm_s: f64) -> Option<(usize, f64, How)> {
-        let admitted = self.apart_ms <= self.admitted_ms;
         // What was lost for a moment is made up for in one frame; what came in a heap is executed in haste, where the seat is
         // set to.
         let time = if self.bunched { self.time_ms } else { self.ms };
-        let may_take = if admitted { time.max(self.apart_ms) } else { time };
-        let far = may_take * mm_s * PULSES_PER_MM / 1_000.0 * SLACK + ROUNDING;
-        let axis = (0..12).max_by(|a, b| self.far[*a].abs().total_cmp(&self.far[*b].abs()))?;
+        let far = time.max(self.makes_up_ms) * mm_s * PULSES_PER_MM / 1_000.0 * SLACK + ROUNDING;
+        let over = |axis: usize| self.far[axis].abs() - self.by_hand[axis];
+        let axis = (0..12).max_by(|a, b| over(*a).total_cmp(&over(*b)))?;
         let mm = self.far[axis].abs() / PULSES_PER_MM;
-        if self.far[axis].abs() > far {
+        if over(axis) > far {
             return Some((axis, mm, How::Fast));
         }
-        (!self.asked && mm > STILL_MM).then_some((axis, mm, How::Unasked))
+        (!self.asked && over(axis) > STILL_MM * PULSES_PER_MM).then_some((axis, mm, How::Unasked))
     }
 }

@@ -38,7 +38,7 @@ impl Person {
     /// Leads a hall until it closes.
     pub(crate) fn lead(&mut self, hall: &mut Hall<'_, '_>) -> Close {
         hall.planner_ns = self.dice.pick(&[1, 1, 8, 40]) * MS;
-        hall.acks_ns = self.dice.pick(&[5, 10]) * MS;
+        hall.acks_ns = self.dice.pick(&[1, 5]) * MS;
         hall.load(self.dice.range(0, 3) as usize);
         let booted = hall.comes_to(|state| state != State::Boot, self.dice.range(400, 1_500));
         hall.note(|| format!("booted: {booted}"));

@@ -84,7 +84,7 @@ fn what_was_lost_for_less_than_fifty_milliseconds_is_admitted_and_no_more() {
         let mut seat = seat(|_| {});
         hears(&mut seat, &frame(0x1401, 1, 10, 2.0), 0);
         let far = 2.0 + 0.2 * lost_ms as f64;
-        hears(&mut seat, &frame(0x1401, 2, 10, far), lost_ms);
+        hears(&mut seat, &frame(0x1401, 1 + lost_ms as u32 / 10, 10, far), lost_ms);
         mm(&mut seat, 1_000);
         assert_eq!(seat.breaches.len(), breaches, "{lost_ms} ms");
     }
@@ -142,6 +142,26 @@ fn what_another_master_moves_is_not_judged_and_what_the_hall_moves_after_it_is_o
         assert_eq!((mm(&mut seat, 250).round() as i32, seat.breaches.len()), (100, 0));
         hears(&mut seat, &frame(0x1401, 2, 10, 2.0), 300);
         assert_eq!((mm(&mut seat, 400).round() as i32, seat.breaches.len()), (2, breaches));
+    }
+}
+
+#[test]
+fn what_is_moved_by_hand_in_the_moment_before_the_first_frame_is_not_judged_and_what_was_before_is() {
+    for (jogged_ms, breaches) in [(300, 0), (200, 0), (0, 1)] {
+        let mut seat = seat(|_| {});
+        assert!(seat.jog(0, 60.0, BEGIN + jogged_ms * MS));
+        hears(&mut seat, &frame(0x1401, 1, 10, 0.0), 315);
+        assert_eq!((mm(&mut seat, 400), seat.breaches.len()), (0.0, breaches), "jogged at {jogged_ms} ms");
+    }
+}
+
+#[test]
+fn a_program_that_stood_still_has_lost_no_frames_meanwhile() {
+    for (number, breaches) in [(2, 1), (6, 0)] {
+        let mut seat = seat(|_| {});
+        hears(&mut seat, &frame(0x1401, 1, 10, 2.0), 0);
+        hears(&mut seat, &frame(0x1401, number, 10, 12.0), 60);
+        assert_eq!((mm(&mut seat, 200), seat.breaches.len()), (12.0, breaches), "frame {number}");
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use super::judge::{Breach, Executed, PULSES_PER_MM, admitted_ms};
+use super::judge::{Breach, Executed, PULSES_PER_MM, admitted_ms, read_before_ns};
 use super::words::{self, Frame, Heard};
 
 pub(crate) const MS: u64 = 1_000_000;
@@ -25,6 +25,8 @@ const LED: u64 = 150 * MS;
 const BUNCHED: u64 = 500 * MS;
 /// What README admits that may be lost.
 const ADMITTED: u64 = 50 * MS;
+/// Frames further apart may be of two programs, each with its own numbers.
+const ONE_MOTION: u64 = 300 * MS;
 /// Frames of another master further apart are of two.
 const BOUT: u64 = 1_000 * MS;
 /// For how long a seat is looked at before it counts as at rest.
@@ -80,6 +82,16 @@ struct Command {
     foreign: bool,
 }
 
+/// A frame that was executed.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    sent_ns: u64,
+    time_ms: f64,
+    number: u32,
+    /// That of the newest: this may be an old one that the network repeats.
+    newest: u32,
+}
+
 #[derive(Debug, Clone, Copy)]
 struct Move {
     from: [f64; 12],
@@ -122,8 +134,10 @@ pub(crate) struct Seat {
     jogged: bool,
     queue: VecDeque<Command>,
     last_absolute: Option<u32>,
-    /// When the frame was sent that was executed last.
-    executed: Option<u64>,
+    /// What was executed last.
+    executed: Option<Last>,
+    /// Where somebody moved it by hand last: how fast, pulses a nanosecond, from when to when.
+    by_hand: ([f64; 12], u64, u64),
     came: Option<(u64, u64)>,
     bunched_until: u64,
     /// Whether its queue has not run empty since frames came bunched.
@@ -172,6 +186,7 @@ impl Seat {
             queue: VecDeque::new(),
             last_absolute: None,
             executed: None,
+            by_hand: ([0.0; 12], 0, 0),
             came: None,
             bunched_until: 0,
             heaped: false,
@@ -239,6 +254,10 @@ impl Seat {
         let mut to = self.rest;
         to[axis] = (to[axis] + mm * PULSES_PER_MM).clamp(0.0, 150.0 * PULSES_PER_MM);
         self.go(to, JOG_MM_S, now, Why::Led);
+        if let Some(Move { from, to, begin, end, .. }) = self.moving {
+            let speed = std::array::from_fn(|axis| (to[axis] - from[axis]).abs() / (end - begin) as f64);
+            self.by_hand = (speed, begin, end);
+        }
         self.jogged = true;
         true
     }
@@ -344,26 +363,52 @@ impl Seat {
             far: std::array::from_fn(|axis| to[axis] - self.rest[axis]),
             ms: takes as f64 / MS as f64,
             time_ms: command.time_ns as f64 / MS as f64,
-            apart_ms: self.apart_ms(&command),
+            makes_up_ms: self.makes_up_ms(&command),
             bunched: bunched || self.settings.jitter_ms > 0.0,
-            admitted_ms: self.admitted_ms(&command),
+            by_hand: self.moved_by_hand(&command, now),
             asked: command.asked,
         };
         if !self.crowded {
             self.judge(&executed, command.number, now);
         }
-        self.executed = Some(command.sent_ns);
+        // The first frame that comes ends it.
+        self.by_hand = ([0.0; 12], 0, 0);
+        let newest = self.last_of_motion(&command).map_or(0, |last| last.newest).max(command.number);
+        let (sent_ns, time_ms, number) = (command.sent_ns, executed.time_ms, command.number);
+        self.executed = Some(Last { sent_ns, time_ms, number, newest });
     }
 
-    /// From the sending of the frame after which this one comes: of that which was executed before or, where that is long ago,
-    /// of the first of a motion that was lost since.
-    fn apart_ms(&self, command: &Command) -> f64 {
-        let ms = |ns: u64| ns as f64 / MS as f64;
-        let of_executed = self.executed.map_or(f64::INFINITY, |sent| ms(sent.abs_diff(command.sent_ns)));
-        if of_executed <= self.admitted_ms(command) {
-            return of_executed;
+    /// What was executed last, if the command goes on with that motion.
+    fn last_of_motion(&self, command: &Command) -> Option<Last> {
+        self.executed.filter(|last| last.sent_ns.abs_diff(command.sent_ns) < ONE_MOTION)
+    }
+
+    /// How long that took, as far as README admits it, which the command makes up for: the frames that were lost since the newest, and
+    /// those by which an older one takes the seat back that the network repeats; or the first of a motion. While the program stands
+    /// still it sends none that could be lost.
+    fn makes_up_ms(&self, command: &Command) -> f64 {
+        let (period_ms, admitted_ms) = (self.settings.period_ms, self.admitted_ms(command));
+        let repeated_ms = ADMITTED as f64 / MS as f64;
+        let frames = |one: u32, other: u32| f64::from(one.abs_diff(other)) * period_ms;
+        if let Some(Last { time_ms, number, newest, .. }) = self.last_of_motion(command)
+            && frames(newest, command.number) <= admitted_ms
+            && frames(newest, number) <= repeated_ms
+        {
+            // The last one may have taken longer than others.
+            let longer_ms = if command.number < number { time_ms - period_ms } else { 0.0 };
+            let apart_ms = frames(number, command.number);
+            return apart_ms + longer_ms.clamp(0.0, (repeated_ms - apart_ms).max(0.0));
         }
-        ms(command.sent_ns - command.lost_since) + self.settings.period_ms
+        let apart_ms = (command.sent_ns - command.lost_since) as f64 / MS as f64 + period_ms;
+        if apart_ms <= admitted_ms { apart_ms } else { 0.0 }
+    }
+
+    /// How far somebody has moved each axis by hand since the hall may have read it last before it sent this, pulses.
+    fn moved_by_hand(&self, command: &Command, now: u64) -> [f64; 12] {
+        let (speed, begin, end) = self.by_hand;
+        let read = command.sent_ns.saturating_sub(read_before_ns(self.settings.period_ms));
+        let lasts = end.min(now).saturating_sub(begin.max(read)) as f64;
+        speed.map(|speed| speed * lasts)
     }
 
     /// How far apart it and the frame before may have been sent.

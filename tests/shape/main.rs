@@ -32,20 +32,19 @@ const ROWS: &[Row] = &[
     ("circles within rooms", circles::within_rooms, Less, 2.0, 0.0),
     ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
     // By this count 49 where the target of 170 was set, of what were 192 then, lists of public fields among them.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 71.0, 43.0),
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 73.0, 43.0),
     ("pairs of runs, to the letter", repeats::to_the_letter, Less, 15.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
     // by MIDI, Art-Net, OSC, HTTP and the clock of the day, and for sync watch; 370 for the film of a hall and its
-    // status; 240 for an engine
-    // whose phases hold what is theirs, with types of their own for show time, lanes and what crosses to the planner; 150 for a limiter
-    // that judges axes in groups, and for seats that vibrate on.
-    ("lines of code", counts::lines_of_code, Less, 55_190.0, 39_800.0),
+    // status; 240 for an engine whose phases hold what is theirs, with types of their own for show time, lanes and what crosses to the planner; 150 for a limiter
+    // that judges axes in groups, and for seats that vibrate on; 45 for motions that begin from a reading of now.
+    ("lines of code", counts::lines_of_code, Less, 55_218.0, 39_800.0),
     // Two more for the film in the status, which tests make.
     ("public items and fields", counts::public_items, Less, 1_147.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 469.0, 390.0),
+    ("lines of the longest file", counts::longest_file, Less, 468.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.6, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];
