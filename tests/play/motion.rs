@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use rustix::process::Signal;
 
 use super::process::{Playing, Relay, Row, Sim, play};
-use super::{Folder, STROKE};
+use super::{Folder, STROKE, undisturbed};
 
 /// The greatest speed of the bench seat, and of any seat on its way to park, pulses/s: 240 and 50 mm/s.
 const LIMIT: f64 = 480_000.0;
@@ -48,15 +48,20 @@ fn no_axis_moves_faster_than_its_seat_may_and_none_parks_faster_than_50_mm_a_sec
     let cue = swing(&folder);
     // Without fast forward, so that a simulator that was held up does not hurry by itself.
     let start_sim = || Sim::one(&["--pa", "06=0"]);
-    let (whole, cut) = (start_sim(), start_sim());
-    let relay = Relay::start(&cut.addresses[0]);
-    let playing = Playing::start(&cue, &whole.to(), &["--json"]);
-    let stopped = Playing::start(&cue, &[relay.to()], &["--json", "--rate", "500"]);
-    relay.wait_for(|frame| frame.frame.0 == 900); // at full swing
-    stopped.signal(Signal::INT);
-    assert_eq!(stopped.finish().report_of(0)["result"], "stopped");
-    assert_eq!(playing.finish().report_of(0)["result"], "completed");
-    let (whole, cut) = (whole.end(), cut.end());
+    let (whole, cut) = undisturbed(|| {
+        let (whole, cut) = (start_sim(), start_sim());
+        let relay = Relay::start(&cut.addresses[0]);
+        let playing = Playing::start(&cue, &whole.to(), &["--json"]);
+        let stopped = Playing::start(&cue, &[relay.to()], &["--json"]);
+        relay.wait_for(|frame| frame.frame.0 >= 215); // at full swing, and its join is over
+        stopped.signal(Signal::INT);
+        let reports = [stopped.finish().report_of(0), playing.finish().report_of(0)];
+        assert_eq!(
+            reports.each_ref().map(|report| report["result"].as_str()),
+            [Some("stopped"), Some("completed")]
+        );
+        ((whole.end(), cut.end()), reports.to_vec())
+    });
     for seen in [&whole, &cut] {
         let (commanded, executed) = fastest(&seen.rows);
         assert!((LIMIT / 2.0..LIMIT * SLACK).contains(&commanded), "{commanded}");
