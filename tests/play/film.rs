@@ -13,7 +13,7 @@ use rustix::process::Signal;
 use serde_json::{Value, json};
 
 use super::process::{Guarded, Playing, Sim, kinocue};
-use super::{Folder, STROKE, pulses};
+use super::{Folder, STROKE, pulses, undisturbed};
 
 /// A cue that rises a third of the stroke in so many seconds, from rest to rest, and stays there for one more.
 fn rise(folder: &Folder, seconds: u32) -> std::path::PathBuf {
@@ -35,18 +35,20 @@ fn reel(folder: &Folder, start: &str, seconds: &str) -> String {
 
 #[test]
 fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park() {
-    let (folder, sim) = (Folder::new(), Sim::one(&[]));
-    let chase = format!("ltc:{}", reel(&folder, "00:59:58:00", "9"));
-    let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
-    let run = Playing::start(&rise(&folder, 4), &sim.to(), &args).finish();
-    let report = run.report_of(0);
-    assert_eq!(report["result"], "completed", "{}", run.stderr);
+    let (run, seen) = undisturbed(|| {
+        let (folder, sim) = (Folder::new(), Sim::one(&[]));
+        let chase = format!("ltc:{}", reel(&folder, "00:59:58:00", "9"));
+        let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
+        let run = Playing::start(&rise(&folder, 4), &sim.to(), &args).finish();
+        let report = run.report_of(0);
+        assert_eq!(report["result"], "completed", "{}", run.stderr);
+        ((run, sim.end()), vec![report])
+    });
     assert!(
         run.stderr.contains("waiting: ") && run.stderr.contains("parking: the cue is over"),
         "{}",
         run.stderr
     );
-    let seen = sim.end();
     assert!(seen.rest_in_park());
     // It is where the cue is at a time that goes on as the frames do.
     let rows: Vec<_> = seen.rows.iter().map(|row| (f64::from(row.frame), row.commanded[0])).collect();

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::process::{Playing, Relay, Row, Seen, Sim, play};
-use super::{Folder, NOD_MS, NOD_TOP, STROKE, pulses};
+use super::{Folder, NOD_MS, NOD_TOP, STROKE, pulses, undisturbed};
 
 fn functions(seen: &Seen) -> Vec<&str> {
     let mut all: Vec<&str> = seen.rows.iter().map(|row| row.function.as_str()).collect();
@@ -193,11 +193,13 @@ fn analogue_outputs_are_set_while_the_cue_lasts_and_off_at_the_end_with_either_d
 
 /// Plays a nod at this rate: every frame's number, its Time and what the first axis is told.
 fn at_rate(rate: &str) -> Vec<Row> {
-    let (folder, sim) = (Folder::new(), Sim::one(&[]));
-    let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json", "--rate", rate]).report_of(0);
+    let (report, seen) = undisturbed(|| {
+        let (folder, sim) = (Folder::new(), Sim::one(&[]));
+        let report = play(&folder.nod(&[0.1]), &sim.to(), &["--json", "--rate", rate]).report_of(0);
+        ((report.clone(), sim.end()), vec![report])
+    });
     assert_all_acked(&report);
     assert_eq!(report["rate_hz"].as_f64(), rate.parse().ok());
-    let seen = sim.end();
     assert!(seen.rest_in_park());
     seen.rows
 }
