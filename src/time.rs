@@ -83,6 +83,12 @@ impl ShowTime {
         self.0 as f64 * 1e-9
     }
 
+    /// How far it is after `start`; negative before it.
+    #[must_use]
+    pub(crate) const fn since(self, start: Self) -> Self {
+        Self(self.0.saturating_sub(start.0))
+    }
+
     /// The position nearest to `seconds`; not-a-number gives zero, what lies outside the range its end.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a saturating cast is what is wanted")]

@@ -52,7 +52,7 @@ impl Play {
         let rules = ChaseRules::until(timeline.duration());
         fit(&config, &timeline)?;
         keeps_limits(&at_any_pace(&config, rules.pace), &timeline, show.rate, manner.level)?;
-        Self::staged(config, timeline, show, manner, Some(LeadingFilm { source, rules }))
+        Self::staged(config, timeline, show, manner, Some(LeadingFilm { source, rules: Some(rules) }))
     }
 
     /// A play of frames that hold every seat at its park pose, whatever the cue asks for, effects off. It does not begin

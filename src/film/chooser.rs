@@ -30,7 +30,7 @@ impl SourceView {
 
     /// How far another film is ahead.
     const fn behind(&self, other: &Self) -> ShowTime {
-        ShowTime::from_nanos(other.point.media.as_nanos().saturating_sub(self.point.media.as_nanos()))
+        other.point.media.since(self.point.media)
     }
 
     /// Whether another says the same, so that the change is slewed: from one that is further off seats would have to join.

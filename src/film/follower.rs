@@ -113,7 +113,7 @@ impl Follower {
     /// How far the film, less the trim, is ahead of where the playhead would be at the end of a frame, seconds.
     #[must_use]
     pub(crate) fn error_s(&self, point: &FilmPoint, end: MonoTime, frame: Duration) -> f64 {
-        let ahead = point.media_at(end).as_nanos().saturating_sub(self.playhead.as_nanos());
+        let ahead = point.media_at(end).since(self.playhead).as_nanos();
         ShowTime::from_nanos(ahead).as_secs_f64() - self.trim_s - frame.as_secs_f64() * self.rate_of(point)
     }
 

@@ -104,8 +104,7 @@ impl PositionReader {
         }
         if told.media_ms.is_finite() {
             let media = ShowTime::from_secs_f64(told.media_ms / 1e3);
-            let media = ShowTime::from_nanos(media.as_nanos().saturating_sub(self.begin.as_nanos()));
-            out(Observation::new(at, FilmWord::Position(media)));
+            out(Observation::new(at, FilmWord::Position(media.since(self.begin))));
         }
     }
 }

@@ -182,12 +182,15 @@ impl FromStr for FilmSource {
     }
 }
 
+/// What stands before the comma, and the option behind it; an empty one where that is another.
+fn with_option<'t>(text: &'t str, key: &str) -> (&'t str, Option<&'t str>) {
+    let Some((first, more)) = text.split_once(',') else { return (text, None) };
+    (first, Some(more.strip_prefix(key).unwrap_or_default()))
+}
+
 impl NamedSender {
     fn of(text: &str, port: u16) -> Result<Self, FilmArgError> {
-        let (from, bind) = match text.split_once(',') {
-            None => (text, None),
-            Some((from, more)) => (from, Some(more.strip_prefix("bind=").unwrap_or(""))),
-        };
+        let (from, bind) = with_option(text, "bind=");
         let refuse = || {
             FilmArgError(format!(
                 "{text} names no sender; write its address, as 10.0.0.20, and after a comma where it is heard, as bind=0.0.0.0:{port}"
@@ -209,10 +212,7 @@ impl FromStr for ClockStart {
 
     /// An instant with its offset, a date and time of this machine's zone, or a time of today.
     fn from_str(text: &str) -> Result<Self, FilmArgError> {
-        let (time, most) = match text.split_once(',') {
-            None => (text, None),
-            Some((time, more)) => (time, Some(more.strip_prefix("max_error=").unwrap_or(""))),
-        };
+        let (time, most) = with_option(text, "max_error=");
         let at = ClockTime::of(time).ok_or_else(|| {
             FilmArgError(format!(
                 "{time} is no time; write 2026-11-21T19:00:00+01:00, 2026-11-21T19:00 or 19:00"

@@ -35,7 +35,7 @@ impl Leg {
     }
 
     fn since_start(&self, at: ShowTime) -> f64 {
-        ShowTime::from_nanos(at.as_nanos().saturating_sub(self.start.as_nanos())).as_secs_f64()
+        at.since(self.start).as_secs_f64()
     }
 }
 

@@ -104,7 +104,7 @@ impl Plan {
     /// Where a lane's slots are at a show time, if the move starts at `start`; slots that do not move rest at park. Never
     /// allocates.
     fn pose_at(&mut self, at: ShowTime, start: ShowTime, window: &Window) -> Pose {
-        let seconds = ShowTime::from_nanos(at.as_nanos().saturating_sub(start.as_nanos())).as_secs_f64();
+        let seconds = at.since(start).as_secs_f64();
         let mut pose = window.park();
         for ((slot, _), position) in window.moving().zip(self.position_at(seconds)) {
             pose[slot] = *position;

@@ -22,10 +22,16 @@ pub struct FilmLead {
     clock: ChasedFilm,
     chase: Chase,
     begin: ShowTime,
-    /// True if the show that is loaded follows it.
-    is_followed: bool,
-    /// True if shows say how they follow it; a play has one show, which does.
-    is_of_a_hall: bool,
+    followed: Followed,
+}
+
+/// Who follows the film.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Followed {
+    /// The one show of a play.
+    Always,
+    /// The shows of a hall that say so; whether the one that is loaded does.
+    ByShow(bool),
 }
 
 impl FilmLead {
@@ -36,29 +42,22 @@ impl FilmLead {
             clock: ChasedFilm::new(source),
             chase: Chase::new(rules, now),
             begin: ShowTime::ZERO,
-            is_followed: true,
-            is_of_a_hall: false,
+            followed: Followed::Always,
         }
     }
 
     /// The film of a hall in which no show follows it yet.
     pub(crate) fn of_a_hall(source: Arc<PublishedPoint>, now: MonoTime) -> Self {
-        let chase = Chase::new(ChaseRules::until(ShowTime::ZERO), now);
         Self {
-            clock: ChasedFilm::new(source),
-            chase,
-            begin: ShowTime::ZERO,
-            is_followed: false,
-            is_of_a_hall: true,
+            followed: Followed::ByShow(false),
+            ..Self::new(source, ChaseRules::until(ShowTime::ZERO), now)
         }
     }
 
     /// Another show is loaded, which follows the film so, or not at all.
     pub(super) fn load(&mut self, start: Option<FilmStart>, now: MonoTime) {
-        if !self.is_of_a_hall {
-            return;
-        }
-        self.is_followed = start.is_some();
+        let Followed::ByShow(does) = &mut self.followed else { return };
+        *does = start.is_some();
         if let Some(FilmStart { begin, rules }) = start {
             (self.begin, self.chase) = (begin, Chase::new(rules, now));
         }
@@ -66,7 +65,7 @@ impl FilmLead {
 
     /// True if the show that is loaded follows it.
     pub(super) const fn is_followed(&self) -> bool {
-        self.is_followed
+        !matches!(self.followed, Followed::ByShow(false))
     }
 
     /// A person lets seats join that hold until one does.
@@ -89,11 +88,8 @@ impl FilmLead {
         trim_ms: i32,
         may_lead: bool,
     ) -> (Event, Option<ShowTime>) {
-        let begin = self.begin.as_nanos();
-        let point = self.clock.at(tick).map(|point| FilmPoint {
-            media: ShowTime::from_nanos(point.media.as_nanos().saturating_sub(begin)),
-            ..point
-        });
+        let begin = self.begin;
+        let point = self.clock.at(tick).map(|point| FilmPoint { media: point.media.since(begin), ..point });
         let state = point.map_or(FilmState::Absent, |point| point.state);
         match self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead }) {
             ChaseVerdict::Wait => (Event::FilmAwaited(HoldCause::Film(state)), None),

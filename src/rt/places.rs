@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
-use crate::belief::{Belief, Fall, Found, Known, Taken, Tally};
+use crate::belief::{Belief, Fall, Found, Known, KnownPose, Taken, Tally};
 use crate::drive::Lane;
 use crate::engine::{Beat, Engine, LaneOrder};
 use crate::net::Delivery;
@@ -99,8 +99,7 @@ impl Places {
             if !is_unseen && !engine.rests_at(lane).is_some_and(|pose| belief.contradicts(pose)) {
                 continue;
             }
-            let flows = moving && self.moved && mail.live().has_reader();
-            if let Some(known) = if flows { belief.start(now) } else { belief.pose(now) } {
+            if let Some(known) = known(belief, moving && self.moved, mail, now) {
                 engine.found(lane, &known, belief.near());
             } else if is_unseen && moving && self.waits.is_none() {
                 engine.order(lane, LaneOrder::FallOut(Fall::Gap));
@@ -182,8 +181,7 @@ impl Places {
         }
         let belief = &self.lanes[lane].belief;
         // What begins meanwhile has it read once more.
-        let flows = self.moved && mail.live().has_reader();
-        match if flows { belief.start(now) } else { belief.pose(now) } {
+        match known(belief, self.moved, mail, now) {
             Some(known) => engine.found(lane, &known, belief.near()),
             None if let Some(pose) = belief.vibrates_about(now) => engine.still(lane, pose),
             None if belief.is_measured_in_part() => {
@@ -245,6 +243,11 @@ impl Places {
             Delivery::Failed(_) => belief.refused(taken.at),
         }
     }
+}
+
+/// The pose of a seat that is found: while frames flow the next leads it on, so that it has to be of now where seats are read.
+fn known(belief: &Belief, flows: bool, mail: &Mail, now: MonoTime) -> Option<KnownPose> {
+    if flows && mail.live().has_reader() { belief.start(now) } else { belief.pose(now) }
 }
 
 /// A lane's number in the mail.

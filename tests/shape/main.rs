@@ -40,7 +40,7 @@ const ROWS: &[Row] = &[
     // by MIDI, Art-Net, OSC, HTTP and the clock of the day, and for sync watch; 370 for the film of a hall and its
     // status; 240 for an engine whose phases hold what is theirs, with types of their own for show time, lanes and what crosses to the planner; 150 for a limiter
     // that judges axes in groups, and for seats that vibrate on; 45 for motions that begin from a reading of now.
-    ("lines of code", counts::lines_of_code, Less, 55_218.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 55_209.0, 39_800.0),
     // Two more for the film in the status, which tests make.
     ("public items and fields", counts::public_items, Less, 1_147.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),

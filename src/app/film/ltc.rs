@@ -17,8 +17,6 @@ use crate::time::Clock as _;
 
 /// A block is 10 ms of sound at 48,000 samples a second, or what of it there is.
 const BLOCK: usize = 960;
-/// From the end of a writer to the next look for one.
-const AGAIN: Duration = Duration::from_secs(1);
 
 /// Begins to read an input; a command that is started for it is put there.
 pub(super) fn start_reading(
@@ -43,7 +41,7 @@ pub(super) fn start_reading(
             path.metadata().map_err(failed(&path))?;
             start("ltc", move || {
                 // Opening waits for a writer.
-                while line.again(File::open(&path).and_then(|fifo| line.read(fifo, false))) {}
+                while line.told.again(File::open(&path).and_then(|fifo| line.read(fifo, false))) {}
             })?;
         }
         LtcInput::Pipe(command) => {
@@ -76,7 +74,7 @@ fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Re
             if matches!(ended, Some(Ok(status)) if status.success()) {
                 return line.end(read);
             }
-            if !line.again(read) {
+            if !line.told.again(read) {
                 return;
             }
             output = command.spawn().ok().and_then(|one| put(one, &child));
@@ -141,18 +139,6 @@ impl LtcLine {
 
     /// Nothing more can come: whoever wrote is gone for good, and the film over.
     fn end(&self, _read: io::Result<()>) {
-        self.say(FilmWord::End);
-    }
-
-    /// The writer is gone, and another may come; says whether anybody waits for one.
-    fn again(&self, read: io::Result<()>) -> bool {
-        self.told.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
-        let is_heard = self.say(FilmWord::Gone);
-        Monotonic.sleep_until(Monotonic.now() + AGAIN);
-        is_heard
-    }
-
-    fn say(&self, word: FilmWord) -> bool {
-        self.told.tell(Observation::new(Monotonic.now(), word))
+        self.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
     }
 }

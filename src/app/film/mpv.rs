@@ -5,14 +5,13 @@ use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use super::told::AGAIN;
 use super::{WordSink, start};
 use crate::film::mpv::MpvClient;
 use crate::film::observation::{FilmWord, Observation};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
-/// From one try to connect to the next.
-const AGAIN: Duration = Duration::from_secs(1);
 /// An answer is read for so long before it is looked whether something is to be asked.
 const READ_FOR: Duration = Duration::from_millis(10);
 
@@ -78,7 +77,7 @@ impl MpvPlayer {
 
     fn tell(&self, mut what: Observation) -> bool {
         if let FilmWord::Position(media) = &mut what.word {
-            *media = ShowTime::from_nanos(media.as_nanos().saturating_sub(self.begin.as_nanos()));
+            *media = media.since(self.begin);
         }
         self.told.tell(what)
     }

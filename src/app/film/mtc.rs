@@ -4,17 +4,12 @@ use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use super::{FilmError, WordSink, read_some, start};
 use crate::film::mtc::MtcReader;
-use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::FilmArgs;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
-
-/// From the end of a line to the next look for one.
-const AGAIN: Duration = Duration::from_secs(1);
 
 /// Begins to read a line of MIDI; a device that is pulled out may come back, a FIFO have another writer.
 pub(super) fn start_reading(path: &Path, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
@@ -25,7 +20,11 @@ pub(super) fn start_reading(path: &Path, args: &FilmArgs, told: WordSink) -> Res
         return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, why)));
     }
     let line = MidiLine { path: path.to_path_buf(), args: args.clone(), told };
-    start("mtc", move || while line.listen() {})?;
+    // Opening a FIFO waits for a writer.
+    start(
+        "mtc",
+        move || while line.told.again(File::open(&line.path).and_then(|bytes| line.read(bytes))) {},
+    )?;
     Ok(())
 }
 
@@ -36,16 +35,7 @@ struct MidiLine {
 }
 
 impl MidiLine {
-    /// One line, from its begin to its end; false once nobody listens.
-    fn listen(&self) -> bool {
-        // Opening a FIFO waits for a writer.
-        let read = File::open(&self.path).and_then(|line| self.read(line));
-        self.told.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
-        let is_heard = self.told.tell(Observation::new(Monotonic.now(), FilmWord::Gone));
-        Monotonic.sleep_until(Monotonic.now() + AGAIN);
-        is_heard
-    }
-
+    /// One line, from its begin to its end, or until nobody listens.
     fn read(&self, mut line: File) -> io::Result<()> {
         let mut reader = MtcReader::new(self.args.rate, self.args.start);
         let mut bytes = [0; 256];

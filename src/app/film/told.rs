@@ -1,14 +1,21 @@
 //! What readers tell: where the film is, in observations; and what a person should know beside that, in notes.
 
+use std::io;
 use std::net::Ipv4Addr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use serde::Serialize;
 
 use crate::film::labels::LabelClock;
-use crate::film::observation::Observation;
+use crate::film::observation::{FilmWord, Observation};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+
+/// From the end of a writer or a player to the next look for one.
+pub(super) const AGAIN: Duration = Duration::from_secs(1);
 
 /// What is noted of a source beside where its film is.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -65,6 +72,14 @@ impl WordSink {
     /// Tells of the film; false once nobody listens.
     pub(super) fn tell(&self, what: Observation) -> bool {
         !self.is_over() && self.to.send((self.place, what)).is_ok()
+    }
+
+    /// Whoever wrote is gone, as `read` says, and another may come, which is waited for; false once nobody listens.
+    pub(super) fn again(&self, read: io::Result<()>) -> bool {
+        self.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
+        let is_heard = self.tell(Observation::new(Monotonic.now(), FilmWord::Gone));
+        Monotonic.sleep_until(Monotonic.now() + AGAIN);
+        is_heard
     }
 
     /// Notes something for people.

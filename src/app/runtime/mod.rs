@@ -78,13 +78,13 @@ pub enum Purpose {
     },
 }
 
-/// A film that a play chases.
+/// A film that a play chases, or that the shows of a hall may follow.
 #[derive(Debug)]
 pub struct LeadingFilm {
     /// Where its source says where it is.
     pub(super) source: Arc<PublishedPoint>,
-    /// How it is followed.
-    pub(super) rules: ChaseRules,
+    /// How a play follows it; `None` where each show says so.
+    pub(super) rules: Option<ChaseRules>,
 }
 
 impl Purpose {
@@ -205,13 +205,13 @@ impl Runtime {
         let (leave, granted) = (Arc::default(), RealTime::NOTHING);
         let handle = RuntimeHandle { config, desk, live, leave, commands, news, orders, granted };
         let silent = manner.silent;
-        let ticks = Ticks { engine, lanes, film, of_the_hall: None, sender, mail };
+        let ticks = Ticks { engine, lanes, film, sender, mail };
         Ok(Self { handle, line, silent, acks, watch, plans, ticks })
     }
 
     /// The same with a film that shows may follow.
     pub(super) fn with_film(mut self, film: Option<Arc<PublishedPoint>>) -> Self {
-        self.ticks.of_the_hall = film;
+        self.ticks.film = film.map(|source| LeadingFilm { source, rules: None });
         self
     }
 
@@ -324,8 +324,6 @@ struct Ticks {
     engine: Engine,
     lanes: Vec<Lane>,
     film: Option<LeadingFilm>,
-    /// The film of a hall, whose shows say how they follow it.
-    of_the_hall: Option<Arc<PublishedPoint>>,
     sender: Sender,
     mail: Mail,
 }
@@ -333,10 +331,12 @@ struct Ticks {
 impl Ticks {
     /// The loop on that clock, from the grid's first tick on.
     fn on<'a, C: Clock>(self, clock: &'a C, grid: TickGrid, control: &'a Control) -> TickLoop<'a, C, Sender> {
-        let Self { engine, lanes, film, of_the_hall, sender: sink, mail } = self;
+        let Self { engine, lanes, film, sender: sink, mail } = self;
         let now = grid.next_deadline();
-        let film = film.map(|film| FilmLead::new(film.source, film.rules, now));
-        let film = film.or_else(|| of_the_hall.map(|source| FilmLead::of_a_hall(source, now)));
+        let film = film.map(|LeadingFilm { source, rules }| match rules {
+            Some(rules) => FilmLead::new(source, rules, now),
+            None => FilmLead::of_a_hall(source, now),
+        });
         let conductor = Conductor::of_a_hall(now).chasing(film);
         let places = Places::new(&lanes, grid.rate());
         let Control { desk, leave, .. } = control;

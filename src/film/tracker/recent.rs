@@ -62,7 +62,7 @@ impl Recent {
             let place = self.places[(self.count - 1 - back) % KEPT];
             let span = newest.at.since(place.at);
             // From the newest on: squares of seconds since midnight would lose the microseconds.
-            let media = place.media.as_nanos().saturating_sub(newest.media.as_nanos());
+            let media = place.media.since(newest.media).as_nanos();
             (span, (-span.as_secs_f64(), ShowTime::from_nanos(media).as_secs_f64()))
         };
         let within = move |place: &(Duration, (f64, f64))| place.0 <= window;
