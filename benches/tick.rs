@@ -1,5 +1,5 @@
 //! What one tick costs before anything is sent: sample, course and encode for 64 six-axis controllers, against 64 bare
-//! sends to loopback in the same run, tick by tick in turns.
+//! sends to loopback in the same run, tick by tick in turns; and what following a film adds to it.
 //!
 //! `cargo bench --bench tick -- [--rounds N] [--quick]`
 
@@ -15,16 +15,22 @@ use std::time::Duration;
 use common::spread::{Spread, verdict};
 use kinocue::harness::belief::{LaneEvidence, Reading, Taken};
 use kinocue::harness::engine::Step;
+use kinocue::harness::film::chase::{Chase, ChaseInput, ChaseRules, ChaseVerdict};
+use kinocue::harness::film::point::{ChasedFilm, FilmPoint, FilmState, PublishedPoint};
 use kinocue::harness::motion::MAX_AXES;
 use kinocue::harness::net::Delivery;
 use kinocue::harness::rt::{Live, Places, mailboxes};
 use kinocue::harness::sys::clock::Monotonic;
-use kinocue::harness::time::{Clock as _, MonoTime};
+use kinocue::harness::time::{Clock as _, MonoTime, ShowTime, Tick};
 use kinocue::harness::{ride, stage};
 use kinocue::wire::MAX_LEN;
 
 const CONTROLLERS: usize = 64;
 const GOAL: f64 = 0.25;
+/// Nanoseconds that a film may add to a tick of all controllers.
+const FILM_GOAL: f64 = 100.0;
+/// A point is published anew after so many ticks, as it is ten times a second and more.
+const TOLD_EVERY: u64 = 50;
 /// Ticks of one round: the join lasts 1.5 s, the ride fills the rest.
 const TICKS: u64 = 4_500;
 const SECONDS: u32 = 6;
@@ -54,7 +60,9 @@ impl Phase {
 fn main() {
     let rounds = rounds();
     let links: Vec<Link> = (0..CONTROLLERS).map(|_| Link::open()).collect();
-    let rounds: Vec<Round> = (0..rounds).map(|_| round(&links)).collect();
+    let pairs: Vec<[Round; 2]> =
+        (0..rounds).map(|_| [false, true].map(|chases| round(&links, chases))).collect();
+    let rounds: Vec<&Round> = pairs.iter().map(|[alone, _]| alone).collect();
     println!(
         "one tick for {CONTROLLERS} six-axis controllers, median of {} rounds (least..greatest)",
         rounds.len()
@@ -62,6 +70,9 @@ fn main() {
     println!("{:<10} {:>20} {:>22} {:>22}  goal", "", "tick, us", "64 bare sends, us", "tick / sends");
     tell("following", rounds.iter().map(|round| &round.following));
     tell("joining", rounds.iter().map(|round| &round.joining));
+    let tick_ns = |round: &Round| 1e3 * round.following.figures()[0];
+    let added = Spread::of(pairs.iter().map(|[alone, chasing]| tick_ns(chasing) - tick_ns(alone)));
+    println!("a film adds {added:.0} ns  <= {FILM_GOAL}: {}", verdict(added, FILM_GOAL));
 }
 
 /// `--rounds N`, `--quick`; other arguments are the bench runner's own.
@@ -104,7 +115,7 @@ impl Link {
 
 /// One play, flat out: each tick is followed by as many bare sends, which nobody counts twice because the receivers are
 /// emptied outside the measurement.
-fn round(links: &[Link]) -> Round {
+fn round(links: &[Link], chases: bool) -> Round {
     let addresses: Vec<SocketAddrV4> = links.iter().map(Link::address).collect();
     let (staged, _) = stage(ride(SECONDS, 0.1, &[]), 1000.0, &addresses, false);
     let settled = staged.course.settled();
@@ -115,13 +126,20 @@ fn round(links: &[Link]) -> Round {
     let parked = Reading::at_rest([0.0; MAX_AXES], MonoTime::default());
     evidence(&live).for_each(|evidence| evidence.on_reading(&parked));
     let mut places = Places::new(&lanes, rate);
+    let mut film = chases.then(|| Film::new(engine.playhead().at()));
     let (mut round, mut buf) = (Round::default(), [0; MAX_LEN]);
     for tick in 0..TICKS {
         let joining = engine.playhead().at() < settled;
         let at = MonoTime::default() + rate.offset(tick);
+        if let Some(film) = film.as_mut().filter(|_| tick % TOLD_EVERY == 0) {
+            film.publish(at);
+        }
         let tick_us = timed(|| {
+            let due = Tick { index: tick, deadline: at, late: Duration::ZERO, missed: 0 };
+            // The first frame of a chased show joins, for which there is no planner here.
+            let target = film.as_mut().and_then(|film| film.target(&due)).filter(|_| tick > 1);
             places.look(&mut engine, &mail, at, true);
-            let Step::Send(beat) = engine.tick(0, None) else { unreachable!("the ride is longer") };
+            let Step::Send(beat) = engine.tick(0, target) else { unreachable!("the ride is longer") };
             for (index, lane) in lanes.iter_mut().enumerate() {
                 let beat = places.admit(index, &mut engine, &beat, at).expect("every lane takes part");
                 let pose = engine.lane(index).pose();
@@ -147,6 +165,44 @@ fn round(links: &[Link]) -> Round {
         phase.sends_us.push(sends_us);
     }
     round
+}
+
+/// A film that runs a little faster than the clock, and the chase of it.
+struct Film {
+    begun: ShowTime,
+    point: Arc<PublishedPoint>,
+    clock: ChasedFilm,
+    chase: Chase,
+}
+
+impl Film {
+    fn new(begun: ShowTime) -> Self {
+        let point = Arc::<PublishedPoint>::default();
+        let rules = ChaseRules::until(ShowTime::from_millis(1_000 * i64::from(SECONDS)));
+        let clock = ChasedFilm::new(Arc::clone(&point));
+        Self { begun, point, clock, chase: Chase::new(rules, MonoTime::default()) }
+    }
+
+    fn publish(&self, at: MonoTime) {
+        let begun = FilmPoint {
+            at: MonoTime::default(),
+            media: self.begun,
+            rate: 1.000_2,
+            epoch: 0,
+            state: FilmState::Locked,
+        };
+        self.point.publish(&FilmPoint { at, media: begun.media_at(at), ..begun });
+    }
+
+    fn target(&mut self, tick: &Tick) -> Option<ShowTime> {
+        let point = self.clock.at(tick);
+        let frame = Duration::from_millis(1);
+        let input = ChaseInput { tick, frame, point, trim_ms: 0, may_lead: true };
+        match self.chase.tick(&input) {
+            ChaseVerdict::Follow { playhead, .. } => Some(playhead),
+            _ => None,
+        }
+    }
 }
 
 fn evidence(live: &Live) -> impl Iterator<Item = &LaneEvidence> {

@@ -155,6 +155,24 @@ fn a_seek_in_a_pause_moves_nothing_until_resume() {
 }
 
 #[test]
+fn a_seek_in_a_hold_after_a_gap_or_overtaken_by_one_or_by_a_pause_is_done_all_the_same() {
+    let (seek, slow) = (Event::Seek(ShowTime::from_millis(15_000)), Event::SlowPlanner(40));
+    let late = Event::Late(Duration::from_millis(300));
+    let (pause, resume) = (Event::Ask(Transition::Pause), Event::Ask(Transition::Resume));
+    let shows = [
+        ("in a hold", ride().with(590, slow).with(600, late).with(605, seek)),
+        ("before a gap", ride().with(590, slow).with(600, seek).with(605, late)),
+        ("before a pause", ride().with(590, slow).with(600, seek).with(605, pause).with(800, resume)),
+    ];
+    for (what, show) in shows {
+        let played = show.play();
+        assert_eq!(played.ended.ending, Ending::Completed, "{what}");
+        let frames = played.lane(0).count();
+        assert!(frames < 1_750, "{what}: {frames} frames, where five seconds of film were left");
+    }
+}
+
+#[test]
 fn a_park_out_of_a_pause_and_a_stop_out_of_a_park_are_gentle() {
     for stop_at in [700, 702, 710, 750, 800] {
         let played = ride()

@@ -52,6 +52,8 @@ pub(super) fn routes() -> (axum::Router<Arc<Shared>>, OpenApi) {
         .routes(routes!(show::park))
         .routes(routes!(show::clear))
         .routes(routes!(settings::trim))
+        .routes(routes!(status::sync))
+        .routes(routes!(settings::source))
         .routes(routes!(settings::levels))
         .routes(routes!(settings::preset))
         .routes(routes!(settings::preflight))

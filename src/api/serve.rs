@@ -1,8 +1,11 @@
 //! Connections in, each served on the one thread of the control plane; beyond their number another one is closed.
 
 use std::convert::Infallible;
-use std::net::IpAddr;
+use std::future::poll_fn;
+use std::io;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 use hyper::body::Incoming;
@@ -11,7 +14,7 @@ use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::{TcpListener, UnixListener};
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
 use tokio::sync::{mpsc, watch};
 
 use super::guarded::Guarded;
@@ -64,39 +67,39 @@ impl Hall {
 /// Serves the control socket until the server ends.
 pub(super) async fn local(listener: UnixListener, hall: Hall) {
     let places = Places::new(LOCAL);
-    let mut closing = hall.closing.clone();
-    loop {
-        let accepted = tokio::select! {
-            accepted = listener.accept() => accepted,
-            _ = closing.changed() => return,
-        };
-        match accepted {
-            Ok((stream, _)) => {
-                let Ok(user) = stream.peer_cred() else { continue };
-                let place = hall.place(&places, None, "the control socket");
-                tokio::spawn(connection(stream, Peer::of_user(user.uid()), place, hall.clone()));
-            }
-            Err(_) => tokio::time::sleep(PAUSE).await, // out of descriptors or memory: a moment later there may be some
-        }
-    }
+    let on = |(stream, _): (UnixStream, _)| {
+        let Ok(user) = stream.peer_cred() else { return };
+        let place = hall.place(&places, None, "the control socket");
+        tokio::spawn(connection(stream, Peer::of_user(user.uid()), place, hall.clone()));
+    };
+    accept_each(hall.closing.clone(), |context| listener.poll_accept(context), on).await;
 }
 
 /// Serves one TCP port until the server ends.
 pub(super) async fn tcp(listener: TcpListener, places: Places, hall: Hall) {
-    let mut closing = hall.closing.clone();
+    let on = |(stream, from): (TcpStream, SocketAddr)| {
+        let address = from.ip().to_canonical();
+        let place = hall.place(&places, Some(address), &address.to_string());
+        let _ = stream.set_nodelay(true); // a stop is worth a packet of its own
+        tokio::spawn(connection(stream, Peer::Tcp(address), place, hall.clone()));
+    };
+    accept_each(hall.closing.clone(), |context| listener.poll_accept(context), on).await;
+}
+
+/// Hands on each connection that comes until the server ends.
+async fn accept_each<T>(
+    mut closing: watch::Receiver<bool>,
+    mut accept: impl FnMut(&mut Context<'_>) -> Poll<io::Result<T>>,
+    on: impl Fn(T),
+) {
     loop {
         let accepted = tokio::select! {
-            accepted = listener.accept() => accepted,
+            accepted = poll_fn(&mut accept) => accepted,
             _ = closing.changed() => return,
         };
         match accepted {
-            Ok((stream, from)) => {
-                let address = from.ip().to_canonical();
-                let place = hall.place(&places, Some(address), &address.to_string());
-                let _ = stream.set_nodelay(true); // a stop is worth a packet of its own
-                tokio::spawn(connection(stream, Peer::Tcp(address), place, hall.clone()));
-            }
-            Err(_) => tokio::time::sleep(PAUSE).await,
+            Ok(connection) => on(connection),
+            Err(_) => tokio::time::sleep(PAUSE).await, // out of descriptors or memory: a moment later there may be some
         }
     }
 }

@@ -47,6 +47,25 @@ fn trim_ms(offset_s: f64) -> Result<i32, Problem> {
     Err(bad_value(detail, "give seconds by which the motion is later than the film"))
 }
 
+/// The source by which the film is followed.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Source {
+    /// As the status names it; null leaves it to the ranking.
+    #[serde(deserialize_with = "Option::deserialize")]
+    #[schema(required)]
+    source: Option<String>,
+}
+
+/// Has the film followed by one source, whatever becomes of it, or by the ranking again.
+#[utoipa::path(
+    put, path = "/api/v1/sync/source", tag = "settings", request_body = Source,
+    responses((status = 200, body = Status))
+)]
+pub(super) async fn source(asker: Asker, Json(Source { source }): Json<Source>) -> Reply {
+    asker.ask(Command::Source(source)).await
+}
+
 /// Changes levels and effects; what is not named stays as it is.
 #[utoipa::path(
     put, path = "/api/v1/levels", tag = "settings", request_body = LevelsChange, responses((status = 200, body = Status))

@@ -17,7 +17,7 @@ use super::asker::StatusReply;
 use super::pieces::Pieces;
 use super::shared::Shared;
 use super::streams::Stream;
-use crate::control::{Code, Problem, Status, Who};
+use crate::control::{Code, FilmStatus, Problem, Status, Who};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -34,6 +34,13 @@ pub(super) async fn status(State(shared): State<Arc<Shared>>) -> Result<StatusRe
         return Err(Problem::new(Code::Timeout, detail, "look at the seats; a stop works all the same"));
     }
     Ok(StatusReply(shared.write(&shared.handle.status())))
+}
+
+/// The film alone, as the status has it; 404 in a hall that follows none.
+#[utoipa::path(get, path = "/api/v1/sync", tag = "hall", responses((status = 200, body = FilmStatus)))]
+pub(super) async fn sync(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    let film = shared.handle.status().film.clone().ok_or_else(Problem::no_film)?;
+    Ok(axum::Json(film).into_response())
 }
 
 /// Server-sent events named `status`, each the whole status: at once, then at each change, ten a second at the most. Between

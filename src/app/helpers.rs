@@ -69,8 +69,10 @@ impl<'scope> Helpers<'scope> {
         let mut accounts = self.acks.join().expect("the ack thread does not panic");
         let closed_at = Monotonic.now();
         accounts.close(ticks.lanes.iter().map(Lane::last_frame), closed_at);
-        let clamps = (0..ticks.lanes.len()).map(|lane| *ticks.engine.lane(lane).clamps()).collect();
+        let lanes = 0..ticks.lanes.len();
+        let clamps = lanes.clone().map(|lane| *ticks.engine.lane(lane).clamps()).collect();
+        let lost_sight_of = lanes.filter(|lane| ticks.engine.lane(*lane).is_lost_sight_of()).collect();
         let (spun, tallies) = (ticks.clock.spun(), ticks.places.tallies().collect());
-        Run { ended, accounts, granted, spun, refusals, clamps, tallies, origin, closed_at }
+        Run { ended, accounts, granted, spun, refusals, clamps, tallies, lost_sight_of, origin, closed_at }
     }
 }

@@ -4,6 +4,7 @@ mod company;
 pub(crate) mod film;
 mod helpers;
 mod play;
+pub(crate) mod player;
 mod refused;
 mod report;
 mod run;

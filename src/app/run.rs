@@ -24,6 +24,8 @@ pub(crate) struct Run {
     pub(crate) clamps: Vec<Counts>,
     /// What the check of where seats may be had to do, lane by lane.
     pub(crate) tallies: Vec<Tally>,
+    /// Lanes that ended where nobody knows.
+    pub(crate) lost_sight_of: Vec<usize>,
     /// The instant of tick 0.
     pub(crate) origin: MonoTime,
     /// The instant at which the accounts were closed.

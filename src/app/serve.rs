@@ -203,6 +203,7 @@ fn serve_halls(
         carryover,
         settings_file,
         film: None,
+        player: None,
     };
     let surfaces = Surfaces::open(&config, &places.sockets, &handle, library.clone(), pages, &log)?;
     let mut journal = Journal::open(&config.log.dir, Limits::from(&config.log), &Zoned::now());
@@ -211,7 +212,7 @@ fn serve_halls(
     up(handle, surfaces.addresses());
     let mut feeder = None;
     let served = loop {
-        ports.film = film.table();
+        (ports.film, ports.player) = (film.table(), film.player());
         let left = keep(runtime, ports, library.clone(), journal, &mut feeder)?;
         (ports, journal) = (left.ports, left.journal);
         let Some(next) = left.reload else {
@@ -236,7 +237,7 @@ fn open(
     film: &mut HallFilm,
 ) -> Result<Runtime, RuntimeError> {
     let runtime = Runtime::open(Arc::clone(config), Purpose::Hall { crashed }, numbers, leave)?;
-    let point = film.follow(config.sync.as_ref()).map_err(RuntimeError::Thread)?;
+    let point = film.follow(config).map_err(RuntimeError::Thread)?;
     Ok(runtime.with_film(point))
 }
 

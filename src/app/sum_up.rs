@@ -55,6 +55,8 @@ pub struct Played {
     pub(crate) silent: Vec<String>,
     /// Controllers whose seats were to park at the end, and tell that they are elsewhere.
     pub(crate) off_park: Vec<String>,
+    /// Controllers whose seats were to park at the end, and were left where nobody knows.
+    pub(crate) lost_sight_of: Vec<String>,
 }
 
 /// What is summed up.
@@ -95,6 +97,7 @@ pub(super) fn sum_up(about: About, controllers: &[Controller], prepared: &Prepar
         notes: notes(controllers, prepared, run),
         silent: lost.map(|index| controllers[index].name.clone()).collect(),
         off_park: Vec::new(),
+        lost_sight_of: run.lost_sight_of.iter().map(|index| controllers[*index].name.clone()).collect(),
     }
 }
 

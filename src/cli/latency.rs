@@ -8,6 +8,7 @@ use anyhow::{Context as _, anyhow};
 
 use super::load::parse_rate;
 use super::play::{exit_of, judge, leave_on_signals};
+use super::stream::StreamArgs;
 use super::targets::Targets;
 use super::{Exit, Failure, OrExit as _, load, print};
 use crate::app::{Play, PlayError, Played};
@@ -84,21 +85,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3600))]
     seconds: u32,
 
-    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
-    #[arg(long, value_name = "ADDR")]
-    bind: Option<SocketAddrV4>,
-
-    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
-    ack_every: Option<u32>,
-
-    /// Request no acks, and measure lateness alone.
-    #[arg(long)]
-    no_acks: bool,
-
-    /// Wake up this long before each tick and spin, 0 to 900 µs [default: 0, or the configuration's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
-    spin_us: Option<u32>,
+    #[command(flatten)]
+    stream: StreamArgs,
 
     /// Write the histograms of each second to a file.
     #[arg(long, value_name = "FILE")]
@@ -146,9 +134,7 @@ fn configuration(args: &Args) -> Result<Config, Failure> {
 fn measure(args: &Args, mut config: Config, of_our_own: bool) -> Result<Exit, Failure> {
     let show = &mut config.show;
     show.rate_hz = args.rate;
-    show.ack_every = args.ack_every.unwrap_or(show.ack_every);
-    show.spin_us = args.spin_us.unwrap_or(show.spin_us);
-    show.bind = args.bind.unwrap_or(show.bind);
+    args.stream.put_into(show);
     let (config, refused) = standing(config)?;
     if config.controllers.is_empty() {
         let why = anyhow!("no seat left to measure; only reads were sent");
@@ -183,7 +169,7 @@ fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Fai
     let timeline = cue(&config.controllers, args.seconds);
     let rate = Rate::from_hz(config.show.rate_hz);
     let show = Show { rate, timing: config.show.timing, start: ShowTime::ZERO, plays: 1 };
-    let play = Play::holding(config, timeline, show, args.no_acks).map_err(failed)?;
+    let play = Play::holding(config, timeline, show, args.stream.no_acks).map_err(failed)?;
     let control = play.control();
     leave_on_signals(&control.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let live = control.live;

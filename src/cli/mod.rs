@@ -19,6 +19,7 @@ mod demo;
 mod doctor;
 mod exit;
 mod figures;
+mod film_player;
 mod fit;
 mod home;
 mod info;
@@ -33,6 +34,7 @@ mod register;
 mod report;
 mod serve;
 mod sim;
+mod stream;
 mod sync;
 mod targets;
 mod token;
@@ -91,6 +93,8 @@ enum Command {
     /// Checks and proves one cue for the library, as a process of the lowest priority.
     #[command(hide = true)]
     Prove(prove::Args),
+    #[command(hide = true)]
+    FilmPlayer(film_player::Args),
     #[command(hide = true)] // for those who make packages
     Man(man::Args),
 }
@@ -163,6 +167,7 @@ fn run(command: Command) -> Result<Exit, Failure> {
         Command::Client(command) => client::run(&command),
         Command::Completions(args) => completions::run(&args),
         Command::Prove(args) => prove::run(&args),
+        Command::FilmPlayer(args) => film_player::run(&args),
         Command::Man(args) => man::run(&args),
     }
 }

@@ -1,6 +1,5 @@
 //! `kinocue play`: one cue in the foreground, keys and live lines on a terminal, the report at the end.
 
-use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,6 +8,7 @@ use anyhow::{Context as _, anyhow};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::load::{self, SourceArgs, after_help, parse_rate};
+use super::stream::StreamArgs;
 use super::targets::tell_absent;
 use super::{Exit, Failure, OrExit as _, print};
 use crate::app::film::{FilmReader, SourceRules};
@@ -79,19 +79,8 @@ pub(super) struct Args {
     /// An effect's output, for controllers that are not on this machine: NAME=N; repeatable.
     #[arg(long, value_name = "NAME=N", conflicts_with = "config")]
     effect: Vec<String>,
-    /// The frame port [default: 0.0.0.0:8410, or the configuration's]; port 0 takes any.
-    #[arg(long, value_name = "ADDR")]
-    bind: Option<SocketAddrV4>,
-    /// Request an ack on every Nth frame, 1 to 1000 [default: 1, or the configuration's].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), conflicts_with = "no_acks")]
-    ack_every: Option<u32>,
-    /// Request no acks, and read none.
-    #[arg(long)]
-    no_acks: bool,
-    /// Wake up this long before each tick and spin, 0 to 900 µs: less lateness for more processor time [default: 0, or the
-    /// configuration's].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=900))]
-    spin_us: Option<u32>,
+    #[command(flatten)]
+    stream: StreamArgs,
     /// Follow a film: the seats wait at park, join, and hold while it stands. mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH,
     /// ltc:alsa:DEVICE, ltc:-, ltc:FILE.wav, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or clock:TIME; repeatable, the best first.
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["start", "plays"])]
@@ -127,7 +116,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
             anyhow!("--start {} is not before the end of the cue at {}", show.start, timeline.duration());
         return Err(why).or_exit(Exit::Usage);
     }
-    let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.no_acks };
+    let manner = Manner { level: args.level.unwrap_or(1.0), silent: args.stream.no_acks };
     let film = film(args)?;
     play(config, timeline, show, manner, film.as_ref(), args.json)
 }
@@ -194,15 +183,7 @@ fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     if let Some(hz) = args.rate {
         config.show.rate_hz = hz;
     }
-    if let Some(every) = args.ack_every {
-        config.show.ack_every = every;
-    }
-    if let Some(spin) = args.spin_us {
-        config.show.spin_us = spin;
-    }
-    if let Some(bind) = args.bind {
-        config.show.bind = bind;
-    }
+    args.stream.put_into(&mut config.show);
     match args.time.as_deref() {
         Some("absolute") => config.show.timing = Timing::Absolute,
         Some(_) => config.show.timing = Timing::Relative,
@@ -314,6 +295,14 @@ pub(super) fn judge(played: &Played) -> Result<Exit, Failure> {
         let who = played.off_park.join(", ");
         let why = anyhow!(
             "{who} tells that it is not at park, where its last frames led; look at it before the next play"
+        );
+        return Err(why).or_exit(Exit::TryAgain);
+    }
+    if !played.lost_sight_of.is_empty() {
+        let who = played.lost_sight_of.join(", ");
+        let why = anyhow!(
+            "{who} could not be led to park: nobody knows which frames reached it, or it was moved; look where it stands before \
+             the next play"
         );
         return Err(why).or_exit(Exit::TryAgain);
     }

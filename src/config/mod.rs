@@ -14,6 +14,7 @@ mod accept;
 mod api;
 mod effect_limits;
 mod fault;
+mod film;
 mod fit;
 mod gear;
 mod level;
@@ -33,6 +34,7 @@ pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
 pub(crate) use effect_limits::EffectLimit;
 pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
+pub(crate) use film::{FilmPlayer, OnStop, stays_below};
 pub(crate) use fit::{HallStroke, Misfit};
 pub(crate) use gear::GearWord;
 pub(crate) use level::{level, parse_level, switches, trim};
@@ -80,6 +82,8 @@ pub struct Config {
     pub(crate) api: Api,
     /// The film that leads the shows, where one does.
     pub(crate) sync: Option<FilmSync>,
+    /// Its player, where the service starts one.
+    pub(crate) film: Option<FilmPlayer>,
 }
 
 /// How cues are played.

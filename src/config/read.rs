@@ -15,12 +15,13 @@ use super::accept::acceptances;
 use super::api::api;
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
+use super::film::film;
 use super::library::store;
 use super::log::log;
 use super::osc::osc;
 use super::preset::presets;
 use super::section::{Entry, Section, did_you_mean};
-use super::sync::sync;
+use super::sync::{FilmSync, sync};
 use super::text::text;
 use super::{
     Absent, Accept, Api, Belts, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN,
@@ -76,8 +77,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
-    let [preset_at, library_at, log_at, osc_at, text_at, sync_at] =
-        ["preset", "library", "log", "osc", "text", "sync"].map(|key| section.get(key));
+    let [preset_at, library_at, log_at, osc_at, text_at, sync_at, film_at] =
+        ["preset", "library", "log", "osc", "text", "sync", "film"].map(|key| section.get(key));
     section.finish();
     let show = show_at.map_or_else(|| Some(Show::default()), |entry| show(entry, faults));
     let (seats, named) = seat_at.map_or_else(Default::default, |entry| seats(entry, faults));
@@ -92,7 +93,10 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
-    let sync = sync_at.and_then(|entry| sync(entry, faults));
+    let film = film_at.and_then(|entry| film(entry, faults));
+    // The player tells where its film is, whoever else does.
+    let of_player = film.is_some().then(FilmSync::default);
+    let sync = sync_at.and_then(|entry| sync(entry, faults)).or(of_player);
     Some(Config {
         show: show?,
         seats,
@@ -107,6 +111,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         text,
         api: api?,
         sync,
+        film,
     })
 }
 

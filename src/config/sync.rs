@@ -36,6 +36,19 @@ pub(crate) struct FilmSync {
     pub(crate) allows_coarse: bool,
 }
 
+impl Default for FilmSync {
+    fn default() -> Self {
+        Self {
+            sources: Vec::new(),
+            leads: false,
+            offset: ShowTime::ZERO,
+            pace: PaceLimits::default(),
+            rejoin: Rejoin::Auto,
+            allows_coarse: false,
+        }
+    }
+}
+
 impl FilmSync {
     /// Where the film is when a cue begins that an entry of a playlist may name the timecode of; `None` if no film leads it.
     ///

@@ -98,6 +98,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         text: None,
         api: Api::default(),
         sync: None,
+        film: None,
     })
 }
 

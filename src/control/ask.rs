@@ -56,6 +56,8 @@ pub enum Command {
     Clear,
     /// How much later than the film the motion is, ms, -500 to 500.
     Trim(i32),
+    /// Have the film followed by that source, or by the ranking.
+    Source(Option<String>),
     /// Change levels and effects.
     Levels(LevelsChange),
     /// Set levels and effects as the preset of that name says.
@@ -139,6 +141,7 @@ impl Command {
             Self::Park => ("park", Operate, STALE, Some(GearWord::Park)),
             Self::Clear => ("clear", Engineer, STALE, None),
             Self::Trim(_) => ("trim", Operate, LASTS, Some(GearWord::Trim)),
+            Self::Source(_) => ("source", Operate, LASTS, None),
             Self::Levels(_) => ("levels", Operate, LASTS, Some(GearWord::Levels)),
             Self::Preset(_) => ("preset", Operate, LASTS, None),
             Self::Enable(_) => ("enable", Operate, STALE, Some(GearWord::Seats)),
@@ -193,6 +196,7 @@ impl fmt::Display for Command {
             Self::Select { entry } => write!(f, " entry {}", entry.saturating_add(1)), // as people count
             Self::Seek(film) => write!(f, " {film}"),
             Self::Trim(ms) => write!(f, " {ms} ms"),
+            Self::Source(name) => write!(f, " {}", name.as_deref().unwrap_or("by the ranking")),
             Self::Levels(change) => change.fmt(f),
             Self::GoFrom(film) => write!(f, " from {film}"),
             Self::Preset(name) | Self::Enable(name) | Self::Disable { name, why: None } => {

@@ -92,6 +92,11 @@ impl Problem {
         Self { status: code.status(), code, detail: detail.into(), remedy: remedy.into(), faults: Vec::new() }
     }
 
+    /// That no film leads shows here.
+    pub(crate) fn no_film() -> Self {
+        Self::new(Code::Unknown, "this hall follows no film", "configure its sources in [sync], and reload")
+    }
+
     /// The same, with every fault.
     #[must_use]
     pub fn with(mut self, faults: Vec<String>) -> Self {

@@ -165,8 +165,26 @@ pub struct FilmStatus {
     pub(crate) position_s: Option<f64>,
     /// How much faster than the clock it runs, millionths.
     pub(crate) rate_ppm: Option<f64>,
+    /// How far ahead of the film, less the trim, the seats are, ms; null while they follow none.
+    pub(crate) error_ms: Option<f64>,
+    /// The label of the frame that the leading source is at, if it has labels.
+    pub(crate) timecode: Option<String>,
+    /// A source that ranks higher and says something else.
+    pub(crate) disagrees: Option<FilmDisagreement>,
+    /// The source that a person chose; null while the ranking decides.
+    pub(crate) chosen: Option<String>,
     /// All sources, in their ranking.
     pub(crate) sources: Vec<FilmSourceStatus>,
+}
+
+/// A source that ranks higher than the one that leads, and says something else; a person has to decide.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default)]
+pub(crate) struct FilmDisagreement {
+    /// As it is configured.
+    pub(crate) source: String,
+    /// How far it is ahead of the one that leads, s.
+    pub(crate) ahead_s: f64,
 }
 
 /// A source that tells where the film is.
@@ -189,6 +207,12 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) may_lead: bool,
     /// How often nothing was heard of it.
     pub(crate) dropouts: u64,
+    /// Samples that were too far off to be used.
+    pub(crate) rejected: u64,
+    /// How often the film jumped by it.
+    pub(crate) jumps: u64,
+    /// How loud its line is, dB of full scale, where it has one.
+    pub(crate) level_dbfs: Option<f64>,
     /// What others sent in its place, and was not heard.
     pub(crate) foreign: u64,
 }

@@ -8,7 +8,7 @@ use super::survey::told;
 use super::talk::Link;
 use super::{Address, Fault, Outcome, Patience, Request, Talk, reads, refusal};
 use crate::config::{Controller, FanOut};
-use crate::motion::Pulses;
+use crate::motion::{PulseRange, Pulses};
 use crate::time::Clock;
 use crate::wire::{DP_POSITIONS, DeviceError, Dialect, ReplyCode, position};
 
@@ -82,16 +82,14 @@ pub(crate) enum StandError {
         mbox: i32,
     },
     /// It stands where no frame can hold it.
-    #[error(
-        "axis {axis} stands at {pulses} pulses, outside its stroke of 0..={stroke:.0}; check the seat type"
-    )]
+    #[error("axis {axis} stands at {pulses} pulses, outside its stroke of {stroke}; check the seat type")]
     PastStroke {
         /// The axis, from 1.
         axis: usize,
         /// Where it stands.
         pulses: i32,
         /// The stroke, pulses.
-        stroke: f64,
+        stroke: PulseRange,
     },
     /// It does not stand still.
     #[error("axis {axis} moves, from {from} to {to} pulses within {} ms; wait until it stands", APART.as_millis())]
@@ -201,8 +199,8 @@ fn judge(controller: &Controller, first: &Values, again: &Values) -> Result<Vec<
         let held = |address| values.get(&address).copied().unwrap_or_default();
         position(words(axis).map_or([0; 2], |words| words.map(held)), dialect)
     };
-    let stroke = controller.seat.stroke_pulses();
-    let inside = |pulses: Pulses| (0.0..=stroke).contains(&f64::from(pulses.0));
+    let stroke = controller.seat.pulse_range();
+    let inside = |pulses: Pulses| stroke.contains(pulses);
     (0..axes)
         .map(|axis| {
             let [was, is] = [first, again].map(|values| place(values, axis, controller.dialect));

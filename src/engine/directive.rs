@@ -133,16 +133,22 @@ impl Engine {
     pub(crate) fn seek(&mut self, film: ShowTime) {
         let target = self.playhead.cue_time(film.min(self.timeline.duration()));
         match &self.phase {
-            Phase::Braking(Rest::Paused) | Phase::Holding(Holding { why: Rest::Paused, .. }) => {
+            // Lanes at rest go on from there by whatever leads them on: of a hold after a gap the film runs meanwhile.
+            Phase::Braking(Rest::Paused) | Phase::Holding(Holding { why: Rest::Paused | Rest::Late, .. }) => {
                 self.give_up_replans();
                 self.playhead.set(target);
             }
-            Phase::Settling(_) | Phase::Following(_) | Phase::Holding(Holding { why: Rest::Late, .. })
-                if !self.is_to_park() =>
-            {
+            Phase::Settling(_) | Phase::Following(_) if !self.is_to_park() => {
                 self.planner.sought = Some(target);
             }
             _ => {}
+        }
+    }
+
+    /// Lanes that rest before the way to where somebody seeks was known go on from there.
+    pub(super) fn seek_at_rest(&mut self) {
+        if let Some(target) = self.planner.sought.take() {
+            self.playhead.restart(target);
         }
     }
 

@@ -28,6 +28,7 @@ impl Engine {
         if matches!(self.phase, Phase::Following(_) | Phase::Settling(_)) {
             self.playhead.catch_up();
         }
+        self.seek_at_rest();
         self.enter(Phase::Braking(why));
     }
 
@@ -48,6 +49,7 @@ impl Engine {
     pub(super) fn halt(&mut self, why: Rest) {
         self.stamps.break_off();
         self.lanes.halt();
+        self.seek_at_rest();
         self.rest(why, hold_frames(self.show.rate));
     }
 

@@ -40,6 +40,12 @@ impl LaneMotion {
         self.mode == LaneMode::Still && self.needs_a_course()
     }
 
+    /// Whether it takes part, and stays where it is, wherever that may be: nobody knows.
+    #[must_use]
+    pub(crate) fn is_lost_sight_of(&self) -> bool {
+        self.wanted.on && matches!(self.mode, LaneMode::Away | LaneMode::Blind(_))
+    }
+
     /// Whether a park is not over without it.
     pub(super) fn is_missing(&self) -> bool {
         self.is_awaited() || self.is_left_behind()

@@ -66,11 +66,11 @@ impl Playhead {
         time_ms
     }
 
-    pub(super) const fn frames(&self) -> u64 {
+    pub(crate) const fn frames(&self) -> u64 {
         self.frames
     }
 
-    pub(super) const fn reached(&self) -> ShowTime {
+    pub(crate) const fn reached(&self) -> ShowTime {
         self.reached
     }
 

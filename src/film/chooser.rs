@@ -53,8 +53,6 @@ pub(crate) struct ChosenFilm {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Chooser {
     present: Option<usize>,
-    /// A person chose the present one: none takes over that merely ranks higher.
-    by_hand: bool,
     /// Since when each can lead.
     leads_since: [Option<MonoTime>; MOST_SOURCES],
     /// The epoch that is told, and the one of the source that it stands for.
@@ -69,23 +67,25 @@ impl Chooser {
         self.switches
     }
 
-    /// A person chooses; it stays so until that source is lost.
-    #[cfg(test)]
-    pub(crate) fn choose_by_hand(&mut self, source: usize, views: &[SourceView]) {
-        if source < views.len().min(MOST_SOURCES) {
-            self.switch(source, views);
-            self.by_hand = true;
-        }
-    }
-
-    /// The film at an instant, by the views of all sources, in their ranking.
-    pub(crate) fn choose(&mut self, views: &[SourceView], now: MonoTime) -> ChosenFilm {
+    /// The film at an instant, by the views of all sources, in their ranking. The one that a person chose leads whatever becomes of
+    /// it: where it stops or is lost seats rest, and none takes over until the person says so.
+    pub(crate) fn choose(
+        &mut self,
+        views: &[SourceView],
+        by_hand: Option<usize>,
+        now: MonoTime,
+    ) -> ChosenFilm {
         let views = &views[..views.len().min(MOST_SOURCES)];
         for (since, view) in self.leads_since.iter_mut().zip(views) {
             *since = if view.leads() { since.or(Some(now)) } else { None };
         }
-        self.go_down(views);
-        let disagrees = self.go_up(views, now);
+        let disagrees = if let Some(by_hand) = by_hand.filter(|place| *place < views.len()) {
+            self.switch(by_hand, views);
+            None
+        } else {
+            self.go_down(views);
+            self.go_up(views, now)
+        };
         let view = self.present.and_then(|present| views.get(present));
         let Some(view) = view else {
             return ChosenFilm { source: None, point: best_of_none(views, now), disagrees: None };
@@ -114,7 +114,7 @@ impl Chooser {
 
     /// Takes a source that ranks higher, if it has been good for long enough and says the same.
     fn go_up(&mut self, views: &[SourceView], now: MonoTime) -> Option<(usize, ShowTime)> {
-        let present = self.present.filter(|_| !self.by_hand)?;
+        let present = self.present?;
         let is_long = |since: &Option<MonoTime>| since.is_some_and(|since| now.since(since) >= UP_AFTER);
         // Only those that rank higher: between lower ones nobody has to choose.
         let higher = self.leads_since[..present].iter().position(is_long)?;
@@ -134,7 +134,7 @@ impl Chooser {
         self.epoch = self.epoch.wrapping_add(u32::from(jumps && self.present.is_some()));
         self.switches += u64::from(self.present.is_some());
         self.of_source = views[to].point.epoch;
-        (self.present, self.by_hand) = (Some(to), false);
+        self.present = Some(to);
     }
 }
 

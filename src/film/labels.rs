@@ -57,6 +57,11 @@ impl LabelClock {
         self.configured.map_or(self.found, |rate| rate.dropping(drops))
     }
 
+    /// The label of the film's time 0, once it is known how frames are labelled.
+    pub(crate) fn start(&self) -> Option<Timecode> {
+        self.start_at(self.rate()?).ok()
+    }
+
     /// Why the labels are none that can be used.
     pub(crate) const fn refused(&self) -> Option<&TimecodeError> {
         self.refused.as_ref()
@@ -77,7 +82,11 @@ impl LabelClock {
             self.find((at, label, quarters), labels);
         }
         self.newest = Some((at, label));
-        let placed = self.place(self.rate()?, label, quarters);
+        let placed = match (self.configured, self.rate()) {
+            (_, Some(rate)) => self.place(rate, label, quarters),
+            (Some(rate), None) => Err(TimecodeError::Drops { label, rate }),
+            (None, None) => return None,
+        };
         // What was refused for how its seconds end is refused until one ends otherwise.
         match placed {
             Ok(media) if self.contradictions < CONTRADICTS => {
@@ -86,14 +95,30 @@ impl LabelClock {
             }
             Ok(_) => None,
             Err(error) => {
-                self.refused = Some(error);
+                // The first is as good as those after it, and whoever reads it has the time to.
+                if !self.is_refused_alike(&error) {
+                    self.refused = Some(error);
+                }
                 None
             }
         }
     }
 
+    /// Whether that adds nothing to what is said already: another label that is refused for the same, or for how seconds end.
+    fn is_refused_alike(&self, error: &TimecodeError) -> bool {
+        self.refused.as_ref().is_some_and(|said| {
+            let ends = matches!(said, TimecodeError::SecondEnds { .. } | TimecodeError::Says { .. });
+            (ends && matches!(error, TimecodeError::Range { .. }))
+                || std::mem::discriminant(said) == std::mem::discriminant(error)
+        })
+    }
+
+    fn start_at(&self, rate: FrameRate) -> Result<Timecode, TimecodeError> {
+        Timecode::of(Label { drops: rate.drops(), ..self.start }, rate)
+    }
+
     fn place(&self, rate: FrameRate, label: Label, quarters: i64) -> Result<ShowTime, TimecodeError> {
-        let start = Timecode::of(Label { drops: rate.drops(), ..self.start }, rate)?;
+        let start = self.start_at(rate)?;
         let frame = Timecode::of(label, rate)?;
         Ok(rate.quarters(frame.since(start).saturating_mul(4).saturating_add(quarters)))
     }
@@ -106,7 +131,6 @@ impl LabelClock {
             return;
         }
         if rate.dropping(label.drops).is_none() {
-            self.refused = Some(TimecodeError::Drops { label, rate });
             self.newest = None;
         }
         let Some((before, last)) = self.newest else { return };

@@ -113,6 +113,11 @@ impl FilmArgs {
         of(self.start).unwrap_or(ShowTime::ZERO)
     }
 
+    /// A source that tells the film's own time, from the cue's beginning on.
+    pub(crate) fn of(source: FilmSource) -> Self {
+        Self { source, rate: None, start: Label::default(), latency: Duration::ZERO }
+    }
+
     /// What is written for them: a source, frames a second, and the timecode at which the cue begins.
     ///
     /// # Errors

@@ -68,7 +68,7 @@ impl Chain {
             SourceView { point: tracker.point(now), may_lead }
         };
         let views: Vec<SourceView> = self.trackers.iter_mut().zip(&mut self.grades).map(view).collect();
-        self.published.publish(&self.chooser.choose(&views, now).point);
+        self.published.publish(&self.chooser.choose(&views, None, now).point);
         let tick = Tick { index: self.ticks, deadline: now, late: Duration::ZERO, missed: 0 };
         let point = self.clock.at(&tick);
         let verdict = self.chase.tick(&ChaseInput { tick: &tick, frame: FRAME, point, trim_ms: 0, may_lead });

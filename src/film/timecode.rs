@@ -266,6 +266,13 @@ impl Timecode {
         self.rate.quarters(4 * self.since(start))
     }
 
+    /// The frame that the film is at, so long after this one began.
+    #[expect(clippy::cast_possible_truncation, reason = "beyond a day it begins anew")]
+    pub(crate) fn at_media(self, media: ShowTime) -> Self {
+        // A frame has begun even if rounding puts its begin a little later.
+        self.plus((media.as_secs_f64() * self.rate.frames_per_second() + 1e-4).floor() as i64)
+    }
+
     pub(crate) fn label(self) -> Label {
         let (rate, index) = (self.rate, self.index);
         let counted = if rate.drops() { index + DROPPED * minutes_dropped(index) } else { index };

@@ -3,6 +3,7 @@
 
 mod grade;
 mod kind;
+mod quiet;
 mod recent;
 mod states;
 #[cfg(test)]
@@ -94,6 +95,8 @@ pub(crate) struct SourceTracker {
     /// The share of positions that did not fit, and whether the last one did not.
     misfits: f64,
     was_misfit: bool,
+    /// When the last one did that fitted.
+    fitted_at: MonoTime,
     /// Positions that fitted since the estimate began, or jumped; how many it takes.
     fitted: u32,
     needed: u32,
@@ -144,8 +147,9 @@ impl SourceTracker {
             winding: false,
             misfits: 0.0,
             was_misfit: false,
+            fitted_at: now,
             fitted: 0,
-            needed: if traits.coarse { SAMPLES_AGAIN } else { SAMPLES },
+            needed: traits.samples(),
             held: HeldSince::default(),
             patience: traits.silent_for,
             counts: TrackerCounts::default(),
@@ -217,24 +221,6 @@ impl SourceTracker {
         }
     }
 
-    /// Notes that time has passed. To be told some times a second, whatever is heard.
-    pub(crate) fn poll(&mut self, now: MonoTime) {
-        let quiet = self.newest.map_or_else(|| now.since(self.since), |newest| now.since(newest.at));
-        let period = self.newest.map_or(Duration::ZERO, |newest| newest.period);
-        if quiet > MISSING.max(MISSING_PERIODS * period) {
-            self.on_sign(SourceSign::Miss, now);
-        }
-        if quiet
-            > self.patience.max(if self.traits.coarse { WINDOW_PERIODS * period } else { Duration::ZERO })
-        {
-            self.on_sign(SourceSign::TimeOut, now);
-        }
-        if now.since(self.since) > ACQUIRE_FOR {
-            self.on_sign(SourceSign::GiveUp, now);
-        }
-        self.doubt(now);
-    }
-
     fn on_sign(&mut self, sign: SourceSign, at: MonoTime) {
         let to = next(self.state, sign);
         if to == self.state {
@@ -253,12 +239,6 @@ impl SourceTracker {
         self.anew = true;
         self.recent.clear();
         (self.held.off_speed, self.held.on_speed) = (None, None);
-    }
-
-    /// The line is there and carries no timecode.
-    fn on_quiet(&mut self, patience: Duration, at: MonoTime) {
-        self.patience = patience;
-        self.on_sign(SourceSign::Miss, at);
     }
 
     fn on_told_speed(&mut self, rate: f64, at: MonoTime) {
@@ -328,7 +308,7 @@ impl SourceTracker {
     /// The first position, or the first after a stop or a jump.
     fn begin(&mut self, at: MonoTime, media: ShowTime) {
         self.anew = false;
-        self.fitted = 1;
+        (self.fitted, self.fitted_at) = (1, at);
         match &mut self.estimate {
             None => self.estimate = Some(Estimate::new(at, media.as_secs_f64(), self.traits.sigma_s)),
             Some(estimate) => {
@@ -354,12 +334,15 @@ impl SourceTracker {
         if fits {
             estimate.take_up(missed, told.bound);
             self.late.push(missed);
-            self.fitted = self.fitted.saturating_add(1);
+            (self.fitted, self.fitted_at) = (self.fitted.saturating_add(1), at);
             self.counts.used += 1;
             self.on_sign(SourceSign::Fit, at);
         } else {
             self.counts.rejected += 1;
             self.on_outlier(missed, at, media);
+        }
+        if !fits && self.was_misfit {
+            self.held.sure = None; // one may be an outlier
         }
         self.was_misfit = !fits;
         self.watch_speed(at);
@@ -373,6 +356,7 @@ impl SourceTracker {
         let Some(estimate) = &mut self.estimate else { return };
         if let Some(ahead) = self.recent.agreed(window, span, estimate.rate(), estimate.noise_s()) {
             estimate.move_to(at, media.as_secs_f64() + ahead);
+            self.fitted_at = at;
             self.recent.clear();
             self.epoch = self.epoch.wrapping_add(1);
             // A cut of a frame is slewed: the noise is known, so nobody has to hold until the new place is.
@@ -453,14 +437,6 @@ impl SourceTracker {
         let since = *self.held.sure.get_or_insert(at);
         if self.needed == SAMPLES_AGAIN || at.since(since) >= SURE_FOR {
             self.on_sign(SourceSign::Sure, at);
-        }
-    }
-
-    /// An estimate that nobody may follow any more.
-    fn doubt(&mut self, now: MonoTime) {
-        let limit = DOUBT * if self.traits.coarse { SURE_COARSE_S } else { SURE_S };
-        if self.estimate.as_ref().is_some_and(|estimate| 3.0 * estimate.sigma_s(now) > limit) {
-            self.on_sign(SourceSign::Doubt, now);
         }
     }
 }

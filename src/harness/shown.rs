@@ -160,6 +160,12 @@ impl ShownFilm {
         SOURCES[source].0
     }
 
+    /// The same of another film.
+    pub fn changed(mut self, change: impl FnOnce(TrueFilm) -> TrueFilm) -> Self {
+        self.truth = change(self.truth);
+        self
+    }
+
     /// Is stopped, and started again, by whoever says so.
     pub fn paused(mut self, from: f64, to: f64) -> Self {
         self.truth = self.truth.rate_from(from, 0.0).rate_from(to, 1.0);
@@ -170,6 +176,20 @@ impl ShownFilm {
     /// Nothing is heard of it for a while.
     pub fn unheard(mut self, from: f64, to: f64) -> Self {
         self.gaps.push((from, to));
+        self
+    }
+
+    /// Somebody winds it, and says so, to so many seconds further on.
+    pub fn sought(mut self, at: f64, seconds: f64) -> Self {
+        self.truth = self.truth.step_at(at, seconds);
+        self.words.extend([(at - 0.01, FilmWord::Seek), (at + 0.01, FilmWord::Landed)]);
+        self
+    }
+
+    /// From then on it runs at another rate, of which the source tells.
+    pub fn sped(mut self, at: f64, rate: f64) -> Self {
+        self.truth = self.truth.rate_from(at, rate);
+        self.words.push((at, FilmWord::Speed(rate)));
         self
     }
 

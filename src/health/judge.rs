@@ -54,8 +54,8 @@ impl HealthTable {
         for controller in self.groups.members(group) {
             let member = &self.members[controller];
             let when = |is: bool, why: Why| is.then_some(why);
-            found.tripped = found.tripped.or(when(member.tripped, Why::EmergencyStop(controller)));
-            found.first_error = found.first_error.or(member.first_error);
+            found.tripped = found.tripped.or(when(member.faults.tripped, Why::EmergencyStop(controller)));
+            found.first_error = found.first_error.or(member.faults.first);
             found.must_rehome = found.must_rehome.or(member.must_rehome);
             found.silent = found.silent.or(when(member.is_silent(now), Why::Silent(controller)));
             found.poor = found.poor.or(when(member.is_poor(), Why::AcksMissing(controller)));
@@ -102,7 +102,7 @@ impl HealthTable {
                 on(Notice::Hall(state::Event::Trouble(state::Trouble::OtherMaster(controller))));
             }
             // Wherever it is pressed the hall stops; it waits for a release only where somebody is to sit.
-            if (member.take_press() || member.holds()) && !self.stop_told {
+            if (member.faults.take_press() || member.holds()) && !self.stop_told {
                 self.stop_told = true;
                 on(Notice::Hall(state::Event::EmergencyStop(controller)));
             }
@@ -122,7 +122,7 @@ impl HealthTable {
         let mut latch = Latch::Free;
         for group in (0..self.places.len()).filter(latched) {
             let mut members = self.groups.members(group).map(|controller| &self.members[controller]);
-            let held = members.any(|member| member.pressed || member.ails());
+            let held = members.any(|member| member.faults.pressed || member.faults.go_on());
             latch = if held || latch == Latch::Held { Latch::Held } else { Latch::Over };
         }
         if std::mem::replace(&mut self.latch_told, latch) != latch {

@@ -4,29 +4,20 @@ use std::time::Duration;
 
 use super::Why;
 use super::counter::{Counter, Said};
+use super::faults::FaultLatch;
 use super::proof::{Baseline, Sighting, Traffic, Verdict};
-use super::window::Window;
+use super::replies::Replies;
 use crate::belief::Fall;
-use crate::motion::{MAX_AXES, Pulses};
+use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{DPFE, FrameNo};
 
-/// A controller is lost when it was not heard for this long, and for ten frames that asked.
-const SILENCE: Duration = Duration::from_millis(250);
-const UNHEARD: u32 = 10;
-/// Two beats without an answer, and the wait for a third, are as long as silence may be.
-const BEAT_WEIGHT: u32 = UNHEARD.div_ceil(2);
 /// How long a sighting speaks for a controller whose group waits for the others.
 const SEEN_FOR: Duration = Duration::from_secs(1);
-/// Frames further apart belong to two streams, and what was unanswered of the first says nothing of the second.
-const APART: Duration = Duration::from_secs(2);
 /// While nothing moves, what a controller is and whether it knows its zero is read this often: nobody sees it being reset.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
 /// A seat that falls out three times within so long is not led back and forth any more.
 const UNSTEADY: Duration = Duration::from_mins(1);
-/// A controller needs a second to start (PA3d), and may have begun to just before it was asked: where all that was asked of
-/// it found an answer sooner, it has not rebooted.
-const GAP: Duration = Duration::from_millis(600);
 /// Frames go to a controller to which one went so long ago.
 const FLOWS: Duration = Duration::from_millis(500);
 /// From one read to the next: 5 Hz.
@@ -35,17 +26,7 @@ const READ_EVERY: Duration = Duration::from_millis(200);
 #[derive(Debug, Clone)]
 pub(super) struct Member {
     controller: usize,
-    window: Window,
-    interval: Duration,
-    /// Since when an ack is waited for, and how many frames have asked since.
-    waiting: Option<MonoTime>,
-    unheard: u32,
-    heard: MonoTime,
-    asked: MonoTime,
-    /// The first of what it was asked that it has not answered by anything yet; whether by a frame, a beat or a read.
-    unanswered: Option<MonoTime>,
-    /// It took long enough to answer to have rebooted, since it was believed last.
-    gap: bool,
+    replies: Replies,
     traffic: Traffic,
     baseline: Option<Baseline>,
     /// Its position is known from homing or preflight, so that the next sighting needs no proof.
@@ -64,19 +45,8 @@ pub(super) struct Member {
     pub(super) out: bool,
     /// It has to be homed, and why.
     pub(super) must_rehome: Option<Why>,
-    /// An emergency stop is in effect.
-    pub(super) pressed: bool,
-    /// One was, since it was cleared.
-    pub(super) tripped: bool,
-    /// It began, and nobody was told yet.
-    press_untold: bool,
-    error: u16,
-    /// The alarm that it tells of itself (MBOX): a register, and what stands there; over with 0.
-    alarm: (u16, u16),
-    drives: [u16; MAX_AXES],
-    refusing: bool,
-    /// What went wrong first since it was cleared.
-    pub(super) first_error: Option<Why>,
+    /// What it says is wrong with it.
+    pub(super) faults: FaultLatch,
     /// Its seat was found elsewhere than frames left it.
     pub(super) moved: bool,
     /// Nobody knows where its seat is, and why.
@@ -98,14 +68,7 @@ impl Member {
     pub(super) fn new(controller: usize, interval: Duration) -> Self {
         Self {
             controller,
-            window: Window::new(interval),
-            interval,
-            waiting: None,
-            unheard: 0,
-            heard: MonoTime::default(),
-            asked: MonoTime::default(),
-            unanswered: None,
-            gap: false,
+            replies: Replies::new(interval),
             traffic: Traffic::default(),
             baseline: None,
             trusted: true,
@@ -117,14 +80,7 @@ impl Member {
             next_read: None,
             out: false,
             must_rehome: None,
-            pressed: false,
-            tripped: false,
-            press_untold: false,
-            error: 0,
-            alarm: (0, 0),
-            drives: [0; MAX_AXES],
-            refusing: false,
-            first_error: None,
+            faults: FaultLatch::of(controller),
             moved: false,
             unsure: None,
             falls: [None; 2],
@@ -139,51 +95,34 @@ impl Member {
     pub(super) fn on_sent(&mut self, frame: FrameNo, asked: bool, at: MonoTime) {
         self.traffic.sent += 1;
         self.framed = Some(at);
-        if !asked {
-            return;
+        if asked {
+            self.replies.on_asked(frame, at);
         }
-        if at.since(self.asked) > APART.max(2 * self.interval) {
-            self.rest();
-        }
-        self.asked = at;
-        self.unanswered.get_or_insert(at);
-        self.window.on_asked(frame, at);
-        self.unheard = self.unheard.saturating_add(1);
-        // After a time without frames, silence begins with the first of them.
-        let flows = at.since(self.heard) <= 2 * self.interval;
-        self.waiting.get_or_insert(if flows { self.heard } else { at });
     }
 
     pub(super) fn on_ack(&mut self, frame: FrameNo, at: MonoTime) {
-        let Some(alive) = self.window.on_ack(frame, at) else { return };
+        let Some(alive) = self.replies.on_ack(frame, at) else { return };
         self.traffic.acked += 1;
         if alive {
-            self.refusing = false;
+            self.faults.on_frame_taken();
             self.on_life(at);
         }
     }
 
     /// It has answered something.
     pub(super) fn on_answer(&mut self, at: MonoTime) {
-        let late = GAP.max(2 * self.interval);
-        self.gap |= self.unanswered.take().is_some_and(|since| at.since(since) > late);
+        self.replies.on_answer(at);
     }
 
     /// A sign of life, told again at every look, is one only once.
     pub(super) fn on_life(&mut self, at: MonoTime) {
-        if at <= self.heard {
-            return;
-        }
-        self.on_answer(at);
-        self.heard = at;
-        self.waiting = None;
-        self.unheard = 0;
+        self.replies.on_life(at);
     }
 
     pub(super) fn on_read_sent(&mut self, datagrams: u32) {
         self.traffic.sent += u64::from(datagrams);
         self.reading = true;
-        self.unanswered.get_or_insert(self.read);
+        self.replies.on_read_sent(self.read);
     }
 
     /// So many datagrams went out that ask for nothing of this.
@@ -197,9 +136,7 @@ impl Member {
         if self.flows(at) {
             return;
         }
-        self.unheard = self.unheard.saturating_add(BEAT_WEIGHT);
-        self.waiting.get_or_insert(at);
-        self.unanswered.get_or_insert(at);
+        self.replies.on_beat_sent(at);
         self.look_again = self.must_be_home && at.since(self.read) >= LOOK_AGAIN;
     }
 
@@ -213,17 +150,18 @@ impl Member {
             // A look at a time, somebody else's frames are no more than may be under way: what they add up to tells.
             self.counter.hear(packets);
         }
-        self.on_error(sighting.error);
-        self.on_alarm(DPFE, sighting.alarm);
+        self.faults.on_error(sighting.error);
+        self.faults.on_alarm(DPFE, sighting.alarm);
         let is_well = sighting.error == 0 && sighting.alarm == 0;
-        self.refusing &= !is_well;
+        self.faults.refusing &= !is_well;
         if let Some(why) = self.against(sighting, at) {
             self.crowd_untold |= self.must_rehome.is_none() && matches!(why, Why::OtherMaster(_));
             self.must_rehome.get_or_insert(why);
         } else {
             let renewed = |before: Baseline| before.renewed(sighting, self.traffic, at);
             self.baseline = Some(self.baseline.map_or_else(|| Baseline::of(sighting, self.traffic), renewed));
-            (self.trusted, self.gap) = (false, false);
+            self.trusted = false;
+            self.replies.forget_gap();
             self.seen = is_well.then_some(at);
         }
     }
@@ -236,7 +174,7 @@ impl Member {
     fn against(&self, sighting: &Sighting, now: MonoTime) -> Option<Why> {
         let controller = self.controller;
         let verdict = match &self.baseline {
-            Some(baseline) => baseline.judge(sighting, self.traffic, self.gap, now),
+            Some(baseline) => baseline.judge(sighting, self.traffic, self.replies.has_gap(), now),
             None if self.trusted => Verdict::Same,
             None => Verdict::Unproved,
         };
@@ -252,72 +190,21 @@ impl Member {
         }
     }
 
-    pub(super) fn on_error(&mut self, error: u16) {
-        self.error = error;
-        if error != 0 {
-            self.ail(Why::Error { controller: self.controller, error });
-        }
-    }
-
-    pub(super) fn on_alarm(&mut self, register: u16, value: u16) {
-        self.alarm = (register, value);
-        if value != 0 {
-            self.ail(Why::Alarm { controller: self.controller, register, value });
-        }
-    }
-
-    /// It drives more axes than its seat type has.
-    pub(super) fn on_more_axes(&mut self, drives: u16) {
-        self.ail(Why::MoreAxes { controller: self.controller, drives });
-    }
-
-    /// It answers with registers that nobody here can read.
-    pub(super) fn on_wide_registers(&mut self) {
-        self.first_error.get_or_insert(Why::Wide(self.controller));
-    }
-
-    pub(super) fn on_drive(&mut self, axis: usize, error: u16) {
-        let Some(known) = axis.checked_sub(1).and_then(|index| self.drives.get_mut(index)) else { return };
-        *known = error;
-        if error != 0 {
-            self.ail(Why::Drive { controller: self.controller, axis, error });
-        }
-    }
-
-    /// The first that went wrong counts; but that frames are refused is soon explained by what is read.
-    fn ail(&mut self, why: Why) {
-        if self.first_error.is_none_or(|before| matches!(before, Why::Refuses(_))) {
-            self.first_error = Some(why);
-        }
-    }
-
-    pub(super) fn on_refused(&mut self) {
-        self.refusing = true;
-        self.first_error.get_or_insert(Why::Refuses(self.controller));
-    }
-
     /// Nobody presses it any more, and only a reset ends it, which is a homing.
     pub(super) const fn on_stop_held(&mut self) {
-        self.pressed = false;
+        self.faults.on_released();
         self.must_rehome = Some(Why::HeldUntilReset(self.controller));
     }
 
     pub(super) fn on_emergency_stop(&mut self, pressed: bool) {
         // It was reset at its place, or is pressed anew.
         self.must_rehome.take_if(|why| matches!(why, Why::HeldUntilReset(_)));
-        self.press_untold |= pressed && !self.pressed;
-        self.tripped |= pressed;
-        self.pressed = pressed;
-    }
-
-    /// True if an emergency stop began since this was last asked.
-    pub(super) const fn take_press(&mut self) -> bool {
-        std::mem::replace(&mut self.press_untold, false)
+        self.faults.on_emergency_stop(pressed);
     }
 
     /// True if an emergency stop is in effect that the hall waits for.
     pub(super) const fn holds(&self) -> bool {
-        self.pressed && !self.out
+        self.faults.pressed && !self.out
     }
 
     /// True if another master was found since this was last asked.
@@ -337,9 +224,10 @@ impl Member {
             return;
         }
         let [last, before] = self.falls;
-        self.falls = [Some(self.asked), last];
-        if before.is_some_and(|first| self.asked.since(first) < UNSTEADY) {
-            self.first_error.get_or_insert(Why::Unsteady(self.controller));
+        let asked = self.replies.asked();
+        self.falls = [Some(asked), last];
+        if before.is_some_and(|first| asked.since(first) < UNSTEADY) {
+            self.faults.latch(Why::Unsteady(self.controller));
         }
     }
 
@@ -362,22 +250,14 @@ impl Member {
         self.baseline = None;
         self.trusted = true;
         self.seen = None;
-        (self.unanswered, self.gap) = (None, false);
+        self.replies.on_homed();
         self.counter = Counter::default();
-    }
-
-    /// True if something is still wrong with it.
-    pub(super) fn ails(&self) -> bool {
-        self.error != 0 || self.alarm.1 != 0 || self.refusing || self.drives.iter().any(|error| *error != 0)
     }
 
     /// What was latched is over, unless it goes on.
     pub(super) fn clear(&mut self) {
-        // Whether it would still refuse frames, only the next frame can tell.
-        self.refusing = false;
-        self.tripped = self.pressed;
-        if !self.ails() {
-            (self.first_error, self.falls) = (None, [None; 2]);
+        if self.faults.clear() {
+            self.falls = [None; 2];
         }
     }
 
@@ -386,7 +266,7 @@ impl Member {
     }
 
     pub(super) fn tick(&mut self, now: MonoTime) {
-        self.window.tick(now);
+        self.replies.tick(now);
         match self.counter.judge(self.traffic, now) {
             Some(Said::Crowded) => {
                 self.crowd_untold |= self.must_rehome.is_none();
@@ -410,12 +290,11 @@ impl Member {
     }
 
     pub(super) const fn is_poor(&self) -> bool {
-        self.window.is_poor()
+        self.replies.is_poor()
     }
 
     pub(super) fn is_silent(&self, now: MonoTime) -> bool {
-        let limit = SILENCE.max(UNHEARD * self.interval);
-        self.unheard >= UNHEARD && self.waiting.is_some_and(|since| now.since(since) >= limit)
+        self.replies.is_silent(now)
     }
 
     pub(super) fn is_seen(&self, now: MonoTime) -> bool {
@@ -435,14 +314,7 @@ impl Member {
         self.next_read = None;
         // Who it is when it is back, and whether it rebooted, is for a sighting to prove.
         self.counter = self.counter.anew();
-        self.rest();
-    }
-
-    /// Nothing is expected of it until the next frame that asks.
-    fn rest(&mut self) {
-        self.window.clear();
-        self.waiting = None;
-        self.unheard = 0;
+        self.replies.rest();
     }
 
     /// True if its packet counter has to be read, though all is well. One that has none is looked at all the time, also in a

@@ -7,12 +7,14 @@
 //! since, and by them alone.
 
 mod counter;
+mod faults;
 mod groups;
 mod health_state;
 mod judge;
 mod late;
 mod member;
 mod proof;
+mod replies;
 #[cfg(test)]
 mod tests;
 mod window;
@@ -118,7 +120,7 @@ impl HealthTable {
 
     /// A frame was refused: x = 3 or 5, of an MBOX controller also 4.
     pub(crate) fn on_refused(&mut self, controller: usize) {
-        self.members[controller].on_refused();
+        self.members[controller].faults.on_refused();
     }
 
     /// A status report of the controller itself.
@@ -133,9 +135,9 @@ impl HealthTable {
             observe::What::EmergencyStop { .. } => member.on_emergency_stop(true),
             observe::What::EmergencyStopHeld => member.on_stop_held(),
             observe::What::EmergencyStopOver => member.on_emergency_stop(false),
-            observe::What::Error(error) => member.on_error(error),
-            observe::What::ServoError { axis, error } => member.on_drive(axis, error),
-            observe::What::Alarm { register, value } => member.on_alarm(register, value),
+            observe::What::Error(error) => member.faults.on_error(error),
+            observe::What::ServoError { axis, error } => member.faults.on_drive(axis, error),
+            observe::What::Alarm { register, value } => member.faults.on_alarm(register, value),
             observe::What::Report { .. } => {}
         }
     }
@@ -167,7 +169,7 @@ impl HealthTable {
 
     /// It has answered with registers of 32 bits, as the IMAX manual has them (2.3) and no program that is known.
     pub(crate) fn on_wide_registers(&mut self, controller: usize) {
-        self.members[controller].on_wide_registers();
+        self.members[controller].faults.on_wide_registers();
     }
 
     /// What was read; of no account where no read was sent since the group was lost.
@@ -177,7 +179,7 @@ impl HealthTable {
 
     /// A controller drives more axes than its seat type has, and frames have places for them.
     pub(crate) fn on_more_axes(&mut self, controller: usize, drives: u16) {
-        self.members[controller].on_more_axes(drives);
+        self.members[controller].faults.on_more_axes(drives);
     }
 
     /// The packet counter of a controller, which was read while frames go there. To be told before the sending of all that it

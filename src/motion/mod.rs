@@ -12,7 +12,7 @@ pub(crate) use halt::{Begun, Halt, Means};
 #[cfg(test)]
 pub(crate) use measure::Readings;
 pub use measure::{Measure, Spacing};
-pub(crate) use seat::{FACTORY_INTERVAL_MS, in_stroke};
+pub(crate) use seat::{FACTORY_INTERVAL_MS, PulseRange, in_stroke};
 pub use seat::{Pulses, SeatType};
 pub use window::{Limits, Slot, Window};
 

@@ -1,5 +1,7 @@
 //! A seat type: the geometry and limits of the axes of one controller, and the way from stroke to pulses.
 
+use std::fmt;
+
 use super::MAX_AXES;
 
 /// The speed limit of a controller as it leaves the factory, turns a minute (PA07, IMAX manual 2.3.1).
@@ -75,6 +77,12 @@ impl SeatType {
         self.stroke_mm / self.lead_mm * self.pulses_per_rev
     }
 
+    /// Between which pulses a motor of this seat stands.
+    #[must_use]
+    pub(crate) fn pulse_range(&self) -> PulseRange {
+        PulseRange { low: 0.0, high: self.stroke_pulses() }
+    }
+
     /// How fast the controller lets an axis move, mm/s: its own limit, else that of the factory.
     #[must_use]
     pub(crate) fn speed_ceiling_mm_s(&self) -> f64 {
@@ -110,16 +118,43 @@ impl SeatType {
     }
 }
 
+/// Between which pulses the motor of an axis stands, the lower first; below 0 where its zero is inside the range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PulseRange {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+impl PulseRange {
+    /// Pulses from one end to the other.
+    #[must_use]
+    pub(crate) fn span(self) -> f64 {
+        self.high - self.low
+    }
+
+    /// True if `pulses` is inside the range, its ends included.
+    #[must_use]
+    pub(crate) fn contains(self, pulses: Pulses) -> bool {
+        (self.low..=self.high).contains(&f64::from(pulses.0))
+    }
+}
+
+impl fmt::Display for PulseRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.0}..={:.0}", self.low, self.high)
+    }
+}
+
 /// How far outside its stroke a motor may be found that stands at its end, in strokes: 0.15 mm of 150. Drives hold a
 /// place to some pulses.
 const ROUNDING: f64 = 0.001;
 
-/// True if a motor can stand at `pulses`, of a stroke of so many: inside it, or outside by no more than rounding. What is
+/// True if a motor of that range can stand at `pulses`: inside it, or outside by no more than rounding. What is
 /// farther out is no position, but a wrong word order, another seat type, or a zero that was lost.
 #[must_use]
-pub(crate) fn in_stroke(pulses: Pulses, stroke_pulses: f64) -> bool {
-    let slack = (ROUNDING * stroke_pulses).max(1.0);
-    (-slack..=stroke_pulses + slack).contains(&f64::from(pulses.0))
+pub(crate) fn in_stroke(pulses: Pulses, range: PulseRange) -> bool {
+    let slack = (ROUNDING * range.span()).max(1.0);
+    (range.low - slack..=range.high + slack).contains(&f64::from(pulses.0))
 }
 
 #[cfg(test)]
@@ -142,9 +177,20 @@ mod tests {
     }
     #[test]
     fn a_motor_is_found_outside_its_stroke_by_rounding_alone() {
+        let of = |low, high| PulseRange { low, high };
         for (pulses, inside) in [(-301, false), (-300, true), (0, true), (300_300, true), (300_301, false)] {
-            assert_eq!(in_stroke(Pulses(pulses), 300_000.0), inside, "{pulses}");
+            assert_eq!(in_stroke(Pulses(pulses), of(0.0, 300_000.0)), inside, "{pulses}");
         }
-        assert!(in_stroke(Pulses(-1), 100.0) && !in_stroke(Pulses(-2), 100.0));
+        assert!(in_stroke(Pulses(-1), of(0.0, 100.0)) && !in_stroke(Pulses(-2), of(0.0, 100.0)));
+    }
+
+    #[test]
+    fn a_range_with_its_zero_in_the_middle_has_the_same_room_at_both_ends() {
+        let turntable = PulseRange { low: -250_000.0, high: 250_000.0 };
+        for (pulses, inside) in [(-250_500, true), (-250_501, false), (250_500, true), (250_501, false)] {
+            assert_eq!(in_stroke(Pulses(pulses), turntable), inside, "{pulses}");
+        }
+        assert!(turntable.contains(Pulses(-250_000)) && !turntable.contains(Pulses(-250_001)));
+        assert_eq!(turntable.to_string(), "-250000..=250000");
     }
 }

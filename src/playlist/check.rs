@@ -31,6 +31,10 @@ impl Playlist {
             let message = format!("preset: there is no [preset.{name}] in the configuration{hint}");
             faults.push(self.fault(entry.places.preset, message));
         }
+        if entry.film.movie.is_some() && config.film.is_none() {
+            let message = "movie: the configuration has no [film], which says who shows it".to_owned();
+            faults.push(self.fault(entry.places.movie, message));
+        }
         for name in entry.effects.keys() {
             if !config.effects.iter().any(|effect| effect.name == *name) {
                 let hint = did_you_mean(name, config.effects.iter().map(|effect| effect.name.as_str()));
@@ -38,6 +42,15 @@ impl Playlist {
                 faults.push(self.fault(entry.places.effects, message));
             }
         }
+    }
+
+    /// Which of its films cannot be shown now, and why. Somebody may copy them yet before their time.
+    #[must_use]
+    pub(crate) fn missing(&self, config: &Config) -> Vec<String> {
+        let movies: BTreeSet<_> =
+            self.entries.iter().filter_map(|entry| entry.film.movie.as_deref()).collect();
+        let player = config.film.iter();
+        player.flat_map(|player| movies.iter().filter_map(|movie| player.find(movie).err())).collect()
     }
 
     fn fault(&self, (line, column): (usize, usize), message: String) -> ConfigFault {

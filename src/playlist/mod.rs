@@ -56,8 +56,8 @@ pub(crate) struct Entry {
     pub(crate) vibration: Option<f64>,
     /// How much later than the film the motion is, ms, -500 to 500.
     pub(crate) trim_ms: Option<i32>,
-    /// The film's timecode when the cue begins; `None` if the hall's configuration says it, or no film leads.
-    pub(crate) film: Option<Label>,
+    /// The film that it is played to.
+    pub(crate) film: EntryFilm,
     /// True if an effect may be on, by its name.
     pub(crate) effects: BTreeMap<String, bool>,
     /// What follows its end.
@@ -66,6 +66,15 @@ pub(crate) struct Entry {
     pub(crate) at: Option<At>,
     /// Where the file says what has to be looked up elsewhere.
     pub(crate) places: Places,
+}
+
+/// The film of an entry.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct EntryFilm {
+    /// Its timecode when the cue begins; `None` if the hall's configuration says it, or no film leads.
+    pub(crate) begin: Option<Label>,
+    /// Its file in the folder of films, where the hall's own player shows it.
+    pub(crate) movie: Option<String>,
 }
 
 /// A time of day, on some days of the week.
@@ -83,6 +92,7 @@ pub(crate) struct Places {
     cue: (usize, usize),
     preset: (usize, usize),
     effects: (usize, usize),
+    movie: (usize, usize),
 }
 
 impl At {

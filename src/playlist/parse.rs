@@ -7,8 +7,8 @@ use jiff::civil::Time;
 use jiff::tz::TimeZone;
 use toml::de::DeTable;
 
-use super::{At, Entry as PlaylistEntry, Places, Playlist, Then};
-use crate::config::{ConfigFaults, Entry, Faults, Section, level, switches, trim};
+use super::{At, Entry as PlaylistEntry, EntryFilm, Places, Playlist, Then};
+use crate::config::{ConfigFaults, Entry, Faults, Section, level, stays_below, switches, trim};
 use crate::film::timecode::Label;
 use crate::library::CueId;
 
@@ -109,6 +109,7 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
     let vibration = level(&mut section, "vibration");
     let trim_ms = trim(&mut section, "trim_ms");
     let film = film(&mut section);
+    let movie = movie(&mut section, film.is_some());
     let effects_at = section.get("effects");
     let then = section.choice("then", &[("hold", Then::Hold), ("go", Then::Go)]);
     let at = at(&mut section);
@@ -121,11 +122,16 @@ fn one(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<PlaylistEntry> {
         level: motion,
         vibration,
         trim_ms,
-        film,
+        film: EntryFilm { begin: film, movie },
         effects,
         then: then.unwrap_or_default(),
         at,
-        places: Places { cue: place("cue"), preset: place("preset"), effects: place("effects") },
+        places: Places {
+            cue: place("cue"),
+            preset: place("preset"),
+            effects: place("effects"),
+            movie: place("movie"),
+        },
     })
 }
 
@@ -133,6 +139,24 @@ fn film(section: &mut Section<'_, '_, '_>) -> Option<Label> {
     let entry = section.get("film")?;
     let label = entry.text(section.faults)?.parse::<Label>();
     label.map_err(|error| entry.fault(section.faults, &error.to_string())).ok()
+}
+
+/// `"feature.mkv"`, below the folder of films.
+fn movie(section: &mut Section<'_, '_, '_>, has_begin: bool) -> Option<String> {
+    let entry = section.get("movie")?;
+    let text = entry.text(section.faults)?;
+    if !stays_below(text) {
+        let message =
+            format!("{text:?} names no file below the folder of films; write it as \"feature.mkv\"");
+        entry.fault(section.faults, &message);
+    }
+    if has_begin {
+        entry.fault(
+            section.faults,
+            "its cue begins with it; film = is for one that others show, leave one of them out",
+        );
+    }
+    Some(text.to_owned())
 }
 
 fn cue(section: &mut Section<'_, '_, '_>) -> Option<CueId> {

@@ -301,3 +301,17 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_movie_is_a_file_below_the_folder_of_films_and_needs_somebody_to_show_it() {
+    let playlist = parse("title = \"x\"\n[[entry]]\ncue = \"c\"\nmovie = \"reel/feature.mkv\"\n").unwrap();
+    assert_eq!(playlist.entries[0].film.movie.as_deref(), Some("reel/feature.mkv"));
+    for (entry, says) in [
+        ("movie = \"../feature.mkv\"", "names no file below the folder of films"),
+        ("movie = \"/srv/feature.mkv\"", "names no file below the folder of films"),
+        ("movie = \"a.mkv\"\nfilm = \"01:00:00:00\"", "leave one of them out"),
+    ] {
+        let faults = faults_of(&format!("cue = \"c\"\n{entry}"));
+        assert!(faults.iter().any(|fault| fault.contains(says)), "{entry}: {faults:?}");
+    }
+}

@@ -3,7 +3,7 @@
 use super::{Check, Notes, Subject};
 use crate::device::home::DPF0;
 use crate::device::{change::dialect_name, position_words_of};
-use crate::motion::{Pulses, in_stroke};
+use crate::motion::{PulseRange, Pulses, in_stroke};
 use crate::wire::{Dialect, WordOrder, position, word_order};
 
 /// What DPF0 reads once the controller knows its zero; before, no place means anything.
@@ -14,7 +14,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         return;
     }
     let Some(survey) = subject.survey else { return };
-    let stroke = subject.controller.seat.stroke_pulses();
+    let stroke = subject.controller.seat.pulse_range();
     let axes = subject.working_axes().min(subject.controller.seat.axes);
     let Some(words) = position_words_of(&survey.values, axes) else { return };
     let again = position_words_of(&survey.again, axes);
@@ -50,7 +50,7 @@ fn remedy(dialect: Dialect) -> String {
 }
 
 /// Axes without position registers, of which only a report tells.
-fn judge_further_axes(reported: Option<&[Pulses]>, known: usize, stroke: f64, notes: &mut Notes) {
+fn judge_further_axes(reported: Option<&[Pulses]>, known: usize, stroke: PulseRange, notes: &mut Notes) {
     let further = reported.into_iter().flatten().enumerate().skip(known);
     for (axis, place) in further.filter(|(_, place)| !in_stroke(**place, stroke)) {
         notes.add(Check::Position, outside(axis, *place, stroke), AFTER_HOMING);
@@ -62,7 +62,7 @@ fn judge_further_axes(reported: Option<&[Pulses]>, known: usize, stroke: f64, no
 struct Stand<'a> {
     words: &'a [[u16; 2]],
     dialect: Dialect,
-    stroke: f64,
+    stroke: PulseRange,
     reported: Option<&'a [Pulses]>,
 }
 
@@ -91,7 +91,7 @@ impl Stand<'_> {
         let (dialect, other) = (dialect_name(self.dialect), dialect_name(other(self.dialect)));
         format!(
             "axis {axis} stands at {own} pulses by the word order of {dialect}, at {by_other} by that of {other}; its \
-             stroke is 0..={:.0}",
+             stroke is {}",
             self.stroke
         )
     }
@@ -119,8 +119,8 @@ impl Stand<'_> {
     }
 }
 
-fn outside(axis: usize, place: Pulses, stroke: f64) -> String {
-    format!("axis {} stands at {} pulses, outside its stroke of 0..={stroke:.0}", axis + 1, place.0)
+fn outside(axis: usize, place: Pulses, stroke: PulseRange) -> String {
+    format!("axis {} stands at {} pulses, outside its stroke of {stroke}", axis + 1, place.0)
 }
 
 const fn other(dialect: Dialect) -> Dialect {

@@ -9,7 +9,7 @@ use super::pieces::Pieces;
 use super::smooth::{Resampled, Smoothing};
 use super::stencil::Stencils;
 use super::{Breach, Digest, Proof, SLACK, Subject, Terms, prove, subjects};
-use crate::cue::{Cue, Interpolation, Vibration};
+use crate::cue::{Cue, Vibration};
 use crate::motion::{MAX_AXES, SeatType};
 use crate::time::ShowTime;
 use crate::timeline::{HELD_BACK, Timeline};
@@ -337,6 +337,3 @@ fn lower_vibration(cue: Cue, terms: &Terms) -> (Cue, usize) {
     let cue = timeline.cue().clone();
     (cue.with_vibration(&tracks), lowered)
 }
-
-/// The interpolation of a cue that was smoothed.
-pub(super) const SMOOTH: Interpolation = Interpolation::Spline;

@@ -1,8 +1,7 @@
 //! A zero-phase low-pass for coarse sources: three running means over evenly spaced samples of the curve, each as far to
 //! the left as to the right, so that nothing is moved in time.
 
-use super::fit::SMOOTH;
-use crate::cue::{Cue, limits};
+use crate::cue::{Cue, Interpolation, limits};
 use crate::time::{ShowTime, nanos};
 use crate::timeline::{Hint, Timeline};
 
@@ -83,7 +82,7 @@ impl Resampled {
             positions.iter_mut().for_each(|position| *position = position.min(1.0));
         }
         let smoothing = Smoothing { cut_off_hz: self.cut_off_hz(strength) };
-        (cue.with_rows(self.times.clone(), positions, SMOOTH), smoothing)
+        (cue.with_rows(self.times.clone(), positions, Interpolation::Spline), smoothing)
     }
 
     #[expect(clippy::cast_precision_loss, reason = "a few thousand samples of some milliseconds")]

@@ -33,6 +33,8 @@ pub struct Conductor {
     film: Option<FilmLead>,
     /// Whether that is why the seats parked.
     film_is_over: bool,
+    /// How far ahead of the film the seats are that follow it.
+    film_error_ns: Option<i64>,
 }
 
 /// A signal goes to whoever leads the hall as well, who knows more: this long it is left to them.
@@ -57,6 +59,7 @@ impl Conductor {
             ended: None,
             film: None,
             film_is_over: false,
+            film_error_ns: None,
         }
     }
 
@@ -148,15 +151,25 @@ impl Conductor {
         trim_ms: i32,
         now: MonoTime,
     ) -> Option<ShowTime> {
+        self.film_error_ns = None;
         let film = self.film.as_mut().filter(|film| film.is_followed())?;
         let rides = matches!(self.machine.state(), State::Playing(_));
         let (event, target) = film.tick(tick, engine.playhead().frame_time(), trim_ms, rides);
+        // The pose that was sent a tick ago is reached now.
+        let reached = engine.playhead().reached();
+        let follows = self.machine.state() == State::Playing(PlayMode::Following);
+        self.film_error_ns = film.error_ns(reached, tick.deadline, trim_ms).filter(|_| follows);
         if rides {
             self.machine.event(event, now);
             self.film_is_over = matches!(event, Event::FilmOver(_));
             self.steer(engine);
         }
         target.filter(|_| rides)
+    }
+
+    /// How far ahead of the film that they follow the seats are, nanoseconds; none while they follow none.
+    pub(super) const fn film_error_ns(&self) -> Option<i64> {
+        self.film_error_ns
     }
 
     /// Where the hall stands, and why.
@@ -273,7 +286,11 @@ impl Conductor {
             }
             true
         });
-        if let Some(event) = trouble.map(Event::Trouble).or_else(|| self.what_it_means(engine.progress())) {
+        // Seats that are to join a film are on no cue before a frame has left, though both may be at park.
+        let progress =
+            Some(engine.progress()).filter(|_| self.film().is_none() || engine.playhead().frames() > 0);
+        let means = progress.and_then(|progress| self.what_it_means(progress));
+        if let Some(event) = trouble.map(Event::Trouble).or(means) {
             self.machine.event(event, now);
             self.steer(engine);
         }

@@ -23,6 +23,8 @@ pub struct FilmLead {
     chase: Chase,
     begin: ShowTime,
     followed: Followed,
+    /// Where it was in this tick, from the cue's beginning on.
+    point: Option<FilmPoint>,
 }
 
 /// Who follows the film.
@@ -43,6 +45,7 @@ impl FilmLead {
             chase: Chase::new(rules, now),
             begin: ShowTime::ZERO,
             followed: Followed::Always,
+            point: None,
         }
     }
 
@@ -80,6 +83,12 @@ impl FilmLead {
         self.chase.state() == ChaseState::Following
     }
 
+    /// How far ahead of the film, less the trim, seats are that reach `pose` of the cue at `at`, nanoseconds.
+    pub(super) fn error_ns(&self, pose: ShowTime, at: MonoTime, trim_ms: i32) -> Option<i64> {
+        let film = self.point?.media_at(at).as_nanos();
+        Some(pose.as_nanos().saturating_sub(film.saturating_sub(i64::from(trim_ms) * 1_000_000)))
+    }
+
     /// What this tick makes of the film, for the hall, and where in the cue its frame is to lead, if anywhere.
     pub(super) fn tick(
         &mut self,
@@ -90,6 +99,7 @@ impl FilmLead {
     ) -> (Event, Option<ShowTime>) {
         let begin = self.begin;
         let point = self.clock.at(tick).map(|point| FilmPoint { media: point.media.since(begin), ..point });
+        self.point = point;
         let state = point.map_or(FilmState::Absent, |point| point.state);
         match self.chase.tick(&ChaseInput { tick, frame, point, trim_ms, may_lead }) {
             ChaseVerdict::Wait => (Event::FilmAwaited(HoldCause::Film(state)), None),

@@ -67,6 +67,8 @@ pub struct Live {
     parking: AtomicU32,
     parking_ms: AtomicU32,
     show_ns: AtomicI64,
+    /// Twice how far ahead of the film the seats are, and 1; 0 while they follow none.
+    film_error_ns: AtomicI64,
     ticks: AtomicU64,
     missed: AtomicU64,
     beats: AtomicU64,
@@ -182,6 +184,12 @@ impl Live {
         ShowTime::from_nanos(self.show_ns.load(Ordering::Relaxed))
     }
 
+    /// How far ahead of the film that they follow the seats are, seconds; none while they follow none.
+    pub(crate) fn film_error_s(&self) -> Option<f64> {
+        let twice = self.film_error_ns.load(Ordering::Relaxed);
+        (twice != 0).then(|| ShowTime::from_nanos(twice >> 1).as_secs_f64())
+    }
+
     /// Ticks that sent so far.
     #[must_use]
     pub(crate) fn ticks(&self) -> u64 {
@@ -269,6 +277,11 @@ impl Live {
             self.on_show(engine.playhead().film());
         }
         self.hall.set(machine.state(), moving && !engine.waits(), machine.clears());
+    }
+
+    /// Notes how far ahead of the film the seats are.
+    pub(super) fn on_film_error(&self, ns: Option<i64>) {
+        self.film_error_ns.store(ns.map_or(0, |ns| ns << 1 | 1), Ordering::Relaxed);
     }
 
     /// Notes where the film is.

@@ -259,6 +259,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
 
     fn hand_on(&mut self) {
         self.mail.look(self.conductor.machine(), &self.engine);
+        self.mail.live().on_film_error(self.conductor.film_error_ns());
         tell_state(&mut self.conductor, &mut self.mail);
         if let Some(request) = self.engine.take_request() {
             self.mail.task(Task::Plan(request));

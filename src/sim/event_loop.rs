@@ -10,8 +10,8 @@ use std::time::Duration;
 use rustix::buffer::spare_capacity;
 use rustix::event::{EventfdFlags, Timespec, epoll, eventfd};
 
-use super::farm::Outcome;
 use super::log::Logs;
+use super::outcome::Outcome;
 use super::station::Station;
 use super::{Command, CommandError};
 use crate::sys::clock::Monotonic;

@@ -8,12 +8,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Sender};
 use std::thread::JoinHandle;
 
-use serde::Serialize;
-
 use super::event_loop::{DELAYED, EventLoop, Order, wait_for};
 use super::log::Logs;
+use super::outcome::Outcome;
 use super::station::{Station, listen};
-use super::{Command, CommandError, Counts, Options, Setup};
+use super::{Command, CommandError, Options, Setup};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -50,22 +49,6 @@ pub enum FarmError {
         #[source]
         source: io::Error,
     },
-}
-
-/// What became of one virtual controller.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Outcome {
-    /// Where it listened.
-    pub(crate) address: SocketAddrV4,
-    /// What became of its datagrams and moves.
-    #[serde(flatten)]
-    pub counts: Counts,
-    /// Where its working axes ended, pulses.
-    pub(crate) positions: Vec<i32>,
-    /// Its outputs at the end, bit 0 = Y01.
-    pub(crate) outputs: u16,
-    /// Its analogue outputs at the end, as the last frame without vibration had them in Extend.
-    pub(crate) extend: u32,
 }
 
 /// Virtual controllers at work on a thread of their own, until they are stopped or dropped.

@@ -7,7 +7,7 @@ use std::io;
 use std::net::SocketAddrV4;
 
 use super::MotionSeen;
-use super::farm::Outcome;
+use super::outcome::Outcome;
 use super::player::Executed;
 use super::sheet::Sheet;
 use crate::motion::Pulses;

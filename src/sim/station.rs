@@ -5,9 +5,9 @@ use std::io;
 use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
-use super::farm::Outcome;
 use super::link::{Fate, Link};
 use super::log::Logs;
+use super::outcome::Outcome;
 use super::{Action, Controller, Counts, Options, Setup};
 use crate::time::MonoTime;
 use crate::wire::MAX_LEN;

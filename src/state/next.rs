@@ -1,6 +1,7 @@
 //! What a person does next.
 
 use super::{Cause, Latch, Machine, PlayMode, Readiness, State, Trouble};
+use crate::film::chase::HoldCause;
 
 /// What a person does next; worded by its `Display`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -37,6 +38,8 @@ pub enum Next {
     AwaitJoin,
     /// See to the film: the seats join it by themselves.
     AwaitFilm,
+    /// Resume: the film could be joined, and a person is to say so. Or park.
+    LetJoin,
     /// Resume, or park.
     Resume,
     /// Release the emergency stop, then clear.
@@ -60,7 +63,7 @@ pub enum Next {
 impl Next {
     /// All there are.
     #[cfg(test)]
-    pub(crate) const ALL: [Self; 25] = [
+    pub(crate) const ALL: [Self; 26] = [
         Self::AwaitAnswers,
         Self::AwaitPositions,
         Self::AwaitHome,
@@ -77,6 +80,7 @@ impl Next {
         Self::Watch,
         Self::AwaitJoin,
         Self::AwaitFilm,
+        Self::LetJoin,
         Self::Resume,
         Self::Release,
         Self::PutRight,
@@ -100,7 +104,10 @@ impl Machine {
             State::Homing => Next::AwaitHome,
             State::Armed => Next::Go,
             State::Playing(PlayMode::Holding) => Next::AwaitJoin,
-            State::Playing(PlayMode::Waiting) => Next::AwaitFilm,
+            State::Playing(PlayMode::Waiting) => match self.cause {
+                Cause::FilmAwaited(HoldCause::Unstable | HoldCause::Asks) => Next::LetJoin,
+                _ => Next::AwaitFilm,
+            },
             State::Playing(_) => Next::Watch,
             State::Paused => Next::Resume,
             State::Stopping | State::Parking => Next::AwaitRest,

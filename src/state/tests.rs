@@ -483,6 +483,7 @@ fn a_show_waits_while_its_film_cannot_be_followed_and_says_why_and_parks_when_it
         );
         hall.event(Event::FilmAwaited(HoldCause::Unstable), s(2));
         assert_eq!((hall.state(), hall.cause()), waiting(HoldCause::Unstable), "another cause is told");
+        assert_eq!(hall.next(), Next::LetJoin, "nobody joins by themselves any more");
         hall.event(Event::FilmAwaited(HoldCause::Unstable), s(3));
         assert_eq!(hall.since(), s(2), "the same is not");
         hall.event(Event::FilmLeads, s(4));

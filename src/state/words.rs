@@ -91,6 +91,7 @@ impl fmt::Display for Next {
             Self::Watch => "nothing; pause, park or stop as needed",
             Self::AwaitJoin => "nothing; the seats rejoin by themselves",
             Self::AwaitFilm => "see to the film; the seats join it by themselves",
+            Self::LetJoin => "see to the film, then resume; or park",
             Self::Resume => "resume, or park",
             Self::Release => {
                 "release the emergency-stop button, then clear; or disable a seat that cannot tell that it is"

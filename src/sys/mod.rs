@@ -4,11 +4,13 @@
 
 pub(crate) mod adjusted;
 pub(crate) mod batch;
+pub(crate) mod child;
 pub(crate) mod clock;
 pub(crate) mod file;
 pub(crate) mod folder;
 pub(crate) mod humble;
 pub(crate) mod machine;
+pub(crate) mod own_folder;
 pub(crate) mod realtime;
 pub(crate) mod signal;
 pub(crate) mod terminal;

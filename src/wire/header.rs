@@ -133,6 +133,20 @@ impl Header {
         })
     }
 
+    /// The header of a request of `family`, or of a report.
+    pub(super) const fn request(family: u8, slot: u16, accept: Code, reply: Code) -> Self {
+        Self { function: request_function(family), slot, accept, reply }
+    }
+
+    /// Reads the header of a request of `family`, or of a report.
+    ///
+    /// # Errors
+    /// Those of a broken header or another function.
+    pub(super) fn parse_request(bytes: &[u8], family: u8) -> Result<Self, WireError> {
+        let header = Self::parse(bytes)?;
+        if header.family() == family && header.is_request() { Ok(header) } else { Err(header.foreign()) }
+    }
+
     /// Writes the header to the front of `bytes`.
     pub(super) fn emit(self, bytes: &mut [u8]) {
         open(bytes, self.function);

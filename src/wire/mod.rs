@@ -15,6 +15,7 @@ mod motion;
 mod per_axis;
 mod position;
 mod register;
+mod reply;
 mod report;
 mod servo;
 mod status;

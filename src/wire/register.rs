@@ -1,6 +1,7 @@
 //! Registers of the controller: 0x1101 reads, 0x1201 writes, and their replies (SMC manual 2.2.2.1 to 2.2.2.4).
 
-use super::header::{Header, reply_function, request_function};
+use super::header::Header;
+use super::reply::ReplyParts;
 use super::words::{self, Words};
 use super::{Code, Dialect, MAX_LEN, ReplyCode, WireError};
 
@@ -60,8 +61,7 @@ pub struct ReadRequest {
 impl ReadRequest {
     /// Writes the request to the front of `buf` and returns it.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let function = request_function(READ);
-        Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
+        Header::request(READ, self.channel, self.accept, self.reply).emit(buf);
         words::emit_ask(buf, self.start, self.num)
     }
 
@@ -70,12 +70,9 @@ impl ReadRequest {
     /// # Errors
     /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
     pub fn parse(bytes: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        if header.family() != READ || !header.is_request() {
-            return Err(header.foreign());
-        }
+        let Header { slot: channel, accept, reply, .. } = Header::parse_request(bytes, READ)?;
         let (start, num) = words::ask(bytes)?;
-        Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, num })
+        Ok(Self { channel, accept, reply, start, num })
     }
 }
 
@@ -97,8 +94,7 @@ pub struct WriteRequest<'a> {
 impl<'a> WriteRequest<'a> {
     /// Writes the request to the front of `buf` and returns it.
     pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let function = request_function(WRITE);
-        Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
+        Header::request(WRITE, self.channel, self.accept, self.reply).emit(buf);
         words::emit_all(buf, self.start, self.data)
     }
 
@@ -108,12 +104,9 @@ impl<'a> WriteRequest<'a> {
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
     pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        if header.family() != WRITE || !header.is_request() {
-            return Err(header.foreign());
-        }
+        let Header { slot: channel, accept, reply, .. } = Header::parse_request(bytes, WRITE)?;
         let (start, data) = words::all(bytes)?;
-        Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, data })
+        Ok(Self { channel, accept, reply, start, data })
     }
 }
 
@@ -161,14 +154,9 @@ impl<'a> RegisterReply<'a> {
 
     /// Writes the reply to the front of `buf` and returns it.
     pub fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let family = match self.access {
-            Access::Read => READ,
-            Access::Write => WRITE,
-        };
-        let slot = if self.code == ReplyCode::Running { self.channel } else { self.error };
-        let function = reply_function(family, self.code);
-        Header { function, slot, accept: Code::NONE, reply: Code::NONE }.emit(buf);
-        words::emit_some(buf, self.start, self.num, self.data)
+        let Self { access, code, start, num, data, .. } = *self;
+        let slot = if code == ReplyCode::Running { self.channel } else { self.error };
+        ReplyParts { access, code, slot, start, num, data }.emit([READ, WRITE], buf)
     }
 
     /// The registers that it tells. A refusal of an MBOX controller tells none: what stands there is an error number (IMAX
@@ -188,28 +176,14 @@ impl<'a> RegisterReply<'a> {
     /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Surplus`] where it goes on,
     /// [`WireError::Count`] for more than 256 words, and those of a broken header or another function.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        let access = match header.family() {
-            READ => Access::Read,
-            WRITE => Access::Write,
-            _ => return Err(header.foreign()),
-        };
-        let code = header.reply_code().ok_or(header.foreign())?;
+        let ReplyParts { access, code, slot, start, num, data } = ReplyParts::parse(bytes, [READ, WRITE])?;
         let running = code == ReplyCode::Running;
-        let (start, num, data) = if running { words::answer(bytes)? } else { words::refusal(bytes)? };
         // A refusal may bring an error number in place of its words.
         let need = words::HEAD_LEN + 2 * usize::from(if running { num } else { num.max(1) });
         if bytes.len() > need {
             return Err(WireError::Surplus { len: bytes.len(), need });
         }
-        Ok(Self {
-            access,
-            code,
-            channel: if running { header.slot } else { 0 },
-            error: if running { 0 } else { header.slot },
-            start,
-            num,
-            data,
-        })
+        let (channel, error) = if running { (slot, 0) } else { (0, slot) };
+        Ok(Self { access, code, channel, error, start, num, data })
     }
 }

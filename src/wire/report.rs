@@ -1,6 +1,6 @@
 //! Registers that an IMAX or MBOX controller reports unasked when something is wrong, 0x1001 (IMAX manual 2.2.2.1).
 
-use super::header::{Header, request_function};
+use super::header::Header;
 use super::words::{self, Words};
 use super::{Code, MAX_LEN, WireError};
 
@@ -29,8 +29,7 @@ pub struct Report<'a> {
 impl<'a> Report<'a> {
     /// Writes the report to the front of `buf` and returns it.
     pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let function = request_function(FAMILY);
-        Header { function, slot: self.channel, accept: self.accept, reply: self.reply }.emit(buf);
+        Header::request(FAMILY, self.channel, self.accept, self.reply).emit(buf);
         words::emit_all(buf, self.start, self.data)
     }
 
@@ -40,11 +39,8 @@ impl<'a> Report<'a> {
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        if header.family() != FAMILY || !header.is_request() {
-            return Err(header.foreign());
-        }
+        let Header { slot: channel, accept, reply, .. } = Header::parse_request(bytes, FAMILY)?;
         let (start, data) = words::all(bytes)?;
-        Ok(Self { channel: header.slot, accept: header.accept, reply: header.reply, start, data })
+        Ok(Self { channel, accept, reply, start, data })
     }
 }

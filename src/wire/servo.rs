@@ -1,7 +1,8 @@
 //! Registers of the servo drives behind a controller: 0x2101 reads, 0x2201 writes (SMC manual 2.2.2.13 and
 //! 2.2.2.14). The manual has no table for the replies; they are taken to be like those of the controller's own.
 
-use super::header::{Header, reply_function, request_function};
+use super::header::Header;
+use super::reply::ReplyParts;
 use super::words::{self, Words};
 use super::{Access, Code, MAX_LEN, ReplyCode, WireError};
 
@@ -29,8 +30,7 @@ pub struct ServoRead {
 impl ServoRead {
     /// Writes the request to the front of `buf` and returns it.
     pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let function = request_function(READ);
-        Header { function, slot: self.servo, accept: self.accept, reply: self.reply }.emit(buf);
+        Header::request(READ, self.servo, self.accept, self.reply).emit(buf);
         words::emit_ask(buf, self.start, self.num)
     }
 
@@ -39,12 +39,9 @@ impl ServoRead {
     /// # Errors
     /// [`WireError::Length`] where it ends before its count, and those of a broken header or another function.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        if header.family() != READ || !header.is_request() {
-            return Err(header.foreign());
-        }
+        let Header { slot: servo, accept, reply, .. } = Header::parse_request(bytes, READ)?;
         let (start, num) = words::ask(bytes)?;
-        Ok(Self { servo: header.slot, accept: header.accept, reply: header.reply, start, num })
+        Ok(Self { servo, accept, reply, start, num })
     }
 }
 
@@ -66,8 +63,7 @@ pub struct ServoWrite<'a> {
 impl<'a> ServoWrite<'a> {
     /// Writes the request to the front of `buf` and returns it.
     pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let function = request_function(WRITE);
-        Header { function, slot: self.servo, accept: self.accept, reply: self.reply }.emit(buf);
+        Header::request(WRITE, self.servo, self.accept, self.reply).emit(buf);
         words::emit_all(buf, self.start, self.data)
     }
 
@@ -77,12 +73,9 @@ impl<'a> ServoWrite<'a> {
     /// [`WireError::Length`] where it ends before its last word, [`WireError::Count`] for more than 256, and those of
     /// a broken header or another function.
     pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        if header.family() != WRITE || !header.is_request() {
-            return Err(header.foreign());
-        }
+        let Header { slot: servo, accept, reply, .. } = Header::parse_request(bytes, WRITE)?;
         let (start, data) = words::all(bytes)?;
-        Ok(Self { servo: header.slot, accept: header.accept, reply: header.reply, start, data })
+        Ok(Self { servo, accept, reply, start, data })
     }
 }
 
@@ -108,14 +101,9 @@ pub struct ServoReply<'a> {
 impl<'a> ServoReply<'a> {
     /// Writes the reply to the front of `buf` and returns it.
     pub(crate) fn emit<'b>(&self, buf: &'b mut [u8; MAX_LEN]) -> &'b [u8] {
-        let family = match self.access {
-            Access::Read => READ,
-            Access::Write => WRITE,
-        };
-        let slot = if self.code == ReplyCode::Running { self.servo } else { self.error };
-        let function = reply_function(family, self.code);
-        Header { function, slot, accept: Code::NONE, reply: Code::NONE }.emit(buf);
-        words::emit_some(buf, self.start, self.num, self.data)
+        let Self { access, code, start, num, data, .. } = *self;
+        let slot = if code == ReplyCode::Running { self.servo } else { self.error };
+        ReplyParts { access, code, slot, start, num, data }.emit([READ, WRITE], buf)
     }
 
     /// Reads a reply, x = 2 to 5; bytes after it are let pass.
@@ -124,23 +112,9 @@ impl<'a> ServoReply<'a> {
     /// [`WireError::Length`] where words are missing from a reply with x = 2, [`WireError::Count`] for more than 256,
     /// and those of a broken header or another function.
     pub(crate) fn parse(bytes: &'a [u8]) -> Result<Self, WireError> {
-        let header = Header::parse(bytes)?;
-        let access = match header.family() {
-            READ => Access::Read,
-            WRITE => Access::Write,
-            _ => return Err(header.foreign()),
-        };
-        let code = header.reply_code().ok_or(header.foreign())?;
+        let ReplyParts { access, code, slot, start, num, data } = ReplyParts::parse(bytes, [READ, WRITE])?;
         let running = code == ReplyCode::Running;
-        let (start, num, data) = if running { words::answer(bytes)? } else { words::refusal(bytes)? };
-        Ok(Self {
-            access,
-            code,
-            servo: if running { header.slot } else { 0 },
-            error: if running { 0 } else { header.slot },
-            start,
-            num,
-            data,
-        })
+        let (servo, error) = if running { (slot, 0) } else { (0, slot) };
+        Ok(Self { access, code, servo, error, start, num, data })
     }
 }

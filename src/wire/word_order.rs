@@ -2,7 +2,7 @@
 //! order makes another place of the same bytes.
 
 use super::{Dialect, position};
-use crate::motion::{Pulses, in_stroke};
+use crate::motion::{PulseRange, Pulses, in_stroke};
 
 /// How far a report and a reading of a seat at rest may be apart, in strokes. The two orders differ by at least 65,535
 /// pulses wherever they differ at all.
@@ -24,7 +24,7 @@ pub(crate) enum WordOrder {
 }
 
 /// Which order of words fits the position registers of axis 1 and on, two `words` each, of a controller of `dialect`
-/// whose stroke has that many pulses. `reported` are the positions of a report of the same rest, where there is one; to a
+/// whose motors stand within `range`. `reported` are the positions of a report of the same rest, where there is one; to a
 /// seat that moves a report from another instant says nothing, and must not be given.
 ///
 /// One axis that tells settles it for all, since a controller has one order; axes that tell different ones fit neither.
@@ -32,11 +32,11 @@ pub(crate) enum WordOrder {
 pub(crate) fn word_order(
     words: &[[u16; 2]],
     dialect: Dialect,
-    stroke: f64,
+    range: PulseRange,
     reported: Option<&[Pulses]>,
 ) -> WordOrder {
     let fits = |place: Pulses, report: Option<&Pulses>| {
-        in_stroke(place, stroke) && report.is_none_or(|it| near(*it, place, stroke))
+        in_stroke(place, range) && report.is_none_or(|it| near(*it, place, range.span()))
     };
     let (mut configured, mut swapped, mut same) = (true, true, true);
     for (axis, words) in words.iter().enumerate() {
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::wire::position_words;
 
-    const STROKE: f64 = 300_000.0;
+    const STROKE: PulseRange = PulseRange { low: 0.0, high: 300_000.0 };
 
     /// What a controller that goes by `dialect` tells of these places.
     fn told(places: &[i32], dialect: Dialect) -> Vec<[u16; 2]> {
@@ -116,6 +116,15 @@ mod tests {
         assert_eq!(order(&[320_000, 0, 0], None), WordOrder::Neither);
         let mixed = [told(&[150_000], Dialect::Smc), told(&[150_000], Dialect::Mbox)].concat();
         assert_eq!(word_order(&mixed, Dialect::Smc, STROKE, None), WordOrder::Neither, "axes that disagree");
+    }
+
+    #[test]
+    fn a_place_below_the_zero_in_the_middle_settles_the_order_of_a_signed_axis() {
+        let words = told(&[-100], Dialect::Smc);
+        let signed = PulseRange { low: -250_000.0, high: 250_000.0 };
+        assert_eq!(word_order(&words, Dialect::Smc, signed, None), WordOrder::Configured);
+        assert_eq!(word_order(&words, Dialect::Mbox, signed, None), WordOrder::Other);
+        assert_eq!(word_order(&words, Dialect::Smc, signed, Some(&[Pulses(100)])), WordOrder::Configured);
     }
 
     proptest! {

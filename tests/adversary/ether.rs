@@ -41,6 +41,8 @@ pub(crate) enum Weather {
     Slow(u32),
 }
 
+/// When the seats' time begins.
+pub(crate) const BEGIN: u64 = 1_000 * MS;
 /// So long after a frame, or after somebody asked for motion, nobody jogs a seat.
 const JUST: u64 = 300 * MS;
 
@@ -93,6 +95,8 @@ pub(crate) struct World {
     /// Whether a person has asked for motion, and when one did.
     pub(crate) asked: bool,
     pub(crate) asked_at: u64,
+    /// What was sent until then was asked for, however late it is read.
+    pub(crate) asked_until: u64,
     /// Frames of motion in words, where somebody wants to read them.
     pub(crate) frames: Option<Vec<String>>,
 }
@@ -117,8 +121,9 @@ impl Ether {
             master: None,
         };
         let lines = seats.iter().enumerate().map(line).collect();
-        let world = World { lines, dice: Dice::new(!seed), asked: false, asked_at: 0, frames: None };
-        Self { now: Arc::new(AtomicU64::new(1_000 * MS)), world: Arc::new(Mutex::new(world)) }
+        let world =
+            World { lines, dice: Dice::new(!seed), asked: false, asked_at: 0, asked_until: 0, frames: None };
+        Self { now: Arc::new(AtomicU64::new(BEGIN)), world: Arc::new(Mutex::new(world)) }
     }
 
     pub(crate) fn ns(&self) -> u64 {
@@ -145,8 +150,9 @@ impl Ether {
     /// Takes a datagram that was sent at that instant.
     pub(crate) fn take_in(&self, lane: usize, datagram: &[u8], sent: u64) -> Delivery {
         let now = self.ns();
-        let World { lines, dice, asked, frames, .. } = &mut *self.world();
-        let delivery = lines[lane].take(datagram, (now, sent), *asked, dice);
+        let World { lines, dice, asked, asked_until, frames, .. } = &mut *self.world();
+        let asked = *asked || sent <= *asked_until;
+        let delivery = lines[lane].take(datagram, (now, sent), asked, dice);
         if let (Some(frames), Heard::Motion(frame)) = (frames, words::hear(datagram)) {
             let places: Vec<i32> = frame.positions[..frame.axes].iter().map(|at| at / 200).collect();
             let (at, number, ms) = (now as f64 * 1e-9, frame.number, frame.time_ms);
@@ -298,6 +304,8 @@ impl Line {
             if dice.one_in(6) {
                 insert(&mut self.there, Packet { at: later, ..packet.clone() });
             } else if dice.one_in(6) {
+                // What overtakes it ends the loss, not this.
+                self.lost_since = moves.then_some(lost_since);
                 insert(&mut self.there, Packet { at: later, ..packet });
                 return Delivery::Sent;
             }

@@ -9,6 +9,7 @@ use kinocue::harness::state::{Event, Readiness, State, Transition, Trouble};
 use kinocue::harness::time::{MonoTime, Rate, ShowTime};
 use kinocue::wire::Dialect;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -72,8 +73,8 @@ pub(crate) struct Hall<'h, 'l> {
     /// Orders to home that each seat had heard before the last homing.
     homings: Vec<u32>,
     ready: bool,
-    /// What somebody wanted last that moves seats.
-    wanted: Option<Transition>,
+    /// The commands that the hall has not answered yet, in their order: whether each asks for motion.
+    open: VecDeque<bool>,
     show_over: bool,
     pub(crate) closed: bool,
     pub(crate) diary: Option<Vec<String>>,
@@ -120,7 +121,7 @@ pub(crate) fn open<T>(
             homing: None,
             homings: Vec::new(),
             ready: false,
-            wanted: None,
+            open: VecDeque::new(),
             show_over: false,
             closed: false,
             diary: None,
@@ -212,9 +213,7 @@ impl Hall<'_, '_> {
             self.homing = (state == State::Homing).then_some(Homing::UnderWay { told: 0 });
             self.line.open(state == State::Homing);
             (self.state, self.since) = (state, now);
-            if !state.may_send_motion() {
-                self.ether.world().asked = false;
-            }
+            self.see_who_asks();
         }
         if matches!(state, State::Paused | State::Stopping) && now > self.since + COMES_TO_REST {
             self.ether.world().asked = false;
@@ -226,17 +225,19 @@ impl Hall<'_, '_> {
         while let Ok(news) = self.runtime.news.pop() {
             match news {
                 News::Refused(refusal) => {
-                    // Another thing may be asked for since.
-                    if !self.state.may_send_motion() && self.wanted == Some(refusal.asked) {
-                        self.ether.world().asked = false;
-                    }
+                    self.open.pop_front();
                     self.note(|| format!("refused: {:?}, {:?}", refusal.asked, refusal.why));
                 }
-                News::NotLoaded(state) => self.note(|| format!("not loaded while {state:?}")),
+                News::NotLoaded(state) => {
+                    self.open.pop_front();
+                    self.note(|| format!("not loaded while {state:?}"));
+                }
+                News::Taken => drop(self.open.pop_front()),
                 News::Unplanned(what) => self.note(|| format!("unplanned: {what:?}")),
-                News::Entered { .. } | News::Taken => {}
+                News::Entered { .. } => {}
             }
         }
+        self.see_who_asks();
         if std::mem::take(&mut self.show_over) {
             self.start = ShowTime::ZERO;
             self.stage();
@@ -313,8 +314,19 @@ impl Hall<'_, '_> {
         self.runtime.desk.mix(lane).on
     }
 
+    /// A hall that rests moves nobody, unless somebody asked for that and has no answer yet.
+    fn see_who_asks(&self) {
+        if !self.state.may_send_motion() && !self.open.contains(&true) {
+            self.ether.world().asked = false;
+        }
+    }
+
     fn command(&mut self, command: Command) {
-        drop(self.runtime.commands.push(command));
+        let moves =
+            matches!(command, Command::Request(Transition::Go | Transition::Resume | Transition::Park));
+        if self.runtime.commands.push(command).is_ok() {
+            self.open.push_back(moves);
+        }
     }
 
     /// Makes the show anew from what is set, and hands it over.
@@ -350,7 +362,7 @@ impl Hall<'_, '_> {
     pub(crate) fn ask(&mut self, request: Transition) {
         self.note(|| format!("asks: {request:?}"));
         if matches!(request, Transition::Go | Transition::Resume | Transition::Park) {
-            self.wants(request);
+            self.wants();
         }
         if request == Transition::Stop {
             self.runtime.desk.stop();
@@ -360,8 +372,7 @@ impl Hall<'_, '_> {
     }
 
     /// Somebody wants the seats to move.
-    fn wants(&mut self, request: Transition) {
-        self.wanted = Some(request);
+    fn wants(&mut self) {
         let (now, world) = (self.ether.ns(), &mut *self.ether.world());
         (world.asked, world.asked_at) = (true, now);
     }
@@ -416,7 +427,7 @@ impl Hall<'_, '_> {
         self.note(|| "the hall is to close".to_owned());
         // It parks first.
         if matches!(self.state, State::Playing(_) | State::Paused) {
-            self.wants(Transition::Park);
+            self.wants();
         }
         self.runtime.leave.store(true, Ordering::Relaxed);
     }

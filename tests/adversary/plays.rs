@@ -1,5 +1,7 @@
 //! `kinocue play` as a real process, to virtual seats on real sockets.
 
+use std::thread;
+
 use super::cues::{KINDS, swing};
 use super::ether::Weather;
 use super::hall::{breaches, seats};
@@ -63,6 +65,24 @@ fn nor_does_one_whose_seat_answers_everything_but_where_it_is() {
     let (town, code) = play(&[100.0], |seat| seat.shy = true, lost);
     assert_no_breach(&town, code);
     assert_eq!(code, Some(75), "at {} mm", height(&town, 0));
+}
+
+#[test]
+fn a_play_that_leaves_a_seat_where_nobody_knows_does_not_end_as_if_it_were_at_park() {
+    let cut_off = |town: &Town| {
+        let ether = town.ether.clone();
+        thread::spawn(move || {
+            // The one slow frame, and some of the ride.
+            while ether.world().lines[0].frames < 60 {
+                thread::yield_now();
+            }
+            ether.turns(0, Weather::Cut, 120);
+        });
+    };
+    let (town, code) = play(&[0.0], |seat| seat.shy = true, cut_off);
+    assert_no_breach(&town, code);
+    // Lost, since it does not tell where it is; or left somewhere, if it was not lost yet.
+    assert!(matches!(code, Some(69 | 75)), "exit {code:?} at {} mm", height(&town, 0));
 }
 
 // D14: a controller that cuts what takes long.

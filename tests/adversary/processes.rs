@@ -111,7 +111,7 @@ impl Hall {
         Monotonic.sleep_until(Monotonic.now() + Duration::from_millis(ms));
         let now = self.town.ether.ns();
         if self.stopped.is_some_and(|stopped| now > stopped + RESTS) {
-            self.town.ether.world().asked = false;
+            self.town.nobody_asks();
         }
     }
 
@@ -136,7 +136,7 @@ impl Hall {
             _ => {
                 self.note("it is killed".to_owned());
                 drop(self.serving.take());
-                self.town.ether.world().asked = false;
+                self.town.nobody_asks();
                 self.serve();
             }
         }

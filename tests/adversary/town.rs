@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use kinocue::harness::sys::batch::{Batch, stamp_arrivals};
 use kinocue::harness::sys::clock::{Monotonic, wall_now_ns};
-use kinocue::harness::time::{Clock as _, nanos};
+use kinocue::harness::time::{Clock as _, MonoTime, nanos};
 
-use super::ether::Ether;
+use super::ether::{BEGIN, Ether};
 use super::seat::Settings;
 
 /// How long a seat's thread waits for a datagram until it looks after what else there is.
@@ -22,6 +22,7 @@ const JITTER_MS: f64 = 40.0;
 pub(crate) struct Town {
     pub(crate) ether: Ether,
     pub(crate) addresses: Vec<SocketAddr>,
+    began: MonoTime,
     over: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -43,13 +44,20 @@ impl Town {
         let seats: Vec<Settings> = seats.iter().zip(&addresses).map(settled).collect();
         let ether = Ether::new(&seats, seed);
         ether.world().asked = true;
-        let over = Arc::<AtomicBool>::default();
+        let (over, began) = (Arc::<AtomicBool>::default(), Monotonic.now());
         let live = |(index, socket): (usize, UdpSocket)| {
             let (ether, over) = (ether.clone(), Arc::clone(&over));
-            thread::spawn(move || live(&ether, index, &socket, &over))
+            thread::spawn(move || live(&ether, began, index, &socket, &over))
         };
         let threads = sockets.into_iter().enumerate().map(live).collect();
-        Self { ether, addresses, over, threads }
+        Self { ether, addresses, began, over, threads }
+    }
+
+    /// From now on nobody asks for motion; what is on its way was asked for.
+    pub(crate) fn nobody_asks(&self) {
+        let now = since(self.began);
+        let world = &mut *self.ether.world();
+        (world.asked, world.asked_until) = (false, now);
     }
 }
 
@@ -60,10 +68,14 @@ impl Drop for Town {
     }
 }
 
+/// The seats' time, that of the machine since the town was opened.
+fn since(began: MonoTime) -> u64 {
+    BEGIN + nanos(Monotonic.now().since(began))
+}
+
 /// One seat, until all is over. What the kernel stamped tells when a datagram was sent, however late this thread is.
-fn live(ether: &Ether, index: usize, socket: &UdpSocket, over: &AtomicBool) {
-    let (began, zero) = (Monotonic.now(), ether.ns());
-    let now = || zero + nanos(Monotonic.now().since(began));
+fn live(ether: &Ether, began: MonoTime, index: usize, socket: &UdpSocket, over: &AtomicBool) {
+    let now = || since(began);
     socket.set_read_timeout(Some(LOOK)).expect("it is longer than nothing");
     stamp_arrivals(socket).expect("the kernel stamps");
     let (mut batch, mut host) = (Batch::new(), None);

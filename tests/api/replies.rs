@@ -41,6 +41,8 @@ fn every_change_reaches_the_hall_as_it_was_asked() {
         (plain("/api/v1/show/disarm"), Command::Disarm),
         (plain("/api/v1/show/clear"), Command::Clear),
         (put("/api/v1/trim", r#"{"offset_s":0.08}"#), Command::Trim(80)),
+        (put("/api/v1/sync/source", r#"{"source":"ltc"}"#), Command::Source(Some("ltc".to_owned()))),
+        (put("/api/v1/sync/source", r#"{"source":null}"#), Command::Source(None)),
         (
             put("/api/v1/levels", r#"{"motion":0.6,"effects":{"water":false},"rows":{"A":0}}"#),
             Command::Levels(levels),

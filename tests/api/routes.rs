@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::client::{Request, problem};
 use crate::hall::Hall;
 
-const GETS: [&str; 13] = [
+const GETS: [&str; 14] = [
     "/api/v1/controllers",
     "/api/v1/controllers/{name}",
     "/api/v1/cues",
@@ -16,12 +16,13 @@ const GETS: [&str; 13] = [
     "/api/v1/playlists",
     "/api/v1/reports/{day}",
     "/api/v1/status",
+    "/api/v1/sync",
     "/healthz",
     "/metrics",
     "/readyz",
 ];
 
-const CHANGES: [(&str, &str); 21] = [
+const CHANGES: [(&str, &str); 22] = [
     ("post", "/api/v1/controllers/{name}/disable"),
     ("post", "/api/v1/controllers/{name}/enable"),
     ("post", "/api/v1/playlist/select"),
@@ -42,6 +43,7 @@ const CHANGES: [(&str, &str); 21] = [
     ("post", "/api/v1/test"),
     ("put", "/api/v1/levels"),
     ("put", "/api/v1/playlist"),
+    ("put", "/api/v1/sync/source"),
     ("put", "/api/v1/trim"),
 ];
 

@@ -59,6 +59,12 @@ impl Guarded {
         Self::start_with(args, Stdio::null(), Stdio::piped())
     }
 
+    /// The same with the programs of a folder, and no others.
+    pub(crate) fn start_with_path(args: &[&str], path: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinocue"));
+        Self::spawn(command.args(args).env("PATH", path), Stdio::null(), Stdio::piped())
+    }
+
     fn start_with(args: &[&str], stdin: Stdio, stderr: Stdio) -> Self {
         Self::spawn(Command::new(env!("CARGO_BIN_EXE_kinocue")).args(args), stdin, stderr)
     }

@@ -86,10 +86,15 @@ struct SoFar {
 impl Serving {
     /// Serves the hall of `hall.toml` in a folder, with its sockets and its state there.
     pub(crate) fn start(dir: &Path) -> Self {
+        Self::start_by(dir, Guarded::start)
+    }
+
+    /// The same, started so.
+    pub(crate) fn start_by(dir: &Path, start: impl FnOnce(&[&str]) -> Guarded) -> Self {
         let path = |name: &str| dir.join(name).to_str().expect("text").to_owned();
         let (config, socket, state) = (path("hall.toml"), path("control.sock"), path("state"));
         let args = ["serve", "--config", &config, "--socket", &socket, "--state", &state];
-        let mut guarded = Guarded::start(&args);
+        let mut guarded = start(&args);
         let stderr = guarded.stderr();
         let said = Arc::<Said>::default();
         let hears = Arc::clone(&said);

@@ -1,6 +1,7 @@
 //! A hall whose film leads its shows: Art-Net timecode as a cinema server sends it.
 
 use crate::hall::Hall;
+use crate::http::Request;
 use crate::process::Guarded;
 
 /// Where timecode is heard, and from whom: addresses of this machine that no other test and no other run of them has.
@@ -46,10 +47,18 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
     hall.done(&["go"]);
     let at = |status: &serde_json::Value, what: &str| status[what]["position_s"].as_f64().unwrap_or(f64::MAX);
     let follows = |status: &serde_json::Value| (at(status, "film") - at(status, "show")).abs() < 0.25;
-    hall.wait(|status| status["state"] == "playing" && follows(status));
+    let led = hall.wait(|status| {
+        let error = status["film"]["error_ms"].as_f64();
+        status["state"] == "playing" && follows(status) && error.is_some_and(|error| error.abs() < 45.0)
+    });
+    let code = led["film"]["timecode"].as_str().expect("Art-Net has labels");
+    assert!(code.starts_with("01:00:"), "{code}");
+    assert_eq!((&led["film"]["disagrees"], &led["film"]["chosen"]), (&().into(), &().into()));
+    assert_eq!(led["film"]["sources"][0]["jumps"], 0, "{}", led["film"]);
 
     drop(reel);
     let waits = hall.wait(|status| status["state"] == "waiting" && status["film"]["state"] == "lost");
+    assert_eq!(waits["film"]["error_ms"], serde_json::Value::Null, "seats that wait follow nothing");
     assert_eq!(waits["cause"], "nothing is heard of the film any more");
     assert!(waits["next"].as_str().is_some_and(|next| next.contains("see to the film")), "{}", waits["next"]);
     let reel = film(0, "01:00:30:00");
@@ -61,6 +70,33 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
     let lines = hall.close();
     assert!(lines.iter().any(|line| line.contains("the film has left the cue")), "{lines:?}");
     assert!(hall.end().rest_in_park());
+}
+
+#[test]
+fn a_source_that_a_person_chose_is_followed_though_it_is_lost_until_the_ranking_decides_again() {
+    let (from, bind) = network(2);
+    let hall = Hall::open_with(|config| {
+        format!(
+            "{config}[sync]\nsources = [\"artnet\", \"mtc\"]\nfilm_fps = \"25\"\nstart = \"01:00:00:00\"\n\
+             [sync.artnet]\nfrom = \"{from}\"\nbind = \"{bind}\"\n[sync.mtc]\ndevice = \"/nowhere/midi\"\n"
+        )
+    });
+    let _reel = film(2, "01:00:05:00");
+    let led = hall.wait(|status| status["film"]["state"] == "locked");
+    let name = |place: usize| led["film"]["sources"][place]["source"].clone();
+    let choose = |source: serde_json::Value| {
+        let body = serde_json::json!({ "source": source }).to_string();
+        Request::new("PUT", "/api/v1/sync/source").json(body).send(&hall.socket())
+    };
+    assert_eq!(choose(name(1)).status, 200);
+    let chosen = hall.wait(|status| status["film"]["state"] == "absent");
+    assert_eq!((&chosen["film"]["chosen"], &chosen["film"]["source"]), (&name(1), &name(1)));
+    assert_eq!(choose("nobody".into()).status, 404);
+    assert_eq!(hall.status()["film"]["chosen"], name(1), "there is no such source");
+    assert_eq!(choose(serde_json::Value::Null).status, 200);
+    assert_eq!(hall.socket().get("/api/v1/sync").status, 200);
+    let by_ranking = hall.wait(|status| status["film"]["state"] == "locked");
+    assert_eq!(by_ranking["film"]["chosen"], serde_json::Value::Null);
 }
 
 #[test]
@@ -94,5 +130,9 @@ fn a_hall_opens_without_the_source_of_its_film_and_says_what_is_wrong_with_it() 
         format!("{config}[sync]\nsources = [\"mtc\"]\n[sync.mtc]\ndevice = \"/nowhere/midi\"\n")
     });
     let cause = |status: &serde_json::Value| status["film"]["sources"][0]["cause"].to_string();
-    hall.wait(|status| cause(status).contains("/nowhere/midi cannot be opened: No such file"));
+    let status = hall.wait(|status| cause(status).contains("/nowhere/midi cannot be opened: No such file"));
+    let warnings = status["warnings"].as_array().expect("a list");
+    let of_the_film =
+        warnings.iter().find(|one| one["id"] == "film").expect("whoever looks at no source is told as well");
+    assert!(of_the_film["text"].to_string().contains("/nowhere/midi"), "{of_the_film}");
 }

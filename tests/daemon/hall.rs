@@ -12,7 +12,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::http::To;
-use crate::process::{PATIENCE, Relay, Run, Seen, Sim};
+use crate::process::{Guarded, PATIENCE, Relay, Run, Seen, Sim};
 use crate::serving::{self, Serving};
 
 /// Statuses that are waited through; where all is well a few dozen do.
@@ -69,8 +69,20 @@ impl Hall {
     /// Starts the daemon.
     pub(crate) fn serve(&mut self) {
         self.launch();
+        self.begins();
+    }
+
+    fn begins(&self) {
         let begun = |line: &str| ["parked: ", "recovering: "].iter().any(|state| line.contains(state));
         self.serving().heard(|line| begun(line).then_some(()));
+    }
+
+    /// Starts it where no other program is installed.
+    pub(crate) fn serve_alone(&mut self) {
+        let nothing = self.path("cues");
+        let start = |args: &[&str]| Guarded::start_with_path(args, &nothing);
+        self.serving = Some(Serving::start_by(self.dir.path(), start));
+        self.begins();
     }
 
     /// Kills the daemon, as a crash would.

@@ -13,8 +13,13 @@ mod http;
 #[path = "../common/process.rs"]
 #[expect(dead_code, reason = "each test uses its own part")]
 mod process;
+#[path = "../common/programs.rs"]
+mod programs;
 #[path = "../common/serving.rs"]
 mod serving;
+
+#[path = "../common/wav.rs"]
+mod wav;
 
 mod begin;
 mod film;
@@ -22,6 +27,7 @@ mod hall;
 mod lasting;
 mod library;
 mod mbox;
+mod player;
 mod playlist;
 mod remedies;
 mod show;

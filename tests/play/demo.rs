@@ -13,8 +13,10 @@ use serde_json::Value;
 
 use super::Folder;
 use super::keyboard::{read_all, terminal};
-use super::process::{PATIENCE, Playing};
+use super::process::{Guarded, PATIENCE, Playing};
+use super::programs::is_installed;
 use super::report::assert_sound;
+use super::wav::silent_film;
 
 /// The console of a demo, and whoever has its link.
 struct Console {
@@ -131,6 +133,32 @@ fn the_demo_serves_the_console_while_it_plays_and_ends_by_itself_with_every_fram
     assert!(report["ticks"].as_u64() > Some(1_700), "the whole cue: {report}");
     assert_all_acked(&report);
     assert!(is_empty(&folder.path("")), "it leaves no file behind");
+}
+
+#[test]
+fn the_demo_shows_a_film_and_plays_a_cue_of_its_length_to_it_and_leaves_nothing() {
+    if !is_installed("mpv") {
+        return;
+    }
+    let (folder, films) = (Folder::new(), Folder::new());
+    let film = films.write("film.wav", silent_film(10));
+    let args = ["--json", "--film", film.to_str().expect("text")];
+    let mut demo = Playing::demo(&folder.path(""), &args, Stdio::null(), Stdio::piped());
+    demo.wait_for("playing: ");
+    let report = demo.finish().report_of(0);
+    assert_eq!(report["result"], "completed");
+    assert_all_acked(&report);
+    assert!(is_empty(&folder.path("")), "it leaves no file behind");
+}
+
+#[test]
+fn the_demo_of_a_film_says_what_to_install_where_there_is_no_player() {
+    let films = Folder::new();
+    let film = films.write("film.wav", silent_film(10));
+    let run =
+        Guarded::start_with_path(&["demo", "--film", film.to_str().expect("text")], &films.path("")).finish();
+    assert_eq!(run.code, Some(69), "{run:?}");
+    assert!(run.stderr.contains("install it (`apt-get install mpv`)"), "{run:?}");
 }
 
 #[test]

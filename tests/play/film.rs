@@ -50,6 +50,8 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
         run.stderr
     );
     assert!(seen.rest_in_park());
+    let said = |what: &str| run.stderr.find(what).unwrap_or_else(|| panic!("{what}: {}", run.stderr));
+    assert!(said("joining: the seats join the film") < said("playing: the seats are on the cue"));
     // It is where the cue is at a time that goes on as the frames do.
     let rows: Vec<_> = seen.rows.iter().map(|row| (f64::from(row.frame), row.commanded[0])).collect();
     let media_s = |at: i32| {
@@ -68,7 +70,9 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
     let off: Vec<f64> = rising.map(|(frame, at)| media_s(*at) - frame * 0.01).collect();
     let (least, most) =
         off.iter().fold((f64::MAX, f64::MIN), |(least, most), off| (least.min(*off), most.max(*off)));
-    assert!(off.len() > 50 && most - least < 0.005, "{} frames, {least}..{most}", off.len());
+    // A frame of the film lasts 40 ms: it stays nearer to its own than to any other. How near is judged in virtual time and, on a
+    // machine of which more is known, by `benches/film`.
+    assert!(off.len() > 50 && most - least < 0.02, "{} frames, {least}..{most}", off.len());
 }
 
 /// A player that speaks as mpv does: its film runs until it is told.
@@ -152,6 +156,17 @@ fn a_player_leads_the_seat_which_rests_while_it_is_paused_and_parks_when_its_fil
     assert_eq!(run.report_of(0)["result"], "completed");
     let seen = sim.end();
     assert!(seen.rest_in_park() && seen.rows.iter().any(|row| row.commanded[0] > pulses(0.001)));
+}
+
+#[test]
+fn a_reel_that_ends_before_it_has_reached_the_cue_ends_the_play_and_moves_nobody() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let chase = format!("ltc:{}", reel(&folder, "00:10:00:00", "2"));
+    let args = ["--json", "--chase", &chase, "--film-fps", "25", "--tc-start", "01:00:00:00"];
+    let run = Playing::start(&rise(&folder, 4), &sim.to(), &args).finish();
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.contains("no source can tell of another"), "{}", run.stderr);
+    assert!(sim.end().rows.iter().all(|row| row.commanded[0] == 0));
 }
 
 #[test]

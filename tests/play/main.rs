@@ -3,6 +3,11 @@
 #[expect(dead_code, reason = "shared with tests that need more of it")]
 #[path = "../common/process.rs"]
 mod process;
+#[path = "../common/wav.rs"]
+mod wav;
+
+#[path = "../common/programs.rs"]
+mod programs;
 
 mod controllers;
 mod cue_files;
@@ -15,6 +20,7 @@ mod motion;
 mod report;
 mod stopping;
 mod usage;
+mod wire;
 
 use std::path::{Path, PathBuf};
 

@@ -22,29 +22,33 @@ type Row = (&'static str, fn(&[File]) -> (f64, String), Better, f64, f64);
 /// What is counted, how, which way is better, what it was when it was noted last, and the target.
 const ROWS: &[Row] = &[
     ("methods on one type", counts::methods_of_one_type, Less, 74.0, 25.0),
-    ("bool fields in one struct", counts::bools_of_one_struct, Less, 13.0, 3.0),
+    ("bool fields in one struct", counts::bools_of_one_struct, Less, 8.0, 3.0),
     ("enums with the words of the hall's state", counts::encodings_of_state, Less, 1.0, 1.0),
     ("compositions", counts::compositions, Less, 1.0, 1.0),
     ("type names used again (clap's Args apart)", counts::type_names_used_again, Less, 140.0, 30.0),
     ("uses of one type name", counts::uses_of_one_type_name, Less, 13.0, 2.0),
     ("polled said-once flags", counts::flags_told_once, Less, 9.0, 0.0),
     ("polling sleeps in the supervisor", counts::sleeps_of_the_supervisor, Less, 0.0, 0.0),
-    ("circles within rooms", circles::within_rooms, Less, 2.0, 0.0),
+    ("circles within rooms", circles::within_rooms, Less, 0.0, 0.0),
     ("rooms that know config", counts::rooms_that_know_config, Less, 17.0, 9.0),
     // By this count 49 where the target of 170 was set, of what were 192 then, lists of public fields among them.
-    ("pairs of runs, but for names", repeats::but_for_names, Less, 73.0, 43.0),
-    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 15.0, 2.0),
+    // Two more for one more command in the list of commands.
+    ("pairs of runs, but for names", repeats::but_for_names, Less, 57.0, 43.0),
+    ("pairs of runs, to the letter", repeats::to_the_letter, Less, 9.0, 2.0),
     // 490 more where the supervisor was taken apart into features that are tested alone, 650 for the analogue outputs and what a seat
     // tells in a show, 2,790 for where the film is: six kinds of timecode, four decoders, tracker, ranking, follower; 150 for the seam to
     // a family of drives; 950 for shows that chase a film: sources that are read, seats that wait, sync send and check; 1,040 for films
     // by MIDI, Art-Net, OSC, HTTP and the clock of the day, and for sync watch; 370 for the film of a hall and its
     // status; 240 for an engine whose phases hold what is theirs, with types of their own for show time, lanes and what crosses to the planner; 150 for a limiter
-    // that judges axes in groups, and for seats that vibrate on; 45 for motions that begin from a reading of now.
-    ("lines of code", counts::lines_of_code, Less, 55_209.0, 39_800.0),
+    // that judges axes in groups, and for seats that vibrate on; 45 for motions that begin from a reading of now; 85 for a controller's
+    // replies and faults apart; 130 for sources of a film that are left at once and looked for again, and for a film that is known to
+    // be over; 1,020 for a player that the service starts, keeps and leads with the seats, and for films in playlists and in the demo;
+    // 155 for how far seats are from their film, its timecode, a source that a person chooses, and seats that are left where nobody knows.
+    ("lines of code", counts::lines_of_code, Less, 56_605.0, 39_800.0),
     // Two more for the film in the status, which tests make.
     ("public items and fields", counts::public_items, Less, 1_147.0, 400.0),
-    ("lines of the longest function", counts::longest_function, Less, 54.0, 48.0),
-    ("lines of the longest file", counts::longest_file, Less, 468.0, 390.0),
+    ("lines of the longest function", counts::longest_function, Less, 52.0, 48.0),
+    ("lines of the longest file", counts::longest_file, Less, 466.0, 390.0),
     ("plain comments in limiter, proof, film, engine, %", counts::reasons, More, 1.6, 3.0),
     ("console tests passing with no browser", counts::console_tests_without_a_browser, Less, 0.0, 0.0),
 ];

@@ -4,12 +4,15 @@ use std::io;
 use std::sync::Arc;
 
 use super::{FilmReader, SharedTable, SourceRules};
-use crate::config::FilmSync;
+use crate::app::player::{Player, PlayerLink};
+use crate::config::{Config, FilmPlayer, FilmSync};
 use crate::film::point::PublishedPoint;
+use crate::film::source::{FilmArgs, FilmSource};
 
-/// The sources of a hall, over all its configurations.
+/// The sources of a hall, and its player, over all its configurations.
 #[derive(Debug, Default)]
 pub(crate) struct HallFilm {
+    player: Option<(FilmPlayer, Player)>,
     reader: Option<(FilmSync, FilmReader)>,
 }
 
@@ -18,13 +21,27 @@ impl HallFilm {
     ///
     /// # Errors
     /// The system starts no thread. What is wrong with a source itself is noted beside it.
-    pub(crate) fn follow(&mut self, sync: Option<&FilmSync>) -> io::Result<Option<Arc<PublishedPoint>>> {
+    pub(crate) fn follow(&mut self, config: &Config) -> io::Result<Option<Arc<PublishedPoint>>> {
+        let film = config.film.as_ref();
+        if self.player.as_ref().map(|(before, _)| before) != film {
+            (self.reader, self.player) = (None, None);
+            self.player =
+                film.map(|film| Ok::<_, io::Error>((film.clone(), Player::start(film)?))).transpose()?;
+        }
+        let sync = config.sync.as_ref();
         if self.reader.as_ref().map(|(before, _)| before) != sync {
             // What holds a port or a device goes first.
             self.reader = None;
-            self.reader = sync.map(|sync| Ok::<_, io::Error>((sync.clone(), open(sync)?))).transpose()?;
+            let player = self.player.as_ref().map(|(_, player)| player);
+            self.reader =
+                sync.map(|sync| Ok::<_, io::Error>((sync.clone(), open(sync, player)?))).transpose()?;
         }
         Ok(self.reader.as_ref().map(|(_, reader)| reader.point()))
+    }
+
+    /// The way to the player, where there is one.
+    pub(crate) fn player(&self) -> Option<PlayerLink> {
+        self.player.as_ref().map(|(_, player)| player.link())
     }
 
     /// What is heard of it, for people.
@@ -33,7 +50,10 @@ impl HallFilm {
     }
 }
 
-fn open(sync: &FilmSync) -> io::Result<FilmReader> {
+fn open(sync: &FilmSync, player: Option<&Player>) -> io::Result<FilmReader> {
     let rules = SourceRules { allows_coarse: sync.allows_coarse, band: sync.pace.band };
-    FilmReader::open(&sync.sources, rules).map_err(io::Error::other)
+    let mut sources = sync.sources.clone();
+    // A film that is shown from here leads before all others; while there is none it is heard of nowhere, and others may.
+    sources.splice(..0, player.map(|player| FilmArgs::of(FilmSource::Mpv(player.socket().to_owned()))));
+    FilmReader::open(&sources, rules, player.map(Player::gate)).map_err(io::Error::other)
 }

@@ -2,13 +2,17 @@
 
 use std::fs::File;
 use std::io::{self, Read};
+use std::os::fd::AsFd;
+use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use rustix::process::{Pid, Signal, kill_process_group};
+
 use super::riff::SampleStream;
-use super::{ChildSlot, FilmError, WordSink, read_some, start};
+use super::{ChildSlot, FilmError, LeftRead, WordSink, start};
 use crate::film::ltc::LtcReader;
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::{FilmArgs, LtcInput};
@@ -35,13 +39,17 @@ pub(super) fn start_reading(
             let file = File::open(path).map_err(failed(path))?;
             start("ltc", move || line.end(line.read(file, true)))?;
         }
-        LtcInput::Stdin => start("ltc", move || line.end(line.read(io::stdin(), false)))?,
+        LtcInput::Stdin => {
+            // Not through the buffer that is shared: what lies in there no poll tells of.
+            let input = io::stdin().as_fd().try_clone_to_owned().map_err(failed(Path::new("stdin")))?;
+            start("ltc", move || line.end(line.read(File::from(input), false)))?;
+        }
         LtcInput::Fifo(path) => {
             let path = path.clone();
             path.metadata().map_err(failed(&path))?;
             start("ltc", move || {
-                // Opening waits for a writer.
-                while line.told.again(File::open(&path).and_then(|fifo| line.read(fifo, false))) {}
+                let read = || LeftRead::open(&path, &line.told).and_then(|fifo| line.read_from(fifo, false));
+                while line.told.again(read()) {}
             })?;
         }
         LtcInput::Pipe(command) => {
@@ -61,12 +69,14 @@ pub(super) fn start_reading(
 /// Reads what a command writes. One that fails, as a sound card does that is pulled out, is started anew; one that ends well has
 /// nothing more to say.
 fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Result<(), FilmError> {
-    command.stdin(Stdio::null()).stdout(Stdio::piped());
+    // In a group of its own: a shell is ended with all that it has started.
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
     let failed = |source| FilmError::Command { command: name.to_owned(), source };
     let mut output = put(command.spawn().map_err(failed)?, child);
     let child = Arc::clone(child);
     start("ltc", move || {
-        loop {
+        // Whoever ended what was started ends no more: this one was started meanwhile.
+        while !line.told.is_over() {
             let read = output.take().map_or(Ok(()), |output| line.read(output, false));
             // Whoever ends the program meanwhile does not wait for the lock.
             let done = lock(&child).take();
@@ -79,6 +89,7 @@ fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Re
             }
             output = command.spawn().ok().and_then(|one| put(one, &child));
         }
+        end(&child);
     })?;
     Ok(())
 }
@@ -90,7 +101,16 @@ fn put(mut one: Child, child: &Mutex<Option<Child>>) -> Option<ChildStdout> {
     output
 }
 
-pub(super) fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
+/// Ends a command, and what it has started.
+pub(super) fn end(child: &Mutex<Option<Child>>) {
+    if let Some(mut one) = lock(child).take() {
+        // One that has ended by itself cannot be ended any more.
+        let _ = kill_process_group(Pid::from_child(&one), Signal::KILL);
+        let _ = one.wait();
+    }
+}
+
+fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
     child.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -101,14 +121,18 @@ struct LtcLine {
 }
 
 impl LtcLine {
-    /// Reads to the end of a stream; one that is `paced`, at the speed of its sound.
-    fn read(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
+    /// Reads to the end of a stream, or until nobody listens; one that is `paced`, at the speed of its sound.
+    fn read(&self, stream: impl Read + AsFd, paced: bool) -> io::Result<()> {
+        self.read_from(LeftRead::new(stream, &self.told), paced)
+    }
+
+    fn read_from(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
         let (mut samples, mut block, mut octets) = (SampleStream::default(), Vec::new(), [0; BLOCK]);
         let FilmArgs { rate, start, latency, .. } = self.args;
         let (begun, mut heard) = (Monotonic.now(), 0_u64);
         let mut reader: Option<LtcReader> = None;
         loop {
-            let count = read_some(&mut stream, &mut octets)?;
+            let count = stream.read(&mut octets)?;
             if count == 0 {
                 return Ok(());
             }
@@ -123,7 +147,7 @@ impl LtcLine {
             }
             let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
             reader.hear(&block, at, &mut |what| {
-                self.told.tell(what); // without a listener the program ends
+                self.told.tell(what);
             });
             self.note(reader);
         }

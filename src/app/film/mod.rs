@@ -4,6 +4,7 @@
 mod clock;
 mod datagrams;
 mod hall;
+mod left;
 mod ltc;
 mod mpv;
 mod mtc;
@@ -16,7 +17,7 @@ mod table;
 mod tests;
 mod told;
 
-use std::io::{self, Read};
+use std::io;
 use std::process::Child;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -29,9 +30,11 @@ pub(crate) use sent::TimecodeSent;
 pub(crate) use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
 pub(crate) use table::{FilmTable, SharedTable, SourceRow};
 
+use super::player::FilmGate;
 use crate::film::chooser::MOST_SOURCES;
 use crate::film::point::PublishedPoint;
 use crate::film::source::{FilmArgs, FilmSource};
+use left::LeftRead;
 use table::Ranking;
 use told::{Notes, WordSink};
 
@@ -112,21 +115,33 @@ impl FilmReader {
     /// # Errors
     /// [`FilmError`] where one cannot be had at all. One that ends later is looked for again.
     pub(crate) fn start(sources: &[FilmArgs], rules: SourceRules) -> Result<Self, FilmError> {
-        Self::each(sources, rules, &mut Err)
+        Self::each(sources, rules, None, read)
     }
 
-    /// The same in a hall, which opens whatever its sources are: what is wrong with one is noted beside it.
+    /// The same in a hall, which opens whatever its sources are: what is wrong with one is noted beside it, and it is tried again.
+    /// The first of them is the hall's own player, where it has one, and heard while it shows the film that it is to.
     ///
     /// # Errors
     /// [`FilmError::Thread`].
-    pub(crate) fn open(sources: &[FilmArgs], rules: SourceRules) -> Result<Self, FilmError> {
-        Self::each(sources, rules, &mut |_| Ok(()))
+    pub(crate) fn open(
+        sources: &[FilmArgs],
+        rules: SourceRules,
+        player: Option<FilmGate>,
+    ) -> Result<Self, FilmError> {
+        Self::each(sources, rules, player, |args, told, child| match noting(args, &told, &child) {
+            Ok(()) => Ok(()),
+            Err(_) => {
+                let args = args.clone();
+                Ok(start("source", move || while told.waits() && noting(&args, &told, &child).is_err() {})?)
+            }
+        })
     }
 
     fn each(
         sources: &[FilmArgs],
         rules: SourceRules,
-        on_error: &mut dyn FnMut(FilmError) -> Result<(), FilmError>,
+        mut player: Option<FilmGate>,
+        read: impl Fn(&FilmArgs, WordSink, ChildSlot) -> Result<(), FilmError>,
     ) -> Result<Self, FilmError> {
         if sources.len() > MOST_SOURCES {
             return Err(FilmError::Many(sources.len()));
@@ -138,31 +153,18 @@ impl FilmReader {
         let mut reader = Self { point, table, children: Vec::new(), over: Arc::default() };
         start("film", move || ranking.run(&heard))?;
         for (place, (args, notes)) in sources.iter().zip(notes).enumerate() {
-            let told = WordSink { place, to: to.clone(), notes, over: Arc::clone(&reader.over) };
-            let noted = told.clone();
-            if let Err(error) = reader.read(args, told) {
-                let why = std::error::Error::source(&error).map(|why| format!(": {why}")).unwrap_or_default();
-                noted.note(|notes| notes.trouble = Some(format!("{error}{why}")));
-                on_error(error)?;
-            }
+            let told = WordSink {
+                place,
+                to: to.clone(),
+                notes,
+                over: Arc::clone(&reader.over),
+                gate: player.take(),
+            };
+            let child = ChildSlot::default();
+            reader.children.push(Arc::clone(&child));
+            read(args, told, child)?;
         }
         Ok(reader)
-    }
-
-    fn read(&mut self, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
-        match &args.source {
-            FilmSource::Ltc(input) => {
-                let child = ChildSlot::default();
-                self.children.push(Arc::clone(&child));
-                ltc::start_reading(input, args, told, &child)
-            }
-            FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args.begin(), told)?),
-            FilmSource::Mtc(device) => mtc::start_reading(device, args, told),
-            FilmSource::ArtNet(sender) => network::hear_artnet(sender, args, told),
-            FilmSource::Osc(sender) => network::hear_osc(sender, args, told),
-            FilmSource::Http(sender) => network::hear_http(sender, args, told),
-            FilmSource::Clock(from) => clock::start_reading(from, told),
-        }
     }
 
     /// Where the film is, for whoever follows it.
@@ -180,26 +182,34 @@ impl FilmReader {
 impl Drop for FilmReader {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        for child in &self.children {
-            if let Some(mut child) = ltc::lock(child).take() {
-                // One that has ended by itself cannot be ended any more.
-                let _ = child.kill();
-                let _ = child.wait();
-            }
-        }
+        self.children.iter().for_each(|child| ltc::end(child));
     }
+}
+
+/// Begins to read a source; a command that is started for it is put there.
+fn read(args: &FilmArgs, told: WordSink, child: ChildSlot) -> Result<(), FilmError> {
+    match &args.source {
+        FilmSource::Ltc(input) => ltc::start_reading(input, args, told, &child),
+        FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args.begin(), told)?),
+        FilmSource::Mtc(device) => mtc::start_reading(device, args, told),
+        FilmSource::ArtNet(sender) => network::hear_artnet(sender, args, told),
+        FilmSource::Osc(sender) => network::hear_osc(sender, args, told),
+        FilmSource::Http(sender) => network::hear_http(sender, args, told),
+        FilmSource::Clock(from) => clock::start_reading(from, told),
+    }
+}
+
+/// The same; why it cannot be had is noted beside it, for as long as that is so.
+fn noting(args: &FilmArgs, told: &WordSink, child: &ChildSlot) -> Result<(), FilmError> {
+    let begun = read(args, told.clone(), Arc::clone(child));
+    let why = begun.as_ref().err().map(|error| {
+        let why = std::error::Error::source(error).map(|why| format!(": {why}")).unwrap_or_default();
+        format!("{error}{why}")
+    });
+    told.note(|notes| notes.trouble = why);
+    begun
 }
 
 fn start(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<()> {
     thread::Builder::new().name(name.to_owned()).spawn(run).map(drop)
-}
-
-/// What there is to read, once there is something; 0 at the end.
-fn read_some(from: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
-    loop {
-        match from.read(bytes) {
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            read => return read,
-        }
-    }
 }

@@ -36,8 +36,7 @@ impl MpvPlayer {
         self.told.note(|notes| notes.trouble = ended.err().map(|error| error.to_string()));
         let mut is_heard = true;
         client.hear_end(Monotonic.now(), &mut |what| is_heard &= self.tell(what));
-        Monotonic.sleep_until(Monotonic.now() + AGAIN);
-        is_heard
+        is_heard && self.told.waits()
     }
 
     fn converse(&self, mut stream: UnixStream, client: &mut MpvClient) -> io::Result<()> {
@@ -45,23 +44,33 @@ impl MpvPlayer {
         stream.set_write_timeout(Some(AGAIN))?;
         stream.write_all(MpvClient::greeting().as_bytes())?;
         let mut octets = [0; 4_096];
-        loop {
+        // One that talks without a pause is left as well.
+        while !self.told.is_over() {
             if let Some(question) = client.poll(Monotonic.now()) {
                 stream.write_all(question.as_bytes())?;
             }
             match stream.read(&mut octets) {
                 Ok(0) => return Ok(()),
                 Ok(count) => {
-                    client.hear(&octets[..count], Monotonic.now(), &mut |what| {
-                        self.tell(what);
-                    });
+                    // Line by line, so that what is told is of the film that was said to be open before.
+                    for line in octets[..count].split_inclusive(|octet| *octet == b'\n') {
+                        let counts = self.counts(client);
+                        client.hear(line, Monotonic.now(), &mut |what| {
+                            self.tell(if counts { what } else { Observation::new(what.at, FilmWord::Gone) });
+                        });
+                    }
                     self.note(client);
                 }
-                Err(_) if self.told.is_over() => return Ok(()),
                 Err(error) if is_nothing_yet(&error) => {}
                 Err(error) => return Err(error),
             }
         }
+        Ok(())
+    }
+
+    /// True if the film that is open is one to be heard of.
+    fn counts(&self, client: &MpvClient) -> bool {
+        self.told.gate.as_ref().is_none_or(|gate| gate.lets(client.path()))
     }
 
     fn note(&self, client: &MpvClient) {

@@ -1,11 +1,11 @@
 //! MIDI timecode from a raw device or a FIFO: bytes as they come, each read stamped with the instant at which it was.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read as _};
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 
-use super::{FilmError, WordSink, read_some, start};
+use super::{FilmError, LeftRead, WordSink, start};
 use crate::film::mtc::MtcReader;
 use crate::film::source::FilmArgs;
 use crate::sys::clock::Monotonic;
@@ -20,11 +20,9 @@ pub(super) fn start_reading(path: &Path, args: &FilmArgs, told: WordSink) -> Res
         return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, why)));
     }
     let line = MidiLine { path: path.to_path_buf(), args: args.clone(), told };
-    // Opening a FIFO waits for a writer.
-    start(
-        "mtc",
-        move || while line.told.again(File::open(&line.path).and_then(|bytes| line.read(bytes))) {},
-    )?;
+    start("mtc", move || {
+        while line.told.again(LeftRead::open(&line.path, &line.told).and_then(|bytes| line.read(bytes))) {}
+    })?;
     Ok(())
 }
 
@@ -36,12 +34,12 @@ struct MidiLine {
 
 impl MidiLine {
     /// One line, from its begin to its end, or until nobody listens.
-    fn read(&self, mut line: File) -> io::Result<()> {
+    fn read(&self, mut line: LeftRead<File>) -> io::Result<()> {
         let mut reader = MtcReader::new(self.args.rate, self.args.start);
         let mut bytes = [0; 256];
         self.told.note(|notes| notes.trouble = None);
         loop {
-            let count = read_some(&mut line, &mut bytes)?;
+            let count = line.read(&mut bytes)?;
             if count == 0 {
                 return Ok(());
             }

@@ -1,5 +1,6 @@
 //! All sources of a show, in their ranking: observations in, where the film is by the best of them out, and what a person is to see.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -30,6 +31,11 @@ pub(crate) struct FilmTable {
     pub(crate) switches: u64,
     /// A source that ranks higher is ahead by so many seconds, and a person has to decide.
     pub(crate) disagrees: Option<Disagreement>,
+    /// The place of the one that a person chose.
+    pub(crate) chosen: Option<usize>,
+    /// No source can tell any more, nor will: each was a recording, or a command that has ended.
+    #[serde(skip)]
+    pub(crate) over: bool,
 }
 
 /// Two sources that say different things.
@@ -47,8 +53,10 @@ pub(crate) struct SourceRow {
     pub(crate) state: FilmState,
     /// What that means.
     pub(crate) words: &'static str,
-    /// Where in the cue the film is, seconds, if that is known.
+    /// Where the film is by its own time, seconds, if that is known.
     pub(crate) media_s: Option<f64>,
+    /// The label of the frame that it is at, if the source has labels.
+    pub(crate) timecode: Option<String>,
     /// How much faster than the clock it runs, millionths.
     pub(crate) rate_ppm: Option<f64>,
     /// Deviation of where it is, milliseconds.
@@ -69,15 +77,34 @@ fn word<S: Serializer>(state: &FilmState, serializer: S) -> Result<S::Ok, S::Err
 
 /// The newest table, for whoever looks.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SharedTable(Arc<Mutex<FilmTable>>);
+pub(crate) struct SharedTable {
+    newest: Arc<Mutex<FilmTable>>,
+    /// The place of the source that a person chose, and 1; 0 while the ranking decides.
+    chosen: Arc<AtomicUsize>,
+}
 
 impl SharedTable {
     pub(crate) fn read(&self) -> FilmTable {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        let table = self.newest.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        FilmTable { chosen: self.chosen(), ..table }
+    }
+
+    /// A person chooses the source of that name, or leaves it to the ranking; false where there is none.
+    pub(crate) fn choose(&self, name: Option<&str>) -> bool {
+        let is_it = |row: &SourceRow| Some(row.source.as_str()) == name;
+        let place = self.read().sources.iter().position(is_it);
+        if place.is_some() || name.is_none() {
+            self.chosen.store(place.map_or(0, |place| place + 1), Ordering::Relaxed);
+        }
+        place.is_some() || name.is_none()
+    }
+
+    fn chosen(&self) -> Option<usize> {
+        self.chosen.load(Ordering::Relaxed).checked_sub(1)
     }
 
     fn put(&self, table: FilmTable) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = table;
+        *self.newest.lock().unwrap_or_else(PoisonError::into_inner) = table;
     }
 }
 
@@ -100,12 +127,15 @@ impl TrackedSource {
         let FilmPoint { media, rate, .. } = view.point;
         let (state, counts) = (self.tracker.state(), self.tracker.counts());
         let is_known = !matches!(state, FilmState::Absent);
+        let notes = noted(&self.notes).clone();
+        let code = notes.start.filter(|_| is_known).map(|start| start.at_media(media));
         let runs = matches!(state, FilmState::Locked | FilmState::Freewheeling);
         SourceRow {
             source: self.name.clone(),
             state,
             words: state.of_a_source(),
             media_s: is_known.then(|| media.as_secs_f64()),
+            timecode: code.map(|code| code.to_string()),
             rate_ppm: runs.then_some((rate - 1.0) * 1e6),
             sigma_ms: self.tracker.sigma_s(now).filter(|_| runs).map(|sigma| sigma * 1e3),
             may_lead: view.may_lead,
@@ -113,7 +143,7 @@ impl TrackedSource {
             rejected: counts.rejected,
             jumps: counts.jumps,
             dropouts: counts.dropouts,
-            notes: noted(&self.notes).clone(),
+            notes,
         }
     }
 }
@@ -126,6 +156,7 @@ pub(super) struct Ranking {
     views: Vec<SourceView>,
     pub(super) point: Arc<PublishedPoint>,
     pub(super) table: SharedTable,
+    over: bool,
     next: MonoTime,
 }
 
@@ -146,6 +177,7 @@ impl Ranking {
             views: Vec::with_capacity(args.len()),
             point: Arc::default(),
             table: SharedTable::default(),
+            over: false,
             next: now,
         };
         ranking.publish(now);
@@ -159,7 +191,7 @@ impl Ranking {
                 Ok((place, told)) => self.sources[place].tracker.hear(&told),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    self.next = Monotonic.now();
+                    (self.over, self.next) = (true, Monotonic.now());
                     return self.publish(self.next);
                 }
             }
@@ -171,7 +203,7 @@ impl Ranking {
         self.views.clear();
         let allows_coarse = self.allows_coarse;
         self.views.extend(self.sources.iter_mut().map(|source| source.view(now, allows_coarse)));
-        let chosen = self.chooser.choose(&self.views, now);
+        let chosen = self.chooser.choose(&self.views, self.table.chosen(), now);
         self.point.publish(&chosen.point);
         // What is heard a hundred times a second is not read that often.
         if now < self.next {
@@ -182,7 +214,8 @@ impl Ranking {
             chosen.disagrees.map(|(source, ahead)| Disagreement { source, ahead_s: ahead.as_secs_f64() });
         let rows = self.sources.iter().zip(&self.views).map(|(source, view)| source.row(view, now)).collect();
         let switches = self.chooser.switches();
-        self.table.put(FilmTable { sources: rows, leads: chosen.source, switches, disagrees });
+        let (leads, over) = (chosen.source, self.over);
+        self.table.put(FilmTable { sources: rows, leads, switches, disagrees, over, chosen: None });
     }
 }
 
@@ -210,7 +243,7 @@ impl SourceRow {
         let sentences = [&notes.trouble, &notes.refused].into_iter().flatten();
         let sentences = sentences.map(|why| format!("{source}: {why}"));
         let coarse = (self.state == FilmState::Locked && !self.may_lead).then(|| {
-            format!("{source}: too coarse to lead seats; allow it with --allow-coarse if it has to")
+            format!("{source}: too coarse to lead seats; --allow-coarse, or allow_coarse in [sync], allows it if it has to")
         });
         sentences.chain(foreign).chain(set).chain(coarse).collect()
     }

@@ -139,15 +139,7 @@ fn garbage_of_the_named_sender_is_counted_and_leads_nobody_astray() {
 #[test]
 fn midi_timecode_of_a_fifo_locks_survives_garbage_and_locks_again_with_the_next_writer() {
     let folder = TempDir::new().expect("there is room");
-    let fifo = folder.path().join("midi");
-    rustix::fs::mknodat(
-        rustix::fs::CWD,
-        &fifo,
-        rustix::fs::FileType::Fifo,
-        rustix::fs::Mode::from_raw_mode(0o600),
-        0,
-    )
-    .expect("a FIFO can be made");
+    let fifo = fifo(&folder);
     let reader = listen(&[format!("mtc:{}", fifo.display())]);
     let film = RunningFilm::by_fifo(&fifo, "00:10:00:00");
     in_state(&reader, FilmState::Locked);
@@ -277,4 +269,70 @@ fn a_source_that_falls_silent_leaves_the_lead_to_the_next_of_the_ranking() {
     drop(best);
     let table = until(&reader, "the second leads", |table| table.leads == Some(1));
     assert_eq!((table.sources[0].state, table.switches), (FilmState::Lost, 1));
+}
+
+fn fifo(folder: &TempDir) -> std::path::PathBuf {
+    let path = folder.path().join("line");
+    let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::from_raw_mode(0o600));
+    rustix::fs::mknodat(rustix::fs::CWD, &path, kind, mode, 0).expect("a FIFO can be made");
+    path
+}
+
+#[test]
+fn a_reader_that_is_left_takes_nothing_of_a_fifo_from_the_one_that_comes_after_it() {
+    let folder = TempDir::new().expect("there is room");
+    let (path, text) = (fifo(&folder), |path: &Path| format!("ltc:fifo:{}", path.display()));
+    // None of them has had a writer: each waits for one when it is left.
+    (0..4).for_each(|_| drop(listen(&[text(&path)])));
+    let reader = listen(&[text(&path)]);
+    let mut line = File::options().write(true).open(&path).expect("somebody reads");
+    let mut sound = super::LtcSound::new("25", "00:00:10:00").expect("there is such a label");
+    let blocks = (0..).map(move |block| {
+        let samples = (&mut sound).take(480).flat_map(i16::to_le_bytes).collect();
+        (Duration::from_millis(10 * block), samples)
+    });
+    let _film = RunningFilm::new(blocks, move |bytes| drop(line.write_all(bytes)));
+    let row = in_state(&reader, FilmState::Locked);
+    assert_eq!((row.rejected, row.jumps, row.dropouts), (0, 0, 0), "{row:?}");
+}
+
+#[test]
+fn a_command_ends_with_whoever_listened_and_so_does_what_its_shell_has_started() {
+    let folder = TempDir::new().expect("there is room");
+    let path = folder.path().join("pid");
+    let reader = listen(&[format!("ltc:pipe:sleep 600 & echo $! > {}; wait", path.display())]);
+    let end = Monotonic.now() + PATIENCE;
+    let started = loop {
+        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        if let Some(pid) = text.trim().parse().ok().and_then(rustix::process::Pid::from_raw) {
+            break pid;
+        }
+        assert!(Monotonic.now() < end, "the shell starts nothing");
+        thread::yield_now();
+    };
+    drop(reader);
+    let runs = || {
+        // One that has ended and that nobody has waited for is a zombie.
+        let state = std::fs::read_to_string(format!("/proc/{}/stat", started.as_raw_nonzero()));
+        state.is_ok_and(|state| !state.contains(") Z"))
+    };
+    while runs() {
+        assert!(Monotonic.now() < end, "it runs on");
+        thread::yield_now();
+    }
+}
+
+#[test]
+fn a_source_that_a_hall_does_not_find_at_first_is_heard_once_it_is_there() {
+    let folder = TempDir::new().expect("there is room");
+    let path = folder.path().join("line");
+    let source = format!("mtc:{}", path.display()).parse().expect("it is a source");
+    let args = FilmArgs::new(source, Some("25"), None).expect("it is whole");
+    let reader = FilmReader::open(&[args], RULES, None).expect("a hall opens without it");
+    until(&reader, "missing", |table| table.sources[0].notes.trouble.is_some());
+    let path = fifo(&folder);
+    let table = until(&reader, "there", |table| table.sources[0].notes.trouble.is_none());
+    assert_eq!(table.sources[0].state, FilmState::Absent);
+    let _film = RunningFilm::by_fifo(&path, "00:00:10:00");
+    in_state(&reader, FilmState::Locked);
 }

@@ -9,8 +9,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::app::player::FilmGate;
 use crate::film::labels::LabelClock;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::timecode::Timecode;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -26,6 +28,9 @@ pub(crate) struct SourceNotes {
     pub(crate) refused: Option<String>,
     /// Frames a second, as configured or found.
     pub(crate) fps: Option<String>,
+    /// The label of the film's time 0, once it is known how frames are labelled.
+    #[serde(skip)]
+    pub(crate) start: Option<Timecode>,
     /// Who else sends what this source is to send, the first of them, and how often others did.
     pub(crate) foreign_from: Option<Ipv4Addr>,
     pub(crate) foreign: u64,
@@ -47,6 +52,7 @@ impl SourceNotes {
     pub(super) fn label(&mut self, labels: &LabelClock) {
         self.refused = labels.refused().map(ToString::to_string);
         self.fps = labels.rate().map(|rate| rate.to_string());
+        self.start = labels.start();
     }
 }
 
@@ -66,6 +72,8 @@ pub(super) struct WordSink {
     pub(super) notes: Notes,
     /// Nobody listens any more.
     pub(super) over: Arc<AtomicBool>,
+    /// Which of its films counts, where not all do.
+    pub(super) gate: Option<FilmGate>,
 }
 
 impl WordSink {
@@ -77,9 +85,13 @@ impl WordSink {
     /// Whoever wrote is gone, as `read` says, and another may come, which is waited for; false once nobody listens.
     pub(super) fn again(&self, read: io::Result<()>) -> bool {
         self.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
-        let is_heard = self.tell(Observation::new(Monotonic.now(), FilmWord::Gone));
+        self.tell(Observation::new(Monotonic.now(), FilmWord::Gone)) && self.waits()
+    }
+
+    /// Waits until it is time for another look; false if nobody listens any more by then.
+    pub(super) fn waits(&self) -> bool {
         Monotonic.sleep_until(Monotonic.now() + AGAIN);
-        is_heard
+        !self.is_over()
     }
 
     /// Notes something for people.

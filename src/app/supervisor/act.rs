@@ -5,6 +5,7 @@ use jiff::Zoned;
 
 use super::hall::{Counted, HallContext, ShowChange};
 use super::job::{Job, JobResult};
+use crate::app::player::PlayerAsk;
 use crate::control::{Desired, Problem, Surface};
 use crate::journal::PlaylistPlace;
 use crate::log::Line;
@@ -79,6 +80,8 @@ pub(super) enum Act {
     EndShow,
     /// A test of the seats is over, and why; what was loaded before is back.
     EndTest(&'static str),
+    /// Asks it of the player, and waits for nothing.
+    Player(PlayerAsk),
     /// Tells the ack thread.
     Order(Order),
     /// Has the hall opened with the configuration as it is now.

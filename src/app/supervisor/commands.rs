@@ -3,10 +3,12 @@
 use super::act::Act;
 use super::belts;
 use super::features::Features;
+use super::film;
 use super::gear;
 use super::hall::{HallContext, ShowChange};
 use super::hall_settings::HallSettings;
 use super::job::Job;
+use super::player;
 use super::seat_testing::SeatTesting;
 use super::show::no_cue;
 use crate::control::{Asked, Code, Command, LevelsChange, Problem, Who, overtaken};
@@ -54,6 +56,7 @@ impl Features {
             }
             Command::Seek(film) => seek(*film, hall),
             Command::Trim(ms) => trim(*ms, hall),
+            Command::Source(name) => film::choose(name.as_deref(), hall),
             Command::Levels(change) if who.surface.is_gear() => gear::levels(change, hall),
             Command::Levels(change) => set(hall, |settings| settings.change(change)),
             Command::Preset(name) => preset(name, hall),
@@ -131,11 +134,15 @@ fn seek(film: ShowTime, hall: &HallContext) -> Result<Vec<Act>, Problem> {
         let detail = format!("{film} is outside the cue, which is {length} long");
         return Err(Problem::new(Code::Value, detail, "give a time within it"));
     }
-    Ok(vec![if matches!(hall.mirror.state, State::Armed | State::Parked) {
-        Act::Stage(ShowChange::Start(film))
-    } else {
-        Act::Tick(TickCommand::Seek(film))
-    }])
+    // Where the film is shown from here it is wound, and the seats follow.
+    let wound = player::seek(film, hall);
+    Ok(match (hall.mirror.state, wound) {
+        (State::Armed | State::Parked, wound) => {
+            [Act::Stage(ShowChange::Start(film))].into_iter().chain(wound).collect()
+        }
+        (State::Playing(_) | State::Paused, Some(wound)) => vec![wound],
+        _ => vec![Act::Tick(TickCommand::Seek(film))],
+    })
 }
 
 /// Sets something, and makes the show anew where its first frames hang on that.

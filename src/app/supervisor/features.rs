@@ -8,6 +8,7 @@ use super::hall::{HallContext, ShowChange};
 use super::homing::Homing;
 use super::job::{Again, JobResult};
 use super::lasting::Lasting;
+use super::player::FilmShown;
 use super::playlist::Onward;
 use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
@@ -27,6 +28,7 @@ pub(super) struct Features {
     pub(super) gear: GearLimits,
     pub(super) records: ShowRecords,
     pub(super) figures: Figures,
+    pub(super) shown: FilmShown,
 }
 
 impl Features {
@@ -41,13 +43,14 @@ impl Features {
             gear: GearLimits::default(),
             records,
             figures: Figures::default(),
+            shown: FilmShown::default(),
         }
     }
 
     /// Tells all of them what happens; gives what is to be done for it.
     pub(super) fn on(&mut self, event: &SupervisorEvent<'_>, hall: &HallContext) -> Vec<Act> {
-        let Self { onward, homing, seats, lasting, gear, records, figures, readiness: _ } = self;
-        let all: [&mut dyn Feature; 7] = [onward, homing, seats, lasting, gear, records, figures];
+        let Self { onward, homing, seats, lasting, gear, records, figures, shown, readiness: _ } = self;
+        let all: [&mut dyn Feature; 8] = [onward, homing, seats, lasting, gear, records, figures, shown];
         let mut out = Vec::new();
         all.into_iter().for_each(|feature| feature.on(event, hall, &mut out));
         out

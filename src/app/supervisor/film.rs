@@ -1,8 +1,9 @@
 //! The film of a hall as surfaces show it.
 
+use super::act::Act;
 use super::hall::HallContext;
 use crate::app::film::{FilmTable, SourceRow};
-use crate::control::{FilmSourceStatus, FilmStatus};
+use crate::control::{Code, FilmDisagreement, FilmSourceStatus, FilmStatus, Problem};
 use crate::film::point::FilmState;
 
 /// The film by the source that leads, or by the first while none does.
@@ -19,8 +20,26 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
         source: table.leads.and(best).map(|row| row.source.clone()),
         position_s: best.and_then(|row| row.media_s).map(|at| at - begin_s),
         rate_ppm: best.and_then(|row| row.rate_ppm),
+        error_ms: hall.live.film_error_s().map(|error_s| error_s * 1e3),
+        timecode: table.leads.and(best).and_then(|row| row.timecode.clone()),
+        disagrees: table.disagrees.and_then(|two| {
+            let source = table.sources.get(two.source)?.source.clone();
+            Some(FilmDisagreement { source, ahead_s: two.ahead_s })
+        }),
+        chosen: table.chosen.and_then(|place| Some(table.sources.get(place)?.source.clone())),
         sources: table.sources.iter().map(|row| source(row, begin_s)).collect(),
     }
+}
+
+/// A person chooses the source that is followed, or leaves it to the ranking.
+pub(super) fn choose(name: Option<&str>, hall: &HallContext) -> Result<Vec<Act>, Problem> {
+    let Some(table) = &hall.film else { return Err(Problem::no_film()) };
+    if table.choose(name) {
+        return Ok(Vec::new());
+    }
+    let detail = format!("this hall has no source {}", name.unwrap_or_default());
+    let names: Vec<_> = table.read().sources.into_iter().map(|row| row.source).collect();
+    Err(Problem::new(Code::Unknown, detail, format!("choose one of {}, or none", names.join(", "))))
 }
 
 fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
@@ -33,6 +52,9 @@ fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
         sigma_ms: row.sigma_ms,
         may_lead: row.may_lead,
         dropouts: row.dropouts,
+        rejected: row.rejected,
+        jumps: row.jumps,
+        level_dbfs: row.notes.level_db,
         foreign: row.notes.foreign,
     }
 }

@@ -9,6 +9,7 @@ use super::hall_settings::HallSettings;
 use super::show::ProvedShow;
 use super::state_mirror::StateMirror;
 use crate::app::film::SharedTable;
+use crate::app::player::PlayerLink;
 use crate::app::runtime::RuntimeHandle;
 use crate::config::Config;
 use crate::control::{Code, Problem};
@@ -44,6 +45,8 @@ pub(super) struct HallContext {
     pub(super) ended: Cause,
     /// What is heard of the film, if one leads shows.
     pub(super) film: Option<SharedTable>,
+    /// The way to the player, if the hall has one.
+    pub(super) player: Option<PlayerLink>,
     /// The slow work that is under way.
     pub(super) job: Option<&'static str>,
     pub(super) now: MonoTime,
@@ -110,6 +113,7 @@ impl HallContext {
             left_at: None,
             ended: Cause::Started,
             film: None,
+            player: None,
             job: None,
             now,
         }
@@ -254,8 +258,8 @@ impl HallContext {
 
     /// The hall goes from one state to another: where the film is when the seats leave the cue is where a show may go on.
     pub(super) fn note_place(&mut self, from: State, to: State) {
-        // A film that leads says by itself where a show goes on.
-        let is_led = self.cued.as_ref().is_some_and(|cued| cued.film.is_some());
+        // A film that others show says by itself where a show goes on.
+        let is_led = self.cued.as_ref().is_some_and(|cued| cued.film.is_some() && cued.movie.is_none());
         if rides(from) && !rides(to) && !is_led && self.mirror.cause != Cause::CueEnded {
             self.left_at = Some(self.live.show());
         }

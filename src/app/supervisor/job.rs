@@ -15,9 +15,8 @@ use super::show::{ProvedShow, no_cue, read};
 use crate::app::runtime::{DeviceJob, Finding, run_on_devices};
 use crate::config::Config;
 use crate::control::{Asked, Code, Problem};
-use crate::film::timecode::Label;
 use crate::library::{CueId, Library};
-use crate::playlist::{PlaylistId, Shelf};
+use crate::playlist::{EntryFilm, PlaylistId, Shelf};
 use crate::settings::{LoadedShow, SettingsFile};
 
 /// What is to be done.
@@ -28,7 +27,7 @@ pub(super) enum Job {
     /// Check a playlist, and prove the cue of its first entry.
     List(PlaylistId),
     /// Prove the cue of an entry.
-    Entry(usize, CueId, Option<Label>),
+    Entry(usize, CueId, EntryFilm),
     /// Load what was loaded before.
     Again(LoadedShow),
     /// Make a test of the seats of these rows; none for all.
@@ -93,15 +92,15 @@ impl Job {
         let Tools { config, library, line, settings } = tools;
         let on_devices = |job| run_on_devices(&mut line.hold(), &config.controllers, job, &mut |_| {});
         match self {
-            Self::Load(id) => JobResult::Loaded(read(library, config, &id, None)),
+            Self::Load(id) => JobResult::Loaded(read(library, config, &id, &EntryFilm::default())),
             Self::List(id) => {
                 let list = List::read(&Shelf::new(&config.playlists()), library, config, &id);
                 JobResult::Listed(list.and_then(|list| {
-                    let cued = read(library, config, &list.entry().cue, list.entry().film)?;
+                    let cued = read(library, config, &list.entry().cue, &list.entry().film)?;
                     Ok((Box::new(list), cued))
                 }))
             }
-            Self::Entry(entry, id, film) => JobResult::Entry(entry, read(library, config, &id, film)),
+            Self::Entry(entry, id, film) => JobResult::Entry(entry, read(library, config, &id, &film)),
             Self::Again(loaded) => {
                 let _loading = SettingsFile::loading(settings);
                 let id = loaded.cue.parse().map_err(|error| no_cue(&loaded.cue, &error));
@@ -109,9 +108,9 @@ impl Job {
                 let again = |place| List::again(&shelf, library, config, &place, &loaded.cue).map(Box::new);
                 let list = loaded.playlist.clone().map(again);
                 let entry = list.as_ref().and_then(|list| list.as_ref().ok()).map(|list| list.entry());
-                let film =
-                    entry.filter(|entry| entry.cue.to_string() == loaded.cue).and_then(|entry| entry.film);
-                let cued = id.and_then(|id| read(library, config, &id, film));
+                let entry = entry.filter(|entry| entry.cue.to_string() == loaded.cue);
+                let film = entry.map(|entry| entry.film.clone()).unwrap_or_default();
+                let cued = id.and_then(|id| read(library, config, &id, &film));
                 JobResult::Again((list, cued))
             }
             Self::Test(only) => JobResult::Tested(SeatTest::make(config), only),

@@ -19,6 +19,8 @@ pub(super) struct List {
     pub(super) cues: Vec<(Option<String>, f64)>,
     pub(super) current: usize,
     pub(super) schedule: Schedule,
+    /// What cannot be shown of its films now.
+    pub(super) missing: Vec<String>,
 }
 
 impl List {
@@ -42,7 +44,8 @@ impl List {
             library.get(&entry.cue).map_or((None, 0.0), |info| (info.title, info.length_s.unwrap_or(0.0)))
         };
         let cues = playlist.entries.iter().map(about).collect();
-        Ok(Self { id: id.to_string(), playlist, cues, current: 0, schedule: Schedule::default() })
+        let missing = playlist.missing(config);
+        Ok(Self { id: id.to_string(), playlist, cues, current: 0, schedule: Schedule::default(), missing })
     }
 
     /// Reads the one that was loaded before, at the entry where it was.

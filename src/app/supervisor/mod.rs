@@ -18,6 +18,7 @@ mod job;
 mod lasting;
 mod list;
 mod perform;
+mod player;
 mod playlist;
 mod preflighted;
 mod procedures;
@@ -52,6 +53,7 @@ use std::time::Duration;
 use jiff::Zoned;
 
 use super::film::SharedTable;
+use super::player::PlayerLink;
 use super::runtime::{RuntimeEnd, RuntimeHandle};
 use crate::config::Config;
 use crate::control::model::Ending;
@@ -99,6 +101,8 @@ pub(crate) struct SupervisorPorts {
     pub(crate) settings_file: SettingsFile,
     /// What is heard of the film, if one leads.
     pub(crate) film: Option<SharedTable>,
+    /// The way to the player, where the hall has one.
+    pub(crate) player: Option<PlayerLink>,
 }
 
 /// What is left once the hall has closed.
@@ -153,7 +157,7 @@ impl Supervisor {
         ports.source.lead(Arc::clone(&runtime.desk));
         examine(library.clone());
         let mut hall = HallContext::new(&runtime, settings, now);
-        hall.film = ports.film.clone();
+        (hall.film, hall.player) = (ports.film.clone(), ports.player.clone());
         let tools = Tools {
             config: Arc::clone(&hall.config),
             library,

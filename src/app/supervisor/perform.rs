@@ -5,7 +5,7 @@ use super::hall::{ShowChange, Undo};
 use super::procedures::Awaited;
 use super::reload::reload;
 use super::state_mirror::{ANSWER, busy};
-use super::{Supervisor, belts};
+use super::{Supervisor, belts, player};
 use crate::control::{Problem, Surface};
 use crate::rt::Command as TickCommand;
 use crate::state::{Event, Transition};
@@ -81,6 +81,7 @@ impl Supervisor {
                 self.features.seats.end(how);
                 self.hall.end_test();
             }
+            Act::Player(ask) => self.hall.player.iter().for_each(|player| player.ask(ask.clone())),
             // Where it finds no room the controller is not looked at, and stays out.
             Act::Order(order) => drop(self.runtime.orders.push(order)),
             Act::Reload => {
@@ -110,8 +111,12 @@ impl Supervisor {
     /// what is set.
     fn stage(&mut self, change: ShowChange) {
         let is_live = matches!(change, ShowChange::Settings(_)) && self.hall.mirror.state.may_send_motion();
+        let is_cue = matches!(change, ShowChange::Cue(..));
         let undo = self.hall.apply(change);
         self.hall.set_desk();
+        if is_cue && let Some(player) = &self.hall.player {
+            player.ask(player::load(&self.hall));
+        }
         if is_live {
             return;
         }

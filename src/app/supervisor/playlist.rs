@@ -80,7 +80,7 @@ impl Onward {
     pub(super) fn fetch(&mut self, entry: usize, start: Option<Start>) -> Vec<Act> {
         (self.start, self.follows, self.waits) = (start, false, None);
         let of_list = self.list.as_ref().map(|list| &list.playlist.entries[entry]);
-        of_list.map(|of| Act::Start(Job::Entry(entry, of.cue.clone(), of.film))).into_iter().collect()
+        of_list.map(|of| Act::Start(Job::Entry(entry, of.cue.clone(), of.film.clone()))).into_iter().collect()
     }
 
     /// Takes up a playlist that was checked.
@@ -93,8 +93,10 @@ impl Onward {
         hall: &HallContext,
     ) -> Result<Vec<Act>, Problem> {
         hall.may("load")?;
-        let settings = entry_settings(self.list.insert(*list), hall)?;
-        Ok(vec![Act::Stage(ShowChange::Cue(cued, Some(settings)))])
+        let list = self.list.insert(*list);
+        let settings = entry_settings(list, hall)?;
+        let missing = list.missing.iter().cloned().map(Act::Note);
+        Ok(missing.chain([Act::Stage(ShowChange::Cue(cued, Some(settings)))]).collect())
     }
 
     /// Takes up the cue of an entry, and starts it where that is still due. That homes no seat: people sit there.

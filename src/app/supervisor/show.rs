@@ -1,5 +1,6 @@
 //! A cue that is loaded, and the show made of it for the tick thread.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::hall_settings::HallSettings;
@@ -9,12 +10,21 @@ use crate::config::Config;
 use crate::control::{Code, Problem, ShowStatus};
 use crate::engine::{Headroom, Show};
 use crate::film::chase::ChaseRules;
-use crate::film::timecode::Label;
 use crate::library::{CueId, IdError, Library};
+use crate::playlist::EntryFilm;
 use crate::proof::{self, Digest, Terms};
 use crate::rt::{FilmStart, Loaded};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
+
+/// A film that is shown from here.
+#[derive(Debug)]
+pub(super) struct Movie {
+    /// As the playlist names it.
+    pub(super) name: String,
+    /// Where it is, or why it cannot be shown.
+    pub(super) file: Result<PathBuf, String>,
+}
 
 /// A cue that fits the hall and keeps its limits at full level.
 #[derive(Debug)]
@@ -32,6 +42,8 @@ pub(super) struct ProvedShow {
     pub(super) join_s: f64,
     /// How it follows the film of the hall, if it does.
     pub(super) film: Option<FilmStart>,
+    /// The film that is shown with it from here.
+    pub(super) movie: Option<Movie>,
 }
 
 impl ProvedShow {
@@ -93,6 +105,7 @@ impl ProvedShow {
             left_at: None,
             join_s: 0.0,
             film,
+            movie: None,
         })
     }
 
@@ -150,25 +163,37 @@ const fn motion_at(film: ShowTime, trim_ms: i32) -> ShowTime {
 }
 
 /// How a cue that ends there follows the film of a hall, if one leads; an entry of a playlist may name the timecode of its beginning.
-fn film_of(config: &Config, named: Option<Label>, end: ShowTime) -> Result<Option<FilmStart>, Problem> {
+fn film_of(config: &Config, of: &EntryFilm, end: ShowTime) -> Result<Option<FilmStart>, Problem> {
     let refused =
         |why: String| Problem::new(Code::Check, why, "correct the playlist, or [sync], and load it again");
+    let named = of.begin;
     let Some(sync) = &config.sync else {
         let why =
             named.map(|label| refused(format!("film = \"{label}\", and the configuration has no [sync]")));
         return why.map_or(Ok(None), Err);
     };
     let rules = ChaseRules { pace: sync.pace, rejoin: sync.rejoin, ..ChaseRules::until(end) };
-    Ok(sync.begin(named).map_err(refused)?.map(|begin| FilmStart { begin, rules }))
+    let begin = if of.movie.is_some() && config.film.is_some() {
+        Some(sync.offset)
+    } else {
+        sync.begin(named).map_err(refused)?
+    };
+    Ok(begin.map(|begin| FilmStart { begin, rules }))
 }
 
 pub(super) fn read(
     library: &Library,
     config: &Config,
     id: &CueId,
-    film: Option<Label>,
+    of: &EntryFilm,
 ) -> Result<Box<ProvedShow>, Problem> {
     let (timeline, sha256) = library.read(id)?;
-    let film = film_of(config, film, timeline.duration())?;
-    ProvedShow::prove_for(id.to_string(), config, timeline, sha256, film).map(Box::new)
+    let film = film_of(config, of, timeline.duration())?;
+    let mut proved = ProvedShow::prove_for(id.to_string(), config, timeline, sha256, film)?;
+    proved.movie = of
+        .movie
+        .as_ref()
+        .zip(config.film.as_ref())
+        .map(|(name, player)| Movie { name: name.clone(), file: player.find(name) });
+    Ok(Box::new(proved))
 }

@@ -415,6 +415,7 @@ fn ports(desk: &Arc<Desk>, folder: &Path, carryover: Carryover) -> (Handle, Supe
             carryover,
             settings_file,
             film: None,
+            player: None,
         },
     )
 }

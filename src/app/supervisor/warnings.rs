@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::belts;
 use super::status::StatusParts;
+use super::{belts, player};
 use crate::control::{Health, Severity, Warning};
 use crate::health::{HealthState, Why};
 use crate::rt::Row;
@@ -46,6 +46,9 @@ impl StatusParts<'_> {
         warnings.extend(belts::warnings(hall, table));
         warnings.extend(self.of_the_machine());
         warnings.extend(self.of_preflight());
+        let of_the_film = hall.film.iter().flat_map(|table| table.read().warnings());
+        warnings.extend(of_the_film.map(|sentence| in_two("film", &sentence)));
+        warnings.extend(player::warnings(hall).iter().map(|trouble| in_two("player", trouble)));
         warnings.extend(features.lasting.warnings(hall));
         warnings.extend(settings_file.map(|trouble| in_two("settings", &trouble)));
         warnings.extend(features.records.trouble().map(|trouble| Warning {

@@ -4,7 +4,7 @@ use super::names::{motion_name, space_name};
 use super::sheet::{self, Sheet};
 use crate::wire::{
     Access, Dialect, ImaxMotion, ImaxRegisters, MAX_SERVO_READ, Message, MotionReply, MotionRequest,
-    ReplyCode, Space, Status, VibrationPort, WireError,
+    RegisterReply, ReplyCode, Space, Status, VibrationPort, WireError,
 };
 
 /// How to read a message.
@@ -75,21 +75,7 @@ impl Sheet {
                 self.registers(write.start, write.data, space);
                 self.surplus(bytes, WORDS + 2 * write.data.len());
             }
-            Message::RegisterReply(reply) => {
-                let (what, space) = match reply.access {
-                    Access::Read => ("reply to read registers", Space::of_read(reply.channel)),
-                    Access::Write => ("reply to write registers", Space::of_write(reply.channel, dialect)),
-                };
-                let space = space.filter(|_| reply.code == ReplyCode::Running);
-                self.head(bytes, what, false);
-                self.answer(reply.code, dialect);
-                self.slot(reply.code, reply.channel, space_name(space), reply.error, dialect);
-                self.told(reply.start, reply.num, reply.data, space);
-                if reply.access == Access::Read && space == Some(Space::Monitor) {
-                    self.monitored_positions(reply.start, reply.data, dialect);
-                }
-                self.surplus(bytes, WORDS + 2 * reply.data.len());
-            }
+            Message::RegisterReply(reply) => self.register_reply(bytes, reply, dialect),
             Message::ServoRead(_) | Message::ServoWrite(_) | Message::ServoReply(_) => {
                 self.servo(bytes, message, dialect);
             }
@@ -102,6 +88,22 @@ impl Sheet {
                 self.surplus(bytes, WORDS + 2 * report.data.len());
             }
         }
+    }
+
+    fn register_reply(&mut self, bytes: &[u8], reply: &RegisterReply<'_>, dialect: Dialect) {
+        let (what, space) = match reply.access {
+            Access::Read => ("reply to read registers", Space::of_read(reply.channel)),
+            Access::Write => ("reply to write registers", Space::of_write(reply.channel, dialect)),
+        };
+        let space = space.filter(|_| reply.code == ReplyCode::Running);
+        self.head(bytes, what, false);
+        self.answer(reply.code, dialect);
+        self.slot(reply.code, reply.channel, space_name(space), reply.error, dialect);
+        self.told(reply.start, reply.num, reply.data, space);
+        if reply.access == Access::Read && space == Some(Space::Monitor) {
+            self.monitored_positions(reply.start, reply.data, dialect);
+        }
+        self.surplus(bytes, WORDS + 2 * reply.data.len());
     }
 
     fn motion(&mut self, bytes: &[u8], motion: &MotionRequest) {

@@ -3,6 +3,7 @@
 use std::env;
 use std::io::{IsTerminal as _, stderr, stdin};
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 
@@ -14,14 +15,15 @@ use crate::app::supervisor::Signals;
 use crate::control::Role;
 use crate::log::Log;
 use crate::sim::{Farm, Options};
+use crate::sys::own_folder::OwnFolder;
 use crate::{config, console};
 
-mod folder;
+mod film;
 mod screen;
 mod script;
 mod seats;
 
-use folder::Folder;
+use film::DemoFilm;
 use screen::Screen;
 use script::Script;
 use seats::SEATS;
@@ -38,28 +40,37 @@ const CUE: &[u8] = include_bytes!("../../../cues/bench-ride.csv");
 /// ride until Ctrl-C, to arm and go again there. Two of the controllers are a pair that shares one frame (PA95). Everything
 /// stays on this machine, in a folder that is gone at the end.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json")]
+#[command(
+    after_help = "Examples:\n  kinocue demo\n  kinocue demo --rate 1000 --json > report.json\n  kinocue demo --film film.mkv"
+)]
 pub(super) struct Args {
     /// Ticks per second, 1 to 1000.
     #[arg(long, value_name = "HZ", value_parser = super::load::parse_rate, default_value = "100")]
     rate: f64,
+    /// Show this film with mpv, and play a gentle cue of its length to it. mpv has to be installed.
+    #[arg(long, value_name = "FILE")]
+    film: Option<PathBuf>,
     /// Print the report as one JSON object on stdout.
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let film = args.film.as_deref().map(DemoFilm::find).transpose()?;
     let signals = Signals::default();
     play::leave_on_signals(&signals.leave).context("signals cannot be handled").or_exit(Exit::System)?;
     let temporary = env::temp_dir();
     let no_folder = || format!("cannot make a folder in {}; set TMPDIR to another", temporary.display());
-    let folder = Folder::make(&temporary).with_context(no_folder).or_exit(Exit::Io)?;
+    let folder = OwnFolder::make(&temporary).with_context(no_folder).or_exit(Exit::Io)?;
     let port = FreePort::find().context("no port for the frames").or_exit(Exit::System)?;
     let host = SocketAddrV4::new(Ipv4Addr::LOCALHOST, port.number);
     let setups = SEATS.iter().map(|seat| seat.setup(host)).collect();
     let farm = Farm::start(Options::loopback(setups)).or_exit(Exit::System)?;
     let token = Token::new("visitor", Role::Engineer).or_exit(Exit::System)?;
-    let places = furnish(&folder, &seats::hall(args.rate, host, &farm.addresses(), &token.config, &folder))?;
+    let mut hall = seats::hall(args.rate, host, &farm.addresses(), &token.config, &folder);
+    hall.extend(film.iter().map(DemoFilm::tables));
+    let places = furnish(&folder, &hall, film.as_ref())?;
+    let (load, cue_name) = film.as_ref().map_or_else(DemoFilm::none, DemoFilm::load);
     let config = config::load(&places.config).or_exit(Exit::Internal)?;
     let on_terminal = stdin().is_terminal() && stderr().is_terminal();
     let screen = Screen::new();
@@ -70,12 +81,12 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut script = None;
     let served = serve(parts, |handle, addresses| {
         let console = addresses.first().map(|address| link(*address, &token.token)).unwrap_or_default();
-        welcome(&farm.addresses(), &console);
-        script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console)));
+        welcome(&farm.addresses(), &console, cue_name);
+        script = Some(Script::start(handle, signals, screen, on_terminal.then_some(console), load));
     });
     // Over by now, as nothing of the hall is left.
     let guided = script.transpose().or_exit(Exit::System)?.map_or(Ok(()), Script::finish);
-    let reported = play::tell(&served?.sum_up(CUE_NAME.to_owned()), args.json);
+    let reported = play::tell(&served?.sum_up(cue_name.to_owned()), args.json);
     farm.stop().or_exit(Exit::Io)?;
     folder.remove().context("the folder of the demo is left").or_exit(Exit::Io)?;
     guided.or_exit(Exit::Internal)?;
@@ -87,18 +98,18 @@ fn link(address: SocketAddr, token: &str) -> String {
     format!("http://{address}/#token={token}")
 }
 
-fn welcome(controllers: &[SocketAddrV4], console: &str) {
+fn welcome(controllers: &[SocketAddrV4], console: &str, cue_name: &str) {
     let names = SEATS.iter().zip(controllers).map(|(seat, address)| format!("{} {address}", seat.name));
     let controllers: Vec<String> = names.collect();
     print::tell(&format!("the console: {console}"));
     print::tell(&format!(
-        "playing {CUE_NAME} to virtual controllers {}; nothing leaves this machine",
+        "playing {cue_name} to virtual controllers {}; nothing leaves this machine",
         controllers.join(", ")
     ));
 }
 
 /// Puts everything that the daemon reads where it reads it.
-fn furnish(folder: &Folder, hall: &str) -> Result<Places, Failure> {
+fn furnish(folder: &OwnFolder, hall: &str, film: Option<&DemoFilm>) -> Result<Places, Failure> {
     let put = |name: &str, bytes: &[u8]| {
         folder
             .write(name, bytes)
@@ -106,6 +117,9 @@ fn furnish(folder: &Folder, hall: &str) -> Result<Places, Failure> {
             .or_exit(Exit::Io)
     };
     put(&format!("cues/{CUE_ID}.csv"), CUE)?;
+    for (name, text) in film.map(DemoFilm::files).into_iter().flatten() {
+        put(&name, text.as_bytes())?;
+    }
     let config = put("demo.toml", hall.as_bytes())?;
     let sockets = crate::app::surfaces::Sockets {
         control: folder.path("control.sock"),

@@ -9,7 +9,6 @@ use std::time::Duration;
 
 use tokio::runtime;
 
-use super::CUE_ID;
 use super::screen::Screen;
 use crate::app::supervisor::Signals;
 use crate::control::{Code, Command, Handle, Problem, Role, Status, Surface, Who};
@@ -37,6 +36,7 @@ impl Script {
         signals: Signals,
         screen: Screen,
         console: Option<String>,
+        load: Command,
     ) -> io::Result<Self> {
         let leave = Arc::clone(&signals.leave);
         let start = || {
@@ -44,7 +44,7 @@ impl Script {
             let seen = handle.watch();
             let run = move || {
                 runtime.block_on(async {
-                    let led = lead(&handle, &signals, &screen, console.as_deref());
+                    let led = lead(&handle, &signals, &screen, console.as_deref(), load);
                     tokio::join!(led, screen.follow(seen)).0
                 })
             };
@@ -65,8 +65,9 @@ async fn lead(
     signals: &Signals,
     screen: &Screen,
     console: Option<&str>,
+    load: Command,
 ) -> Result<(), Problem> {
-    let led = ride(handle).await;
+    let led = ride(handle, load).await;
     if signals.is_leaving() {
         // Whatever was not done, a person wanted the end.
         return Ok(());
@@ -86,8 +87,8 @@ async fn lead(
     }
 }
 
-/// Has the cue played, and waits until the seats rest again.
-async fn ride(handle: &Handle) -> Result<(), Problem> {
+/// Has what that loads played, and waits until the seats rest again.
+async fn ride(handle: &Handle, load: Command) -> Result<(), Problem> {
     let who = Who { role: Role::Operate, surface: Surface::Program, name: "demo".to_owned() };
     let parked = reach(handle, |status| status.state == State::Parked);
     match tokio::time::timeout(PATIENCE, parked).await {
@@ -95,7 +96,7 @@ async fn ride(handle: &Handle) -> Result<(), Problem> {
         Ok(Err(Gone)) => return Ok(()),
         Err(_) => return Err(not_parked(&handle.status())),
     }
-    for ask in [Command::Load { cue: CUE_ID.to_owned() }, Command::Preflight, ARM, Command::Go] {
+    for ask in [load, Command::Preflight, ARM, Command::Go] {
         handle.ask(who.clone(), ask).await?;
     }
     let resting = [State::Parked, State::Stopped, State::Fault, State::Recovering];

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::net::SocketAddrV4;
 
-use super::folder::Folder;
 use crate::sim::{Setup, pa};
+use crate::sys::own_folder::OwnFolder;
 
 /// A seat.
 pub(super) struct Seat {
@@ -52,7 +52,7 @@ pub(super) fn hall(
     host: SocketAddrV4,
     controllers: &[SocketAddrV4],
     token: &str,
-    folder: &Folder,
+    folder: &OwnFolder,
 ) -> String {
     // A text of JSON is one of TOML.
     let path = |name: &str| serde_json::Value::from(folder.path(name).to_string_lossy()).to_string();

@@ -18,7 +18,7 @@ use super::messages::Messages;
 use crate::app::PlayHandle;
 use crate::cli::print;
 use crate::rt::{Command, News, NewsIn};
-use crate::state::{Next, State};
+use crate::state::{Next, PlayMode, State};
 use crate::sys::terminal::Keyboard;
 use crate::time::ShowTime;
 
@@ -28,6 +28,9 @@ const ARM_AFTER: u32 = 6;
 const LOOK: Duration = Duration::from_millis(100);
 /// What a first Ctrl-C does, and what a second one will.
 const LEAVING: &str = "the seats park as far as they may move, and the play ends; half a second from now on Ctrl-C again would end it at once";
+/// What a play ends with that nothing can lead any more.
+const NO_FILM: &str =
+    "the film is over and did not lead the seats, and no source can tell of another; the play ends";
 
 /// The threads; `None` if the system starts no further one, which is no reason to fail.
 pub(super) struct Progress {
@@ -61,6 +64,7 @@ impl Progress {
             now: None,
             standings: HealthMessages::default(),
             film: Vec::new(),
+            film_was_over: false,
         };
         let done = Arc::clone(&over);
         let teller = Builder::new()
@@ -103,6 +107,8 @@ struct Teller {
     standings: HealthMessages,
     /// What was true of the film's sources when they were looked at last.
     film: Vec<String>,
+    /// Whether no source of it could tell any more by then.
+    film_was_over: bool,
 }
 
 impl Teller {
@@ -138,7 +144,14 @@ impl Teller {
     /// What is newly true of the film's sources.
     fn look_at_film(&mut self, lines: &mut Vec<String>) {
         let Some(table) = &self.said.film else { return };
-        let warnings = table.read().warnings();
+        let table = table.read();
+        // By the look before: a film that has led the seats parks them as it ends.
+        let waits = matches!(self.now, Some((State::Playing(PlayMode::Waiting), _)));
+        if self.film_was_over && waits && !self.said.control.leave.swap(true, Ordering::Relaxed) {
+            lines.push(NO_FILM.to_owned());
+        }
+        self.film_was_over = table.over;
+        let warnings = table.warnings();
         lines.extend(warnings.iter().filter(|warning| !self.film.contains(warning)).cloned());
         self.film = warnings;
     }

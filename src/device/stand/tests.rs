@@ -86,7 +86,11 @@ fn a_seat_that_moves_or_stands_outside_its_stroke_is_refused() {
     for outside in [-1, 300_001] {
         let rig = Rig::of(vec![setup(&[])]);
         standing_at(&rig, move |_| place(outside));
-        let refused = Err(StandError::PastStroke { axis: 1, pulses: outside, stroke: 300_000.0 });
+        let refused = Err(StandError::PastStroke {
+            axis: 1,
+            pulses: outside,
+            stroke: PulseRange { low: 0.0, high: 300_000.0 },
+        });
         assert_eq!(stood_on(&rig, ""), refused);
     }
 }

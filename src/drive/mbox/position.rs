@@ -216,7 +216,7 @@ impl Positions {
     /// known to be at 0.
     fn mind_order(&mut self, axis: usize, pulses: Pulses) {
         let other = in_other_order(pulses);
-        let is_open = other != pulses && in_stroke(other, self.seat.stroke_pulses());
+        let is_open = other != pulses && in_stroke(other, self.seat.pulse_range());
         let bit = 1 << axis;
         self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
         let near_zero = self.home && pulses.0.unsigned_abs() < 1 << 15;

@@ -96,3 +96,26 @@ fn labels_of_no_rate_are_placed_nowhere() {
         assert_eq!(of.media(mono(f64::from(n) * 0.04), label, 0, None), None);
     }
 }
+
+#[test]
+fn what_is_refused_again_and_again_is_said_once() {
+    let contradictions = [
+        (FrameRate::F25, FrameRate::F30, None),
+        (FrameRate::F24, FrameRate::F30, Some(30)),
+        (FrameRate::F25, FrameRate::F29_97Drop, None),
+    ];
+    for (configured, rate, said) in contradictions {
+        let mut of = clock(Some(configured), 0.0);
+        after(3.0, rate, &mut of, 0.0, said);
+        let mut all = vec![of.refused().cloned()];
+        let from = Timecode::parse("01:00:10:11", rate).expect("there is such a frame");
+        for frame in 0..300 {
+            let at = mono(8.0 + f64::from(frame) / rate.frames_per_second());
+            assert_eq!(of.media(at, from.plus(frame.into()).label(), 0, said), None);
+            all.push(of.refused().cloned());
+        }
+        all.dedup();
+        assert_eq!(all.len(), 1, "{configured} of {rate}: {all:?}");
+        assert!(all[0].is_some());
+    }
+}

@@ -104,6 +104,20 @@ fn what_is_no_timecode_is_refused_in_words() {
     assert_eq!("29.97".parse::<FrameRate>(), Ok(FrameRate::F29_97));
 }
 
+#[test]
+fn the_label_of_a_place_in_the_film_is_that_of_the_frame_which_is_shown_there() {
+    for rate in FrameRate::ALL {
+        let start = Timecode::parse("01:00:00:00", rate).expect("all rates have that");
+        for frames in [0, 1, 1_799, 1_800, 17_982, 107_892, -1] {
+            let begins = start.plus(frames).media_since(start).as_secs_f64();
+            for within in [0.0, 0.5, 0.9] {
+                let media = ShowTime::from_secs_f64(begins + within / rate.frames_per_second());
+                assert_eq!(start.at_media(media), start.plus(frames), "{within} into {frames} of {rate}");
+            }
+        }
+    }
+}
+
 proptest::proptest! {
     #[test]
     fn steps_forth_and_back_meet_again(rate in 0..6_usize, index in 0..2_592_000_i64, by in -3_000_000_i64..3_000_000) {

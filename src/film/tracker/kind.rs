@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use super::{SAMPLES, SAMPLES_AGAIN};
+
 /// A kind of source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum SourceKind {
@@ -32,6 +34,13 @@ pub(super) struct Traits {
     /// How long the estimate may run on while nothing at all is heard: the estimate would be good for much longer, but nobody
     /// knows if the film still runs.
     pub(super) silent_for: Duration,
+}
+
+impl Traits {
+    /// Positions that have to fit before a lock of which nothing is known from before.
+    pub(super) const fn samples(self) -> u32 {
+        if self.coarse { SAMPLES_AGAIN } else { SAMPLES }
+    }
 }
 
 impl SourceKind {

@@ -377,3 +377,21 @@ fn nothing_that_is_told_makes_the_tracker_panic_or_the_point_anything_but_a_numb
         }
     }
 }
+
+#[test]
+fn places_that_agree_on_nothing_are_followed_for_no_longer_than_silence_is() {
+    let mut film = TrueFilm::new(100.0, 1.0);
+    let mut luck = Luck::new(3);
+    for jump in 0..200 {
+        film = film.step_at(10.0 + 0.12 * f64::from(jump), luck.between(-40.0, 40.0));
+    }
+    for (name, told) in SOURCES {
+        let observations = told.of(&film, (0.1, 34.0), &[], &mut Luck::new(5));
+        let run = Run::of(told.kind, &film, &observations, 34.0);
+        assert!(run.lock_s.is_some_and(|lock| lock < 9.0), "{name}: {:?}", run.lock_s);
+        let patience = if told.kind == SourceKind::Message { 7.0 } else { 2.1 };
+        let last = run.errors.last().map_or(0.0, |last| last.0);
+        assert!(last < 10.0 + patience, "{name} leads at {last}: {:?}", run.states);
+        assert!(run.has_been(FilmState::Unusable), "{name}: {:?}", run.states);
+    }
+}

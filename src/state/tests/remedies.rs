@@ -14,7 +14,7 @@ fn follow(hall: &mut Machine, now: MonoTime) {
         Next::Arm => ask(Transition::Arm),
         Next::ArmAndHome => ask(Transition::HomeAndArm),
         Next::Go => ask(Transition::Go),
-        Next::Resume => ask(Transition::Resume),
+        Next::Resume | Next::LetJoin => ask(Transition::Resume),
         Next::AwaitStandstill
         | Next::CheckCue
         | Next::LookAtSeat

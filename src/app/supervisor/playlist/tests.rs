@@ -15,7 +15,14 @@ const DAY: &str = "title = \"Day\"\n[[entry]]\ncue = \"one\"\nthen = \"go\"\n[[e
 fn list() -> List {
     let playlist = Playlist::parse(Path::new("day.toml"), DAY).unwrap();
     let cues = vec![(None, 4.0); playlist.entries.len()];
-    List { id: "day".to_owned(), playlist, cues, current: 0, schedule: Schedule::default() }
+    List {
+        id: "day".to_owned(),
+        playlist,
+        cues,
+        current: 0,
+        schedule: Schedule::default(),
+        missing: Vec::new(),
+    }
 }
 
 /// A hall whose first entry plays.

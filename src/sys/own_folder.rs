@@ -10,18 +10,18 @@ const TRIES: u32 = 100;
 
 /// A folder that nobody else may look into; removed with all that is in it when this is dropped.
 #[derive(Debug)]
-pub(super) struct Folder(PathBuf);
+pub(crate) struct OwnFolder(PathBuf);
 
-impl Folder {
+impl OwnFolder {
     /// One in `parent`.
     ///
     /// # Errors
     /// Those of the system; [`ErrorKind::InvalidFilename`] where its name could not stand in a configuration.
-    pub(super) fn make(parent: &Path) -> io::Result<Self> {
+    pub(crate) fn make(parent: &Path) -> io::Result<Self> {
         if parent.to_str().is_none() {
             return Err(ErrorKind::InvalidFilename.into());
         }
-        let own = |attempt: u32| parent.join(format!("kinocue-demo-{}-{attempt}", std::process::id()));
+        let own = |attempt: u32| parent.join(format!("kinocue-{}-{attempt}", std::process::id()));
         // What is there already is never taken for ours: it may belong to somebody who waits for us to write into it.
         let made = (0..TRIES).map(own).find_map(|path| match DirBuilder::new().mode(0o700).create(&path) {
             Ok(()) => Some(Ok(Self(path))),
@@ -32,7 +32,7 @@ impl Folder {
     }
 
     /// Where something of that name is in it.
-    pub(super) fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+    pub(crate) fn path(&self, name: impl AsRef<Path>) -> PathBuf {
         self.0.join(name)
     }
 
@@ -40,7 +40,7 @@ impl Folder {
     ///
     /// # Errors
     /// Those of the system.
-    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> io::Result<PathBuf> {
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> io::Result<PathBuf> {
         let path = self.path(name);
         if let Some(parent) = path.parent() {
             fs::create_dir_all(parent)?;
@@ -53,13 +53,13 @@ impl Folder {
     ///
     /// # Errors
     /// Those of the system.
-    pub(super) fn remove(mut self) -> io::Result<()> {
+    pub(crate) fn remove(mut self) -> io::Result<()> {
         let path = std::mem::take(&mut self.0);
         fs::remove_dir_all(path)
     }
 }
 
-impl Drop for Folder {
+impl Drop for OwnFolder {
     fn drop(&mut self) {
         if !self.0.as_os_str().is_empty() {
             let _ = fs::remove_dir_all(&self.0); // another error is on its way
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     fn it_is_for_its_owner_alone_and_goes_with_all_that_is_in_it() {
         let parent = tempfile::tempdir().unwrap();
-        let make = || Folder::make(parent.path()).unwrap();
+        let make = || OwnFolder::make(parent.path()).unwrap();
         let (folder, other) = (make(), make());
         assert_ne!(folder.0, other.0);
         assert_eq!(fs::metadata(&folder.0).unwrap().permissions().mode() & 0o777, 0o700);

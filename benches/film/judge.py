@@ -1,0 +1,249 @@
+"""What a judge needs who trusts nothing of kinocue: a ramp as a cue, a relay that has the kernel stamp each frame, and a player
+that is asked on a connection of the judge's own."""
+
+import contextlib
+import json
+import multiprocessing
+import pathlib
+import random
+import select
+import socket
+import statistics
+import struct
+import subprocess
+import threading
+import time
+
+STROKE = 300_000  # pulses
+EASE_S = 2.0  # at either end of the ramp
+MOTION = (0x1301, 0x1401)
+
+
+class Ramp:
+    """A cue whose position says which instant of the film it is."""
+
+    def __init__(self, seconds):
+        self.seconds, self.per_s = seconds, 1.0 / (seconds - EASE_S)
+
+    def write(self, path):
+        rows = (f"{20 * n},{self.at(n / 50):.9f}\n" for n in range(int(self.seconds * 50) + 1))
+        path.write_text("time_ms,a1\n" + "".join(rows))
+        return path
+
+    def at(self, t):
+        if t < EASE_S:
+            return self.per_s * t * t / (2 * EASE_S)
+        if t > self.seconds - EASE_S:
+            return 1.0 - self.per_s * (self.seconds - t) ** 2 / (2 * EASE_S)
+        return self.per_s * (t - EASE_S / 2)
+
+    def media(self, pulses):
+        """The instant of the film; None where the ramp is not straight."""
+        media = pulses / STROKE / self.per_s + EASE_S / 2
+        return media if EASE_S < media < self.seconds - EASE_S else None
+
+
+def wall_to_mono():
+    """What the wall clock is ahead of the machine's, by the narrowest of some readings."""
+    readings = []
+    for _ in range(5):
+        before, wall, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        readings.append((after - before, wall - (before + after) // 2))
+    return min(readings)[1]
+
+
+def relay(inner, controller, frames):
+    """Passes on what goes to a controller and comes from it, and tells when the kernel had each frame."""
+    inner.setsockopt(socket.SOL_SOCKET, socket.SO_TIMESTAMPNS_NEW if hasattr(socket, "SO_TIMESTAMPNS_NEW") else 35, 1)
+    outer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    outer.connect(controller)
+    host, batch = None, []
+    while True:
+        ready, _, _ = select.select([inner, outer], [], [], 0.1)
+        if inner in ready:
+            data, extra, _, host = inner.recvmsg(2_048, 64)
+            stamp = next(struct.unpack("qq", value[:16]) for _, _, value in extra)
+            mono = stamp[0] * 1_000_000_000 + stamp[1] - wall_to_mono()
+            with contextlib.suppress(OSError):
+                outer.send(data)
+            batch.append((mono * 1e-9, data))
+        if outer in ready and host:
+            with contextlib.suppress(OSError):
+                inner.sendto(outer.recv(2_048), host)
+        if len(batch) >= 10 or (batch and not ready):
+            frames.send(batch)
+            batch = []
+
+
+class Seat:
+    """A simulated controller behind a relay."""
+
+    def __init__(self, program, folder):
+        command = [program, "sim", "--axes", "6", "--listen", "127.0.0.1:0", "--host-port", "0"]
+        self.sim = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        address = next(line.split()[-1] for line in self.sim.stderr if line.startswith("ready "))
+        host, port = address.rsplit(":", 1)
+        inner = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        inner.bind(("127.0.0.1", 0))
+        self.to = "127.0.0.1:%d" % inner.getsockname()[1]
+        self.pipe, other = multiprocessing.Pipe(False)
+        self.relay = multiprocessing.Process(target=relay, args=(inner, (host, int(port)), other), daemon=True)
+        self.relay.start()
+        self.seen = []
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                for at, data in self.pipe.recv():
+                    if len(data) >= 24 and struct.unpack_from(">H", data, 4)[0] in MOTION:
+                        self.seen.append((at, struct.unpack_from(">I", data, 16)[0] / 1e3, struct.unpack_from(">i", data, 20)[0]))
+
+    def frames(self):
+        """What went by since that was asked last: when, how long it takes, where it leads."""
+        time.sleep(0.3)  # the relay tells of some at a time
+        found, self.seen = self.seen, []
+        return found
+
+    def close(self):
+        self.relay.terminate()
+        self.sim.terminate()
+        self.sim.wait()
+
+
+class Player:
+    """mpv with a film, and the judge's own connection to it, which asks where its sound is."""
+
+    def __init__(self, folder, film, more=()):
+        self.socket = folder / "player.sock"
+        self.socket.unlink(missing_ok=True)
+        command = ["mpv", "--no-config", "--really-quiet", "--vo=null", "--ao=null", f"--input-ipc-server={self.socket}"]
+        self.process = subprocess.Popen([*command, *more, str(film)], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        until(self.socket.exists)
+        self.line = socket.socket(socket.AF_UNIX)
+        until(self.connects)
+        self.asked, self.answers, self.events, self.over = {}, [], [], False
+        self.thread = threading.Thread(target=self.listen, daemon=True)
+        self.thread.start()
+        self.tell("observe_property", 1, "pause")
+
+    def connects(self):
+        with contextlib.suppress(OSError):
+            self.line.connect(str(self.socket))
+            return True
+
+    def tell(self, *command, number=0):
+        self.line.sendall((json.dumps({"command": command, "request_id": number}) + "\n").encode())
+
+    def listen(self):
+        self.line.settimeout(0.005)
+        kept, number, due = b"", 0, time.monotonic()
+        while not self.over:
+            if time.monotonic() >= due:
+                number, due = number + 1, max(due + 0.02, time.monotonic())
+                self.asked[number] = time.monotonic()
+                with contextlib.suppress(OSError):
+                    self.tell("get_property", "audio-pts", number=number)
+            try:
+                got = self.line.recv(65_536)
+            except TimeoutError:
+                continue
+            except OSError:
+                return
+            now, kept = time.monotonic(), kept + got
+            *lines, kept = kept.split(b"\n")
+            for line in lines:
+                self.hear(json.loads(line), now)
+
+    def hear(self, told, now):
+        if "event" in told:
+            self.events.append((now, told))
+        elif told.get("error") == "success" and told.get("request_id") in self.asked:
+            asked = self.asked.pop(told["request_id"])
+            self.answers.append(((asked + now) / 2, now - asked, told["data"]))
+
+    def clock(self, since, until):
+        """The film as a straight line between two instants: place and rate at the middle, and how far the answers are from it, s."""
+        those = [answer for answer in self.answers if since <= answer[0] <= until]
+        quick = statistics.median(answer[1] for answer in those)
+        those = [(at, media) for at, trip, media in those if trip <= 2 * quick]
+        middle = statistics.fmean(at for at, _ in those)
+        place = statistics.fmean(media for _, media in those)
+        rate = sum((at - middle) * (media - place) for at, media in those) / sum((at - middle) ** 2 for at, _ in those)
+        left = [abs(media - place - rate * (at - middle)) for at, media in those]
+        return (lambda t: place + rate * (t - middle)), rate, sorted(left)[len(left) * 99 // 100]
+
+    def close(self):
+        self.over = True
+        self.process.terminate()
+        self.process.wait()
+        self.line.close()
+
+
+class Between:
+    """Stands between kinocue and the player: answers are lost, or say another place, as the judge will have it."""
+
+    def __init__(self, folder, player, lost=0.0):
+        self.socket, self.lost, self.ahead_s, self.chance = folder / "between.sock", lost, 0.0, random.Random(5)
+        self.socket.unlink(missing_ok=True)
+        self.door = socket.socket(socket.AF_UNIX)
+        self.door.bind(str(self.socket))
+        self.door.listen(1)
+        threading.Thread(target=self.serve, args=(str(player.socket),), daemon=True).start()
+
+    def serve(self, player):
+        ours, theirs = self.door.accept()[0], socket.socket(socket.AF_UNIX)
+        theirs.connect(player)
+        kept = {ours: b"", theirs: b""}
+        while True:
+            for one in select.select([ours, theirs], [], [])[0]:
+                got = one.recv(65_536)
+                if not got:
+                    return
+                *lines, kept[one] = (kept[one] + got).split(b"\n")
+                for line in lines:
+                    self.pass_on(line, theirs if one is ours else ours, one is theirs)
+
+    def pass_on(self, line, to, is_told):
+        told = json.loads(line)
+        if is_told and told.get("request_id") and isinstance(told.get("data"), float):
+            if self.chance.random() < self.lost:
+                return
+            line = json.dumps(told | {"data": told["data"] + self.ahead_s}).encode()
+        to.sendall(line + b"\n")
+
+
+class Play:
+    """kinocue at work, and what it says."""
+
+    def __init__(self, program, cue, to, source, rate):
+        command = [program, "play", cue, "--to", f"{to},axes=6", "--bind", "127.0.0.1:0", "--rate", rate, "--chase", source]
+        self.lines = []
+        self.process = subprocess.Popen(
+            list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        threading.Thread(target=lambda: self.lines.extend(self.process.stderr), daemon=True).start()
+
+    def says(self, word, since=0):
+        until(lambda: any(word in line for line in self.lines[since:]) or self.process.poll() is not None)
+        assert self.process.poll() is None, self.lines
+
+    def close(self):
+        self.process.send_signal(2)
+        self.process.wait(30)
+
+
+def until(true, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "waited for too long"
+        time.sleep(0.01)
+
+
+def film(folder, seconds):
+    """A film of a small picture and a tone."""
+    path = pathlib.Path(folder) / "film.mkv"
+    picture, tone = "testsrc=size=64x48:rate=24", "sine=frequency=440:sample_rate=48000"
+    made = ["-f", "lavfi", "-i", picture, "-f", "lavfi", "-i", tone, "-t", str(seconds), "-c:v", "mpeg4", "-c:a", "pcm_s16le"]
+    subprocess.run(["ffmpeg", "-v", "error", "-y", *made, str(path)], check=True)
+    return path

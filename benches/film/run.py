@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+"""How far the seats are from the film, judged on the wire: mpv shows a film, `kinocue play --chase` follows it with a cue that is
+one ramp, so that each frame's position says for which instant of the film it was made, and the kernel's stamp when it left. Where
+the film is, mpv is asked on a connection of the judge's own. Prints the table of benches/README.md; shown, not gated.
+
+    cargo build --release && benches/film/run.py [--seconds 120] [--only "idle"] [--rate 100]
+
+Loopback only, in a folder of its own. Needs mpv and ffmpeg; for "jack" also jackd. Python 3.10 or later, nothing besides.
+"""
+
+import argparse
+import contextlib
+import multiprocessing
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+import tempfile
+import time
+
+from judge import Between, Play, Player, Ramp, Seat, film
+
+SETTLED_S = 10.0  # after a join; of five in a minute the next waits for a person
+
+
+def spread(values):
+    values = sorted(values)
+    p99 = values[(len(values) - 1) * 99 // 100]
+    return f"median {statistics.median(values):.2f}, p99 {p99:.2f}, most {values[-1]:.2f} ms of {len(values)}"
+
+
+class Show:
+    """One play of one film."""
+
+    def __init__(self, args, folder, player=(), lost=0.0, between=False, seconds=200.0):
+        self.ramp = Ramp(seconds)
+        self.seat = Seat(args.program, folder)
+        self.player = Player(folder, args.film, player)
+        self.between = Between(folder, self.player, lost) if lost or between else None
+        socket = (self.between or self.player).socket
+        cue = self.ramp.write(folder / "ramp.csv")
+        self.play = Play(args.program, cue, self.seat.to, f"mpv:{socket}", args.rate)
+
+    def __enter__(self):
+        try:
+            self.play.says("playing: ")
+        except BaseException:
+            self.__exit__()
+            raise
+        self.began, self.said = time.monotonic(), len(self.play.lines)
+        return self
+
+    def holds(self):
+        """How often the seats have held since they had joined."""
+        return sum("waiting: " in line for line in self.play.lines[self.said :])
+
+    def errors(self, frames, since, until, ahead_s=0.0):
+        """How far the film is ahead of the seats where each frame ends, ms."""
+        place, self.film_rate, self.film_left = self.player.clock(since, until)
+        ends = ((at, at + lasts, self.ramp.media(pulses)) for at, lasts, pulses in frames if since <= at <= until)
+        return [(at, (place(end) + ahead_s - media) * 1e3) for at, end, media in ends if media is not None]
+
+    def __exit__(self, *_):
+        self.play.close()
+        self.player.close()
+        self.seat.close()
+
+
+def follow(args, folder, player=(), lost=0.0):
+    with Show(args, folder, player, lost, seconds=args.seconds + 40) as show:
+        time.sleep(SETTLED_S + args.seconds)
+        frames = show.seat.frames()
+        holds = show.holds()
+    errors = [error for _, error in show.errors(frames, show.began + SETTLED_S, show.began + SETTLED_S + args.seconds)]
+    bias = statistics.median(errors)
+    return f"|error| {spread(map(abs, errors))}; bias {bias:+.2f} ms, holds {holds}, film {1e6 * (show.film_rate - 1):+.0f} ppm"
+
+
+def loaded(args, folder):
+    busy = [multiprocessing.Process(target=spin, daemon=True) for _ in range(os.cpu_count())]
+    [one.start() for one in busy]
+    try:
+        return follow(args, folder)
+    finally:
+        [one.terminate() for one in busy]
+
+
+def spin():
+    while True:
+        pass
+
+
+def jack(args, folder):
+    if not shutil.which("jackd"):
+        return "not measured: no jackd"
+    server = subprocess.Popen(
+        ["jackd", "--no-realtime", "-d", "dummy", "-r", "48000", "-p", "256"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        time.sleep(2)
+        return follow(args, folder, ["--ao=jack", "--jack-autostart=no"])
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def step(args, folder):
+    after = []
+    with Show(args, folder, between=True) as show:
+        time.sleep(SETTLED_S)
+        for turn in range(6):
+            since = time.monotonic()
+            show.between.ahead_s = 0.038 * ((turn + 1) % 2)
+            time.sleep(7.0)
+            errors = show.errors(show.seat.frames(), since, since + 7.0, show.between.ahead_s)
+            worst = lambda first: max(abs(error) for at, error in errors if at - since >= first)
+            sign = 1 if turn % 2 == 0 else -1
+            after.append((worst(3.0), worst(4.5), max(-sign * error for _, error in errors)))
+        holds = show.holds()
+    three, four, over = (max(column) for column in zip(*after))
+    return f"38 ms to either side, {len(after)} times, holds {holds}: after 3 s {three:.1f} ms, after 4.5 s {four:.1f} ms, over by {over:.1f} ms at most"
+
+
+def pause(args, folder):
+    slower, still = [], []
+    with Show(args, folder) as show:
+        time.sleep(5.0)
+        usual = show.ramp.per_s * 300_000
+        for _ in range(args.times):
+            show.seat.frames()
+            said = len(show.play.lines)
+            show.player.tell("set_property", "pause", True)
+            time.sleep(1.5)
+            told = [at for at, event in show.player.events if event.get("name") == "pause" and event.get("data")][-1]
+            frames = [frame for frame in show.seat.frames() if frame[0] > told - 0.1]
+            steps = [(b[0], (b[2] - a[2]) / b[1] / usual) for a, b in zip(frames, frames[1:])]
+            slower.append(1e3 * (next(at for at, pace in steps if at > told and pace < 0.95) - told))
+            still.append(1e3 * (next((at for at, pace in steps if at > told and pace == 0), frames[-1][0]) - told))
+            show.play.says("waiting: ", said)
+            show.player.tell("set_property", "pause", False)
+            show.play.says("playing: ", said)
+            time.sleep(10.0)
+    return f"told to first slower frame {spread(slower)}; to rest {spread(still)}"
+
+
+def seek(args, folder):
+    joins, there = [], []
+    with Show(args, folder) as show:
+        time.sleep(5.0)
+        for turn in range(args.times):
+            show.seat.frames()
+            target = 20.0 + 50.0 * ((turn + 1) % 2) + turn
+            show.player.tell("seek", target, "absolute")
+            time.sleep(3.5)
+            at = [when for when, event in show.player.events if event["event"] == "playback-restart"][-1]
+            frames, until = show.seat.frames(), time.monotonic()
+            rests = [b[0] for a, b in zip(frames, frames[1:]) if b[0] > at and a[2] == b[2]]
+            moves = next((b[0] for a, b in zip(frames, frames[1:]) if b[0] > at and rests and b[0] > rests[0] and a[2] != b[2]), None)
+            errors = show.errors(frames, at + 0.05, until)
+            near = next((when for when, error in errors if all(abs(e) < 20 for w, e in errors if w >= when)), None)
+            if moves and near:
+                joins.append(1e3 * (moves - at))
+                there.append(1e3 * (near - at))
+            time.sleep(9.5)
+    return f"landed to the join's first frame {spread(joins)}; to within 20 ms of the film {spread(there)}"
+
+
+CASES = {
+    "idle": follow,
+    "busy": loaded,
+    "jack": jack,
+    "300 ppm": lambda args, folder: follow(args, folder, ["--ao-null-speed=1.0003"]),
+    "losses": lambda args, folder: follow(args, folder, lost=0.2),
+    "step": step,
+    "pause": pause,
+    "seek": seek,
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    root = pathlib.Path(__file__).resolve().parents[2]
+    parser.add_argument("--program", type=pathlib.Path, default=root / "target/release/kinocue")
+    parser.add_argument("--seconds", type=float, default=120.0)
+    parser.add_argument("--times", type=int, default=12, help="pauses, and seeks")
+    parser.add_argument("--rate", type=int, default=100)
+    parser.add_argument("--only", choices=CASES, action="append")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
+        folder = pathlib.Path(folder)
+        args.film = film(folder, max(args.seconds + 60, 220))
+        for name in args.only or CASES:
+            print(f"{name:8} {CASES[name](args, folder)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

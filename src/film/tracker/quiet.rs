@@ -1,0 +1,54 @@
+//! What becomes of a source of which nothing is heard, or nothing that fits.
+
+use std::time::Duration;
+
+use super::states::SourceSign;
+use super::{
+    ACQUIRE_FOR, DOUBT, MISSING, MISSING_PERIODS, SURE_COARSE_S, SURE_S, SourceTracker, WINDOW_PERIODS,
+};
+use crate::time::MonoTime;
+
+impl SourceTracker {
+    /// Notes that time has passed. To be told some times a second, whatever is heard.
+    pub(crate) fn poll(&mut self, now: MonoTime) {
+        let quiet = self.newest.map_or_else(|| now.since(self.since), |newest| now.since(newest.at));
+        let period = self.newest.map_or(Duration::ZERO, |newest| newest.period);
+        if quiet > MISSING.max(MISSING_PERIODS * period) {
+            self.on_sign(SourceSign::Miss, now);
+        }
+        let patience =
+            self.patience.max(if self.traits.coarse { WINDOW_PERIODS * period } else { Duration::ZERO });
+        if quiet > patience {
+            self.on_sign(SourceSign::TimeOut, now);
+        } else if self.state.may_lead() && now.since(self.fitted_at) > patience {
+            self.lose_the_place(now);
+        }
+        if now.since(self.since) > ACQUIRE_FOR {
+            self.on_sign(SourceSign::GiveUp, now);
+        }
+        self.doubt(now);
+    }
+
+    /// Positions come, and none is where the film should be, nor do they agree on where it is instead: nobody knows any more that it
+    /// runs there. What is known of its place and rate rests on what has turned out to be none.
+    fn lose_the_place(&mut self, at: MonoTime) {
+        self.estimate = None;
+        self.needed = self.traits.samples();
+        self.begin_anew();
+        self.on_sign(SourceSign::Doubt, at);
+    }
+
+    /// The line is there and carries no timecode.
+    pub(super) fn on_quiet(&mut self, patience: Duration, at: MonoTime) {
+        self.patience = patience;
+        self.on_sign(SourceSign::Miss, at);
+    }
+
+    /// An estimate that nobody may follow any more.
+    pub(super) fn doubt(&mut self, now: MonoTime) {
+        let limit = DOUBT * if self.traits.coarse { SURE_COARSE_S } else { SURE_S };
+        if self.estimate.as_ref().is_some_and(|estimate| 3.0 * estimate.sigma_s(now) > limit) {
+            self.on_sign(SourceSign::Doubt, now);
+        }
+    }
+}
