@@ -150,6 +150,7 @@ fn round(links: &[Link], chases: bool) -> Round {
                     asked: true,
                     pose,
                     lasts_ms: beat.lasts_ms,
+                    at_most_ms: beat.lasts_ms,
                     shakes: stamped.shakes,
                     at,
                 };

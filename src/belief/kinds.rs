@@ -69,6 +69,8 @@ pub struct Taken<'a> {
     pub pose: &'a Pose,
     /// How long it takes, ms.
     pub lasts_ms: u32,
+    /// How long it takes where the network has let a later one overtake it, ms.
+    pub at_most_ms: u32,
     /// The greatest amplitude of vibration that it asks of any slot, strokes.
     pub shakes: f64,
     /// When it was sent.

@@ -100,6 +100,8 @@ pub(crate) struct Belief {
     reading: u32,
     /// Until when the controller is busy with what it was sent.
     busy_until: MonoTime,
+    /// Until when it is at the most, were all that it got since its seat was last seen to follow overtaken on the way.
+    busy_at_most: MonoTime,
     /// When the kernel first refused a frame since it last took one.
     refused_since: Option<MonoTime>,
     /// Whether acks are asked for: else what the kernel takes is all that can be known.
@@ -133,6 +135,7 @@ impl Belief {
             sways: 0.0,
             reading: 0,
             busy_until: MonoTime::default(),
+            busy_at_most: MonoTime::default(),
             refused_since: None,
             asks,
             gap: false,
@@ -248,9 +251,15 @@ impl Belief {
             !(low - shakes - ASTRAY..=high + shakes + ASTRAY).contains(&reading.pose[slot])
         };
         if !slots_in(reading.slots & self.within).any(is_astray) {
+            if reading.slots & self.own == self.own {
+                self.busy_at_most = self.busy_until + FOLLOWS;
+            }
             return Found::Nothing;
         }
         (self.within, self.known) = (0, Known::Contradicted(now));
+        // However many acks come yet, it is not where they say; nor at rest where it stands between two frames of its queue.
+        self.spans = Spans::at(*self.spans.last());
+        self.busy_until = self.busy_until.max(self.busy_at_most);
         Found::Astray
     }
 
@@ -393,12 +402,13 @@ impl Belief {
 
     /// Notes a frame that the kernel took.
     pub(crate) fn taken(&mut self, taken: &Taken<'_>) {
-        let Taken { frame, asked, pose, lasts_ms, shakes, at } = *taken;
-        let lasts = Duration::from_millis(u64::from(lasts_ms));
+        let Taken { frame, asked, pose, lasts_ms, at_most_ms, shakes, at } = *taken;
+        let [lasts, at_most] = [lasts_ms, at_most_ms].map(|ms| Duration::from_millis(u64::from(ms)));
         let behind = self.busy_until.since(at);
         self.tally.late += u64::from(behind > lasts.max(self.period));
         self.tally.hurried += u64::from(behind > 3 * lasts.max(self.period));
         self.busy_until = self.busy_until.max(at) + lasts;
+        self.busy_at_most = self.busy_at_most.max(at) + at_most;
         self.shaking.on_frame(frame, shakes);
         // One that vibrates on does so until this frame arrives.
         self.history.push(self.spans.last(), pose, shakes.max(self.sways), (at, self.busy_until));

@@ -49,6 +49,11 @@ impl Bench {
     }
 
     fn send(&mut self, place: f64, lasts_ms: u32, when: u64) {
+        self.send_out_of_order(place, lasts_ms, lasts_ms, when);
+    }
+
+    /// One that takes longer if a later one overtakes it.
+    fn send_out_of_order(&mut self, place: f64, lasts_ms: u32, at_most_ms: u32, when: u64) {
         let frame = FrameNo(self.next);
         self.next += 1;
         self.belief.taken(&Taken {
@@ -56,6 +61,7 @@ impl Bench {
             asked: true,
             pose: &at(place),
             lasts_ms,
+            at_most_ms,
             shakes: 0.0,
             at: ms(when),
         });
@@ -215,6 +221,7 @@ fn without_acks_what_the_kernel_took_is_where_a_seat_is_once_its_time_is_over() 
         asked: false,
         pose: &pose,
         lasts_ms: 3_000,
+        at_most_ms: 3_000,
         shakes: 0.0,
         at: ms(0),
     });
@@ -239,6 +246,7 @@ fn axes_that_no_reading_tells_are_known_by_confirmed_frames_alone() {
         asked: true,
         pose: &pose,
         lasts_ms: 700,
+        at_most_ms: 700,
         shakes: 0.0,
         at: ms(0),
     });
@@ -316,6 +324,41 @@ fn a_seat_that_follows_a_tenth_of_a_second_late_follows_and_one_that_acks_and_do
 }
 
 #[test]
+fn a_seat_that_fell_behind_is_at_rest_only_once_all_that_it_was_sent_is_over_however_it_arrived() {
+    for (at_most_ms, over) in [(10, 700), (100, 5_100)] {
+        let mut bench = Bench::found(0.2);
+        for tick in 0..50 {
+            bench.send_out_of_order(0.2 + f64::from(tick) * 0.004, 10, at_most_ms, 10 * u64::from(tick));
+            bench.ack(tick + 1);
+            bench.look(10 * u64::from(tick));
+        }
+        assert_eq!(passes(&mut bench, 0.25, 490, 500), Found::Astray);
+        bench.read(0.25, over - 160, true);
+        assert_eq!(
+            bench.belief.known(),
+            Known::Contradicted(ms(500)),
+            "it waits between two frames of its queue"
+        );
+        bench.read(0.3, over, true);
+        assert_eq!(bench.belief.known(), Known::Measured(ms(over), Source::Registers));
+    }
+}
+
+#[test]
+fn of_a_seat_that_is_seen_to_follow_only_what_it_was_sent_since_then_may_be_in_its_queue() {
+    let mut bench = Bench::found(0.2);
+    for tick in 0..50 {
+        let (place, when) = (0.2 + f64::from(tick) * 0.004, 10 * u64::from(tick));
+        bench.send_out_of_order(place, 10, 100, when);
+        bench.ack(tick + 1);
+        assert_eq!(passes(&mut bench, place, when, when), Found::Nothing);
+    }
+    assert_eq!(passes(&mut bench, 0.1, 500, 510), Found::Astray);
+    bench.read(0.3, 900, true);
+    assert_eq!(bench.belief.known(), Known::Measured(ms(900), Source::Registers));
+}
+
+#[test]
 fn an_answer_that_came_late_is_held_against_all_since_it_was_asked_for_and_one_much_too_late_against_nothing()
 {
     assert_eq!(passes(&mut ridden(), 0.28, 350, 500), Found::Nothing, "it was there 300 ms ago");
@@ -326,8 +369,15 @@ fn an_answer_that_came_late_is_held_against_all_since_it_was_asked_for_and_one_m
 #[test]
 fn a_seat_that_vibrates_is_as_far_off_as_it_was_told_to_vibrate() {
     let mut bench = ridden();
-    let taken =
-        Taken { frame: FrameNo(51), asked: true, pose: &at(0.4), lasts_ms: 10, shakes: 0.03, at: ms(500) };
+    let taken = Taken {
+        frame: FrameNo(51),
+        asked: true,
+        pose: &at(0.4),
+        lasts_ms: 10,
+        at_most_ms: 10,
+        shakes: 0.03,
+        at: ms(500),
+    };
     bench.belief.taken(&taken);
     assert_eq!(passes(&mut bench, 0.43, 505, 510), Found::Nothing);
     assert_eq!(passes(&mut bench, 0.45, 505, 510), Found::Astray);
@@ -350,6 +400,7 @@ fn a_seat_that_vibrates_on_may_be_anywhere_in_its_swing_and_no_motion_begins_bef
             asked: true,
             pose: &pose,
             lasts_ms,
+            at_most_ms: lasts_ms,
             shakes,
             at: ms(when),
         });

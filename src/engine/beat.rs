@@ -1,5 +1,6 @@
 //! What a tick does, and what its frames have in common.
 
+use super::phase::FIRST_ABSOLUTE_MS;
 use crate::channel::Samples;
 use crate::timeline::EffectSet;
 use crate::wire::Timing;
@@ -25,6 +26,16 @@ impl Beat {
     pub(crate) fn still(timing: Timing, time_ms: u32) -> Self {
         let (samples, effects) = (Samples::REST, EffectSet::Named(0));
         Self { timing, time_ms, lasts_ms: time_ms, samples, effects }
+    }
+
+    /// How long a controller takes for the frame where a later one came first, ms: one whose running sum is less than the last has
+    /// no Time of its own, and is taken for the first of another sum.
+    #[must_use]
+    pub(crate) fn at_most_ms(&self) -> u32 {
+        match self.timing {
+            Timing::Relative => self.lasts_ms,
+            Timing::Absolute => self.lasts_ms.max(FIRST_ABSOLUTE_MS),
+        }
     }
 
     /// The same for a frame that takes so many milliseconds, whatever its Time says.

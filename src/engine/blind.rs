@@ -322,7 +322,7 @@ mod tests {
 
     fn taken(frame: u64, pose: &Pose, lasts_ms: u32, at: u64) -> Taken<'_> {
         let frame = FrameNo(u32::try_from(frame).unwrap());
-        Taken { frame, asked: true, pose, lasts_ms, shakes: 0.0, at: ms(at) }
+        Taken { frame, asked: true, pose, lasts_ms, at_most_ms: lasts_ms, shakes: 0.0, at: ms(at) }
     }
 
     proptest! {

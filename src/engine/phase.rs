@@ -9,7 +9,7 @@ use crate::time::{Rate, ShowTime};
 use crate::wire::Timing;
 
 /// What a controller takes for its first absolute frame at the most (PA09, IMAX manual 2.3.1).
-const FIRST_ABSOLUTE_MS: u32 = 100;
+pub(super) const FIRST_ABSOLUTE_MS: u32 = 100;
 
 /// For how long frames hold a lane that has come to rest, and three at the least: if none of them arrives, that is known by then, and
 /// what it has on does not stay on.

@@ -230,7 +230,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         }
         let mut buf = [0; MAX_LEN];
         let (stamped, datagram) = lanes[index].encode_slow_park(time_ms, &mut buf);
-        let sent = Outgoing { index, stamped, pose: &park, lasts_ms: time_ms, at };
+        let sent = Outgoing { index, stamped, pose: &park, lasts_ms: time_ms, at_most_ms: time_ms, at };
         sent.hand_over(datagram, places, mail, sink);
         Ok(())
     }
@@ -248,7 +248,8 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
             let (motion, pose) = (engine.lane(index), engine.lane(index).pose());
             let (stamped, datagram) = lane.encode(&beat, pose, motion.mix(), &mut buf);
             first.get_or_insert(at);
-            let sent = Outgoing { index, stamped, pose, lasts_ms: beat.lasts_ms, at };
+            let (lasts_ms, at_most_ms) = (beat.lasts_ms, beat.at_most_ms());
+            let sent = Outgoing { index, stamped, pose, lasts_ms, at_most_ms, at };
             sent.hand_over(datagram, places, mail, sink);
             mail.clamps(index, motion.clamps().clamps);
         }
@@ -290,6 +291,7 @@ struct Outgoing<'a> {
     stamped: Stamped,
     pose: &'a Pose,
     lasts_ms: u32,
+    at_most_ms: u32,
     at: MonoTime,
 }
 
@@ -297,11 +299,11 @@ impl Outgoing<'_> {
     /// Hands it to the kernel, and notes what became of it.
     #[inline]
     fn hand_over(&self, datagram: &[u8], places: &mut Places, mail: &mut Mail, sink: &mut impl FrameSink) {
-        let Self { index, stamped: Stamped { frame, asked, shakes }, pose, lasts_ms, at } = *self;
+        let Self { index, stamped: Stamped { frame, asked, shakes }, pose, lasts_ms, at_most_ms, at } = *self;
         // Posted before it is sent: a reply can overtake what is posted after.
         mail.post(Sent::Posted { lane: places::number(index), frame, asked, at });
         let delivery = sink.send(index, datagram);
-        places.sent(index, &Taken { frame, asked, pose, lasts_ms, shakes, at }, delivery);
+        places.sent(index, &Taken { frame, asked, pose, lasts_ms, at_most_ms, shakes, at }, delivery);
         if let Delivery::Failed(_) = delivery {
             mail.post(Sent::Failed { lane: places::number(index), frame });
         }
