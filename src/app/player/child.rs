@@ -92,6 +92,8 @@ impl Starter {
             "--",
             "mpv",
         ]);
+        // What its libraries keep while they run goes with the folder of its socket.
+        command.envs(self.socket.parent().map(|own| ("TMPDIR", own)));
         command.args(&self.args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         // What a terminal sends to end the service is not for it: first the seats park.
         command.process_group(0).spawn().map(PlayerProcess)
