@@ -111,21 +111,41 @@ fn the_simulated_hall_reaches_nothing_but_this_machine() {
 }
 
 #[test]
-fn the_unit_is_as_closed_as_it_was_measured_to_be() {
-    let unit = "systemd/kinocue.service";
+fn the_units_are_as_closed_as_they_were_measured_to_be() {
     // Exposure in tenths; ends with a failure above it.
-    if let Some(output) = tool("systemd-analyze", &["security", "--offline=true", "--threshold=12", unit]) {
-        assert!(output.status.success(), "{}", said(&output));
+    for (unit, most) in [("systemd/kinocue.service", "12"), ("systemd/kinocue-sync.service", "6")] {
+        let most = format!("--threshold={most}");
+        if let Some(output) = tool("systemd-analyze", &["security", "--offline=true", &most, unit]) {
+            assert!(output.status.success(), "{}", said(&output));
+        }
     }
 }
 
 #[test]
-fn the_unit_lets_nothing_run_with_rights() {
-    let unit = text("systemd/kinocue.service");
-    for line in ["User=kinocue", "CapabilityBoundingSet=", "AmbientCapabilities=", "NoNewPrivileges=yes"] {
-        assert!(unit.lines().any(|found| found == line), "{line}");
+fn the_units_let_nothing_run_with_rights() {
+    for (name, user) in [("kinocue", "User=kinocue"), ("kinocue-sync", "User=kinocue-sync")] {
+        let unit = text(&format!("systemd/{name}.service"));
+        for line in [user, "CapabilityBoundingSet=", "AmbientCapabilities=", "NoNewPrivileges=yes"] {
+            assert!(unit.lines().any(|found| found == line), "{name}: {line}");
+        }
+        assert!(!unit.lines().any(|line| line.contains("CAP_")), "{name}: no capability is named");
     }
-    assert!(!unit.lines().any(|line| line.contains("CAP_")), "no capability is named");
+}
+
+#[test]
+fn who_reads_timecode_devices_has_no_network_and_who_moves_seats_no_device() {
+    let (hall, sync) = (text("systemd/kinocue.service"), text("systemd/kinocue-sync.service"));
+    let has = |unit: &str, line: &str| unit.lines().any(|found| found == line);
+    assert!(has(&sync, "PrivateNetwork=yes") && has(&sync, "RestrictAddressFamilies=AF_UNIX"));
+    assert!(has(&hall, "PrivateDevices=yes") && !hall.contains("\nDeviceAllow"));
+    // The folder of the sockets is one that the one may write and the other read.
+    let folder = "/run/kinocue-sync";
+    assert!(has(&sync, &format!("ReadWritePaths={folder}")));
+    assert!(has(&hall, &format!("BindReadOnlyPaths=-{folder}")));
+    let made = format!("d {folder}           0750 kinocue-sync kinocue -");
+    assert!(has(&text("systemd/kinocue.tmpfiles"), &made));
+    let help = kinocue(&["sync", "relay", "--help"]);
+    assert!(said(&help).contains(folder), "it is where the sockets are unless another is named");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{Exit, Failure};
 
 mod check;
+mod relay;
 mod send;
 mod watch;
 
@@ -12,6 +13,7 @@ Examples:
   kinocue sync check reel.wav
   kinocue sync send --artnet 10.0.0.255 --film-fps 24
   kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0
+  kinocue sync relay ltc:alsa:hw:2,0 --folder /tmp
   kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
 
 /// Makes timecode, and says what is heard of it, or is in a recording.
@@ -27,6 +29,7 @@ enum Command {
     Send(send::Args),
     Check(check::Args),
     Watch(watch::Args),
+    Relay(relay::Args),
 }
 
 pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
@@ -34,5 +37,6 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         Command::Send(args) => send::run(args),
         Command::Check(args) => check::run(args),
         Command::Watch(args) => watch::run(args),
+        Command::Relay(args) => relay::run(args),
     }
 }

@@ -24,8 +24,26 @@ pub(crate) enum LtcInput {
     Stdin,
     /// A sound card, by `arecord`.
     Alsa(String),
+    /// What a relay reads of it on this machine, at its socket.
+    Relay(PathBuf),
     /// A WAV file, at the speed of its samples: for a look, and for tests.
     File(PathBuf),
+}
+
+/// Where MIDI timecode comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum MtcInput {
+    /// A raw device or a FIFO.
+    Device(PathBuf),
+    /// What a relay reads of it on this machine, at its socket.
+    Relay(PathBuf),
+}
+
+/// A kind of line that a relay passes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LineKind {
+    Ltc,
+    Mtc,
 }
 
 /// Who says where the film is.
@@ -35,8 +53,8 @@ pub(crate) enum FilmSource {
     Ltc(LtcInput),
     /// mpv, by its socket (`--input-ipc-server`).
     Mpv(PathBuf),
-    /// Timecode by MIDI, from a raw device or a FIFO.
-    Mtc(PathBuf),
+    /// Timecode by MIDI.
+    Mtc(MtcInput),
     /// Art-Net timecode of one sender.
     ArtNet(NamedSender),
     /// Positions that one player tells by OSC.
@@ -78,7 +96,7 @@ const HTTP_PORT: u16 = 8431;
 /// A clock that is off by more is no film clock: what is felt begins at some ten times that.
 const CLOCK_ERROR: Duration = Duration::from_millis(1);
 /// What there is to choose from.
-const FORMS: &str = "take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:-, ltc:FILE.wav, mtc:DEVICE, \
+const FORMS: &str = "take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:relay:SOCKET, ltc:-, ltc:FILE.wav, mtc:DEVICE, \
                      artnet:FROM, osc:FROM, http:FROM or clock:TIME";
 
 /// How a film is read.
@@ -158,7 +176,9 @@ impl fmt::Display for FilmSource {
             Self::Ltc(LtcInput::Alsa(device)) => write!(f, "ltc:alsa:{device}"),
             Self::Ltc(LtcInput::File(path)) => write!(f, "ltc:{}", path.display()),
             Self::Mpv(path) => write!(f, "mpv:{}", path.display()),
-            Self::Mtc(path) => write!(f, "mtc:{}", path.display()),
+            Self::Ltc(LtcInput::Relay(socket)) => write!(f, "ltc:relay:{}", socket.display()),
+            Self::Mtc(MtcInput::Device(path)) => write!(f, "mtc:{}", path.display()),
+            Self::Mtc(MtcInput::Relay(socket)) => write!(f, "mtc:relay:{}", socket.display()),
             Self::ArtNet(sender) => write!(f, "artnet:{}", sender.from),
             Self::Osc(sender) => write!(f, "osc:{}", sender.from),
             Self::Http(sender) => write!(f, "http:{}", sender.from),
@@ -177,7 +197,7 @@ impl FromStr for FilmSource {
             // Paths and commands are taken as they are: a comma in one is no option.
             "ltc" => Ok(Self::Ltc(LtcInput::of(input))),
             "mpv" => Ok(Self::Mpv(input.into())),
-            "mtc" => Ok(Self::Mtc(input.into())),
+            "mtc" => Ok(Self::Mtc(MtcInput::of(input))),
             "artnet" => NamedSender::of(input, ARTNET_PORT).map(Self::ArtNet),
             "osc" => NamedSender::of(input, OSC_PORT).map(Self::Osc),
             "http" => NamedSender::of(input, HTTP_PORT).map(Self::Http),
@@ -267,8 +287,26 @@ impl LtcInput {
             _ if text == "-" => Self::Stdin,
             Some(("pipe", command)) => Self::Pipe(command.to_owned()),
             Some(("fifo", path)) => Self::Fifo(path.into()),
+            Some(("relay", socket)) => Self::Relay(socket.into()),
             Some(("alsa", device)) => Self::Alsa(device.to_owned()),
             _ => Self::File(text.into()),
+        }
+    }
+}
+
+impl MtcInput {
+    fn of(text: &str) -> Self {
+        text.strip_prefix("relay:")
+            .map_or_else(|| Self::Device(text.into()), |socket| Self::Relay(socket.into()))
+    }
+}
+
+impl LineKind {
+    /// As sources begin that bring it.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Ltc => "ltc",
+            Self::Mtc => "mtc",
         }
     }
 }
@@ -287,7 +325,10 @@ mod tests {
         assert_eq!(of("ltc:alsa:hw:2,0"), ltc(LtcInput::Alsa("hw:2,0".to_owned())));
         assert_eq!(of("mpv:/run/mpv.sock"), Ok(FilmSource::Mpv("/run/mpv.sock".into())));
         assert_eq!(of("ltc:reel:1.wav"), ltc(LtcInput::File("reel:1.wav".into())));
-        assert_eq!(of("mtc:/dev/snd/midiC1D0"), Ok(FilmSource::Mtc("/dev/snd/midiC1D0".into())));
+        let mtc = |input| Ok(FilmSource::Mtc(input));
+        assert_eq!(of("mtc:/dev/snd/midiC1D0"), mtc(MtcInput::Device("/dev/snd/midiC1D0".into())));
+        assert_eq!(of("mtc:relay:/run/mtc.sock"), mtc(MtcInput::Relay("/run/mtc.sock".into())));
+        assert_eq!(of("ltc:relay:/run/ltc.sock"), ltc(LtcInput::Relay("/run/ltc.sock".into())));
         let named = |from: &str, bind: &str| NamedSender {
             from: from.parse().expect("an address"),
             bind: bind.parse().expect("an address and a port"),

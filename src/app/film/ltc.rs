@@ -1,35 +1,48 @@
-//! LTC from wherever sound comes: blocks are read as they come, and each is stamped with the instant at which it was.
+//! LTC from wherever sound comes: bytes as they are read, and when that was, into what they say of the film.
 
-use std::fs::File;
-use std::io::{self, Read};
-use std::os::fd::AsFd;
+use std::io;
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use std::fs::File;
+use std::os::fd::AsFd as _;
+
 use rustix::process::{Pid, Signal, kill_process_group};
 
+use super::line::{Line, LineTaker};
 use super::riff::SampleStream;
-use super::{ChildSlot, FilmError, LeftRead, WordSink, start};
+use super::{ChildSlot, FilmError, WordSink, start};
 use crate::film::ltc::LtcReader;
 use crate::film::observation::{FilmWord, Observation};
-use crate::film::source::{FilmArgs, LtcInput};
+use crate::film::source::{FilmArgs, LineKind, LtcInput};
 use crate::sys::clock::Monotonic;
-use crate::time::Clock as _;
+use crate::time::{Clock as _, MonoTime};
 
-/// A block is 10 ms of sound at 48,000 samples a second, or what of it there is.
-const BLOCK: usize = 960;
-
-/// Begins to read an input; a command that is started for it is put there.
+/// Begins to read an input as LTC; a command that is started for it is put there.
 pub(super) fn start_reading(
     input: &LtcInput,
     args: &FilmArgs,
     told: WordSink,
     child: &ChildSlot,
 ) -> Result<(), FilmError> {
-    let line = LtcLine { args: args.clone(), told };
+    let (args, sink) = (args.clone(), told.clone());
+    let paced = matches!(input, LtcInput::File(_));
+    let open = move || LtcTaker {
+        args: args.clone(),
+        told: sink.clone(),
+        samples: SampleStream::default(),
+        block: Vec::new(),
+        reader: None,
+        paced: paced.then(|| (Monotonic.now(), 0)),
+    };
+    start_line(input, Line::new(told, open), child)
+}
+
+/// Begins to read an input.
+pub(super) fn start_line(input: &LtcInput, line: Line, child: &ChildSlot) -> Result<(), FilmError> {
     let failed = |path: &Path| {
         let what = path.display().to_string();
         move |source| FilmError::Open { what, source }
@@ -37,20 +50,21 @@ pub(super) fn start_reading(
     match input {
         LtcInput::File(path) => {
             let file = File::open(path).map_err(failed(path))?;
-            start("ltc", move || line.end(line.read(file, true)))?;
+            start("ltc", move || end(&line, &line.read(file)))?;
         }
         LtcInput::Stdin => {
             // Not through the buffer that is shared: what lies in there no poll tells of.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(failed(Path::new("stdin")))?;
-            start("ltc", move || line.end(line.read(File::from(input), false)))?;
+            start("ltc", move || end(&line, &line.read(File::from(input))))?;
         }
         LtcInput::Fifo(path) => {
             let path = path.clone();
             path.metadata().map_err(failed(&path))?;
-            start("ltc", move || {
-                let read = || LeftRead::open(&path, &line.told).and_then(|fifo| line.read_from(fifo, false));
-                while line.told.again(read()) {}
-            })?;
+            start("ltc", move || while line.told.again(line.read_at(&path)) {})?;
+        }
+        LtcInput::Relay(socket) => {
+            let socket = socket.clone();
+            start("ltc", move || while line.told.again(line.read_relayed(&socket, LineKind::Ltc)) {})?;
         }
         LtcInput::Pipe(command) => {
             let mut shell = Command::new("sh");
@@ -68,7 +82,7 @@ pub(super) fn start_reading(
 
 /// Reads what a command writes. One that fails, as a sound card does that is pulled out, is started anew; one that ends well has
 /// nothing more to say.
-fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Result<(), FilmError> {
+fn run(mut command: Command, name: &str, line: Line, child: &ChildSlot) -> Result<(), FilmError> {
     // In a group of its own: a shell is ended with all that it has started.
     command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
     let failed = |source| FilmError::Command { command: name.to_owned(), source };
@@ -77,19 +91,19 @@ fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Re
     start("ltc", move || {
         // Whoever ended what was started ends no more: this one was started meanwhile.
         while !line.told.is_over() {
-            let read = output.take().map_or(Ok(()), |output| line.read(output, false));
+            let read = output.take().map_or(Ok(()), |output| line.read(output));
             // Whoever ends the program meanwhile does not wait for the lock.
             let done = lock(&child).take();
             let ended = done.map(|mut one| one.wait());
             if matches!(ended, Some(Ok(status)) if status.success()) {
-                return line.end(read);
+                return end(&line, &read);
             }
             if !line.told.again(read) {
                 return;
             }
             output = command.spawn().ok().and_then(|one| put(one, &child));
         }
-        end(&child);
+        kill(&child);
     })?;
     Ok(())
 }
@@ -102,7 +116,7 @@ fn put(mut one: Child, child: &Mutex<Option<Child>>) -> Option<ChildStdout> {
 }
 
 /// Ends a command, and what it has started.
-pub(super) fn end(child: &Mutex<Option<Child>>) {
+pub(super) fn kill(child: &Mutex<Option<Child>>) {
     if let Some(mut one) = lock(child).take() {
         // One that has ended by itself cannot be ended any more.
         let _ = kill_process_group(Pid::from_child(&one), Signal::KILL);
@@ -114,55 +128,43 @@ fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
     child.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line that carries LTC.
-struct LtcLine {
-    args: FilmArgs,
-    told: WordSink,
+/// Nothing more can come: whoever wrote is gone for good, and the film over.
+fn end(line: &Line, _read: &io::Result<()>) {
+    line.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
 }
 
-impl LtcLine {
-    /// Reads to the end of a stream, or until nobody listens; one that is `paced`, at the speed of its sound.
-    fn read(&self, stream: impl Read + AsFd, paced: bool) -> io::Result<()> {
-        self.read_from(LeftRead::new(stream, &self.told), paced)
-    }
+/// Hears LTC in the sound of a line.
+struct LtcTaker {
+    args: FilmArgs,
+    told: WordSink,
+    samples: SampleStream,
+    block: Vec<i16>,
+    /// None before it is known how many samples a second there are.
+    reader: Option<LtcReader>,
+    /// Since when a recording is heard, at the speed of its sound, and how many samples of it were.
+    paced: Option<(MonoTime, u64)>,
+}
 
-    fn read_from(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
-        let (mut samples, mut block, mut octets) = (SampleStream::default(), Vec::new(), [0; BLOCK]);
-        let FilmArgs { rate, start, latency, .. } = self.args;
-        let (begun, mut heard) = (Monotonic.now(), 0_u64);
-        let mut reader: Option<LtcReader> = None;
-        loop {
-            let count = stream.read(&mut octets)?;
-            if count == 0 {
-                return Ok(());
-            }
-            let mut at = Monotonic.now();
-            block.clear();
-            samples.push(&octets[..count], &mut block).map_err(io::Error::other)?;
-            let Some(per_s) = samples.samples_per_s() else { continue };
-            heard += block.len() as u64;
-            if paced {
-                at = begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s));
-                Monotonic.sleep_until(at);
-            }
-            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
-            reader.hear(&block, at, &mut |what| {
-                self.told.tell(what);
-            });
-            self.note(reader);
+impl LineTaker for LtcTaker {
+    fn take(&mut self, bytes: &[u8], mut at: MonoTime) -> io::Result<()> {
+        self.block.clear();
+        self.samples.push(bytes, &mut self.block).map_err(io::Error::other)?;
+        let Some(per_s) = self.samples.samples_per_s() else { return Ok(()) };
+        if let Some((begun, heard)) = &mut self.paced {
+            *heard += self.block.len() as u64;
+            at = *begun + Duration::from_nanos(*heard * 1_000_000_000 / u64::from(per_s));
+            Monotonic.sleep_until(at);
         }
-    }
-
-    fn note(&self, reader: &LtcReader) {
+        let FilmArgs { rate, start, latency, .. } = self.args;
+        let reader = self.reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
+        reader.hear(&self.block, at, &mut |what| {
+            self.told.tell(what);
+        });
         let level = f64::from(reader.level());
         self.told.note(|notes| {
             notes.level_db = Some(20.0 * level.max(1e-6).log10());
             notes.label(reader.labels());
         });
-    }
-
-    /// Nothing more can come: whoever wrote is gone for good, and the film over.
-    fn end(&self, _read: io::Result<()>) {
-        self.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
+        Ok(())
     }
 }

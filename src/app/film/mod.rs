@@ -5,10 +5,13 @@ mod clock;
 mod datagrams;
 mod hall;
 mod left;
+mod line;
 mod ltc;
 mod mpv;
 mod mtc;
 mod network;
+mod relay;
+mod relayed;
 mod riff;
 mod sent;
 mod sound;
@@ -18,6 +21,7 @@ mod tests;
 mod told;
 
 use std::io;
+use std::path::Path;
 use std::process::Child;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -35,6 +39,7 @@ use crate::film::chooser::MOST_SOURCES;
 use crate::film::point::PublishedPoint;
 use crate::film::source::{FilmArgs, FilmSource};
 use left::LeftRead;
+use relay::Listeners;
 use table::Ranking;
 use told::{Notes, WordSink};
 
@@ -83,6 +88,11 @@ pub(crate) enum FilmError {
     /// There are too many of them.
     #[error("{0} sources are too many; {MOST_SOURCES} can be ranked")]
     Many(usize),
+    /// There is no line that could be relayed.
+    #[error(
+        "{0} is no line that a relay reads; take ltc:alsa:DEVICE, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:- or mtc:DEVICE"
+    )]
+    NoLine(String),
     /// The system starts no further thread.
     #[error("no thread could be started; allow more with `ulimit -u`")]
     Thread(#[from] io::Error),
@@ -128,12 +138,19 @@ impl FilmReader {
         rules: SourceRules,
         player: Option<FilmGate>,
     ) -> Result<Self, FilmError> {
-        Self::each(sources, rules, player, |args, told, child| match noting(args, &told, &child) {
-            Ok(()) => Ok(()),
-            Err(_) => {
-                let args = args.clone();
-                Ok(start("source", move || while told.waits() && noting(&args, &told, &child).is_err() {})?)
-            }
+        Self::each(sources, rules, player, |args, told, child| try_until_read(args, told, child, read))
+    }
+
+    /// Passes on what is read of sources, each at its socket in a folder: nobody here follows them.
+    ///
+    /// # Errors
+    /// [`FilmError`] where a socket cannot be served. A device that is not there is tried again.
+    pub(crate) fn relay(sources: &[FilmArgs], folder: &Path) -> Result<Self, FilmError> {
+        let rules = SourceRules { allows_coarse: false, band: 0.0 };
+        Self::each(sources, rules, None, |args, told, child| {
+            let listeners = Listeners::serve(&args.source, folder)?;
+            let read = move |args: &FilmArgs, told, child| listeners.read(&args.source, told, child);
+            try_until_read(args, told, child, read)
         })
     }
 
@@ -182,7 +199,7 @@ impl FilmReader {
 impl Drop for FilmReader {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        self.children.iter().for_each(|child| ltc::end(child));
+        self.children.iter().for_each(|child| ltc::kill(child));
     }
 }
 
@@ -199,15 +216,28 @@ fn read(args: &FilmArgs, told: WordSink, child: ChildSlot) -> Result<(), FilmErr
     }
 }
 
-/// The same; why it cannot be had is noted beside it, for as long as that is so.
-fn noting(args: &FilmArgs, told: &WordSink, child: &ChildSlot) -> Result<(), FilmError> {
-    let begun = read(args, told.clone(), Arc::clone(child));
-    let why = begun.as_ref().err().map(|error| {
-        let why = std::error::Error::source(error).map(|why| format!(": {why}")).unwrap_or_default();
-        format!("{error}{why}")
-    });
-    told.note(|notes| notes.trouble = why);
-    begun
+/// Has a source read; one that cannot be had is tried again and again, and why is noted beside it for as long as that is so.
+fn try_until_read(
+    args: &FilmArgs,
+    told: WordSink,
+    child: ChildSlot,
+    read: impl Fn(&FilmArgs, WordSink, ChildSlot) -> Result<(), FilmError> + Send + 'static,
+) -> Result<(), FilmError> {
+    let args = args.clone();
+    let is_read = move |told: &WordSink| {
+        let begun = read(&args, told.clone(), Arc::clone(&child));
+        let why = begun.err().map(|error| {
+            let why = std::error::Error::source(&error).map(|why| format!(": {why}")).unwrap_or_default();
+            format!("{error}{why}")
+        });
+        let is_read = why.is_none();
+        told.note(|notes| notes.trouble = why);
+        is_read
+    };
+    if !is_read(&told) {
+        start("source", move || while told.waits() && !is_read(&told) {})?;
+    }
+    Ok(())
 }
 
 fn start(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<()> {

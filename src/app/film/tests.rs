@@ -12,6 +12,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::film::point::FilmState;
+use crate::film::source::MtcInput;
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -80,6 +81,16 @@ impl RunningFilm {
         Self::new(film.artnet(), move |bytes| drop(socket.send(bytes)))
     }
 
+    fn by_sound(fifo: &Path, start: &str) -> Self {
+        let mut line = File::options().write(true).open(fifo).expect("somebody reads");
+        let mut film = LtcSound::new("25", start).expect("there is such a label");
+        let block = move |n: u32| {
+            let sound = film.by_ref().take(480).flat_map(i16::to_le_bytes);
+            (Duration::from_millis(10) * n, sound.collect())
+        };
+        Self::new((1..).map(block), move |bytes| drop(line.write_all(bytes)))
+    }
+
     fn by_fifo(fifo: &Path, start: &str) -> Self {
         let mut line = File::options().write(true).open(fifo).expect("somebody reads");
         let film = TimecodeSent::new("25", start).expect("there is such a label");
@@ -139,7 +150,7 @@ fn garbage_of_the_named_sender_is_counted_and_leads_nobody_astray() {
 #[test]
 fn midi_timecode_of_a_fifo_locks_survives_garbage_and_locks_again_with_the_next_writer() {
     let folder = TempDir::new().expect("there is room");
-    let fifo = fifo(&folder);
+    let fifo = fifo(&folder, "line");
     let reader = listen(&[format!("mtc:{}", fifo.display())]);
     let film = RunningFilm::by_fifo(&fifo, "00:10:00:00");
     in_state(&reader, FilmState::Locked);
@@ -157,11 +168,52 @@ fn midi_timecode_of_a_fifo_locks_survives_garbage_and_locks_again_with_the_next_
 }
 
 #[test]
+fn two_halls_hear_through_a_relay_what_its_devices_carry_and_hear_it_again_once_a_device_is_back() {
+    let folder = TempDir::new().expect("there is room");
+    let (midi, sound) = (folder.path().join("midi"), fifo(&folder, "sound"));
+    let lines = [format!("mtc:{}", midi.display()), format!("ltc:fifo:{}", sound.display())];
+    let args = lines.each_ref().map(|line| FilmArgs::of(line.parse().expect("it is a source")));
+    let _relay = FilmReader::relay(&args, folder.path()).expect("nobody else serves there");
+    let at = |kind: &str| format!("{kind}:relay:{}", folder.path().join(format!("{kind}.sock")).display());
+    let halls = [(); 2].map(|()| listen(&[at("mtc"), at("ltc")]));
+    let is_without =
+        |row: &SourceRow| row.notes.trouble.as_deref().is_some_and(|why| why.contains("no line now"));
+    until(&halls[0], "no device", |table| is_without(&table.sources[0]));
+    assert_eq!(fifo(&folder, "midi"), midi, "it is plugged in");
+
+    let locked = |row: &SourceRow, after: f64| {
+        row.state == FilmState::Locked && row.media_s.is_some_and(|at| (after..after + 100.0).contains(&at))
+    };
+    until(&halls[0], "plugged in", |table| table.sources[0].notes.trouble.is_none());
+    let film = [RunningFilm::by_fifo(&midi, "00:10:00:00"), RunningFilm::by_sound(&sound, "00:10:00:00")];
+    for hall in &halls {
+        let table = until(hall, "both", |table| table.sources.iter().all(|row| locked(row, 600.0)));
+        assert!(table.sources[1].notes.level_db.is_some_and(|level| level > -30.0), "{table:?}");
+    }
+    drop(film);
+    until(&halls[0], "gone", |table| table.sources.iter().all(|row| row.state == FilmState::Lost));
+    let _film = RunningFilm::by_fifo(&midi, "00:20:00:00");
+    for hall in &halls {
+        until(hall, "again", |table| locked(&table.sources[0], 1_200.0));
+    }
+}
+
+#[test]
+fn what_has_no_device_is_not_relayed() {
+    let folder = TempDir::new().expect("there is room");
+    for source in ["mpv:/s", "artnet:10.0.0.20", "ltc:reel.wav", "ltc:relay:/run/ltc.sock", "clock:19:00"] {
+        let args = FilmArgs::of(source.parse().expect("it is a source"));
+        let error = FilmReader::relay(&[args], folder.path()).expect_err(source).to_string();
+        assert!(error.contains("is no line that a relay reads; take ltc:alsa:DEVICE"), "{error}");
+    }
+}
+
+#[test]
 fn a_file_is_no_line_of_midi() {
     let folder = TempDir::new().expect("there is room");
     let path = folder.path().join("song.mid");
     std::fs::write(&path, b"MThd").expect("there is room");
-    let args = FilmArgs::new(FilmSource::Mtc(path), None, None).expect("it is whole");
+    let args = FilmArgs::new(FilmSource::Mtc(MtcInput::Device(path)), None, None).expect("it is whole");
     let error = anyhow::Error::new(FilmReader::start(&[args], RULES).expect_err("it is none"));
     assert!(format!("{error:#}").contains("nor a FIFO"), "{error:#}");
 }
@@ -271,8 +323,8 @@ fn a_source_that_falls_silent_leaves_the_lead_to_the_next_of_the_ranking() {
     assert_eq!((table.sources[0].state, table.switches), (FilmState::Lost, 1));
 }
 
-fn fifo(folder: &TempDir) -> std::path::PathBuf {
-    let path = folder.path().join("line");
+fn fifo(folder: &TempDir, name: &str) -> std::path::PathBuf {
+    let path = folder.path().join(name);
     let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::from_raw_mode(0o600));
     rustix::fs::mknodat(rustix::fs::CWD, &path, kind, mode, 0).expect("a FIFO can be made");
     path
@@ -281,7 +333,7 @@ fn fifo(folder: &TempDir) -> std::path::PathBuf {
 #[test]
 fn a_reader_that_is_left_takes_nothing_of_a_fifo_from_the_one_that_comes_after_it() {
     let folder = TempDir::new().expect("there is room");
-    let (path, text) = (fifo(&folder), |path: &Path| format!("ltc:fifo:{}", path.display()));
+    let (path, text) = (fifo(&folder, "line"), |path: &Path| format!("ltc:fifo:{}", path.display()));
     // None of them has had a writer: each waits for one when it is left.
     (0..4).for_each(|_| drop(listen(&[text(&path)])));
     let reader = listen(&[text(&path)]);
@@ -330,7 +382,7 @@ fn a_source_that_a_hall_does_not_find_at_first_is_heard_once_it_is_there() {
     let args = FilmArgs::new(source, Some("25"), None).expect("it is whole");
     let reader = FilmReader::open(&[args], RULES, None).expect("a hall opens without it");
     until(&reader, "missing", |table| table.sources[0].notes.trouble.is_some());
-    let path = fifo(&folder);
+    let path = fifo(&folder, "line");
     let table = until(&reader, "there", |table| table.sources[0].notes.trouble.is_none());
     assert_eq!(table.sources[0].state, FilmState::Absent);
     let _film = RunningFilm::by_fifo(&path, "00:00:10:00");

@@ -1,0 +1,183 @@
+//! A line that another process has the device of: what it reads there, and when, over a socket. So the service that moves seats needs no
+//! sound card, and several halls hear one line. Both are on one machine, whose clock they share.
+
+use std::io::{self, Write as _};
+use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::line::{Line, LineTaker};
+use super::relayed::{greeting, record};
+use super::{ChildSlot, FilmError, WordSink, ltc, mtc, start};
+use crate::film::source::{FilmSource, LineKind, LtcInput, MtcInput};
+use crate::time::MonoTime;
+
+/// Halls that hear one line at the most.
+const LISTENERS: usize = 8;
+/// Those that hear a line.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Listeners {
+    streams: Arc<Mutex<Vec<UnixStream>>>,
+    /// True while the device is there: else nobody is let in.
+    has_line: Arc<AtomicBool>,
+}
+
+impl Listeners {
+    /// Lets them in at the socket of a source in a folder, which nobody else may serve.
+    ///
+    /// # Errors
+    /// [`FilmError`]: the source is no line, or the socket cannot be served.
+    pub(super) fn serve(source: &FilmSource, folder: &Path) -> Result<Self, FilmError> {
+        let kind = kind_of(source)?;
+        let socket = folder.join(format!("{}.sock", kind.name()));
+        let listeners = Self::default();
+        let served = listener_at(&socket).and_then(|listener| listeners.let_in_at(listener, kind));
+        let failed = |source| FilmError::Open { what: socket.display().to_string(), source };
+        served.map(|()| listeners).map_err(failed)
+    }
+
+    fn let_in_at(&self, listener: UnixListener, kind: LineKind) -> io::Result<()> {
+        let listeners = self.clone();
+        start("relay", move || {
+            for stream in listener.incoming() {
+                // One that cannot be greeted is let go.
+                let _ = stream.and_then(|stream| listeners.let_in(stream, kind));
+            }
+        })
+    }
+
+    /// Begins to pass on what is read of that source.
+    pub(super) fn read(
+        &self,
+        source: &FilmSource,
+        told: WordSink,
+        child: ChildSlot,
+    ) -> Result<(), FilmError> {
+        let listeners = self.clone();
+        let line = Line::new(told, move || listeners.begin());
+        match source {
+            FilmSource::Ltc(input) => ltc::start_line(input, line, &child),
+            FilmSource::Mtc(input) => mtc::start_line(input, line),
+            _ => Err(FilmError::NoLine(source.to_string())),
+        }
+    }
+
+    fn let_in(&self, mut stream: UnixStream, kind: LineKind) -> io::Result<()> {
+        if !self.has_line.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        stream.set_nonblocking(true)?;
+        stream.write_all(greeting(kind).as_bytes())?;
+        let mut streams = self.streams();
+        if streams.len() < LISTENERS {
+            streams.push(stream);
+        }
+        Ok(())
+    }
+
+    /// The device is there, until what this gives is dropped.
+    pub(super) fn begin(&self) -> RelayTaker {
+        self.has_line.store(true, Ordering::Relaxed);
+        RelayTaker(self.clone())
+    }
+
+    fn streams(&self) -> MutexGuard<'_, Vec<UnixStream>> {
+        self.streams.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Passes on what is read of a line.
+pub(super) struct RelayTaker(Listeners);
+
+impl Drop for RelayTaker {
+    /// The device is gone: whoever heard it learns that.
+    fn drop(&mut self) {
+        self.0.has_line.store(false, Ordering::Relaxed);
+        self.0.streams().clear();
+    }
+}
+
+impl LineTaker for RelayTaker {
+    /// One that does not keep up is let go, and may come again: nobody waits for it.
+    fn take(&mut self, bytes: &[u8], at: MonoTime) -> io::Result<()> {
+        let record = record(bytes, at);
+        let passed = |stream: &mut UnixStream| stream.write(&record).is_ok_and(|sent| sent == record.len());
+        self.0.streams().retain_mut(passed);
+        Ok(())
+    }
+}
+
+/// The kind of line of a source that has a device of its own.
+fn kind_of(source: &FilmSource) -> Result<LineKind, FilmError> {
+    match source {
+        FilmSource::Ltc(LtcInput::Pipe(_) | LtcInput::Fifo(_) | LtcInput::Stdin | LtcInput::Alsa(_)) => {
+            Ok(LineKind::Ltc)
+        }
+        FilmSource::Mtc(MtcInput::Device(_)) => Ok(LineKind::Mtc),
+        _ => Err(FilmError::NoLine(source.to_string())),
+    }
+}
+
+/// A socket there, in place of that of one who was killed.
+fn listener_at(socket: &Path) -> io::Result<UnixListener> {
+    if socket.metadata().is_ok_and(|found| found.file_type().is_socket())
+        && UnixStream::connect(socket).is_err()
+    {
+        std::fs::remove_file(socket)?;
+    }
+    let listener = UnixListener::bind(socket)?;
+    // Who may hear it is a matter of the folder: it says nothing but what time it is in a film.
+    std::fs::set_permissions(socket, std::fs::Permissions::from_mode(0o666))?;
+    Ok(listener)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::film::relayed::{BLOCK, RelayedRead};
+    use crate::sys::clock::Monotonic;
+    use crate::time::Clock as _;
+
+    #[test]
+    fn what_is_read_of_a_line_is_heard_with_when_that_was_by_all_that_listen() {
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("ltc.sock");
+        let source = FilmSource::Ltc(LtcInput::Stdin);
+        let listeners = Listeners::serve(&source, folder.path()).unwrap();
+        let refused = RelayedRead::begin(UnixStream::connect(&socket).unwrap(), LineKind::Ltc).err().unwrap();
+        assert!(refused.to_string().contains("has no line now"), "{refused}");
+
+        let mut line = listeners.begin();
+        let join = || RelayedRead::begin(UnixStream::connect(&socket).unwrap(), LineKind::Ltc).unwrap();
+        let mut both = [join(), join()];
+        while listeners.streams().len() < 2 {
+            std::thread::yield_now(); // one is greeted before it is counted
+        }
+        let (first, second) = (Monotonic.now(), Monotonic.now());
+        line.take(b"one", first).unwrap();
+        line.take(b"two", second).unwrap();
+        for one in &mut both {
+            assert_eq!(one.next().unwrap(), Some((&b"one"[..], first)));
+            assert_eq!(one.next().unwrap(), Some((&b"two"[..], second)));
+        }
+        drop(line);
+        assert!(both.iter_mut().all(|one| one.next().unwrap().is_none()), "the device is gone");
+        let taken = Listeners::serve(&source, folder.path()).unwrap_err();
+        assert!(matches!(taken, FilmError::Open { source, .. } if source.kind() == io::ErrorKind::AddrInUse));
+    }
+
+    #[test]
+    fn one_that_does_not_listen_is_let_go_and_holds_nobody_up() {
+        let (ours, _theirs) = UnixStream::pair().unwrap();
+        let mut line = Listeners::default().begin();
+        line.0.let_in(ours, LineKind::Ltc).unwrap();
+        let mut taken = 0;
+        while !line.0.streams().is_empty() {
+            line.take(&[0; BLOCK], Monotonic.now()).unwrap();
+            taken += 1;
+            assert!(taken < 100_000, "a socket does not hold that much");
+        }
+    }
+}

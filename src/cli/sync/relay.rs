@@ -1,0 +1,43 @@
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::app::film::FilmReader;
+use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::film::source::{FilmArgs, FilmSource};
+use crate::sys::clock::Monotonic;
+use crate::time::Clock as _;
+
+/// Reads timecode devices for services that have none: each line at a socket of its own, ltc.sock or mtc.sock, for up to eight halls on
+/// this machine, with ltc:relay:SOCKET or mtc:relay:SOCKET as their source.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct Args {
+    /// One line of LTC, one of MIDI timecode, or both, as `play --chase` takes them.
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<FilmSource>,
+    /// The folder of the sockets; whoever may enter it may listen.
+    #[arg(long, value_name = "DIR", default_value = "/run/kinocue-sync")]
+    folder: PathBuf,
+}
+
+/// How often it is looked what is wrong.
+const EVERY: Duration = Duration::from_millis(500);
+
+pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
+    let sources: Vec<FilmArgs> = args.sources.iter().cloned().map(FilmArgs::of).collect();
+    let reader = FilmReader::relay(&sources, &args.folder).or_exit(Exit::System)?;
+    let (table, mut said) = (reader.table(), BTreeMap::new());
+    let mut at = Monotonic.now();
+    loop {
+        for row in table.read().sources {
+            let words =
+                row.notes.trouble.map_or_else(|| "read".to_owned(), |trouble| format!("not read: {trouble}"));
+            if said.get(&row.source) != Some(&words) {
+                print::tell(&format!("{}: {words}", row.source));
+                said.insert(row.source, words);
+            }
+        }
+        at = at + EVERY;
+        Monotonic.sleep_until(at);
+    }
+}
