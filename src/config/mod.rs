@@ -23,6 +23,7 @@ mod log;
 mod osc;
 mod preset;
 mod read;
+mod seat;
 mod section;
 mod sync;
 mod target;

@@ -131,10 +131,12 @@ pub enum Problem {
     #[error("a row's duration of {0} is not above 0")]
     NoDuration(String),
     /// A position outside the stroke.
-    #[error("{value} is outside the stroke, 0 to {high}{unit}")]
+    #[error("{value} is outside the stroke, {low} to {high}{unit}")]
     OutsideStroke {
         /// The position as the file has it.
         value: f64,
+        /// The lower end, in the same unit.
+        low: f64,
         /// The upper end, in the same unit.
         high: f64,
         /// The unit's name with a space before it; nothing for fractions.
@@ -152,7 +154,7 @@ pub enum Problem {
     },
     /// The curve between two points leaves the stroke by more than may be held back.
     #[error(
-        "the curve reaches {value:.4} at {at}, outside the stroke, 0 to {high}{unit}, by more than 0.001 of it; \
+        "the curve reaches {value:.4} at {at}, outside the stroke, {low} to {high}{unit}, by more than 0.001 of it; \
          add points there, or take interpolation monotone"
     )]
     CurveOutsideStroke {
@@ -160,6 +162,8 @@ pub enum Problem {
         value: f64,
         /// When it is reached.
         at: ShowTime,
+        /// The lower end, in the same unit.
+        low: f64,
         /// The upper end, in the same unit.
         high: f64,
         /// The unit's name with a space before it; nothing for fractions.

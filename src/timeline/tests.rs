@@ -117,7 +117,7 @@ fn millimetres_are_held_against_the_seat() {
     let faults = cue.fits_stroke(0..1, Some(&SeatType::bench3(1))).faults.expect("a fault");
     assert_eq!(faults.to_string(), "t.csv:6:1: a1: 150.001 is outside the stroke, 0 to 150 mm");
     assert!(cue.fits_stroke(0..1, None).faults.is_none());
-    let wide = SeatType { stroke_mm: 200.0, ..SeatType::bench3(1) };
+    let wide = SeatType::bench3(1).with_each(|axis| axis.high = 200.0);
     assert!(cue.fits_stroke(0..1, Some(&wide)).faults.is_none());
 }
 

@@ -140,7 +140,7 @@ impl Positions {
             ..Reading::at_rest([0.0; MAX_AXES], made)
         };
         for (axis, pulses) in (first..own).zip(positions) {
-            reading.pose[self.first_slot + axis] = self.seat.fraction(*pulses);
+            reading.pose[self.first_slot + axis] = self.seat.each[axis].fraction(*pulses);
             reading.slots |= 1 << (self.first_slot + axis);
         }
         reading
@@ -170,7 +170,7 @@ impl Positions {
     /// Hears where axes were between `made` and `at`.
     fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
         for (axis, pulses) in (first..self.led).zip(positions) {
-            let fraction = self.seat.fraction(*pulses);
+            let fraction = self.seat.each[axis].fraction(*pulses);
             let is_own = axis < self.seat.axes;
             // Frames would lead an axis that its seat type does not have to 0 at once: all of its stroke is there.
             let end = if is_own { 1.0 } else { 0.0 };
@@ -216,7 +216,7 @@ impl Positions {
     /// known to be at 0.
     fn mind_order(&mut self, axis: usize, pulses: Pulses) {
         let other = in_other_order(pulses);
-        let is_open = other != pulses && in_stroke(other, self.seat.pulse_range());
+        let is_open = other != pulses && in_stroke(other, self.seat.each[axis].pulse_range());
         let bit = 1 << axis;
         self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
         let near_zero = self.home && pulses.0.unsigned_abs() < 1 << 15;
@@ -227,8 +227,9 @@ impl Positions {
     /// settles it as well.
     fn hold_against(&mut self, axis: usize, reported: Pulses) {
         let Some(told) = self.told[axis] else { return };
-        let told = self.seat.pulses(told.fraction);
-        let apart = |one: Pulses| (self.seat.fraction(one) - self.seat.fraction(reported)).abs();
+        let geometry = &self.seat.each[axis];
+        let told = geometry.pulses(told.fraction);
+        let apart = |one: Pulses| (geometry.fraction(one) - geometry.fraction(reported)).abs();
         self.ordered |= apart(told) <= STILL && apart(in_other_order(told)) > STILL;
     }
 
@@ -256,7 +257,8 @@ impl Positions {
     /// Its axes, from the first on, as far as it told them; none where it told nothing.
     pub(super) fn told(&self) -> Option<PerAxis<Pulses>> {
         let known = self.told.iter().take_while(|told| told.is_some()).count();
-        let pulses = |axis: usize| self.told[axis].map_or(Pulses(0), |told| self.seat.pulses(told.fraction));
+        let place = |axis: usize, told: Told| self.seat.each[axis].pulses(told.fraction);
+        let pulses = |axis: usize| self.told[axis].map_or(Pulses(0), |told| place(axis, told));
         (known > 0).then(|| PerAxis::from_fn(known, pulses))
     }
 
