@@ -12,6 +12,7 @@ use crate::motion::{MAX_AXES, SeatType};
 
 mod accept;
 mod api;
+mod axis;
 mod effect_limits;
 mod fault;
 mod film;

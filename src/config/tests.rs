@@ -370,3 +370,16 @@ fn emergency_stop_inputs_are_a_list_of_inputs() {
     assert_eq!(faults.len(), 2, "{faults:?}");
     assert!(faults[0].ends_with("estop_inputs: 0 is outside 1..=12"), "{faults:?}");
 }
+
+#[test]
+fn a_pose_of_fractions_does_not_say_where_an_axis_rests_that_has_its_zero_inside_its_range() {
+    let ranged = "[seat.s.axis2]\nrange = [-75, 75]\n";
+    let seat = SEAT.replace("axes = 6", "axes = 2\npark = [0.1, 0.0]");
+    let [fault] = &parse(&format!("{seat}{CONTROLLER}{ranged}")).unwrap_err()[..] else {
+        panic!("one fault")
+    };
+    assert!(fault.starts_with("hall.toml:3:8: park: a fraction of the range of axis 2"), "{fault}");
+    assert!(fault.ends_with("give axis2 park of its own, in mm"), "{fault}");
+    let own = parse(&format!("{seat}{CONTROLLER}{ranged}park = 0\n")).unwrap().seats[0].each;
+    assert_eq!((own[0].park, own[1].park, own[1].neutral), (0.1, 0.5, 0.5));
+}

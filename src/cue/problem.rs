@@ -142,6 +142,18 @@ pub enum Problem {
         /// The unit's name with a space before it; nothing for fractions.
         unit: &'static str,
     },
+    /// A unit that the axis is not measured in.
+    #[error(
+        "is in {unit}, and this axis of seat {seat} is measured in {wanted}; give it in {wanted}, fraction or percent"
+    )]
+    OtherUnit {
+        /// The unit of the file.
+        unit: &'static str,
+        /// The seat type.
+        seat: String,
+        /// The unit of the axis.
+        wanted: &'static str,
+    },
     /// A position that no seat could take, whatever its stroke.
     #[error("{value} is outside 0 to {high}{unit}; positions count from the stroke's lower end")]
     NoPosition {

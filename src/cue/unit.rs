@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::limits::{MAX_MILLIMETRES, MAX_PULSES};
-use crate::motion::{AxisGeometry, SeatType, Slot};
+use crate::motion::{AxisGeometry, AxisUnit, SeatType, Slot};
 
 /// The unit that positions and vibration amplitudes have in memory, counted from the stroke's lower end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,6 +25,15 @@ impl Unit {
             Self::Fraction => "fraction",
             Self::Millimetre => "mm",
             Self::Pulse => "pulse",
+        }
+    }
+
+    /// True if the places of an axis can be told in this unit.
+    #[must_use]
+    pub(crate) fn suits(self, axis: &AxisGeometry) -> bool {
+        match self {
+            Self::Fraction | Self::Pulse => true,
+            Self::Millimetre => axis.unit == AxisUnit::Millimetre,
         }
     }
 

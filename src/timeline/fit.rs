@@ -47,6 +47,14 @@ impl Timeline {
             None => (0.0, f64::INFINITY),
         };
         let mut check = Check { timeline: self, faults: Collector::default(), held: Vec::new() };
+        for (axis, seat) in axes.clone().enumerate().filter_map(|(index, axis)| Some((axis, (seat?, index))))
+        {
+            check.unit(axis, seat);
+        }
+        if !check.faults.is_empty() {
+            // In another unit no row means anything.
+            return StrokeFit { faults: check.faults.into_faults(self.cue.path()), held: Vec::new() };
+        }
         for row in 0..self.cue.rows() {
             for axis in axes.start..axes.end.min(self.axes()) {
                 let ends = ends(axis - axes.start);
@@ -68,6 +76,15 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
+    /// The unit of an axis, which is axis `index` of the seat.
+    fn unit(&mut self, axis: usize, (seat, index): (&SeatType, usize)) {
+        let (unit, geometry) = (self.timeline.unit(), &seat.each[index]);
+        if axis < self.timeline.axes() && !unit.suits(geometry) {
+            let (seat, wanted) = (seat.name.clone(), geometry.unit.name());
+            self.add(0, axis, Problem::OtherUnit { unit: unit.name(), seat, wanted });
+        }
+    }
+
     fn point(&mut self, row: usize, axis: usize, (low, high): (f64, f64)) {
         let value = self.timeline.cue.row(row)[axis];
         if !(low..=high).contains(&value) {
