@@ -216,7 +216,8 @@ fn a_cue_in_millimetres_says_nothing_of_an_axis_that_is_measured_in_degrees() {
     let mut seat = SeatType::bench3(2);
     seat.each[1].unit = AxisUnit::Degree;
     let rows = "time_s,a1,a2\n0,0,0\n1,0,0\n2,0,0\n3,0,0\n";
-    let faults = timeline(&format!("# units: mm\n{rows}")).fits_stroke(0..2, Some(&seat)).faults.expect("a fault");
+    let faults =
+        timeline(&format!("# units: mm\n{rows}")).fits_stroke(0..2, Some(&seat)).faults.expect("a fault");
     let text = faults.to_string();
     assert!(text.contains(": a2: is in mm, and this axis of seat bench3 is measured in deg"), "{text}");
     assert!(!text.contains("a1"), "{text}");

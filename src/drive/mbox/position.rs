@@ -82,7 +82,7 @@ pub(in crate::drive) struct Positions {
     ordered: bool,
     /// The axes whose last position would be another one inside the stroke in the other order, a bit each.
     ambiguous: u16,
-    /// Whether it was homed, no frame went to it since, and none was found elsewhere: all its axes are at 0.
+    /// Whether it was homed, no frame went to it since, and none was found elsewhere: all its axes are at pulse 0.
     home: bool,
     by: Source,
     /// When the newest answer was made, at the earliest.
@@ -190,7 +190,7 @@ impl Positions {
                 self.mind_order(axis, *pulses);
             }
             let fraction = fraction.clamp(0.0, 1.0);
-            self.home &= fraction <= STILL;
+            self.home &= (fraction - self.zero(axis)).abs() <= STILL;
             let before = self.told[axis];
             let recent = before.filter(|told| made.since(told.at) <= APART);
             let rest = recent.and_then(|told| told.rest.go_on(fraction, STILL));
@@ -200,6 +200,11 @@ impl Positions {
             let (rest, sway) = (rest.unwrap_or(begin), sway.unwrap_or(begin));
             self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
         }
+    }
+
+    /// Where an axis is at pulse 0, fraction of its stroke.
+    fn zero(&self, axis: usize) -> f64 {
+        self.seat.each[axis].fraction(Pulses(0))
     }
 
     /// How far apart two answers of an axis may be that vibrates on, strokes.
@@ -286,7 +291,7 @@ impl Positions {
                 None if axis < REGISTERS => return None,
                 // There is no register for it.
                 None if !self.home => continue,
-                None => reading.by = Source::Homing,
+                None => (reading.by, reading.pose[slot]) = (Source::Homing, self.zero(axis)),
             }
             reading.slots |= 1 << slot;
         }
