@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use kinocue::cue::{self, Source};
-use kinocue::harness::motion::SeatType;
+use kinocue::harness::motion::{SeatAxis, SeatType};
 use kinocue::harness::proof::figures;
 use kinocue::harness::time::{Rate, ShowTime};
 use kinocue::harness::timeline::{EffectSet, Hint, Timeline};
@@ -42,15 +42,15 @@ fn the_files_are_what_the_generator_makes() {
 fn every_cue_keeps_to_nine_tenths_of_the_bench_seat_at_100_and_1000_hz() {
     for timeline in shipped() {
         let seat = Arc::new(SeatType::bench3(timeline.axes()));
-        let seats = vec![Arc::clone(&seat); timeline.axes()];
+        let seats: Vec<_> = (0..timeline.axes()).map(|axis| SeatAxis::new(&seat, axis)).collect();
         assert_eq!(timeline.fits_stroke(0..timeline.axes(), Some(&seat)).faults, None);
         for rate in [100.0, 1000.0] {
             for (axis, figures) in figures(&timeline, Rate::from_hz(rate), &seats).iter().enumerate() {
-                let seat = &figures.seat;
+                let geometry = figures.on.geometry();
                 for (what, value, limit) in [
-                    ("velocity", figures.velocity.value, seat.max_velocity_mm_s),
-                    ("acceleration", figures.acceleration.value, seat.max_acceleration_mm_s2),
-                    ("jerk", figures.jerk.value, seat.max_jerk_mm_s3),
+                    ("velocity", figures.velocity.value, geometry.max_velocity),
+                    ("acceleration", figures.acceleration.value, geometry.max_acceleration),
+                    ("jerk", figures.jerk.value, geometry.max_jerk),
                 ] {
                     let part = value / limit;
                     assert!(
@@ -61,7 +61,7 @@ fn every_cue_keeps_to_nine_tenths_of_the_bench_seat_at_100_and_1000_hz() {
                     );
                 }
                 assert!(
-                    figures.highest.value > 0.5 * seat.stroke_mm,
+                    figures.highest.value > 0.5 * geometry.stroke(),
                     "{}: a{} hardly moves",
                     name(&timeline),
                     axis + 1

@@ -3,7 +3,7 @@
 
 use kinocue::harness::asked::{self, Sound, Trial, Wild, sound, wild, window};
 use kinocue::harness::limiter::{Admitted, Limit, Limiter, Provenance};
-use kinocue::harness::motion::{Limits, MAX_AXES, Measure, Pose, SeatType, Spacing, Window};
+use kinocue::harness::motion::{AxisGeometry, Limits, MAX_AXES, Measure, Pose, Spacing, Window};
 use kinocue::harness::time::{Rate, ShowTime};
 
 #[test]
@@ -45,7 +45,7 @@ fn at(position: f64) -> Pose {
 }
 
 fn bench() -> Window {
-    window(Limits::of(&SeatType::bench3(1)))
+    window(Limits::of(&AxisGeometry::BENCH))
 }
 
 /// A limiter at 100 Hz that stands in the middle of the stroke.
@@ -120,7 +120,7 @@ fn what_is_said_to_be_proved_and_runs_out_of_its_stroke_is_brought_to_rest_insid
     let mut limiter = standing();
     let mut measure = Measure::new(Spacing::at_rate(100.0));
     let mut asked = 0.5_f64;
-    let limits = Limits::of(&SeatType::bench3(1));
+    let limits = Limits::of(&AxisGeometry::BENCH);
     for index in 0..300_u32 {
         let t = f64::from(index) * 0.01;
         asked = (asked + 0.01 * speed(t)).min(1.0);

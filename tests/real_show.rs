@@ -18,7 +18,7 @@ use kinocue::harness::app::{Control, Play, PlayHandle, Played};
 use kinocue::harness::config::from_to_args;
 use kinocue::harness::drive::Manner;
 use kinocue::harness::engine::{Mix, Show};
-use kinocue::harness::motion::SeatType;
+use kinocue::harness::motion::AxisGeometry;
 use kinocue::harness::rt::{Command, News};
 use kinocue::harness::state::{PlayMode, Refusal, State, Transition, Why};
 use kinocue::harness::sys::clock::Monotonic;
@@ -226,7 +226,7 @@ impl Move {
 
 /// What they make the worst axis do, from rest where the first begins.
 fn worst(rate_hz: u32, moves: &[Move]) -> Worst {
-    let per_pulse = 150.0 / SeatType::bench3(1).stroke_pulses();
+    let per_pulse = 150.0 / AxisGeometry::BENCH.stroke_pulses();
     let rate = Rate::from_hz(f64::from(rate_hz));
     let axes = 0..moves[0].to.len();
     let worst = axes.map(|axis| {

@@ -17,7 +17,7 @@ use super::staged::StagedShow;
 use crate::belief::{FRESH, KnownPose, LaneEvidence, Reading};
 use crate::drive::Lane;
 use crate::motion::Slot;
-use crate::plan::{PARK_VELOCITY_MM_S, slow_park_time};
+use crate::plan::slow_park_time;
 use crate::rt::{Command, Live, News, NewsIn};
 use crate::state::{Event, Finding, Readiness, State, Transition};
 use crate::sys::clock::Monotonic;
@@ -267,7 +267,7 @@ impl PlayScript {
 
     /// How long the slow frame of a lane takes, ms, and whether that may be faster than 50 mm/s.
     fn slow_time(&self, lane: usize) -> (u32, bool) {
-        let (time_ms, hurried) = slow_park_time(self.handle.config.controllers[lane].seat.stroke_mm);
+        let (time_ms, hurried) = slow_park_time(&self.handle.config.controllers[lane].seat);
         (time_ms.min(self.lanes[lane].longest_ms), hurried)
     }
 
@@ -345,11 +345,12 @@ pub(super) fn off_park(lanes: &[Lane], live: &Live, now: MonoTime) -> Vec<(usize
     let way_ms = |lane: usize| {
         let (_, Reading { pose, slots, at, .. }) = live.evidence(lane)?.reading()?;
         let told = lanes[lane].window.moving().filter(|(slot, _)| slots >> slot & 1 == 1);
-        let ways = told.map(|(slot, axis)| ((pose[slot] - axis.park).abs(), axis.stroke_mm));
+        let ways = told.map(|(slot, axis)| ((pose[slot] - axis.park).abs(), axis));
         // What it told before says nothing of now.
         let off = ways.filter(|(way, _)| *way > PARKED && now.since(at) <= FRESH);
-        let longest_mm = off.map(|(way, stroke_mm)| way * stroke_mm).reduce(f64::max)?;
-        Some((longest_mm / PARK_VELOCITY_MM_S * 1e3) as u32)
+        let longest_s =
+            off.map(|(way, axis)| way * axis.stroke / axis.unit.park_velocity()).reduce(f64::max)?;
+        Some((longest_s * 1e3) as u32)
     };
     (0..lanes.len()).filter_map(|lane| Some((lane, way_ms(lane)?))).collect()
 }

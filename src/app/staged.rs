@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::drive::{Lane, Manner, lanes};
 use crate::engine::{Engine, Headroom, Mix, Show};
 use crate::film::follower::PaceLimits;
-use crate::motion::Window;
+use crate::motion::{SeatType, Window};
 use crate::plan::{Course, Curve, From, PlanError, Planner, Request, Scene, To};
 use crate::rt::{Desk, Loaded, Planning};
 use crate::time::Rate;
@@ -43,9 +43,11 @@ pub fn headroom(config: &Config, timeline: &Timeline, rate: Rate) -> Headroom {
 pub(super) fn at_any_pace(config: &Config, pace: PaceLimits) -> Config {
     let mut config = config.clone();
     for controller in &mut config.controllers {
-        let seat = Arc::make_mut(&mut controller.seat);
-        [seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3] =
-            pace.leave(seat.max_velocity_mm_s, seat.max_acceleration_mm_s2, seat.max_jerk_mm_s3);
+        let seat = SeatType::clone(&controller.seat).with_each(|axis| {
+            [axis.max_velocity, axis.max_acceleration, axis.max_jerk] =
+                pace.leave(axis.max_velocity, axis.max_acceleration, axis.max_jerk);
+        });
+        controller.seat = Arc::new(seat);
     }
     config
 }

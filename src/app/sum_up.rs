@@ -9,6 +9,7 @@ use crate::control::{FORMAT, Percentiles};
 use crate::engine;
 use crate::health::Groups;
 use crate::limiter::Clamp;
+use crate::motion::AxisGeometry;
 use crate::time::Rate;
 
 /// What happened to controllers and to groups, in the order of time.
@@ -127,11 +128,15 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
 fn notes(controllers: &[Controller], prepared: &Prepared, run: &Run) -> Vec<String> {
     let mut notes: Vec<String> = run.refusals.iter().map(ToString::to_string).collect();
     notes.extend(prepared.hurried.iter().map(|&index| {
-        let stroke = controllers[index].seat.stroke_mm;
-        let name = &controllers[index].name;
+        let Controller { name, seat, .. } = &controllers[index];
+        let seconds = |axis: &AxisGeometry| axis.stroke() / axis.unit.park_velocity();
+        let slowest = seat.own().iter().max_by(|a, b| seconds(a).total_cmp(&seconds(b)));
+        let (stroke, unit, usual) = slowest.map_or((0.0, "", 0.0), |axis| {
+            (axis.stroke(), axis.unit.name(), axis.unit.park_velocity())
+        });
         format!(
-            "{name}: its stroke of {stroke} mm was crossed in 3 s at the most (PA0b), so its way to park may have been \
-             faster than 50 mm/s"
+            "{name}: its stroke of {stroke} {unit} was crossed in 3 s at the most (PA0b), so its way to park may have been \
+             faster than {usual} {unit}/s"
         )
     }));
     notes.extend(controllers.iter().zip(&run.clamps).filter_map(|(one, clamps)| {

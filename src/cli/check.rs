@@ -1,7 +1,6 @@
 //! `kinocue check`.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -229,7 +228,7 @@ impl Report {
     /// Notes what a proof shows: the table in any case, and what is broken.
     fn proof(&mut self, path: &Path, proof: &Proof) {
         self.axes.extend(figures::proved(&path.display().to_string(), &proof.axes));
-        let seats: Vec<_> = proof.axes.iter().map(|axis| Arc::clone(&axis.seat)).collect();
+        let seats: Vec<_> = proof.axes.iter().map(|axis| axis.on.clone()).collect();
         self.seat = figures::seat_names(&seats);
         self.tables += &figures::proof_table(&proof.axes);
         for violation in &proof.violations {

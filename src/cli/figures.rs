@@ -1,11 +1,9 @@
 //! The figures of a cue as a table and as JSON.
 
-use std::sync::Arc;
-
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use serde::Serialize;
 
-use crate::motion::SeatType;
+use crate::motion::{AxisGeometry, SeatAxis};
 use crate::proof::{AxisFigures, AxisProof, Quantity, SLACK, Worst};
 use crate::timeline::Figure;
 
@@ -63,7 +61,7 @@ impl Most {
 }
 
 impl Position {
-    fn new(lowest: Figure, highest: Figure, seat: &SeatType, margin: f64) -> Self {
+    fn new(lowest: Figure, highest: Figure, axis: &AxisGeometry, margin: f64) -> Self {
         Self {
             min: lowest.value,
             max: highest.value,
@@ -71,7 +69,7 @@ impl Position {
             line: highest.line,
             min_at_s: lowest.at.as_secs_f64(),
             min_line: lowest.line,
-            stroke: seat.stroke_mm,
+            stroke: axis.stroke(),
             margin,
         }
     }
@@ -80,24 +78,25 @@ impl Position {
 /// The axes of the cue in `file`.
 pub(super) fn report(file: &str, figures: &[AxisFigures]) -> Vec<AxisReport> {
     let axis = |(index, figures): (usize, &AxisFigures)| {
-        let AxisFigures { seat, lowest, highest, velocity, acceleration, jerk } = figures;
+        let AxisFigures { on, lowest, highest, velocity, acceleration, jerk } = figures;
+        let geometry = on.geometry();
         AxisReport {
             name: format!("a{}", index + 1),
             file: file.to_owned(),
-            seat: seat.name.clone(),
+            seat: on.seat.name.clone(),
             unit: "mm",
-            position: Position::new(*lowest, *highest, seat, room(lowest, highest, seat)),
-            velocity: Most::new(*velocity, seat.max_velocity_mm_s),
+            position: Position::new(*lowest, *highest, geometry, room(lowest, highest, geometry)),
+            velocity: Most::new(*velocity, geometry.max_velocity),
             step: None,
-            acceleration: Most::new(*acceleration, seat.max_acceleration_mm_s2),
-            jerk: Most::new(*jerk, seat.max_jerk_mm_s3),
+            acceleration: Most::new(*acceleration, geometry.max_acceleration),
+            jerk: Most::new(*jerk, geometry.max_jerk),
         }
     };
     figures.iter().enumerate().map(axis).collect()
 }
 
-fn room(lowest: &Figure, highest: &Figure, seat: &SeatType) -> f64 {
-    lowest.value.min(seat.stroke_mm - highest.value) / seat.stroke_mm
+fn room(lowest: &Figure, highest: &Figure, axis: &AxisGeometry) -> f64 {
+    (lowest.value - axis.low).min(axis.high - highest.value) / axis.stroke()
 }
 
 /// The proved axes of the cue in `file`.
@@ -105,9 +104,9 @@ pub(super) fn proved(file: &str, axes: &[AxisProof]) -> Vec<AxisReport> {
     let axis = |proof: &AxisProof| AxisReport {
         name: format!("a{}", proof.axis + 1),
         file: file.to_owned(),
-        seat: proof.seat.name.clone(),
+        seat: proof.on.seat.name.clone(),
         unit: "mm",
-        position: Position::new(proof.lowest, proof.highest, &proof.seat, proof.position_margin()),
+        position: Position::new(proof.lowest, proof.highest, proof.on.geometry(), proof.position_margin()),
         velocity: Most::proved(proof.velocity),
         step: Some(Most::proved(proof.step)),
         acceleration: Most::proved(proof.acceleration),
@@ -122,7 +121,7 @@ pub(super) fn proof_table(axes: &[AxisProof]) -> String {
     table.load_style(STYLE);
     table.set_header(["axis", "limit", "", "worst", "margin", "at", "row"]);
     for proof in axes {
-        let name = format!("a{} {}", proof.axis + 1, proof.seat.name);
+        let name = format!("a{} {}", proof.axis + 1, proof.on.seat.name);
         table.add_row(position_row(name, proof));
         for (quantity, worst) in proof.worst() {
             let unit = quantity.unit();
@@ -144,16 +143,16 @@ pub(super) fn proof_table(axes: &[AxisProof]) -> String {
 
 /// The position that comes nearest to an end of the stroke, vibration on top.
 fn position_row(name: String, proof: &AxisProof) -> [String; 7] {
-    let stroke = proof.seat.stroke_mm;
+    let axis = proof.on.geometry();
     let lowest = proof.lowest_shaken.filter(|shaken| shaken.value < proof.lowest.value);
     let highest = proof.highest_shaken.filter(|shaken| shaken.value > proof.highest.value);
     let (low, high) = (lowest.unwrap_or(proof.lowest), highest.unwrap_or(proof.highest));
-    let near = if low.value < stroke - high.value { low } else { high };
+    let near = if low.value - axis.low < axis.high - high.value { low } else { high };
     let left = proof.position_margin();
     [
         name,
         "position".to_owned(),
-        format!("0 to {stroke:.0} mm"),
+        format!("{:.0} to {:.0} mm", axis.low, axis.high),
         format!("{:.1} to {:.1} mm", low.value + 0.0, high.value),
         margin(left, left < -1e-6),
         near.at.to_string(),
@@ -166,9 +165,9 @@ fn margin(part: f64, is_over: bool) -> String {
 }
 
 /// The names of the seat types that axes were judged for, each once.
-pub(super) fn seat_names(seats: &[Arc<SeatType>]) -> String {
+pub(super) fn seat_names(seats: &[SeatAxis]) -> String {
     let mut names: Vec<&str> = Vec::new();
-    for seat in seats {
+    for SeatAxis { seat, .. } in seats {
         if !names.contains(&seat.name.as_str()) {
             names.push(&seat.name);
         }
@@ -205,7 +204,8 @@ pub(super) fn table(figures: &[AxisFigures]) -> String {
             // Added to 0, a small value below 0 is not shown as -0.0.
             row.extend([format!("{:.1}", (10.0 * figure.value).round() / 10.0 + 0.0), figure.at.to_string()]);
         }
-        let limits = [f.seat.max_velocity_mm_s, f.seat.max_acceleration_mm_s2, f.seat.max_jerk_mm_s3];
+        let AxisGeometry { max_velocity, max_acceleration, max_jerk, .. } = *f.on.geometry();
+        let limits = [max_velocity, max_acceleration, max_jerk];
         for (figure, limit) in [f.velocity, f.acceleration, f.jerk].into_iter().zip(limits) {
             let mark = if figure.value > limit { " !" } else { "" };
             let percent = format!("{:.0} %{mark}", 100.0 * figure.value / limit);

@@ -126,7 +126,7 @@ struct Report {
 
 impl Report {
     fn new(args: &Args, fitted: &Fitted) -> Self {
-        let seats: Vec<_> = fitted.after.axes.iter().map(|axis| axis.seat.clone()).collect();
+        let seats: Vec<_> = fitted.after.axes.iter().map(|axis| axis.on.clone()).collect();
         let (cue, output) = (args.cue.display().to_string(), args.output.display().to_string());
         Self {
             seat: figures::seat_names(&seats),

@@ -221,7 +221,7 @@ fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationRepor
         let shaking =
             steps.map(|step| Vibration::from(step.value)).filter(|v| v.hz > 0.0 && v.amplitude > 0.0);
         let (hz, amplitudes): (Vec<_>, Vec<_>) = shaking.map(|v| (v.hz, v.amplitude)).unzip();
-        let mm = timeline.unit().to_stroke(&figures.seat) * figures.seat.stroke_mm;
+        let mm = timeline.unit().to_stroke(figures.on.geometry()) * figures.on.geometry().stroke();
         Some(VibrationReport {
             axis: format!("a{}", axis + 1),
             min_hz: hz.iter().copied().reduce(f64::min)?,
@@ -234,8 +234,8 @@ fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationRepor
 
 /// What is held back at the ends of an axis's stroke.
 fn note(held: &Held, figures: &[AxisFigures], timeline: &Timeline) -> Option<String> {
-    let seat = &figures.get(held.axis)?.seat;
-    let mm = held.over * timeline.unit().to_stroke(seat) * seat.stroke_mm;
+    let axis = figures.get(held.axis)?.on.geometry();
+    let mm = held.over * timeline.unit().to_stroke(axis) * axis.stroke();
     let Held { axis, stretches, at, .. } = held;
     Some(format!(
         "a{}: held at the stroke's end in {stretches} places, where the curve goes up to {mm:.4} mm past it ({at})",
@@ -251,19 +251,22 @@ fn thousandths(value: f64) -> f64 {
 /// Each axis as a line of marks, from the bottom of its seat's stroke to the top.
 fn drawn(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<String> {
     const MARKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-    let mut curves = vec![String::new(); timeline.axes()];
+    let slot = |(axis, figures): (usize, &AxisFigures)| {
+        timeline.unit().slot(&figures.on.seat, figures.on.index, Some(axis))
+    };
+    let mut curves: Vec<_> = figures.iter().enumerate().map(|one| (slot(one), String::new())).collect();
     let mut hint = Hint::default();
     for step in 0..DRAWN {
         let part = f64::from(step) / f64::from(DRAWN - 1);
         let at = ShowTime::from_secs_f64(part * timeline.duration().as_secs_f64());
         let pose = timeline.sample(at, &mut hint);
-        for ((curve, position), figures) in curves.iter_mut().zip(pose).zip(figures) {
-            let fraction = position * timeline.unit().to_stroke(&figures.seat);
+        for ((slot, curve), position) in curves.iter_mut().zip(pose) {
+            let fraction = slot.place(position);
             let above = (1..8_u8).filter(|&mark| fraction >= f64::from(mark) / 8.0).count();
             curve.push(MARKS[above]);
         }
     }
-    curves
+    curves.into_iter().map(|(_, curve)| curve).collect()
 }
 
 fn append(text: &mut String, what: std::fmt::Arguments<'_>) {

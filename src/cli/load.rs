@@ -9,7 +9,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use super::{Exit, Failure};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
-use crate::motion::SeatType;
+use crate::motion::{SeatAxis, SeatType};
 use crate::proof::{Digest, Terms};
 use crate::time::Rate;
 use crate::timeline::Timeline;
@@ -109,16 +109,20 @@ fn seat(name: &str, hall: Option<&Config>) -> Result<Arc<SeatType>, Failure> {
 }
 
 impl Judge {
-    /// The seat of each axis of a cue: the one asked for, else that of the first controller that takes the axis,
+    /// What each axis of a cue is on: the seat asked for, else that of the first controller that takes the axis,
     /// else the bench seat.
-    pub(super) fn seats(&self, axes: usize) -> Vec<Arc<SeatType>> {
+    pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
         let bench = Arc::new(SeatType::bench3(axes));
         let seat_of = |axis| {
             let controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
             let taker = controllers.into_iter().find(|controller| controller.takes(axis));
-            self.seat.as_ref().or(taker.map(|controller| &controller.seat)).unwrap_or(&bench)
+            match (&self.seat, taker) {
+                (Some(seat), _) => SeatAxis::new(seat, axis),
+                (None, Some(taker)) => SeatAxis::new(&taker.seat, axis - taker.axis_offset),
+                (None, None) => SeatAxis::new(&bench, axis),
+            }
         };
-        (0..axes).map(|axis| Arc::clone(seat_of(axis))).collect()
+        (0..axes).map(seat_of).collect()
     }
 
     /// What a cue has to be proved for: on the seat asked for, else on all seats of the configuration, else on the bench

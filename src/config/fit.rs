@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::channel::{self, TrackId};
 use crate::cue::CueFaults;
-use crate::motion::SeatType;
+use crate::motion::{SeatAxis, SeatType};
 use crate::time::ShowTime;
 use crate::timeline::{Held, Timeline};
 use crate::wire::{Vibration, motion_channel_and_slots};
@@ -224,14 +224,14 @@ impl Config {
 
     /// The axes that swing too far, once for each seat type.
     fn overshaken(&self, timeline: &Timeline) -> Vec<Misfit> {
-        let mut judged: Vec<(usize, &Arc<SeatType>)> = Vec::new();
+        let mut judged: Vec<(usize, SeatAxis)> = Vec::new();
         let mut misfits = Vec::new();
         for controller in self.controllers.iter().filter(|one| unshakeable(one, timeline).is_none()) {
-            for axis in controller.window() {
-                let pair = (axis, &controller.seat);
-                if !judged.contains(&pair) {
-                    misfits.extend(overshake(axis, &controller.seat, timeline));
-                    judged.push(pair);
+            for (index, axis) in controller.window().enumerate() {
+                let on = SeatAxis::new(&controller.seat, index);
+                if !judged.iter().any(|(before, seat)| *before == axis && seat.is_as(&on)) {
+                    misfits.extend(overshake(axis, &on, timeline));
+                    judged.push((axis, on));
                 }
             }
         }
@@ -276,12 +276,14 @@ fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
 }
 
 /// Why an axis, counted from 0, swings too far on a seat: past the lower of what a frame can say and half the stroke.
-fn overshake(axis: usize, seat: &SeatType, timeline: &Timeline) -> Option<Misfit> {
+fn overshake(axis: usize, on: &SeatAxis, timeline: &Timeline) -> Option<Misfit> {
     let (at, strongest) = timeline.strongest_vibration(axis)?;
-    let swing = |pulses: f64| Swing { mm: pulses / seat.stroke_pulses() * seat.stroke_mm, pulses };
+    let (seat, geometry) = (&on.seat, on.geometry());
+    let stroke_pulses = geometry.stroke_pulses();
+    let swing = |pulses: f64| Swing { mm: pulses / stroke_pulses * geometry.stroke(), pulses };
     // Whole pulses, as the wire has them.
-    let pulses = (strongest.amplitude * timeline.unit().to_stroke(seat) * seat.stroke_pulses()).round();
-    let half = (seat.stroke_pulses() / 2.0).round();
+    let pulses = (strongest.amplitude * timeline.unit().to_stroke(geometry) * stroke_pulses).round();
+    let half = (stroke_pulses / 2.0).round();
     let most = f64::from(Vibration::MAX_AMPLITUDE);
     if pulses <= half.min(most) {
         return None;
@@ -398,7 +400,7 @@ mod tests {
             let timeline = cue("a1,a2,v2_hz,v2_amp", &format!("0,0,20,{}", percent / 100.0));
             let targets = ["127.0.0.1:1,axes=1".to_owned(), "127.0.0.1:2,axes=1,offset=1".to_owned()];
             let mut config = from_to_args(&targets, &[], 2).unwrap();
-            let coarse = SeatType { pulses_per_rev: 1_000.0, ..SeatType::bench3(1) };
+            let coarse = SeatType::bench3(1).with_each(|axis| axis.pulses_per_rev = 1_000.0);
             config.controllers[1].seat = Arc::new(coarse);
             config.misfits(&timeline)
         };
@@ -419,7 +421,7 @@ mod tests {
         let targets = ["127.0.0.1:1,axes=1".to_owned(), "127.0.0.1:2,axes=1,offset=1".to_owned()];
         let mut config = from_to_args(&targets, &[], 2).unwrap();
         assert_eq!(config.fits_stroke(&timeline).faults.len(), 1);
-        let longer = SeatType { stroke_mm: 200.0, ..SeatType::bench3(1) };
+        let longer = SeatType::bench3(1).with_each(|axis| axis.high = 200.0);
         config.controllers[1].seat = Arc::new(longer);
         assert!(config.fits_stroke(&timeline).faults.is_empty());
     }

@@ -12,6 +12,7 @@ use crate::motion::{MAX_AXES, SeatType};
 
 mod accept;
 mod api;
+mod axis;
 mod effect_limits;
 mod fault;
 mod film;
@@ -23,6 +24,7 @@ mod log;
 mod osc;
 mod preset;
 mod read;
+mod seat;
 mod section;
 mod sync;
 mod target;

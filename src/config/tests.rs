@@ -46,8 +46,8 @@ fn a_hall_reads_as_it_is_written() {
     assert_eq!((a2.dialect, a2.accept.code(a2.address)), (Dialect::Mbox, 0x0fc9));
     assert_eq!((b1.group.as_str(), b1.accept.code(b1.address)), ("B", 0x0001));
     assert_eq!((b2.axis_offset, b2.fan_out), (6, FanOut::Shared));
-    assert_eq!(b2.seat.park[..7], [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.0]);
-    assert_eq!(b2.seat.neutral[5], 0.5);
+    assert_eq!(b2.seat.each.map(|axis| axis.park)[..7], [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.0]);
+    assert_eq!(b2.seat.each[5].neutral, 0.5);
     assert_eq!(a1.seat, Arc::new(SeatType::bench3(3)));
     assert_eq!(hall.untaken_axes(12), [0; 0]);
 }
@@ -83,7 +83,7 @@ fn what_is_left_out_has_its_default() {
     assert_eq!((controller.group.as_str(), controller.axis_offset), ("A1", 0));
     assert_eq!((controller.fan_out, controller.dialect), (FanOut::Slice, Dialect::Smc));
     assert_eq!(controller.accept.code(controller.address), 0xffff);
-    assert_eq!(controller.seat.park, [0.0; MAX_AXES]);
+    assert!(controller.seat.each.iter().all(|axis| axis.park == 0.0));
     assert_eq!(config.untaken_axes(8), [7, 8]);
 }
 
@@ -91,7 +91,7 @@ fn what_is_left_out_has_its_default() {
 fn a_missing_neutral_is_the_park_pose() {
     let seat = SEAT.replace("axes = 6", "axes = 1\npark = [0.25]");
     let config = parse(&format!("{seat}{CONTROLLER}")).unwrap();
-    assert_eq!(config.seats[0].neutral[0], 0.25);
+    assert_eq!(config.seats[0].each[0].neutral, 0.25);
 }
 
 #[test]
@@ -110,11 +110,11 @@ fn a_controller_switches_its_own_effects_alone() {
 
 #[test]
 fn what_motion_and_vibration_may_reach_together_has_defaults_and_is_no_less_than_motion_alone_may() {
-    let seat = |more: &str| parse(&format!("{SEAT}{more}{CONTROLLER}")).map(|hall| hall.seats[0].clone());
+    let seat = |more: &str| parse(&format!("{SEAT}{more}{CONTROLLER}")).map(|hall| hall.seats[0].each[0]);
     let usual = seat("").unwrap();
-    assert_eq!((usual.shaken_velocity_mm_s(), usual.shaken_acceleration_mm_s2()), (250.0, 9_806.65));
+    assert_eq!((usual.shaken_velocity(), usual.shaken_acceleration()), (250.0, 9_806.65));
     let own = seat("max_shaken_velocity_mm_s = 245\nmax_shaken_acceleration_mm_s2 = 20000\n").unwrap();
-    assert_eq!((own.shaken_velocity_mm_s(), own.shaken_acceleration_mm_s2()), (245.0, 20_000.0));
+    assert_eq!((own.shaken_velocity(), own.shaken_acceleration()), (245.0, 20_000.0));
     let faults = seat("max_shaken_velocity_mm_s = 200\n").unwrap_err();
     let [fault] = &faults[..] else { panic!("{faults:?}") };
     assert!(
@@ -369,4 +369,17 @@ fn emergency_stop_inputs_are_a_list_of_inputs() {
     let faults = with("estop_inputs = [0, 13]").unwrap_err();
     assert_eq!(faults.len(), 2, "{faults:?}");
     assert!(faults[0].ends_with("estop_inputs: 0 is outside 1..=12"), "{faults:?}");
+}
+
+#[test]
+fn a_pose_of_fractions_does_not_say_where_an_axis_rests_that_has_its_zero_inside_its_range() {
+    let ranged = "[seat.s.axis2]\nrange = [-75, 75]\n";
+    let seat = SEAT.replace("axes = 6", "axes = 2\npark = [0.1, 0.0]");
+    let [fault] = &parse(&format!("{seat}{CONTROLLER}{ranged}")).unwrap_err()[..] else {
+        panic!("one fault")
+    };
+    assert!(fault.starts_with("hall.toml:3:8: park: a fraction of the range of axis 2"), "{fault}");
+    assert!(fault.ends_with("give axis2 park of its own, in mm"), "{fault}");
+    let own = parse(&format!("{seat}{CONTROLLER}{ranged}park = 0\n")).unwrap().seats[0].each;
+    assert_eq!((own[0].park, own[1].park, own[1].neutral), (0.1, 0.5, 0.5));
 }

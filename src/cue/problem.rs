@@ -131,14 +131,28 @@ pub enum Problem {
     #[error("a row's duration of {0} is not above 0")]
     NoDuration(String),
     /// A position outside the stroke.
-    #[error("{value} is outside the stroke, 0 to {high}{unit}")]
+    #[error("{value} is outside the stroke, {low} to {high}{unit}")]
     OutsideStroke {
         /// The position as the file has it.
         value: f64,
+        /// The lower end, in the same unit.
+        low: f64,
         /// The upper end, in the same unit.
         high: f64,
         /// The unit's name with a space before it; nothing for fractions.
         unit: &'static str,
+    },
+    /// A unit that the axis is not measured in.
+    #[error(
+        "is in {unit}, and this axis of seat {seat} is measured in {wanted}; give it in {wanted}, fraction or percent"
+    )]
+    OtherUnit {
+        /// The unit of the file.
+        unit: &'static str,
+        /// The seat type.
+        seat: String,
+        /// The unit of the axis.
+        wanted: &'static str,
     },
     /// A position that no seat could take, whatever its stroke.
     #[error("{value} is outside 0 to {high}{unit}; positions count from the stroke's lower end")]
@@ -152,7 +166,7 @@ pub enum Problem {
     },
     /// The curve between two points leaves the stroke by more than may be held back.
     #[error(
-        "the curve reaches {value:.4} at {at}, outside the stroke, 0 to {high}{unit}, by more than 0.001 of it; \
+        "the curve reaches {value:.4} at {at}, outside the stroke, {low} to {high}{unit}, by more than 0.001 of it; \
          add points there, or take interpolation monotone"
     )]
     CurveOutsideStroke {
@@ -160,6 +174,8 @@ pub enum Problem {
         value: f64,
         /// When it is reached.
         at: ShowTime,
+        /// The lower end, in the same unit.
+        low: f64,
         /// The upper end, in the same unit.
         high: f64,
         /// The unit's name with a space before it; nothing for fractions.

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use super::limits::{MAX_MILLIMETRES, MAX_PULSES};
-use crate::motion::SeatType;
+use crate::motion::{AxisGeometry, AxisUnit, SeatType, Slot};
 
 /// The unit that positions and vibration amplitudes have in memory, counted from the stroke's lower end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,20 +28,50 @@ impl Unit {
         }
     }
 
-    /// The factor that turns a position in this unit into a fraction of the seat's stroke.
+    /// True if the places of an axis can be told in this unit.
     #[must_use]
-    pub(crate) fn to_stroke(self, seat: &SeatType) -> f64 {
-        self.stroke(seat).recip()
+    pub(crate) fn suits(self, axis: &AxisGeometry) -> bool {
+        match self {
+            Self::Fraction | Self::Pulse => true,
+            Self::Millimetre => axis.unit == AxisUnit::Millimetre,
+        }
     }
 
-    /// The length of the seat's stroke in this unit.
+    /// The factor that turns a position in this unit into a fraction of the axis's stroke.
     #[must_use]
-    pub(crate) fn stroke(self, seat: &SeatType) -> f64 {
+    pub(crate) fn to_stroke(self, axis: &AxisGeometry) -> f64 {
+        self.stroke(axis).recip()
+    }
+
+    /// The length of the axis's stroke in this unit.
+    #[must_use]
+    pub(crate) fn stroke(self, axis: &AxisGeometry) -> f64 {
         match self {
             Self::Fraction => 1.0,
-            Self::Millimetre => seat.stroke_mm,
-            Self::Pulse => seat.stroke_pulses(),
+            Self::Millimetre => axis.stroke(),
+            Self::Pulse => axis.stroke_pulses(),
         }
+    }
+
+    /// Between which positions in this unit the axis can be.
+    #[must_use]
+    pub(crate) fn ends(self, axis: &AxisGeometry) -> (f64, f64) {
+        match self {
+            Self::Fraction => (0.0, 1.0),
+            Self::Millimetre => (axis.low, axis.high),
+            Self::Pulse => {
+                let range = axis.pulse_range();
+                (range.low, range.high)
+            }
+        }
+    }
+
+    /// The slot that carries `axis` of a cue in this unit, `seat_axis` being the seat's own count from 0.
+    #[must_use]
+    pub(crate) fn slot(self, seat: &SeatType, seat_axis: usize, axis: Option<usize>) -> Slot {
+        let geometry = &seat.each[seat_axis];
+        let below = self.ends(geometry).0 / self.stroke(geometry);
+        Slot::new(seat, seat_axis, axis, self.to_stroke(geometry)).zero_at(0.0 - below)
     }
 
     /// What stands behind a value in a message; nothing for fractions.

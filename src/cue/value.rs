@@ -29,7 +29,7 @@ pub(super) fn position(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
     if (0.0..=high).contains(&value) {
         Ok(unit.in_memory(value))
     } else if unit.unit() == Unit::Fraction {
-        Err(Problem::OutsideStroke { value, high, unit: unit.suffix() })
+        Err(Problem::OutsideStroke { value, low: 0.0, high, unit: unit.suffix() })
     } else {
         Err(Problem::NoPosition { value, high, unit: unit.suffix() })
     }

@@ -199,10 +199,10 @@ fn judge(controller: &Controller, first: &Values, again: &Values) -> Result<Vec<
         let held = |address| values.get(&address).copied().unwrap_or_default();
         position(words(axis).map_or([0; 2], |words| words.map(held)), dialect)
     };
-    let stroke = controller.seat.pulse_range();
-    let inside = |pulses: Pulses| stroke.contains(pulses);
     (0..axes)
         .map(|axis| {
+            let stroke = controller.seat.each[axis].pulse_range();
+            let inside = |pulses: Pulses| stroke.contains(pulses);
             let [was, is] = [first, again].map(|values| place(values, axis, controller.dialect));
             let [smc, mbox] = [Dialect::Smc, Dialect::Mbox].map(|dialect| place(again, axis, dialect));
             let axis = axis + 1;

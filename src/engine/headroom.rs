@@ -186,7 +186,7 @@ mod tests {
     use super::super::slew::Slew;
     use super::*;
     use crate::cue::{self, Source};
-    use crate::motion::{Measure, Readings, SeatType, Spacing};
+    use crate::motion::{AxisGeometry, Measure, Readings, SeatType, Spacing};
     use crate::timeline::Hint;
 
     fn timeline(text: &str) -> Timeline {
@@ -195,7 +195,8 @@ mod tests {
 
     /// Ten seconds of rest, then ten at a steady share of the seat's greatest speed, back and forth.
     fn headroom(share: f64) -> Headroom {
-        let seat = SeatType { max_acceleration_mm_s2: 1e9, max_jerk_mm_s3: 1e12, ..SeatType::bench3(1) };
+        let free = |axis: &mut AxisGeometry| (axis.max_acceleration, axis.max_jerk) = (1e9, 1e12);
+        let seat = SeatType::bench3(1).with_each(free);
         let window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
         let mut text = "# interpolation: linear\ntime_s,a1\n0,0\n".to_owned();
         let stroke_s = 1.0 / (1.6 * share);
@@ -252,22 +253,18 @@ mod tests {
 
     /// Limits of which the cue uses these shares of velocity, acceleration and jerk.
     fn just_enough(timeline: &Timeline, rate: Rate, shares: [f64; 3]) -> SeatType {
-        let free = SeatType {
-            max_velocity_mm_s: 1e9,
-            max_acceleration_mm_s2: 1e9,
-            max_jerk_mm_s3: 1e12,
-            max_rpm: Some(u32::MAX),
-            ..SeatType::bench3(1)
+        let set = |to: [f64; 3]| {
+            move |axis: &mut AxisGeometry| {
+                [axis.max_velocity, axis.max_acceleration, axis.max_jerk] = to;
+                axis.max_rpm = Some(u32::MAX);
+            }
         };
+        let free = SeatType::bench3(1).with_each(set([1e9, 1e9, 1e12]));
         let digest = crate::proof::Digest::of(timeline.cue());
         let terms = crate::proof::Terms::of_seat(std::sync::Arc::new(free.clone()), 1, digest, rate, 1.0);
         let axis = &crate::proof::prove(timeline, terms).axes[0];
-        SeatType {
-            max_velocity_mm_s: axis.velocity.value / shares[0],
-            max_acceleration_mm_s2: axis.acceleration.value / shares[1],
-            max_jerk_mm_s3: axis.jerk.value / shares[2],
-            ..free
-        }
+        let most = [axis.velocity.value, axis.acceleration.value, axis.jerk.value];
+        free.with_each(set(std::array::from_fn(|place| most[place] / shares[place])))
     }
 
     fn worst_of(limits: Limits, readings: Readings) -> f64 {

@@ -19,7 +19,7 @@ use crate::drive::Manner;
 use crate::engine::{Mix, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
-use crate::motion::{MAX_AXES, Pose, SeatType};
+use crate::motion::{AxisGeometry, MAX_AXES, Pose};
 use crate::net::Delivery;
 use crate::rt::{
     Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning,
@@ -371,7 +371,7 @@ impl FrameSink for Link<'_> {
     fn send(&mut self, lane: usize, datagram: &[u8]) -> Delivery {
         let request = MotionRequest::parse(datagram).expect("only frames are sent");
         self.live.evidence(lane).expect("there is such a lane").on_ack(request.frame);
-        let stroke = SeatType::bench3(1).stroke_pulses();
+        let stroke = AxisGeometry::BENCH.stroke_pulses();
         let there = |slot: usize| request.positions.get(slot).map_or(0.0, |at| f64::from(at.0) / stroke);
         self.stands.borrow_mut()[lane] = std::array::from_fn(there);
         self.frames.push(Frame { lane, at: self.now.get(), request, bytes: datagram.to_vec() });

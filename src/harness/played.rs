@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::Event;
 use crate::limiter::Counts;
-use crate::motion::{Measure, SeatType, Spacing};
+use crate::motion::{AxisGeometry, Measure, Spacing};
 use crate::rt::{Ended, News};
 use crate::time::{MonoTime, Rate, ShowTime};
 use crate::timeline::Timeline;
@@ -66,7 +66,7 @@ impl Played {
 
     /// The positions of one axis of one lane, frame by frame, mm.
     pub fn positions_mm(&self, lane: usize, axis: usize) -> Vec<f64> {
-        let per_pulse = 150.0 / SeatType::bench3(1).stroke_pulses();
+        let per_pulse = 150.0 / AxisGeometry::BENCH.stroke_pulses();
         self.lane(lane).map(|frame| f64::from(frame.request.positions[axis].0) * per_pulse).collect()
     }
 
@@ -132,8 +132,8 @@ impl Played {
 /// What straight lines make an axis of the bench seat do, from rest `before` mm up: each takes that long, and ends that
 /// many mm up. By the measure of what is sent at that rate.
 pub fn worst_of_lines(rate: Rate, before: f64, lines: impl IntoIterator<Item = (Duration, f64)>) -> Worst {
-    let seat = SeatType::bench3(1);
-    let step = 4.0 * seat.max_acceleration_mm_s2 * (1.0 / rate.hz()).max(0.005);
+    let axis = AxisGeometry::BENCH;
+    let step = 4.0 * axis.max_acceleration * (1.0 / rate.hz()).max(0.005);
     let mut worst = Worst::default();
     let mut measure = Measure::new(Spacing::at_rate(rate.hz()));
     let mut at = ShowTime::ZERO;
@@ -145,10 +145,9 @@ pub fn worst_of_lines(rate: Rate, before: f64, lines: impl IntoIterator<Item = (
     for (span, mm) in lines {
         at += span;
         let seen = measure.push(at, mm);
-        worst.velocity = worst.velocity.max(seen.velocity.value.abs() / seat.max_velocity_mm_s);
-        worst.acceleration =
-            worst.acceleration.max(seen.acceleration.value.abs() / seat.max_acceleration_mm_s2);
-        worst.jerk = worst.jerk.max(seen.jerk.value.abs() / seat.max_jerk_mm_s3);
+        worst.velocity = worst.velocity.max(seen.velocity.value.abs() / axis.max_velocity);
+        worst.acceleration = worst.acceleration.max(seen.acceleration.value.abs() / axis.max_acceleration);
+        worst.jerk = worst.jerk.max(seen.jerk.value.abs() / axis.max_jerk);
         worst.step = worst.step.max(seen.step.value.abs() / step);
     }
     worst

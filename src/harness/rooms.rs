@@ -66,7 +66,10 @@ pub mod log {
     pub use crate::log::Log;
 }
 pub mod motion {
-    pub use crate::motion::{Limits, MAX_AXES, Measure, Pose, Pulses, SeatType, Slot, Spacing, Window};
+    pub use crate::motion::{
+        AxisGeometry, AxisUnit, Limits, MAX_AXES, Measure, Pose, Pulses, SeatAxis, SeatType, Slot, Spacing,
+        Window,
+    };
 }
 pub mod net {
     pub use crate::net::{Delivery, DrainGrid, Network, Origin, Ports, SendFault, Sender, over};

@@ -31,10 +31,10 @@ pub(crate) fn held(config: &Config, places: &[Vec<Pulses>]) -> Config {
 
 fn standing(seat: &SeatType, places: &[Pulses]) -> SeatType {
     let mut seat = seat.clone();
-    for (axis, place) in places.iter().enumerate().take(seat.park.len()) {
-        seat.park[axis] = seat.fraction(*place);
+    for (axis, place) in seat.each.iter_mut().zip(places) {
+        axis.park = axis.fraction(*place);
+        axis.neutral = axis.park;
     }
-    seat.neutral = seat.park;
     seat
 }
 
@@ -84,10 +84,10 @@ mod tests {
 
     #[test]
     fn every_place_of_a_stroke_survives_the_way_through_fractions() {
-        let seat = SeatType { stroke_mm: 149.7, lead_mm: 4.9, ..SeatType::bench3(1) };
+        let seat = SeatType::bench3(1).with_each(|axis| (axis.high, axis.lead) = (149.7, 4.9));
         for pulses in (0..=305_510).step_by(7) {
-            let park = standing(&seat, &[Pulses(pulses)]).park[0];
-            assert_eq!(seat.pulses(park), Pulses(pulses));
+            let park = standing(&seat, &[Pulses(pulses)]).each[0].park;
+            assert_eq!(seat.each[0].pulses(park), Pulses(pulses));
         }
     }
 }

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::config::Config;
 use crate::cue::Unit;
-use crate::motion::SeatType;
+use crate::motion::{SeatType, Slot};
 use crate::timeline::{Cubic, Timeline};
 
 /// The most stretches that a curve is asked in.
@@ -48,16 +48,17 @@ pub struct AxisCurve {
 #[must_use]
 pub(crate) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) -> CurveData {
     let bench = SeatType::bench3(timeline.axes());
-    let to_stroke = |axis: usize| {
+    let slot = |axis: usize| {
         let taker = hall.and_then(|hall| hall.named().find(|one| one.takes(axis)));
-        timeline.unit().to_stroke(taker.map_or(&bench, |one| &one.seat))
+        let (seat, first) = taker.map_or((&bench, 0), |one| (&*one.seat, one.axis_offset));
+        timeline.unit().slot(seat, axis - first, Some(axis))
     };
     let length_s = timeline.duration().as_secs_f64();
     let span = length_s / count(points);
     CurveData {
         length_s,
         t_s: (0..points).map(|stretch| (count(stretch) + 0.5) * span).collect(),
-        axes: (0..timeline.axes()).map(|axis| axis_curve(timeline, axis, to_stroke(axis), points)).collect(),
+        axes: (0..timeline.axes()).map(|axis| axis_curve(timeline, axis, &slot(axis), points)).collect(),
     }
 }
 
@@ -67,7 +68,7 @@ pub(crate) fn needs_hall(unit: Unit) -> bool {
     unit != Unit::Fraction
 }
 
-fn axis_curve(timeline: &Timeline, axis: usize, to_stroke: f64, points: usize) -> AxisCurve {
+fn axis_curve(timeline: &Timeline, axis: usize, slot: &Slot, points: usize) -> AxisCurve {
     let times = timeline.cue().times();
     let span = timeline.duration().as_secs_f64() / count(points);
     let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); points];
@@ -84,7 +85,7 @@ fn axis_curve(timeline: &Timeline, axis: usize, to_stroke: f64, points: usize) -
             *ends = (ends.0.min(low), ends.1.max(high));
         }
     }
-    let part = |value: f64| (value * to_stroke).clamp(0.0, 1.0);
+    let part = |value: f64| slot.place(value);
     AxisCurve {
         name: format!("a{}", axis + 1),
         min: ends.iter().map(|(low, _)| part(*low)).collect(),

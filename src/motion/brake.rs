@@ -78,10 +78,10 @@ impl Brake {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::{Limits, SeatType, Slot};
+    use crate::motion::{AxisGeometry, Limits, SeatType, Slot};
 
     fn limits() -> Limits {
-        Limits::of(&SeatType::bench3(1))
+        Limits::of(&AxisGeometry::BENCH)
     }
 
     fn one_axis() -> Window {

@@ -1,19 +1,21 @@
 //! What moves: axes, poses, seat types and how motion is measured. Pure; no file, no clock, no allocation in
 //! anything that the tick thread calls.
 
+mod axis;
 mod brake;
 mod halt;
 mod measure;
 mod seat;
 mod window;
 
+pub use axis::{AxisGeometry, AxisUnit};
 pub(crate) use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
 #[cfg(test)]
 pub(crate) use measure::Readings;
 pub use measure::{Measure, Spacing};
 pub(crate) use seat::{FACTORY_INTERVAL_MS, PulseRange, in_stroke};
-pub use seat::{Pulses, SeatType};
+pub use seat::{Pulses, SeatAxis, SeatType};
 pub use window::{Limits, Slot, Window};
 
 /// The most axes a cue, a frame or a controller can have (PA02, SMC manual 1.5).

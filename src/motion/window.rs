@@ -1,6 +1,6 @@
 //! The axes of one controller's frame: which axis of the cue each slot carries, and on what seat.
 
-use super::{MAX_AXES, Pose, Pulses, SeatType};
+use super::{AxisGeometry, AxisUnit, MAX_AXES, Pose, Pulses, SeatType};
 
 /// What an axis may do, in strokes per second, second squared and second cubed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,13 +14,14 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The limits of a seat type's axes.
+    /// The limits of an axis.
     #[must_use]
-    pub fn of(seat: &SeatType) -> Self {
+    pub fn of(axis: &AxisGeometry) -> Self {
+        let stroke = axis.stroke();
         Self {
-            velocity: seat.max_velocity_mm_s / seat.stroke_mm,
-            acceleration: seat.max_acceleration_mm_s2 / seat.stroke_mm,
-            jerk: seat.max_jerk_mm_s3 / seat.stroke_mm,
+            velocity: axis.max_velocity / stroke,
+            acceleration: axis.max_acceleration / stroke,
+            jerk: axis.max_jerk / stroke,
         }
     }
 }
@@ -34,16 +35,22 @@ pub struct Slot {
     pub(crate) is_own: bool,
     /// Cue unit to fraction of this slot's stroke.
     pub(crate) to_stroke: f64,
+    /// Where the cue's 0 is, fraction of the stroke.
+    pub(crate) cue_zero: f64,
     /// Where it rests, fraction of the stroke.
     pub(crate) park: f64,
     /// What levels scale about, fraction of the stroke.
     pub(crate) neutral: f64,
     /// How much of the cue's motion about that it makes, 0 to 1.
     pub(crate) level: f64,
+    /// Where the motor is at the lower end of the stroke, pulses.
+    pub(crate) low_pulses: f64,
     /// Pulses over the whole stroke.
     pub(crate) stroke_pulses: f64,
-    /// Length of the stroke, mm.
-    pub(crate) stroke_mm: f64,
+    /// Length of the stroke, in `unit`.
+    pub(crate) stroke: f64,
+    /// What the axis is measured in.
+    pub(crate) unit: AxisUnit,
     /// What the axis may do.
     pub(crate) limits: Limits,
     /// Between which fractions of the stroke it may be sent, the lower first: the whole stroke, unless it is held.
@@ -54,18 +61,28 @@ impl Slot {
     /// A slot of a seat that carries `axis` of the cue, `seat_axis` being the seat's own count from 0, at full level.
     #[must_use]
     pub fn new(seat: &SeatType, seat_axis: usize, axis: Option<usize>, to_stroke: f64) -> Self {
+        let geometry = &seat.each[seat_axis];
         Self {
             axis,
             is_own: true,
             to_stroke,
-            park: seat.park.get(seat_axis).copied().unwrap_or(0.0),
-            neutral: seat.neutral.get(seat_axis).copied().unwrap_or(0.0),
+            cue_zero: 0.0,
+            park: geometry.park,
+            neutral: geometry.neutral,
             level: 1.0,
-            stroke_pulses: seat.stroke_pulses(),
-            stroke_mm: seat.stroke_mm,
-            limits: Limits::of(seat),
+            low_pulses: geometry.pulse_range().low,
+            stroke_pulses: geometry.stroke_pulses(),
+            stroke: geometry.stroke(),
+            unit: geometry.unit,
+            limits: Limits::of(geometry),
             reach: (0.0, 1.0),
         }
+    }
+
+    /// The same slot where the cue's 0 is at `fraction` of the stroke.
+    #[must_use]
+    pub(crate) const fn zero_at(self, fraction: f64) -> Self {
+        Self { cue_zero: fraction, ..self }
     }
 
     /// The same slot of a lane whose seat has no such axis: padding of the frame, or another controller's.
@@ -84,13 +101,13 @@ impl Slot {
     /// the axis, were it not held inside the stroke.
     #[must_use]
     pub(crate) fn scale(&self) -> (f64, f64) {
-        (self.to_stroke * self.level, self.neutral * (1.0 - self.level))
+        (self.to_stroke * self.level, self.neutral * (1.0 - self.level) + self.cue_zero * self.level)
     }
 
     /// Where the cue's `value` puts the axis: fraction of the stroke, held inside it.
     #[must_use]
     pub(crate) fn place(&self, value: f64) -> f64 {
-        let full = value * self.to_stroke;
+        let full = value * self.to_stroke + self.cue_zero;
         // At full level the cue's own value, to the last bit.
         let placed = if self.level == 1.0 { full } else { self.neutral + (full - self.neutral) * self.level };
         placed.clamp(0.0, 1.0)
@@ -102,7 +119,7 @@ impl Slot {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a stroke fits i32, checked with the seat type")]
     pub(crate) fn pulses(&self, fraction: f64) -> Pulses {
-        let exact = fraction.clamp(self.reach.0, self.reach.1) * self.stroke_pulses;
+        let exact = self.low_pulses + fraction.clamp(self.reach.0, self.reach.1) * self.stroke_pulses;
         // What `round` says, without a call into the mathematical library for each slot of each frame.
         let whole = exact as i32;
         let left = exact - f64::from(whole);
@@ -200,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_level_scales_about_the_neutral_pose() {
-        let seat = SeatType { neutral: [0.4; MAX_AXES], ..SeatType::bench3(1) };
+        let seat = SeatType::bench3(1).with_each(|axis| axis.neutral = 0.4);
         let slot = Slot::new(&seat, 0, Some(0), 1.0).at_level(0.5);
         assert!((slot.place(0.4) - 0.4).abs() < 1e-12);
         assert!((slot.place(1.0) - 0.7).abs() < 1e-12);
@@ -209,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_window_that_is_held_sends_its_park_pose_whatever_it_is_asked_for() {
-        let seat = SeatType { park: [0.25; MAX_AXES], ..SeatType::bench3(1) };
+        let seat = SeatType::bench3(1).with_each(|axis| axis.park = 0.25);
         let mut window = Window::new(vec![Slot::new(&seat, 0, Some(0), 1.0)]);
         assert_eq!(window.slots()[0].pulses(0.5), Pulses(150_000));
         window.hold();
@@ -220,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_slot_without_an_axis_rests_at_park_and_the_others_stay_inside_the_stroke() {
-        let seat = SeatType { park: [0.25; MAX_AXES], ..SeatType::bench3(3) };
+        let seat = SeatType::bench3(3).with_each(|axis| axis.park = 0.25);
         let window = Window::new(vec![
             Slot::new(&seat, 0, Some(1), 1.0),
             Slot::new(&seat, 1, Some(0), 2.0),

@@ -13,7 +13,7 @@ mod solve;
 mod states;
 
 pub(crate) use course::{After, Course, Leg};
-pub(crate) use park::{PARK_VELOCITY_MM_S, slow_park_time};
+pub(crate) use park::slow_park_time;
 pub(crate) use planner::Planner;
 pub use planner::{From, Request, To};
 pub use scene::{LaneScene, Place, Scene};

@@ -1,13 +1,11 @@
-//! Parking: from wherever a lane is and however it moves to rest in its park pose, no faster than 50 mm/s.
+//! Parking: from wherever a lane is and however it moves to rest in its park pose, no faster than 50 mm/s, or 10 degrees a second.
 
 use super::seam::{Before, SLACK, roughness_of_leaving};
 use super::solve::{Problem, to_position, to_velocity};
 use super::{AxisState, Plan, PlanError};
-use crate::motion::{Limits, Window};
+use crate::motion::{AxisGeometry, Limits, SeatType, Window};
 use crate::time::ShowTime;
 
-/// The greatest speed of a seat on its way to park, mm/s.
-pub(crate) const PARK_VELOCITY_MM_S: f64 = 50.0;
 /// The longest Time that a controller executes as it is in the factory (PA0b, IMAX manual 2.3.1).
 const LONGEST_MS: u32 = 3_000;
 
@@ -77,16 +75,17 @@ fn stop_first(window: &Window, from: &[AxisState]) -> Result<Plan, String> {
     Ok(stop.then(straight(window, &stopped, 1.0)?))
 }
 
-/// The Time of the one slow frame that brings a seat to park from wherever it stands, ms: its whole stroke at 50 mm/s, at
-/// most 3 s; and whether it had to be cut to that.
+/// The Time of the one slow frame that brings a seat to park from wherever it stands, ms: the whole stroke of its slowest axis
+/// at the speed of parking, at most 3 s; and whether it had to be cut to that.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "a saturating cast is what is wanted"
 )]
 #[must_use]
-pub(crate) fn slow_park_time(stroke_mm: f64) -> (u32, bool) {
-    let whole = (stroke_mm / PARK_VELOCITY_MM_S * 1000.0).ceil().max(1.0) as u32;
+pub(crate) fn slow_park_time(seat: &SeatType) -> (u32, bool) {
+    let of_axis = |axis: &AxisGeometry| (axis.stroke() / axis.unit.park_velocity() * 1000.0).ceil();
+    let whole = seat.own().iter().map(of_axis).fold(1.0, f64::max) as u32;
     (whole.min(LONGEST_MS), whole > LONGEST_MS)
 }
 
@@ -95,7 +94,7 @@ fn straight(window: &Window, from: &[AxisState], share: f64) -> Result<Plan, Str
         .moving()
         .zip(from)
         .map(|((_, slot), from)| Limits {
-            velocity: slot.limits.velocity.min(PARK_VELOCITY_MM_S / slot.stroke_mm),
+            velocity: slot.limits.velocity.min(slot.unit.park_velocity() / slot.stroke),
             ..stopping(slot.limits, from, share)
         })
         .collect();
@@ -111,7 +110,7 @@ fn stopping(limits: Limits, from: &AxisState, share: f64) -> Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::{SeatType, Slot};
+    use crate::motion::Slot;
 
     fn one_axis() -> (Window, Limits) {
         let slot = Slot::new(&SeatType::bench3(1), 0, Some(0), 1.0);
@@ -127,7 +126,7 @@ mod tests {
         let fastest = (0..3200)
             .map(|ms| plan.states_at(f64::from(ms) * 1e-3).next().unwrap().velocity.abs())
             .fold(0.0, f64::max);
-        assert!(fastest * 150.0 <= PARK_VELOCITY_MM_S * 1.000_001, "{fastest}");
+        assert!(fastest * 150.0 <= 50.0 * 1.000_001, "{fastest}");
         assert!(plan.position_at(plan.seconds())[0].abs() < 1e-9);
     }
 
@@ -177,8 +176,9 @@ mod tests {
 
     #[test]
     fn the_way_home_takes_the_stroke_at_50_mm_a_second_and_3_s_at_the_most() {
-        assert_eq!(slow_park_time(100.0), (2_000, false));
-        assert_eq!(slow_park_time(150.0), (3_000, false));
-        assert_eq!(slow_park_time(475.0), (3_000, true));
+        let seat = |stroke_mm: f64| SeatType::bench3(1).with_each(|axis| axis.high = stroke_mm);
+        assert_eq!(slow_park_time(&seat(100.0)), (2_000, false));
+        assert_eq!(slow_park_time(&seat(150.0)), (3_000, false));
+        assert_eq!(slow_park_time(&seat(475.0)), (3_000, true));
     }
 }

@@ -1,8 +1,9 @@
-//! Compares the controller's settings of the mechanics with the seat type: encoder, lead, stroke.
+//! Compares the controller's settings of the mechanics with the cylinders of the seat type: encoder, lead, stroke.
 
 use std::collections::BTreeMap;
 
 use super::{Check, Notes, Subject};
+use crate::motion::{AxisGeometry, AxisUnit};
 use crate::wire::Dialect;
 
 /// Lines of the encoder by PA54 (SMC manual 2.3.1).
@@ -25,35 +26,41 @@ fn judge_encoder(subject: &Subject<'_>, notes: &mut Notes) {
         return notes.add(Check::Encoder, found, "set PA54 = 0 for 5000 lines or 1 for 2500");
     };
     let seat = &subject.controller.seat;
-    let counts = seat.pulses_per_rev / lines;
-    let told = format!(
-        "PA54 = {value}: an encoder of {lines} lines, and seat {} has {} pulses a turn",
-        seat.name, seat.pulses_per_rev
-    );
-    let is = |wanted: f64| (counts - wanted).abs() < 1e-6;
-    if is(4.0) {
-        let remedy = "send the empty seat a known distance, measure it, and accept this if it was right";
-        notes.add(Check::EncoderUnsure, format!("{told}, so four for each line"), remedy);
-    } else if !is(2.0) {
+    let told = |axis: &AxisGeometry| {
+        let (name, pulses) = (&seat.name, axis.pulses_per_rev);
+        format!("PA54 = {value}: an encoder of {lines} lines, and seat {name} has {pulses} pulses a turn")
+    };
+    let counts = |axis: &AxisGeometry, each: f64| (axis.pulses_per_rev / lines - each).abs() < 1e-6;
+    let neither = cylinders(subject).find(|axis| !counts(axis, 2.0) && !counts(axis, 4.0));
+    let by_four = cylinders(subject).find(|axis| counts(axis, 4.0));
+    if let Some(axis) = neither {
         let remedy = format!(
             "set PA54 to the motors' encoder, or pulses_per_rev to {} or {}",
             2.0 * lines,
             4.0 * lines
         );
+        let told = told(axis);
         notes.add(Check::Encoder, format!("{told}, so neither two nor four for each line"), remedy);
+    } else if let Some(axis) = by_four {
+        let remedy = "send the empty seat a known distance, measure it, and accept this if it was right";
+        let told = told(axis);
+        notes.add(Check::EncoderUnsure, format!("{told}, so four for each line"), remedy);
     }
+}
+
+/// The axes of the seat that are driven by a screw.
+fn cylinders<'a>(subject: &Subject<'a>) -> impl Iterator<Item = &'a AxisGeometry> {
+    subject.controller.seat.own().iter().filter(|axis| axis.unit == AxisUnit::Millimetre)
 }
 
 fn judge_lead(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(tenths) = subject.pa(0x41) else { return };
     let seat = &subject.controller.seat;
     let lead = f64::from(tenths) / 10.0;
-    if (lead - seat.lead_mm).abs() <= HALF_A_UNIT_MM {
-        return;
-    }
-    let found =
-        format!("PA41 = {tenths}: a lead of {lead} mm, but seat {} has {} mm", seat.name, seat.lead_mm);
-    let remedy = format!("set PA41 = {:.0}, or correct lead_mm of the seat type", seat.lead_mm * 10.0);
+    let differs = |axis: &&AxisGeometry| (lead - axis.lead).abs() > HALF_A_UNIT_MM;
+    let Some(axis) = cylinders(subject).find(differs) else { return };
+    let found = format!("PA41 = {tenths}: a lead of {lead} mm, but seat {} has {} mm", seat.name, axis.lead);
+    let remedy = format!("set PA41 = {:.0}, or correct lead_mm of the seat type", axis.lead * 10.0);
     notes.add(Check::Lead, found, remedy);
 }
 
@@ -64,11 +71,10 @@ fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(tenths) = subject.pa(0x42).filter(|tenths| *tenths > 0 && !is_rise) else { return };
     let seat = &subject.controller.seat;
     let stroke = f64::from(tenths) / 10.0;
-    if stroke < seat.stroke_mm - HALF_A_UNIT_MM {
-        let found = format!(
-            "PA42 = {tenths}: a stroke of {stroke} mm, but seat {} has {} mm",
-            seat.name, seat.stroke_mm
-        );
+    let longest = cylinders(subject).map(AxisGeometry::stroke).fold(0.0, f64::max);
+    if stroke < longest - HALF_A_UNIT_MM {
+        let found =
+            format!("PA42 = {tenths}: a stroke of {stroke} mm, but seat {} has {longest} mm", seat.name);
         let remedy = "correct stroke_mm of the seat type, or have PA42 set at the controller itself";
         notes.add(Check::Stroke, found, remedy);
     }

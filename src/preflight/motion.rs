@@ -108,7 +108,7 @@ fn judge_interval(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
         return;
     }
     let frame = terms.frame_time_ms();
-    let (slow, _) = slow_park_time(subject.controller.seat.stroke_mm);
+    let (slow, _) = slow_park_time(&subject.controller.seat);
     let (longest, what) = match frame.max(slow) {
         longest if longest == frame => (longest, "frames of the show"),
         longest => (longest, "the frame that brings the seat to its park pose"),

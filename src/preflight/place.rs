@@ -14,13 +14,13 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         return;
     }
     let Some(survey) = subject.survey else { return };
-    let stroke = subject.controller.seat.pulse_range();
+    let strokes = subject.controller.seat.pulse_ranges();
     let axes = subject.working_axes().min(subject.controller.seat.axes);
     let Some(words) = position_words_of(&survey.values, axes) else { return };
     let again = position_words_of(&survey.again, axes);
     let reported = survey.reported.measured.map(|heard| heard.value);
     let dialect = subject.controller.dialect;
-    let stand = Stand { words: &words, dialect, stroke, reported: reported.as_deref() };
+    let stand = Stand { words: &words, dialect, strokes: &strokes, reported: reported.as_deref() };
     let stand = if again.is_some_and(|again| stand.rests(&again)) {
         stand
     } else {
@@ -36,7 +36,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
         ),
         WordOrder::Neither => notes.add(Check::Position, stand.what_cannot_be(), AFTER_HOMING),
     }
-    judge_further_axes(reported.as_deref(), words.len(), stroke, notes);
+    judge_further_axes(reported.as_deref(), words.len(), &strokes, notes);
 }
 
 const AFTER_HOMING: &str =
@@ -50,10 +50,10 @@ fn remedy(dialect: Dialect) -> String {
 }
 
 /// Axes without position registers, of which only a report tells.
-fn judge_further_axes(reported: Option<&[Pulses]>, known: usize, stroke: PulseRange, notes: &mut Notes) {
-    let further = reported.into_iter().flatten().enumerate().skip(known);
-    for (axis, place) in further.filter(|(_, place)| !in_stroke(**place, stroke)) {
-        notes.add(Check::Position, outside(axis, *place, stroke), AFTER_HOMING);
+fn judge_further_axes(reported: Option<&[Pulses]>, known: usize, strokes: &[PulseRange], notes: &mut Notes) {
+    let further = reported.into_iter().flatten().zip(strokes).enumerate().skip(known);
+    for (axis, (place, stroke)) in further.filter(|(_, (place, stroke))| !in_stroke(**place, **stroke)) {
+        notes.add(Check::Position, outside(axis, *place, *stroke), AFTER_HOMING);
     }
 }
 
@@ -62,13 +62,14 @@ fn judge_further_axes(reported: Option<&[Pulses]>, known: usize, stroke: PulseRa
 struct Stand<'a> {
     words: &'a [[u16; 2]],
     dialect: Dialect,
-    stroke: PulseRange,
+    /// Of each axis.
+    strokes: &'a [PulseRange],
     reported: Option<&'a [Pulses]>,
 }
 
 impl Stand<'_> {
     fn order(&self) -> WordOrder {
-        word_order(self.words, self.dialect, self.stroke, self.reported)
+        word_order(self.words, self.dialect, self.strokes, self.reported)
     }
 
     /// True if the seat stood where it stands by a later reading: only then does a report tell of the same place.
@@ -92,15 +93,15 @@ impl Stand<'_> {
         format!(
             "axis {axis} stands at {own} pulses by the word order of {dialect}, at {by_other} by that of {other}; its \
              stroke is {}",
-            self.stroke
+            self.strokes[axis - 1]
         )
     }
 
     /// The first axis that is outside its stroke, or elsewhere than its report says.
     fn what_cannot_be(&self) -> String {
         let places: Vec<_> = self.words.iter().map(|words| position(*words, self.dialect)).collect();
-        let outside_of = |(axis, place): (usize, &Pulses)| {
-            (!in_stroke(*place, self.stroke)).then(|| outside(axis, *place, self.stroke))
+        let outside_of = |(axis, (place, stroke)): (usize, (&Pulses, &PulseRange))| {
+            (!in_stroke(*place, *stroke)).then(|| outside(axis, *place, *stroke))
         };
         let elsewhere = || {
             let reported = self.reported.into_iter().flatten();
@@ -115,7 +116,13 @@ impl Stand<'_> {
                 place.0, report.0
             ))
         };
-        places.iter().enumerate().find_map(outside_of).or_else(elsewhere).unwrap_or_default()
+        places
+            .iter()
+            .zip(self.strokes)
+            .enumerate()
+            .find_map(outside_of)
+            .or_else(elsewhere)
+            .unwrap_or_default()
     }
 }
 

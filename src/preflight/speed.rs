@@ -1,6 +1,7 @@
 //! How fast a controller lets its axes move, against what the seat may do.
 
 use super::{Check, Notes, Subject};
+use crate::motion::AxisGeometry;
 
 /// Axes with limits of their own (PA80 to PA85, PAa0 to PAb5).
 const OWN_LIMITS: usize = 6;
@@ -16,6 +17,32 @@ struct Limit {
     source: String,
 }
 
+impl Limit {
+    /// What it is for the turns that the axis needs.
+    fn share(&self, subject: &Subject<'_>) -> f64 {
+        self.rpm / geometry(subject, self.axis).needed_rpm()
+    }
+
+    fn told(&self, subject: &Subject<'_>) -> String {
+        let geometry = geometry(subject, self.axis);
+        let (lead, unit) = (geometry.lead, geometry.unit.name());
+        let speed = self.rpm * lead / 60.0;
+        format!(
+            "axis {} may turn {:.0} rpm ({}), {speed:.1} {unit}/s at a lead of {lead} {unit}; seat {} goes up to {} {unit}/s",
+            self.axis + 1,
+            self.rpm,
+            self.source,
+            subject.controller.seat.name,
+            geometry.max_velocity
+        )
+    }
+}
+
+/// The axis as the seat type has it.
+fn geometry<'a>(subject: &Subject<'a>, axis: usize) -> &'a AxisGeometry {
+    &subject.controller.seat.each[axis]
+}
+
 pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     if subject.pa(0x07) == Some(0) {
         notes.add(
@@ -27,28 +54,17 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     judge_axes_of_their_own(subject, notes);
     let mut limits: Vec<Limit> =
         (0..subject.working_axes()).filter_map(|axis| limit(subject, axis)).collect();
-    limits.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
-    let seat = &subject.controller.seat;
-    let needed = needed_rpm(subject);
-    let told = |limit: &Limit| {
-        let speed = limit.rpm * seat.lead_mm / 60.0;
-        format!(
-            "axis {} may turn {:.0} rpm ({}), {speed:.1} mm/s at a lead of {} mm; seat {} goes up to {} mm/s",
-            limit.axis + 1,
-            limit.rpm,
-            limit.source,
-            seat.lead_mm,
-            seat.name,
-            seat.max_velocity_mm_s
-        )
-    };
-    if let Some(slowest) = limits.first().filter(|limit| limit.rpm < needed * SLACK) {
-        let remedy = format!("allow {:.0} rpm, or lower max_velocity_mm_s of the seat type", needed.ceil());
-        notes.add(Check::SpeedTooLow, told(slowest), remedy);
+    limits.sort_by(|a, b| a.share(subject).total_cmp(&b.share(subject)));
+    let needed = |limit: &Limit| geometry(subject, limit.axis).needed_rpm().ceil();
+    if let Some(slowest) = limits.first().filter(|limit| limit.share(subject) < SLACK) {
+        let unit = geometry(subject, slowest.axis).unit.name();
+        let remedy =
+            format!("allow {:.0} rpm, or lower max_velocity_{unit}_s of the seat type", needed(slowest));
+        notes.add(Check::SpeedTooLow, slowest.told(subject), remedy);
     }
-    if let Some(fastest) = limits.last().filter(|limit| limit.rpm > needed * MARGIN) {
-        let remedy = format!("set PA07 or PA80 to PA85 to {:.0}", needed.ceil());
-        notes.add(Check::SpeedTooHigh, told(fastest), remedy);
+    if let Some(fastest) = limits.last().filter(|limit| limit.share(subject) > MARGIN) {
+        let remedy = format!("set PA07 or PA80 to PA85 to {:.0}", needed(fastest));
+        notes.add(Check::SpeedTooHigh, fastest.told(subject), remedy);
     }
 }
 
@@ -63,10 +79,9 @@ fn judge_axes_of_their_own(subject: &Subject<'_>, notes: &mut Notes) {
     notes.add(Check::AxisSpeedUnlimited, found, format!("set them to {:.0}", needed_rpm(subject).ceil()));
 }
 
-/// Turns a minute that the seat's greatest speed takes.
+/// Turns a minute that the greatest speed of the seat's fastest axis takes.
 fn needed_rpm(subject: &Subject<'_>) -> f64 {
-    let seat = &subject.controller.seat;
-    seat.max_velocity_mm_s * 60.0 / seat.lead_mm
+    subject.controller.seat.own().iter().map(AxisGeometry::needed_rpm).fold(0.0, f64::max)
 }
 
 /// The lowest of PA07, PA80.. and PAa0.. times PAb0.. (SMC manual 5.10); those of 0 set none.

@@ -183,10 +183,8 @@ fn the_seat_is_not_judged_by_axes_that_nobody_gave() {
 #[test]
 fn a_slow_show_needs_long_times() {
     let mut case = Case::smc().with(&[(0x0b, 900)]);
-    case.controller.seat = std::sync::Arc::new(crate::motion::SeatType {
-        stroke_mm: 40.0,
-        ..crate::motion::SeatType::bench3(3)
-    });
+    let short = crate::motion::SeatType::bench3(3).with_each(|axis| axis.high = 40.0);
+    case.controller.seat = std::sync::Arc::new(short);
     assert_eq!(check(&case), None);
     case.terms.rate_hz = 1.0;
     let found = only(&case).unwrap().found;

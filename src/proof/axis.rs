@@ -1,14 +1,12 @@
 //! One axis of the cue on one seat: position, velocity, acceleration and jerk, up to rest after the last pose.
 
-use std::sync::Arc;
-
 use super::end::{Allowed, NoRest, no_rest};
 use super::pieces::{At, Pieces, extremes};
 use super::stencil::{Stencils, step_limit};
 use super::sweep::{Swept, sweep};
 use super::violation::{Breach, Quantity};
 use super::{Found, SLACK, Terms, Worst};
-use crate::motion::{AxisState, Limits, SeatType, Slot};
+use crate::motion::{AxisGeometry, AxisState, Limits, SeatAxis, Slot};
 use crate::time::ShowTime;
 use crate::timeline::{Figure, Timeline};
 
@@ -17,23 +15,23 @@ use crate::timeline::{Figure, Timeline};
 pub(crate) struct AxisProof {
     /// The axis of the cue, from 0.
     pub(crate) axis: usize,
-    /// The seat that it was judged for.
-    pub(crate) seat: Arc<SeatType>,
-    /// The lowest position that is sent, mm from the stroke's lower end.
+    /// The axis of a seat that it was judged for; all figures are in its unit.
+    pub(crate) on: SeatAxis,
+    /// The lowest position that is sent.
     pub(crate) lowest: Figure,
-    /// The highest position that is sent, mm from the stroke's lower end.
+    /// The highest position that is sent.
     pub(crate) highest: Figure,
     /// The lowest position with vibration on top; `None` if the axis never vibrates.
     pub(crate) lowest_shaken: Option<Figure>,
     /// The highest position with vibration on top; `None` if the axis never vibrates.
     pub(crate) highest_shaken: Option<Figure>,
-    /// mm/s.
+    /// Velocity.
     pub(crate) velocity: Worst,
-    /// Change of velocity from one frame to the next, mm/s.
+    /// Change of velocity from one frame to the next.
     pub(crate) step: Worst,
-    /// mm/s².
+    /// Acceleration.
     pub(crate) acceleration: Worst,
-    /// mm/s³.
+    /// Jerk.
     pub(crate) jerk: Worst,
 }
 
@@ -56,7 +54,8 @@ impl AxisProof {
         let low = self.lowest_shaken.map_or(self.lowest.value, |shaken| shaken.value.min(self.lowest.value));
         let high =
             self.highest_shaken.map_or(self.highest.value, |shaken| shaken.value.max(self.highest.value));
-        low.min(self.seat.stroke_mm - high) / self.seat.stroke_mm
+        let axis = self.on.geometry();
+        (low - axis.low).min(axis.high - high) / axis.stroke()
     }
 }
 
@@ -64,13 +63,20 @@ impl AxisProof {
 pub(super) struct Subject<'a> {
     pub(super) timeline: &'a Timeline,
     pub(super) axis: usize,
-    /// The axis of the cue that is the seat's first.
-    pub(super) first: usize,
-    pub(super) seat: &'a Arc<SeatType>,
+    pub(super) on: SeatAxis,
     pub(super) slot: Slot,
 }
 
 impl Subject<'_> {
+    pub(super) fn geometry(&self) -> &AxisGeometry {
+        self.on.geometry()
+    }
+
+    /// The name of the seat type.
+    pub(super) fn seat(&self) -> String {
+        self.on.seat.name.clone()
+    }
+
     /// Proves the axis; what is broken goes to `found`.
     pub(super) fn prove(&self, terms: &Terms, stencils: &Stencils, found: &mut Vec<Found>) -> AxisProof {
         let pieces = Pieces::new(self.timeline, self.axis, &self.slot);
@@ -95,11 +101,11 @@ impl Subject<'_> {
         let shaken = self.shaken(&pieces, terms, stencils, found);
         AxisProof {
             axis: self.axis,
-            seat: Arc::clone(self.seat),
-            lowest: self.figure(lowest),
-            highest: self.figure(highest),
-            lowest_shaken: shaken.map(|(low, _)| self.figure(low)),
-            highest_shaken: shaken.map(|(_, high)| self.figure(high)),
+            on: self.on.clone(),
+            lowest: self.position(lowest),
+            highest: self.position(highest),
+            lowest_shaken: shaken.map(|(low, _)| self.position(low)),
+            highest_shaken: shaken.map(|(_, high)| self.position(high)),
             velocity,
             step,
             acceleration,
@@ -108,14 +114,15 @@ impl Subject<'_> {
     }
 
     fn worst(&self, swept: &Swept, limit: f64) -> Worst {
-        let Figure { value, at, line } = self.figure(At { value: swept.worst, at: swept.at });
-        Worst { value, limit: limit * self.seat.stroke_mm, at, line }
+        let stroke = self.geometry().stroke();
+        let Figure { value, at, line } = self.figure(swept.worst * stroke, swept.at);
+        Worst { value, limit: limit * stroke, at, line }
     }
 
     /// What the axis may do: the limits of its seat, and no faster than the controller lets it move.
     pub(super) fn allowed(&self, terms: &Terms) -> Allowed {
         let Limits { velocity, acceleration, jerk } = self.slot.limits;
-        let velocity = velocity.min(self.seat.speed_ceiling_mm_s() / self.seat.stroke_mm);
+        let velocity = velocity.min(self.geometry().speed_ceiling() / self.geometry().stroke());
         Allowed {
             limits: Limits { velocity, acceleration, jerk },
             step: step_limit(acceleration, terms.rate),
@@ -124,10 +131,10 @@ impl Subject<'_> {
     }
 
     fn restless(&self, pieces: &Pieces, no_rest: NoRest) -> Found {
-        let (mm, seat) = (self.seat.stroke_mm, self.seat.name.clone());
+        let (mm, seat) = (self.geometry().stroke(), self.seat());
         let at = ShowTime::from_nanos(pieces.end());
         let AxisState { position, velocity, .. } = pieces.last_motion();
-        let (position, velocity) = (position * mm, velocity * mm);
+        let (position, velocity) = (self.geometry().place(position), velocity * mm);
         let breach = match no_rest {
             NoRest::NoRoom { missing } => {
                 Breach::NoRoomToRest { velocity, position, missing: missing * mm, stroke: mm, seat, at }
@@ -139,24 +146,28 @@ impl Subject<'_> {
         Found { at, axis: Some(self.axis), column: format!("a{}", self.axis + 1), breach }
     }
 
-    /// In mm, with the line of the row at or before it.
-    pub(super) fn figure(&self, met: At) -> Figure {
-        let at = ShowTime::from_nanos(met.at);
-        let line = self.timeline.cue().line(self.timeline.row_before(at));
-        Figure { value: met.value * self.seat.stroke_mm, at, line }
+    /// A place in the stroke.
+    fn position(&self, met: At) -> Figure {
+        self.figure(self.geometry().place(met.value), met.at)
+    }
+
+    /// A value in the unit of the axis, with the line of the row at or before it.
+    fn figure(&self, value: f64, at: i64) -> Figure {
+        let at = ShowTime::from_nanos(at);
+        Figure { value, at, line: self.timeline.cue().line(self.timeline.row_before(at)) }
     }
 
     fn note(&self, quantity: Quantity, swept: &Swept, limit: f64, found: &mut Vec<Found>) {
-        let mm = self.seat.stroke_mm;
+        let stroke = self.geometry().stroke();
         found.extend(swept.over.iter().map(|stretch| Found {
             at: ShowTime::from_nanos(stretch.at),
             axis: Some(self.axis),
             column: format!("a{}", self.axis + 1),
             breach: Breach::Motion {
                 quantity,
-                value: stretch.worst * mm,
-                limit: limit * mm,
-                seat: self.seat.name.clone(),
+                value: stretch.worst * stroke,
+                limit: limit * stroke,
+                seat: self.seat(),
                 at: ShowTime::from_nanos(stretch.at),
                 from: ShowTime::from_nanos(stretch.from),
                 until: ShowTime::from_nanos(stretch.until),

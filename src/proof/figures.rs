@@ -1,55 +1,54 @@
 //! What each axis of a cue asks of the seat that takes it: the figures that people judge a cue by, measured as the proof
 //! measures, however the frames fall.
 
-use std::sync::Arc;
-
 use super::pieces::Pieces;
 use super::stencil::{Stencil, Stencils};
 use super::sweep::sweep;
-use crate::motion::{SeatType, Slot};
+use crate::motion::SeatAxis;
 use crate::time::{Rate, ShowTime};
 use crate::timeline::{Extreme, Figure, Timeline};
 
 /// What one axis does at most, on the seat that takes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisFigures {
-    /// The seat that it was judged for.
-    pub seat: Arc<SeatType>,
-    /// The lowest position of the curve, mm from the stroke's lower end.
+    /// The axis of a seat that it was judged for; all figures are in its unit.
+    pub on: SeatAxis,
+    /// The lowest position of the curve.
     pub(crate) lowest: Figure,
-    /// The highest position of the curve, mm from the stroke's lower end.
+    /// The highest position of the curve.
     pub highest: Figure,
-    /// The greatest speed, mm/s.
+    /// The greatest speed.
     pub velocity: Figure,
-    /// The greatest acceleration, mm/s².
+    /// The greatest acceleration.
     pub acceleration: Figure,
-    /// The greatest jerk, mm/s³.
+    /// The greatest jerk.
     pub jerk: Figure,
 }
 
 /// What each axis of a cue does at most, in frames of `rate`: positions are those of the curve itself, also between rows,
-/// and before it is held at the stroke's ends. `seats` has the seat of each axis.
+/// and before it is held at the stroke's ends. `seats` has what each axis is on.
 #[must_use]
-pub fn figures(timeline: &Timeline, rate: Rate, seats: &[Arc<SeatType>]) -> Vec<AxisFigures> {
+pub fn figures(timeline: &Timeline, rate: Rate, seats: &[SeatAxis]) -> Vec<AxisFigures> {
     let stencils = Stencils::at(rate);
-    let axis = |(axis, seat): (usize, &Arc<SeatType>)| of_axis(timeline, axis, seat, &stencils);
+    let axis = |(axis, on): (usize, &SeatAxis)| of_axis(timeline, axis, on, &stencils);
     seats.iter().enumerate().take(timeline.axes()).map(axis).collect()
 }
 
-fn of_axis(timeline: &Timeline, axis: usize, seat: &Arc<SeatType>, stencils: &Stencils) -> AxisFigures {
-    let to_stroke = timeline.unit().to_stroke(seat);
-    let pieces = Pieces::new(timeline, axis, &Slot::new(seat, 0, Some(axis), to_stroke));
+fn of_axis(timeline: &Timeline, axis: usize, on: &SeatAxis, stencils: &Stencils) -> AxisFigures {
+    let slot = timeline.unit().slot(&on.seat, on.index, Some(axis));
+    let stroke = on.geometry().stroke();
+    let pieces = Pieces::new(timeline, axis, &slot);
     let most = |stencils: &[Stencil], order| {
         let swept = sweep(&pieces, stencils, order, f64::INFINITY);
         let at = ShowTime::from_nanos(swept.at);
         let line = timeline.cue().line(timeline.row_before(at));
-        Figure { value: swept.worst * seat.stroke_mm, at, line }
+        Figure { value: swept.worst * stroke, at, line }
     };
-    let mm = to_stroke * seat.stroke_mm;
-    let extreme = |e: Extreme| Figure { value: e.value * mm, at: e.at, line: e.line };
+    let (per_unit, zero) = (slot.to_stroke * stroke, on.geometry().place(slot.cue_zero));
+    let extreme = |e: Extreme| Figure { value: e.value * per_unit + zero, at: e.at, line: e.line };
     let extremes = &timeline.extremes()[axis];
     AxisFigures {
-        seat: Arc::clone(seat),
+        on: on.clone(),
         lowest: extreme(extremes.min),
         highest: extreme(extremes.max),
         velocity: most(&stencils.velocity, 1),
@@ -61,9 +60,11 @@ fn of_axis(timeline: &Timeline, axis: usize, seat: &Arc<SeatType>, stencils: &St
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::sync::Arc;
 
     use super::*;
     use crate::cue::{self, Source};
+    use crate::motion::SeatType;
 
     fn timeline(text: &str) -> Timeline {
         Timeline::new(cue::read(Path::new("test.csv"), text.as_bytes(), &Source::Native).unwrap())
@@ -72,7 +73,7 @@ mod tests {
     #[test]
     fn a_steady_move_has_its_speed_in_mm_of_the_seat() {
         let cue = timeline("# interpolation: linear\ntime_s,a1,a2\n0,0,0.5\n1,0.5,0.5\n2,0.5,0.5\n");
-        let seats = [0, 1].map(|_| Arc::new(SeatType::bench3(2)));
+        let seats = [0, 1].map(|axis| SeatAxis::new(&Arc::new(SeatType::bench3(2)), axis));
         let figures = figures(&cue, Rate::from_hz(100.0), &seats);
         assert!((figures[0].velocity.value - 75.0).abs() < 1e-6, "{figures:?}");
         assert_eq!((figures[0].velocity.line, figures[0].highest.line), (3, 4));
@@ -87,7 +88,7 @@ mod tests {
         let rows = |unit: &str, full: f64| {
             format!("# units: {unit}\ntime_s,a1\n0,0\n1,{}\n2,{}\n3,0\n", 0.3 * full, 0.8 * full)
         };
-        let seats = [Arc::new(SeatType::bench3(1))];
+        let seats = [SeatAxis::new(&Arc::new(SeatType::bench3(1)), 0)];
         let figures = |unit: &str, full: f64| {
             super::figures(&timeline(&rows(unit, full)), Rate::from_hz(100.0), &seats)[0].clone()
         };

@@ -1,8 +1,6 @@
 //! Makes a cue keep its limits: amplitude about the neutral pose, never time; a last stretch that comes to rest, where that
 //! changes less; and vibration that is more than the seat stands on top of that.
 
-use std::sync::Arc;
-
 use super::ease::eased;
 use super::end::no_rest;
 use super::pieces::Pieces;
@@ -10,7 +8,7 @@ use super::smooth::{Resampled, Smoothing};
 use super::stencil::Stencils;
 use super::{Breach, Digest, Proof, SLACK, Subject, Terms, prove, subjects};
 use crate::cue::{Cue, Vibration};
-use crate::motion::{MAX_AXES, SeatType};
+use crate::motion::{MAX_AXES, Slot};
 use crate::time::ShowTime;
 use crate::timeline::{HELD_BACK, Timeline};
 
@@ -234,10 +232,9 @@ fn needed(timeline: &Timeline, terms: &Terms) -> Vec<f64> {
 /// How much of its amplitude an axis may keep to stay inside the stroke, where its rows or its curve leave it.
 fn within_stroke(subject: &Subject<'_>) -> f64 {
     let extremes = &subject.timeline.extremes()[subject.axis];
-    let unit = subject.timeline.unit();
-    let neutral = neutral_of(subject.seat, subject.axis - subject.first);
+    let Slot { neutral, to_stroke, cue_zero, .. } = subject.slot;
     let reach = |value: f64| {
-        let place = value * unit.to_stroke(subject.seat);
+        let place = value * to_stroke + cue_zero;
         let room = if place < neutral { neutral } else { 1.0 - neutral };
         let is_inside = (-HELD_BACK..=1.0 + HELD_BACK).contains(&place);
         if is_inside { 1.0 } else { ROUNDING * room / (place - neutral).abs() }
@@ -249,9 +246,8 @@ fn within_stroke(subject: &Subject<'_>) -> f64 {
 fn able_to_rest(subject: &Subject<'_>, terms: &Terms, stencils: &Stencils) -> f64 {
     let pieces = Pieces::new(subject.timeline, subject.axis, &subject.slot);
     let allowed = subject.allowed(terms);
-    let neutral = neutral_of(subject.seat, subject.axis - subject.first);
     let rests = |factor: f64| {
-        no_rest(&pieces.ending(stencils.reach(), factor, neutral), &allowed, stencils).is_none()
+        no_rest(&pieces.ending(stencils.reach(), factor, subject.slot.neutral), &allowed, stencils).is_none()
     };
     if rests(1.0) {
         return 1.0;
@@ -264,16 +260,13 @@ fn able_to_rest(subject: &Subject<'_>, terms: &Terms, stencils: &Stencils) -> f6
     ROUNDING * fits
 }
 
-fn neutral_of(seat: &SeatType, seat_axis: usize) -> f64 {
-    seat.neutral.get(seat_axis).copied().unwrap_or(0.0)
-}
-
 /// The neutral pose of the first seat that takes each axis, in the cue's unit.
 fn neutral(cue: &Cue, terms: &Terms) -> [f64; MAX_AXES] {
     let mut pose = [0.0; MAX_AXES];
     for part in terms.parts.iter().rev() {
         for axis in part.axes.clone().filter(|axis| *axis < MAX_AXES) {
-            pose[axis] = neutral_of(&part.seat, axis - part.axes.start) * cue.unit().stroke(&part.seat);
+            let geometry = &part.seat.each[axis - part.axes.start];
+            pose[axis] = geometry.neutral * cue.unit().stroke(geometry);
         }
     }
     pose
@@ -291,11 +284,12 @@ fn scale(cue: &Cue, factors: &[f64], neutral: &[f64; MAX_AXES]) -> Cue {
 
 /// Where a cue stands farthest from where it stood, at its rows.
 fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
-    let mut seats: [Option<&Arc<SeatType>>; MAX_AXES] = [None; MAX_AXES];
+    let mut mm = [0.0; MAX_AXES];
     for part in &terms.parts {
-        part.axes.clone().filter(|axis| *axis < MAX_AXES).for_each(|axis| seats[axis] = Some(&part.seat));
+        for (mm, geometry) in mm[part.axes.start..].iter_mut().zip(&part.seat.each).take(part.axes.len()) {
+            *mm = cue.unit().to_stroke(geometry) * geometry.stroke();
+        }
     }
-    let mm = seats.map(|seat| seat.map_or(0.0, |seat| cue.unit().to_stroke(seat) * seat.stroke_mm));
     let mut hint = crate::timeline::Hint::default();
     let mut most = Change::default();
     for (row, &at) in cue.times().iter().enumerate() {

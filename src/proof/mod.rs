@@ -38,7 +38,7 @@ use std::sync::Arc;
 use std::{iter, thread};
 
 use crate::cue::{FAULTS_TOLD, Place};
-use crate::motion::{SeatType, Slot};
+use crate::motion::{AxisGeometry, SeatAxis, SeatType};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::Timeline;
 use axis::Subject;
@@ -50,7 +50,7 @@ pub(crate) const SLACK: f64 = 1.001;
 /// The greatest size of something that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Worst {
-    /// In mm/s, mm/s² or mm/s³.
+    /// In the unit of the axis a second, or its square or cube.
     pub(crate) value: f64,
     /// The most that is allowed, in the same unit.
     pub(crate) limit: f64,
@@ -159,21 +159,15 @@ fn subjects<'a>(timeline: &'a Timeline, terms: &'a Terms) -> Vec<Subject<'a>> {
     for part in &terms.parts {
         for axis in part.axes.clone().take_while(|axis| *axis < timeline.axes()) {
             let seat_axis = axis - part.axes.start;
-            let slot = slot(timeline, &part.seat, seat_axis, axis, terms.level);
-            if !subjects
-                .iter()
-                .any(|one| one.axis == axis && one.slot == slot && one.seat.name == part.seat.name)
-            {
-                subjects.push(Subject { timeline, axis, first: part.axes.start, seat: &part.seat, slot });
+            let slot = timeline.unit().slot(&part.seat, seat_axis, Some(axis)).at_level(terms.level);
+            let is_as = |one: &Subject<'_>| one.axis == axis && one.slot == slot;
+            if !subjects.iter().any(|one| is_as(one) && one.on.seat.name == part.seat.name) {
+                subjects.push(Subject { timeline, axis, on: SeatAxis::new(&part.seat, seat_axis), slot });
             }
         }
     }
     subjects.sort_by_key(|subject| subject.axis);
     subjects
-}
-
-fn slot(timeline: &Timeline, seat: &SeatType, seat_axis: usize, axis: usize, level: f64) -> Slot {
-    Slot::new(seat, seat_axis, Some(axis), timeline.unit().to_stroke(seat)).at_level(level)
 }
 
 /// What the seats ask of their controllers, whatever the cue.
@@ -182,25 +176,24 @@ fn hall(terms: &Terms, found: &mut Vec<Found>) {
     for part in &terms.parts {
         if !judged.contains(&&part.seat) {
             judged.push(&part.seat);
-            let breaches = [too_fast(&part.seat), too_far_apart(&part.seat, terms.rate)];
+            let breaches = part.seat.different().filter_map(|(_, axis)| too_fast(&part.seat, axis));
             let at = ShowTime::ZERO;
             let whole = |breach| Found { at, axis: None, column: String::new(), breach };
-            found.extend(breaches.into_iter().flatten().map(whole));
+            found.extend(breaches.chain(too_far_apart(&part.seat, terms.rate)).map(whole));
         }
     }
 }
 
 /// A limit on speed above the controller's own, where the configuration says what that is (PA07, IMAX manual 2.3.1).
-fn too_fast(seat: &SeatType) -> Option<Breach> {
-    let rpm = f64::from(seat.max_rpm?);
-    let (ceiling, needed) = (seat.speed_ceiling_mm_s(), seat.max_velocity_mm_s * 60.0 / seat.lead_mm);
-    (seat.max_velocity_mm_s > ceiling * SLACK).then(|| Breach::SpeedCeiling {
+fn too_fast(seat: &SeatType, axis: &AxisGeometry) -> Option<Breach> {
+    let (rpm, ceiling) = (f64::from(axis.max_rpm?), axis.speed_ceiling());
+    (axis.max_velocity > ceiling * SLACK).then(|| Breach::SpeedCeiling {
         seat: seat.name.clone(),
         rpm,
         ceiling,
-        lead: seat.lead_mm,
-        wanted: seat.max_velocity_mm_s,
-        needed: needed.ceil(),
+        lead: axis.lead,
+        wanted: axis.max_velocity,
+        needed: axis.needed_rpm().ceil(),
     })
 }
 

@@ -37,7 +37,7 @@ struct Swing {
     /// In strokes.
     amplitude: f64,
     hz: f64,
-    /// The greatest velocity and acceleration of motion meanwhile, mm/s and mm/s².
+    /// The greatest velocity and acceleration of motion meanwhile.
     moved: [f64; 2],
 }
 
@@ -64,9 +64,9 @@ impl Subject<'_> {
         })
     }
 
-    /// What motion and vibration together may reach, mm/s and mm/s².
+    /// The velocity and the acceleration that motion and vibration together may reach.
     fn most_shaken(&self) -> [f64; 2] {
-        [self.seat.shaken_velocity_mm_s(), self.seat.shaken_acceleration_mm_s2()]
+        [self.geometry().shaken_velocity(), self.geometry().shaken_acceleration()]
     }
 
     /// The ends that the axis reaches while it vibrates; what is broken goes to `found`.
@@ -127,7 +127,7 @@ impl Subject<'_> {
         let met = stretch(from)..=stretch(until);
         [velocity, acceleration].map(|loads| {
             let most = loads[met.clone()].iter().fold(0.0_f32, |most, load| most.max(*load));
-            f64::from(most) * self.seat.stroke_mm
+            f64::from(most) * self.geometry().stroke()
         })
     }
 
@@ -141,12 +141,12 @@ impl Subject<'_> {
         let is_low = -low.value > high.value - 1.0;
         let (worst, position) =
             if is_low { (low, low.value + amplitude) } else { (high, high.value - amplitude) };
-        let (mm, at) = (self.seat.stroke_mm, ShowTime::from_nanos(worst.at));
+        let (mm, at) = (self.geometry().stroke(), ShowTime::from_nanos(worst.at));
         let breach = Breach::VibrationPastStroke {
             amplitude: amplitude * mm,
-            position: position * mm,
+            position: self.geometry().place(position),
             stroke: mm,
-            seat: self.seat.name.clone(),
+            seat: self.seat(),
             at,
         };
         Some(self.of_vibration(at, breach))
@@ -154,7 +154,7 @@ impl Subject<'_> {
 
     /// The sum that is over its limit by the greater part, if one is.
     fn too_much(&self, swing: &Swing, at: ShowTime) -> Option<Found> {
-        let amplitude = swing.amplitude * self.seat.stroke_mm;
+        let amplitude = swing.amplitude * self.geometry().stroke();
         let of = |place: usize| {
             let (shaken, moved) = (swing.per_amplitude()[place] * amplitude, swing.moved[place]);
             (place, shaken, moved, self.most_shaken()[place])
@@ -163,7 +163,7 @@ impl Subject<'_> {
         let worst = [of(0), of(1)].into_iter().max_by(|a, b| part(a).total_cmp(&part(b)))?;
         let (place, shaken, moved, limit) = worst;
         let quantity = [Quantity::Velocity, Quantity::Acceleration][place];
-        let (hz, seat) = (swing.hz, self.seat.name.clone());
+        let (hz, seat) = (swing.hz, self.seat());
         let breach = Breach::Shaken { quantity, amplitude, hz, shaken, moved, limit, seat, at };
         (part(&worst) > SLACK).then(|| self.of_vibration(at, breach))
     }
@@ -180,7 +180,9 @@ impl Subject<'_> {
         let room = (low.value + amplitude).min(1.0 - (high.value - amplitude));
         let limits = self.most_shaken();
         let left = |place: usize| {
-            ROUNDING * (limits[place] - moved[place]) / swing.per_amplitude()[place] / self.seat.stroke_mm
+            ROUNDING * (limits[place] - moved[place])
+                / swing.per_amplitude()[place]
+                / self.geometry().stroke()
         };
         Some(room.min(left(0)).min(left(1)).max(0.0) / self.slot.scale().0)
     }

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::config::{Config, EffectLimit, from_to_args};
 use crate::cue::{Source, read};
-use crate::motion::{MAX_AXES, Spacing};
+use crate::motion::Spacing;
 use crate::timeline::Hint;
 
 fn timeline(text: &str) -> Timeline {
@@ -37,7 +37,7 @@ fn brute(timeline: &Timeline, seat: &SeatType, hz: f64, level: f64) -> [f64; 4] 
     let rate = Rate::from_hz(hz);
     let Spacing { n, m } = Spacing::at_rate(hz);
     let end = timeline.duration().as_nanos();
-    let mut worst = [0.0_f64; 4];
+    let (mut worst, axis) = ([0.0_f64; 4], &seat.each[0]);
     // Where Times alternate, each phase is met with several arrangements of them, though not with each.
     let first_frames = if has_whole_periods(hz) { 1 } else { 3 };
     for (phase, first) in (0..100_u32).flat_map(|phase| (0..first_frames).map(move |first| (phase, first))) {
@@ -47,10 +47,10 @@ fn brute(timeline: &Timeline, seat: &SeatType, hz: f64, level: f64) -> [f64; 4] 
         let mut hint = Hint::default();
         while at <= end {
             let value =
-                timeline.sample(ShowTime::from_nanos(at), &mut hint)[0] * timeline.unit().to_stroke(seat);
-            let scaled = seat.neutral[0] + level * (value - seat.neutral[0]);
+                timeline.sample(ShowTime::from_nanos(at), &mut hint)[0] * timeline.unit().to_stroke(axis);
+            let scaled = axis.neutral + level * (value - axis.neutral);
             times.push(ShowTime::from_nanos(at).as_secs_f64());
-            places.push(scaled.clamp(0.0, 1.0) * seat.stroke_mm);
+            places.push(scaled.clamp(0.0, 1.0) * axis.stroke());
             at += i64::from(rate.time_ms(frame)) * 1_000_000;
             frame += 1;
         }
@@ -106,7 +106,7 @@ proptest! {
     ) {
         let rows: Vec<_> = rows.iter().map(|row| (regular.unwrap_or(row.0), row.1)).collect();
         let timeline = timeline(&cue_text(interpolation, &rows));
-        let seat = SeatType { neutral: [neutral; MAX_AXES], ..SeatType::bench3(1) };
+        let seat = SeatType::bench3(1).with_each(|axis| axis.neutral = neutral);
         let tried = brute(&timeline, &seat, hz, level);
         let proof = prove(&timeline, terms(&timeline, seat, hz, level));
         for (((what, proved), tried), most) in proof.axes[0].worst().iter().zip(tried).zip([1.01, 1.05, 1.05, 1.05]) {
@@ -228,7 +228,7 @@ fn a_lower_level_breaks_less() {
     assert!(!proof.covers(&Terms { cue: Digest([0; 32]), ..full.clone() }));
     let low = prove(&timeline, Terms { level: 0.4, ..full.clone() });
     assert!(!low.covers(&full), "what is proved at 40 % is not proved at 100 %");
-    let other = SeatType { max_jerk_mm_s3: 50_000.0, ..SeatType::bench3(1) };
+    let other = SeatType::bench3(1).with_each(|axis| axis.max_jerk = 50_000.0);
     assert!(!proof.covers(&terms(&timeline, other, 100.0, 1.0)));
 }
 
@@ -370,19 +370,17 @@ fn a_seat_that_stands_more_vibration_says_so_and_no_drive_goes_beyond_its_own_sp
     let timeline = timeline("# units: mm\ntime_s,a1,v1_hz,v1_amp\n0,75,20,1.5\n1,75,20,1.5\n");
     let on = |seat: SeatType| prove(&timeline, terms(&timeline, seat, 100.0, 1.0));
     assert!(!on(SeatType::bench3(1)).passed(), "23,687 mm/s²");
-    let hard = SeatType { max_shaken_acceleration_mm_s2: Some(24_000.0), ..SeatType::bench3(1) };
+    let hard = SeatType::bench3(1).with_each(|axis| axis.max_shaken_acceleration = Some(24_000.0));
     assert!(on(hard.clone()).passed(), "and 188 mm/s");
-    let slow = SeatType { max_shaken_velocity_mm_s: Some(180.0), ..hard.clone() };
+    let slow = hard.clone().with_each(|axis| axis.max_shaken_velocity = Some(180.0));
     assert!(
         messages(&on(slow))[0]
             .contains("188.5 mm/s of velocity, on motion of 0.0 mm/s is over 180.0 mm/s in all")
     );
-    let held = SeatType {
-        max_velocity_mm_s: 100.0,
-        max_rpm: Some(2_000),
-        max_shaken_velocity_mm_s: Some(900.0),
-        ..hard
-    };
+    let held = hard.with_each(|axis| {
+        (axis.max_velocity, axis.max_rpm) = (100.0, Some(2_000));
+        axis.max_shaken_velocity = Some(900.0);
+    });
     assert!(messages(&on(held))[0].contains("is over 166.7 mm/s in all"), "PA07");
 }
 
@@ -437,21 +435,22 @@ fn the_duty_of_an_effect_is_that_of_its_busiest_window() {
 #[test]
 fn a_seat_faster_than_its_controller_and_frames_too_far_apart_are_named() {
     let timeline = timeline("time_s,a1\n0,0.5\n10,0.5\n");
-    let seat = SeatType { max_rpm: Some(2_000), max_interval_ms: 900, ..SeatType::bench3(1) };
+    let seat = SeatType { max_interval_ms: 900, ..SeatType::bench3(1) };
+    let seat = seat.with_each(|axis| axis.max_rpm = Some(2_000));
     let found = messages(&prove(&timeline, terms(&timeline, seat.clone(), 1.0, 1.0)));
     assert_eq!(found.len(), 2, "{found:?}");
     assert!(
         found[0].contains("2000 rpm (PA07), 166.7 mm/s at a lead of 5 mm; seat bench3 goes up to 240 mm/s")
     );
     assert!(found[1].contains("PA0b = 900: frames of the show, of 1000 ms, are cut to 900 ms"), "{found:?}");
-    let slower = SeatType { max_velocity_mm_s: 160.0, ..seat };
+    let slower = seat.with_each(|axis| axis.max_velocity = 160.0);
     assert!(prove(&timeline, terms(&timeline, slower, 2.0, 1.0)).passed());
 }
 
 #[test]
 fn a_cue_never_passes_for_faster_than_the_controllers_own_limit() {
     let timeline = timeline("# interpolation: linear\ntime_s,a1\n0,0\n0.5,1\n");
-    let seat = SeatType { max_velocity_mm_s: 400.0, ..SeatType::bench3(1) };
+    let seat = SeatType::bench3(1).with_each(|axis| axis.max_velocity = 400.0);
     let proof = prove(&timeline, terms(&timeline, seat, 100.0, 1.0));
     assert_eq!(proof.axes[0].velocity.limit, 250.0, "3000 rpm at a lead of 5 mm");
     assert!(!proof.passed());

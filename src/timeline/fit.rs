@@ -41,17 +41,26 @@ impl Timeline {
     #[must_use]
     pub fn fits_stroke(&self, axes: Range<usize>, seat: Option<&SeatType>) -> StrokeFit {
         let unit = self.unit();
-        let stroke = match seat {
-            Some(seat) => unit.stroke(seat),
-            None if unit == crate::cue::Unit::Fraction => 1.0,
-            None => f64::INFINITY,
+        let ends = |seat_axis: usize| match seat {
+            Some(seat) => unit.ends(&seat.each[seat_axis]),
+            None if unit == crate::cue::Unit::Fraction => (0.0, 1.0),
+            None => (0.0, f64::INFINITY),
         };
-        let mut check = Check { timeline: self, stroke, faults: Collector::default(), held: Vec::new() };
+        let mut check = Check { timeline: self, faults: Collector::default(), held: Vec::new() };
+        for (axis, seat) in axes.clone().enumerate().filter_map(|(index, axis)| Some((axis, (seat?, index))))
+        {
+            check.unit(axis, seat);
+        }
+        if !check.faults.is_empty() {
+            // In another unit no row means anything.
+            return StrokeFit { faults: check.faults.into_faults(self.cue.path()), held: Vec::new() };
+        }
         for row in 0..self.cue.rows() {
             for axis in axes.start..axes.end.min(self.axes()) {
-                check.point(row, axis);
+                let ends = ends(axis - axes.start);
+                check.point(row, axis, ends);
                 if row + 1 < self.cue.rows() {
-                    check.stretch(row, axis);
+                    check.stretch(row, axis, ends);
                 }
             }
         }
@@ -62,36 +71,43 @@ impl Timeline {
 
 struct Check<'a> {
     timeline: &'a Timeline,
-    stroke: f64,
     faults: Collector,
     held: Vec<Held>,
 }
 
 impl Check<'_> {
-    fn point(&mut self, row: usize, axis: usize) {
+    /// The unit of an axis, which is axis `index` of the seat.
+    fn unit(&mut self, axis: usize, (seat, index): (&SeatType, usize)) {
+        let (unit, geometry) = (self.timeline.unit(), &seat.each[index]);
+        if axis < self.timeline.axes() && !unit.suits(geometry) {
+            let (seat, wanted) = (seat.name.clone(), geometry.unit.name());
+            self.add(0, axis, Problem::OtherUnit { unit: unit.name(), seat, wanted });
+        }
+    }
+
+    fn point(&mut self, row: usize, axis: usize, (low, high): (f64, f64)) {
         let value = self.timeline.cue.row(row)[axis];
-        if !(0.0..=self.stroke).contains(&value) {
-            let (high, unit) = (self.stroke, self.timeline.unit().suffix());
-            self.add(row, axis, Problem::OutsideStroke { value, high, unit });
+        if !(low..=high).contains(&value) {
+            let unit = self.timeline.unit().suffix();
+            self.add(row, axis, Problem::OutsideStroke { value, low, high, unit });
         }
     }
 
     /// The curve between a row and the next; where a row itself is outside, that has been said.
-    fn stretch(&mut self, row: usize, axis: usize) {
-        let (low, high) = self.timeline.bounds(row)(axis);
-        if low >= 0.0 && high <= self.stroke {
+    fn stretch(&mut self, row: usize, axis: usize, (low, high): (f64, f64)) {
+        let (least, most) = self.timeline.bounds(row)(axis);
+        if least >= low && most <= high {
             return;
         }
         let cubic = self.timeline.cubic(row, axis);
-        let over = |value: f64| (-value).max(value - self.stroke);
+        let over = |value: f64| (low - value).max(value - high);
         let worst = cubic.still().map(|u| (u, cubic.at(u))).max_by(|a, b| over(a.1).total_cmp(&over(b.1)));
         let Some((u, value)) = worst.filter(|(_, value)| over(*value) > 0.0) else { return };
         let at = self.timeline.time(row, u);
-        // The lower end of a stroke of unknown length has nothing to take a part of.
-        let may_hold = if self.stroke.is_finite() { HELD_BACK * self.stroke } else { f64::INFINITY };
-        if over(value) > may_hold {
-            let (high, unit) = (self.stroke, self.timeline.unit().suffix());
-            self.add(row, axis, Problem::CurveOutsideStroke { value, at, high, unit });
+        // The end of a stroke of unknown length has nothing to take a part of: that is endless too.
+        if over(value) > HELD_BACK * (high - low) {
+            let unit = self.timeline.unit().suffix();
+            self.add(row, axis, Problem::CurveOutsideStroke { value, at, low, high, unit });
         } else {
             self.hold(Held { axis, stretches: 1, over: over(value), at, line: self.timeline.cue.line(row) });
         }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::channel::ChannelId;
 use crate::cue::{Source, read};
-use crate::motion::SeatType;
+use crate::motion::{AxisUnit, SeatType};
 
 fn timeline(text: &str) -> Timeline {
     Timeline::new(
@@ -117,7 +117,7 @@ fn millimetres_are_held_against_the_seat() {
     let faults = cue.fits_stroke(0..1, Some(&SeatType::bench3(1))).faults.expect("a fault");
     assert_eq!(faults.to_string(), "t.csv:6:1: a1: 150.001 is outside the stroke, 0 to 150 mm");
     assert!(cue.fits_stroke(0..1, None).faults.is_none());
-    let wide = SeatType { stroke_mm: 200.0, ..SeatType::bench3(1) };
+    let wide = SeatType::bench3(1).with_each(|axis| axis.high = 200.0);
     assert!(cue.fits_stroke(0..1, Some(&wide)).faults.is_none());
 }
 
@@ -209,4 +209,17 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_cue_in_millimetres_says_nothing_of_an_axis_that_is_measured_in_degrees() {
+    let mut seat = SeatType::bench3(2);
+    seat.each[1].unit = AxisUnit::Degree;
+    let rows = "time_s,a1,a2\n0,0,0\n1,0,0\n2,0,0\n3,0,0\n";
+    let faults =
+        timeline(&format!("# units: mm\n{rows}")).fits_stroke(0..2, Some(&seat)).faults.expect("a fault");
+    let text = faults.to_string();
+    assert!(text.contains(": a2: is in mm, and this axis of seat bench3 is measured in deg"), "{text}");
+    assert!(!text.contains("a1"), "{text}");
+    assert!(timeline(rows).fits_stroke(0..2, Some(&seat)).faults.is_none(), "fractions suit every axis");
 }

@@ -24,7 +24,7 @@ pub(crate) enum WordOrder {
 }
 
 /// Which order of words fits the position registers of axis 1 and on, two `words` each, of a controller of `dialect`
-/// whose motors stand within `range`. `reported` are the positions of a report of the same rest, where there is one; to a
+/// whose motors stand within `ranges`. `reported` are the positions of a report of the same rest, where there is one; to a
 /// seat that moves a report from another instant says nothing, and must not be given.
 ///
 /// One axis that tells settles it for all, since a controller has one order; axes that tell different ones fit neither.
@@ -32,19 +32,19 @@ pub(crate) enum WordOrder {
 pub(crate) fn word_order(
     words: &[[u16; 2]],
     dialect: Dialect,
-    range: PulseRange,
+    ranges: &[PulseRange],
     reported: Option<&[Pulses]>,
 ) -> WordOrder {
-    let fits = |place: Pulses, report: Option<&Pulses>| {
+    let fits = |place: Pulses, range: PulseRange, report: Option<&Pulses>| {
         in_stroke(place, range) && report.is_none_or(|it| near(*it, place, range.span()))
     };
     let (mut configured, mut swapped, mut same) = (true, true, true);
-    for (axis, words) in words.iter().enumerate() {
+    for (axis, (words, range)) in words.iter().zip(ranges).enumerate() {
         let one = position(*words, dialect);
         let two = in_other_order(one);
         let report = reported.and_then(|all| all.get(axis));
-        configured &= fits(one, report);
-        swapped &= fits(two, report);
+        configured &= fits(one, *range, report);
+        swapped &= fits(two, *range, report);
         same &= one == two;
     }
     match (configured, swapped) {
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::wire::position_words;
 
-    const STROKE: PulseRange = PulseRange { low: 0.0, high: 300_000.0 };
+    const STROKE: [PulseRange; 12] = [PulseRange { low: 0.0, high: 300_000.0 }; 12];
 
     /// What a controller that goes by `dialect` tells of these places.
     fn told(places: &[i32], dialect: Dialect) -> Vec<[u16; 2]> {
@@ -82,15 +82,15 @@ mod tests {
 
     fn order(places: &[i32], reported: Option<&[i32]>) -> WordOrder {
         let reported: Option<Vec<_>> = reported.map(|all| all.iter().map(|place| Pulses(*place)).collect());
-        word_order(&told(places, Dialect::Smc), Dialect::Smc, STROKE, reported.as_deref())
+        word_order(&told(places, Dialect::Smc), Dialect::Smc, &STROKE, reported.as_deref())
     }
 
     #[test]
     fn one_axis_whose_other_reading_is_past_the_stroke_settles_the_order() {
         assert_eq!(order(&[150_000, 0, 0], None), WordOrder::Configured);
         let swapped = told(&[150_000, 0, 0], Dialect::Mbox);
-        assert_eq!(word_order(&swapped, Dialect::Smc, STROKE, None), WordOrder::Other);
-        assert_eq!(word_order(&swapped, Dialect::Mbox, STROKE, None), WordOrder::Configured);
+        assert_eq!(word_order(&swapped, Dialect::Smc, &STROKE, None), WordOrder::Other);
+        assert_eq!(word_order(&swapped, Dialect::Mbox, &STROKE, None), WordOrder::Configured);
     }
 
     #[test]
@@ -115,13 +115,13 @@ mod tests {
         assert_eq!(order(&[-20_000, 0, 0], None), WordOrder::Neither);
         assert_eq!(order(&[320_000, 0, 0], None), WordOrder::Neither);
         let mixed = [told(&[150_000], Dialect::Smc), told(&[150_000], Dialect::Mbox)].concat();
-        assert_eq!(word_order(&mixed, Dialect::Smc, STROKE, None), WordOrder::Neither, "axes that disagree");
+        assert_eq!(word_order(&mixed, Dialect::Smc, &STROKE, None), WordOrder::Neither, "axes that disagree");
     }
 
     #[test]
     fn a_place_below_the_zero_in_the_middle_settles_the_order_of_a_signed_axis() {
         let words = told(&[-100], Dialect::Smc);
-        let signed = PulseRange { low: -250_000.0, high: 250_000.0 };
+        let signed = &[PulseRange { low: -250_000.0, high: 250_000.0 }];
         assert_eq!(word_order(&words, Dialect::Smc, signed, None), WordOrder::Configured);
         assert_eq!(word_order(&words, Dialect::Mbox, signed, None), WordOrder::Other);
         assert_eq!(word_order(&words, Dialect::Smc, signed, Some(&[Pulses(100)])), WordOrder::Configured);
@@ -137,7 +137,7 @@ mod tests {
             let words = told(&places, dialect);
             let reported: Vec<_> = places.iter().map(|place| Pulses(*place)).collect();
             for reported in [None, Some(&reported[..])] {
-                let found = word_order(&words, dialect, STROKE, reported);
+                let found = word_order(&words, dialect, &STROKE, reported);
                 prop_assert!(!matches!(found, WordOrder::Other | WordOrder::Neither), "{found:?}");
             }
         }

@@ -7,7 +7,6 @@ use kinocue::cue::{self, Source};
 use kinocue::harness::app::staged::headroom;
 use kinocue::harness::config::{Config, LossPolicy, from_to_args};
 use kinocue::harness::engine::Headroom;
-use kinocue::harness::motion::Pose;
 use kinocue::harness::time::Rate;
 use kinocue::harness::timeline::Timeline;
 use kinocue::wire::{Dialect, Timing};
@@ -143,8 +142,8 @@ impl Kind {
         config.show.loss_policy = self.policy;
         for controller in &mut config.controllers {
             let seat = Arc::make_mut(&mut controller.seat);
-            let rests: Pose = std::array::from_fn(|axis| if axis < seat.axes { self.park } else { 0.0 });
-            (seat.park, seat.neutral) = (rests, rests);
+            let own = seat.axes;
+            seat.each[..own].iter_mut().for_each(|axis| (axis.park, axis.neutral) = (self.park, self.park));
             // Its replies tell nothing of an emergency stop.
             controller.estop_inputs = u16::from(self.dialect == Dialect::Mbox);
         }

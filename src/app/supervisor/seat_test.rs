@@ -81,7 +81,7 @@ fn script(config: &Config) -> (Vec<TestPart>, CueBuilder) {
 /// Where an axis of the cue rests: that of the first seat that takes it.
 fn park_of(config: &Config, axis: usize) -> f64 {
     let taker = config.controllers.iter().find(|one| one.takes(axis));
-    taker.and_then(|one| one.seat.park.get(axis - one.axis_offset).copied()).unwrap_or(0.0)
+    taker.map_or(0.0, |one| one.seat.each[axis - one.axis_offset].park)
 }
 
 impl SeatTest {

@@ -10,6 +10,7 @@ use crate::control::model::us;
 use crate::control::{
     ControllerStatus, FORMAT, Health, Histogram, Percentiles, RealTimeStatus, Status, Times, Warning,
 };
+use crate::motion::{AxisGeometry, Pulses};
 use crate::rt::Row;
 use crate::state::Next;
 use crate::time::MonoTime;
@@ -141,10 +142,9 @@ impl StatusParts<'_> {
             belts_open: belts::open(controller, &state, now).map(belts::numbers),
             outputs: state.outputs.map(|heard| heard.value),
             positions_mm: state.measured.or(state.echoed).map(|heard| {
-                let mm = |pulses: &crate::motion::Pulses| {
-                    controller.seat.fraction(*pulses) * controller.seat.stroke_mm
-                };
-                heard.value.iter().take(controller.seat.axes).map(mm).collect()
+                let own = controller.seat.own().iter();
+                let place = |(axis, pulses): (&AxisGeometry, &Pulses)| axis.place(axis.fraction(*pulses));
+                own.zip(heard.value.iter()).map(place).collect()
             }),
             ..nameplate(controller)
         }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::{Evidence, EvidenceList, Incoming, Lane, Need, Seen, Whereabouts};
 use crate::belief::Reading;
 use crate::config::Controller;
-use crate::motion::{MAX_AXES, Pose, Pulses, SeatType};
+use crate::motion::{AxisGeometry, MAX_AXES, Pose, Pulses, SeatType};
 use crate::time::MonoTime;
 use crate::wire::{
     Code, DP_POSITIONS, Dialect, FromController, MAX_LEN, RegisterReply, ReplyCode, Words, WriteRequest,
@@ -231,8 +231,11 @@ impl MboxPeer {
     /// Whether a seat in that pose stands at park, to a pulse.
     fn is_parked(&self, pose: &Pose) -> bool {
         let Self { seat, first_slot, park, .. } = self;
-        let apart = |slot: usize| seat.pulses(pose[slot]).0.abs_diff(seat.pulses(park[slot]).0);
-        (*first_slot..MAX_AXES.min(first_slot + seat.axes)).all(|slot| apart(slot) <= 1)
+        let apart = |(index, axis): (usize, &AxisGeometry)| {
+            let [stands, parks] = [pose, park].map(|pose| axis.pulses(pose[first_slot + index]));
+            stands.0.abs_diff(parks.0)
+        };
+        seat.own().iter().take(MAX_AXES - first_slot).enumerate().all(|axis| apart(axis) <= 1)
     }
 
     /// Whether a seat that is read in that pose is where it is parked, but for what is noise.

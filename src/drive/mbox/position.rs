@@ -82,7 +82,7 @@ pub(in crate::drive) struct Positions {
     ordered: bool,
     /// The axes whose last position would be another one inside the stroke in the other order, a bit each.
     ambiguous: u16,
-    /// Whether it was homed, no frame went to it since, and none was found elsewhere: all its axes are at 0.
+    /// Whether it was homed, no frame went to it since, and none was found elsewhere: all its axes are at pulse 0.
     home: bool,
     by: Source,
     /// When the newest answer was made, at the earliest.
@@ -140,7 +140,7 @@ impl Positions {
             ..Reading::at_rest([0.0; MAX_AXES], made)
         };
         for (axis, pulses) in (first..own).zip(positions) {
-            reading.pose[self.first_slot + axis] = self.seat.fraction(*pulses);
+            reading.pose[self.first_slot + axis] = self.seat.each[axis].fraction(*pulses);
             reading.slots |= 1 << (self.first_slot + axis);
         }
         reading
@@ -170,7 +170,7 @@ impl Positions {
     /// Hears where axes were between `made` and `at`.
     fn hear(&mut self, first: usize, positions: &[Pulses], made: MonoTime, at: MonoTime, by: Source) {
         for (axis, pulses) in (first..self.led).zip(positions) {
-            let fraction = self.seat.fraction(*pulses);
+            let fraction = self.seat.each[axis].fraction(*pulses);
             let is_own = axis < self.seat.axes;
             // Frames would lead an axis that its seat type does not have to 0 at once: all of its stroke is there.
             let end = if is_own { 1.0 } else { 0.0 };
@@ -190,7 +190,7 @@ impl Positions {
                 self.mind_order(axis, *pulses);
             }
             let fraction = fraction.clamp(0.0, 1.0);
-            self.home &= fraction <= STILL;
+            self.home &= (fraction - self.zero(axis)).abs() <= STILL;
             let before = self.told[axis];
             let recent = before.filter(|told| made.since(told.at) <= APART);
             let rest = recent.and_then(|told| told.rest.go_on(fraction, STILL));
@@ -200,6 +200,11 @@ impl Positions {
             let (rest, sway) = (rest.unwrap_or(begin), sway.unwrap_or(begin));
             self.told[axis] = Some(Told { fraction, at: made, rest, sway, moved });
         }
+    }
+
+    /// Where an axis is at pulse 0, fraction of its stroke.
+    fn zero(&self, axis: usize) -> f64 {
+        self.seat.each[axis].fraction(Pulses(0))
     }
 
     /// How far apart two answers of an axis may be that vibrates on, strokes.
@@ -216,7 +221,7 @@ impl Positions {
     /// known to be at 0.
     fn mind_order(&mut self, axis: usize, pulses: Pulses) {
         let other = in_other_order(pulses);
-        let is_open = other != pulses && in_stroke(other, self.seat.pulse_range());
+        let is_open = other != pulses && in_stroke(other, self.seat.each[axis].pulse_range());
         let bit = 1 << axis;
         self.ambiguous = if is_open { self.ambiguous | bit } else { self.ambiguous & !bit };
         let near_zero = self.home && pulses.0.unsigned_abs() < 1 << 15;
@@ -227,8 +232,9 @@ impl Positions {
     /// settles it as well.
     fn hold_against(&mut self, axis: usize, reported: Pulses) {
         let Some(told) = self.told[axis] else { return };
-        let told = self.seat.pulses(told.fraction);
-        let apart = |one: Pulses| (self.seat.fraction(one) - self.seat.fraction(reported)).abs();
+        let geometry = &self.seat.each[axis];
+        let told = geometry.pulses(told.fraction);
+        let apart = |one: Pulses| (geometry.fraction(one) - geometry.fraction(reported)).abs();
         self.ordered |= apart(told) <= STILL && apart(in_other_order(told)) > STILL;
     }
 
@@ -256,7 +262,8 @@ impl Positions {
     /// Its axes, from the first on, as far as it told them; none where it told nothing.
     pub(super) fn told(&self) -> Option<PerAxis<Pulses>> {
         let known = self.told.iter().take_while(|told| told.is_some()).count();
-        let pulses = |axis: usize| self.told[axis].map_or(Pulses(0), |told| self.seat.pulses(told.fraction));
+        let place = |axis: usize, told: Told| self.seat.each[axis].pulses(told.fraction);
+        let pulses = |axis: usize| self.told[axis].map_or(Pulses(0), |told| place(axis, told));
         (known > 0).then(|| PerAxis::from_fn(known, pulses))
     }
 
@@ -284,7 +291,7 @@ impl Positions {
                 None if axis < REGISTERS => return None,
                 // There is no register for it.
                 None if !self.home => continue,
-                None => reading.by = Source::Homing,
+                None => (reading.by, reading.pose[slot]) = (Source::Homing, self.zero(axis)),
             }
             reading.slots |= 1 << slot;
         }

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::chance::Chance;
 use super::judge::Judge;
 use crate::cue::{Source, read};
-use crate::motion::{Limits, SeatType};
+use crate::motion::{AxisGeometry, Limits};
 use crate::time::{Rate, ShowTime};
 use crate::timeline::{Hint, Timeline};
 
@@ -38,7 +38,7 @@ impl Sound {
         let mut chance = Chance::new(seed);
         let hz = if chance.once_in(4) { chance.between(50.0, 1000.0) } else { chance.one_of(&RATES) };
         let rate = Rate::from_hz(hz);
-        let limits = Limits::of(&SeatType::bench3(1));
+        let limits = Limits::of(&AxisGeometry::BENCH);
         let sort = chance.below(SORTS.len());
         let times = times(rate);
         let mut at = 0;

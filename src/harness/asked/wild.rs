@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::chance::Chance;
 use super::judge::Judge;
-use crate::motion::{Limits, SeatType};
+use crate::motion::{AxisGeometry, Limits};
 use crate::time::Rate;
 
 /// Rates that are tried more often than others.
@@ -195,7 +195,7 @@ impl Wild {
 
 /// Those of the bench seat, or any that a seat might have.
 fn limits(chance: &mut Chance) -> Limits {
-    let seat = Limits::of(&SeatType::bench3(1));
+    let seat = Limits::of(&AxisGeometry::BENCH);
     if !chance.once_in(4) {
         return seat;
     }

@@ -33,10 +33,8 @@ fn the_stroke_register_is_a_rise_where_the_smc_manual_says_so() {
 #[test]
 fn pulses_that_no_count_of_the_encoder_makes_are_refused() {
     let mut case = Case::smc();
-    case.controller.seat = std::sync::Arc::new(crate::motion::SeatType {
-        pulses_per_rev: 7_500.0,
-        ..crate::motion::SeatType::bench3(3)
-    });
+    let odd = crate::motion::SeatType::bench3(3).with_each(|axis| axis.pulses_per_rev = 7_500.0);
+    case.controller.seat = std::sync::Arc::new(odd);
     let found = only(&case).unwrap();
     assert_eq!(found.check, Check::Encoder);
     assert!(

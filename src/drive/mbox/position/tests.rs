@@ -89,6 +89,54 @@ fn axes_without_a_register_are_known_from_a_report_or_right_after_homing_alone()
     assert_eq!(positions.reading(ms(200)).unwrap().slots, 0xff);
 }
 
+/// A seat whose last axis turns to either side of its zero.
+fn turntable(axes: usize) -> Positions {
+    let mut seat = SeatType::bench3(axes);
+    (seat.each[axes - 1].low, seat.each[axes - 1].high) = (-75.0, 75.0);
+    Positions::new(Arc::new(seat), 0, motion_channel_and_slots(axes).1)
+}
+
+#[test]
+fn an_axis_with_its_zero_inside_its_range_is_where_its_pulses_say_to_either_side() {
+    for (pulses, place) in [(-150_000, 0.0), (-75_000, 0.25), (0, 0.5), (75_000, 0.75), (150_000, 1.0)] {
+        let mut positions = turntable(2);
+        look(&mut positions, 0, &[Pulses(150_000), Pulses(pulses)], 0);
+        let reading = positions.reading(ms(0)).expect("both axes told");
+        assert_eq!(reading.pose[..2], [0.5, place]);
+        let told = positions.told().expect("both axes told");
+        assert_eq!(told.iter().copied().collect::<Vec<_>>(), [Pulses(150_000), Pulses(pulses)]);
+    }
+    let mut positions = turntable(2);
+    look(&mut positions, 0, &[Pulses(0), Pulses(-151_000)], 0);
+    assert_eq!((positions.reading(ms(0)), positions.outside()), (None, Some((1, Pulses(-151_000)))));
+}
+
+#[test]
+fn an_axis_without_a_register_that_is_home_stands_at_its_zero_and_not_at_the_end_of_its_range() {
+    let homed = |first: i32| {
+        let mut positions = turntable(8);
+        positions.on_homed();
+        look(&mut positions, 0, &[Pulses(first); 6], 0);
+        positions.reading(ms(0)).expect("its registers told")
+    };
+    let home = homed(0);
+    assert_eq!((home.slots, home.by, home.pose[7]), (0xff, Source::Homing, 0.5));
+    assert_eq!(homed(90_000).slots, 0b11_1111, "an axis that is elsewhere was not homed");
+}
+
+#[test]
+fn a_turntable_that_tells_its_zero_is_home_and_one_at_the_end_of_its_range_is_not() {
+    let slots = |pulses: i32| {
+        let mut seat = SeatType::bench3(8);
+        (seat.each[0].low, seat.each[0].high) = (-75.0, 75.0);
+        let mut positions = Positions::new(Arc::new(seat), 0, motion_channel_and_slots(8).1);
+        positions.on_homed();
+        look(&mut positions, 0, &[pulses, 0, 0, 0, 0, 0].map(Pulses), 0);
+        positions.reading(ms(0)).expect("its registers told").slots
+    };
+    assert_eq!([0, -150_000].map(slots), [0xff, 0b11_1111]);
+}
+
 #[test]
 fn an_answer_is_as_old_as_the_oldest_request_that_is_open_and_in_passing_as_the_newest() {
     let mut positions = seat(1);
