@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure};
 
+mod calibrate;
 mod check;
 mod relay;
 mod send;
@@ -14,6 +15,7 @@ Examples:
   kinocue sync send --artnet 10.0.0.255 --film-fps 24
   kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0
   kinocue sync relay ltc:alsa:hw:2,0 --folder /tmp
+  kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock
   kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
 
 /// Makes timecode, and says what is heard of it, or is in a recording.
@@ -30,6 +32,7 @@ enum Command {
     Check(check::Args),
     Watch(watch::Args),
     Relay(relay::Args),
+    Calibrate(calibrate::Args),
 }
 
 pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
@@ -38,5 +41,6 @@ pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
         Command::Check(args) => check::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Relay(args) => relay::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
     }
 }

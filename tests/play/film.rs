@@ -75,6 +75,49 @@ fn a_reel_of_timecode_leads_the_seat_from_park_through_the_cue_and_back_to_park(
     assert!(off.len() > 50 && most - least < 0.02, "{} frames, {least}..{most}", off.len());
 }
 
+#[test]
+fn the_delay_of_a_capture_chain_is_measured_against_one_that_has_none() {
+    let folder = Folder::new();
+    let sound = std::fs::read(reel(&folder, "01:00:00:00", "9")).expect("it was written");
+    let [late, prompt] = ["late", "prompt"].map(|name| {
+        let path = folder.path(name);
+        rustix::fs::mkfifoat(rustix::fs::CWD, &path, rustix::fs::Mode::RWXU).expect("there is room");
+        path
+    });
+    let source = |fifo: &Path| format!("ltc:fifo:{}", fifo.display());
+    let (measured, against) = (source(&late), source(&prompt));
+    let args = [
+        "sync",
+        "calibrate",
+        &measured,
+        "--against",
+        &against,
+        "--seconds",
+        "2",
+        "--tc-start",
+        "01:00:00:00",
+        "--json",
+    ];
+    let measuring = Guarded::start(&args);
+    let line = |fifo: &Path| std::fs::OpenOptions::new().write(true).open(fifo).expect("it is read");
+    let (mut late, mut prompt) = (line(&late), line(&prompt));
+    // 10 ms of sound at a time; the one line has each four blocks after the other.
+    let blocks: Vec<&[u8]> = sound[44..].chunks(960).collect();
+    let begun = Monotonic.now();
+    for (at, block) in (0_u32..).zip(&blocks) {
+        Monotonic.sleep_until(begun + Duration::from_millis(10) * at);
+        // Once enough was heard nobody reads any more.
+        let before = at.checked_sub(4).map_or(Ok(()), |before| late.write_all(blocks[before as usize]));
+        if prompt.write_all(block).and(before).is_err() {
+            break;
+        }
+    }
+    let run = measuring.finish();
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let late_ms = run.report()["median_ms"].as_f64().expect("a number");
+    assert!((late_ms - 40.0).abs() < 5.0, "{run:?}");
+}
+
 /// A player that speaks as mpv does: its film runs until it is told.
 struct Player {
     told: Sender<Value>,
