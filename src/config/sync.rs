@@ -78,11 +78,13 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
     let [fps, start] = ["film_fps", "start"].map(|key| section.text(key));
     let sources = names.iter().filter_map(|name| source(*name, &mut section)).collect::<Vec<_>>();
     let latency = section.get("ltc").and_then(|entry| latency(entry, section.faults));
+    let films = section.get("mpv").map(|entry| films(entry, section.faults)).unwrap_or_default();
     let args = |(name, source): (Entry<'_>, FilmSource)| {
+        let films = if matches!(source, FilmSource::Mpv(_)) { films.clone() } else { Vec::new() };
         let latency = latency.filter(|_| matches!(source, FilmSource::Ltc(_))).unwrap_or_default();
         let args = FilmArgs::new(source, fps.as_deref(), start.as_deref());
         let args = args.map_err(|error| name.fault(section.faults, &error.to_string())).ok()?;
-        Some(FilmArgs { latency, ..args })
+        Some(FilmArgs { latency, films, ..args })
     };
     let sources = sources.into_iter().filter_map(args).collect();
     let default = PaceLimits::default();
@@ -116,7 +118,7 @@ fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) 
     // The key that says who, and the one that may be beside it.
     let (needed, more) = match kind {
         "ltc" => ("input", "latency"),
-        "mpv" => ("socket", ""),
+        "mpv" => ("socket", "films"),
         "mtc" => ("device", ""),
         "clock" => ("at", "max_error"),
         _ => ("from", "bind"),
@@ -129,10 +131,21 @@ fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) 
         Section::new(format!("[sync.{kind}]"), entry.at, entry.table(section.faults)?, section.faults);
     table.require(&[needed]);
     let said = table.text(needed);
-    let beside = if more.is_empty() { None } else { table.text(more) };
+    let beside = match more {
+        "latency" | "films" => table.get(more).and(None), // read on its own
+        "" => None,
+        _ => table.text(more),
+    };
     table.finish();
-    let beside = beside.filter(|_| more != "latency").map(|value| format!(",{more}={value}"));
+    let beside = beside.map(|value| format!(",{more}={value}"));
     Some(format!("{kind}:{}{}", said?, beside.unwrap_or_default()))
+}
+
+/// The films that a player may lead with.
+fn films(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<String> {
+    let films = entry.value.as_table().and_then(|table| table.get("films"));
+    let films = films.and_then(|value| Entry::new("films", value).array(faults)).unwrap_or_default();
+    films.iter().filter_map(|film| film.text(faults)).map(str::to_owned).collect()
 }
 
 fn latency(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Duration> {
@@ -201,6 +214,14 @@ mod tests {
         assert!(sync.leads && sync.allows_coarse && sync.offset.as_nanos() == -40_000_000);
         let bare = hall_with("[sync]\nsources = [\"mpv:/run/hall.sock\"]").sync.unwrap();
         assert!(!bare.leads && !bare.allows_coarse, "nobody follows what begins nowhere");
+    }
+
+    #[test]
+    fn the_films_of_a_player_may_be_named() {
+        let text = "[sync]\nsources = [\"mpv\"]\n[sync.mpv]\nsocket = \"/s\"\nfilms = [\"feature.mkv\"]\n";
+        assert_eq!(hall_with(text).sync.unwrap().sources[0].films, ["feature.mkv"]);
+        let wrong = faults_of(&text.replace("[\"feature.mkv\"]", "\"feature.mkv\""));
+        assert!(wrong.iter().any(|fault| fault.contains("films")), "{wrong:?}");
     }
 
     #[test]

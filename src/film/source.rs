@@ -110,6 +110,8 @@ pub(crate) struct FilmArgs {
     pub(crate) start: Label,
     /// How long sound takes from the line to a block.
     pub(crate) latency: Duration,
+    /// The files that a player may lead with, by name or path; any where none is named.
+    pub(crate) films: Vec<String>,
 }
 
 /// Why something that was written is none of this.
@@ -124,6 +126,15 @@ impl FilmArgError {
 }
 
 impl FilmArgs {
+    /// True if the file that a player has open is one that it may lead with.
+    pub(crate) fn counts(&self, open: Option<&str>) -> bool {
+        let is_it = |open: &str| {
+            let name = open.rsplit('/').next().unwrap_or_default();
+            self.films.iter().any(|film| film == open || film == name)
+        };
+        self.films.is_empty() || open.is_some_and(is_it)
+    }
+
     /// Where a film is whose first frame is labelled 00:00:00:00 when the cue begins.
     pub(crate) fn begin(&self) -> ShowTime {
         let rate = self.rate.unwrap_or(FrameRate::F24);
@@ -133,7 +144,7 @@ impl FilmArgs {
 
     /// A source that tells the film's own time, from the cue's beginning on.
     pub(crate) fn of(source: FilmSource) -> Self {
-        Self { source, rate: None, start: Label::default(), latency: Duration::ZERO }
+        Self { source, rate: None, start: Label::default(), latency: Duration::ZERO, films: Vec::new() }
     }
 
     /// What is written for them: a source, frames a second, and the timecode at which the cue begins.
@@ -150,7 +161,13 @@ impl FilmArgs {
         if let (Some(start), Some(rate)) = (start, rate) {
             Timecode::of(start, rate).map_err(|error| FilmArgError::of(&error))?;
         }
-        Ok(Self { source, rate, start: start.unwrap_or_default(), latency: Duration::ZERO })
+        Ok(Self {
+            source,
+            rate,
+            start: start.unwrap_or_default(),
+            latency: Duration::ZERO,
+            films: Vec::new(),
+        })
     }
 }
 
@@ -369,6 +386,18 @@ mod tests {
         }
         assert_eq!(read("19:00,max_error=2.5ms").max_error, Duration::from_micros(2_500));
         assert_eq!(read("19:00").max_error, CLOCK_ERROR);
+    }
+
+    #[test]
+    fn a_player_leads_with_the_films_that_are_named_by_name_or_path_and_with_any_where_none_is() {
+        let mut args = FilmArgs::of(FilmSource::Mpv("/s".into()));
+        assert!(args.counts(None) && args.counts(Some("/srv/trailer.mkv")));
+        args.films = vec!["feature.mkv".to_owned(), "/srv/two.mkv".to_owned()];
+        let counts = ["/srv/feature.mkv", "feature.mkv", "/srv/two.mkv"].map(|open| args.counts(Some(open)));
+        assert_eq!(counts, [true; 3]);
+        let others =
+            ["/srv/trailer.mkv", "two.mkv", "/srv/feature.mkv/", ""].map(|open| args.counts(Some(open)));
+        assert_eq!((others, args.counts(None)), ([false; 4], false));
     }
 
     #[test]

@@ -207,7 +207,7 @@ impl Drop for FilmReader {
 fn read(args: &FilmArgs, told: WordSink, child: ChildSlot) -> Result<(), FilmError> {
     match &args.source {
         FilmSource::Ltc(input) => ltc::start_reading(input, args, told, &child),
-        FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args.begin(), told)?),
+        FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args, told)?),
         FilmSource::Mtc(device) => mtc::start_reading(device, args, told),
         FilmSource::ArtNet(sender) => network::hear_artnet(sender, args, told),
         FilmSource::Osc(sender) => network::hear_osc(sender, args, told),

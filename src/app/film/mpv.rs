@@ -9,21 +9,23 @@ use super::told::AGAIN;
 use super::{WordSink, start};
 use crate::film::mpv::MpvClient;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::source::FilmArgs;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
 /// An answer is read for so long before it is looked whether something is to be asked.
 const READ_FOR: Duration = Duration::from_millis(10);
 
-/// Begins to ask the player at that socket; the cue begins where its film is at `begin`.
-pub(super) fn start_reading(socket: &Path, begin: ShowTime, told: WordSink) -> io::Result<()> {
-    let player = MpvPlayer { socket: socket.to_path_buf(), begin, told };
+/// Begins to ask the player at that socket; the cue begins where its film is at the begin of those arguments.
+pub(super) fn start_reading(socket: &Path, args: &FilmArgs, told: WordSink) -> io::Result<()> {
+    let player = MpvPlayer { socket: socket.to_path_buf(), begin: args.begin(), args: args.clone(), told };
     start("mpv", move || while player.talk() {})
 }
 
 struct MpvPlayer {
     socket: PathBuf,
     begin: ShowTime,
+    args: FilmArgs,
     told: WordSink,
 }
 
@@ -70,7 +72,8 @@ impl MpvPlayer {
 
     /// True if the film that is open is one to be heard of.
     fn counts(&self, client: &MpvClient) -> bool {
-        self.told.gate.as_ref().is_none_or(|gate| gate.lets(client.path()))
+        let lets = self.told.gate.as_ref().is_none_or(|gate| gate.lets(client.path()));
+        lets && self.args.counts(client.path())
     }
 
     fn note(&self, client: &MpvClient) {
@@ -80,6 +83,10 @@ impl MpvPlayer {
             }
             notes.avsync_ms = client.avsync_s().map(|seconds| seconds * 1e3);
             notes.garbage = client.garbage();
+            let other = client.path().filter(|open| !self.args.counts(Some(open)));
+            notes.refused = other.map(|open| {
+                format!("{open} is none of its films, so it leads nobody; if it should, name it in films of [sync.mpv]")
+            });
             notes.trouble = None;
         });
     }

@@ -208,6 +208,51 @@ fn what_has_no_device_is_not_relayed() {
     }
 }
 
+/// A player at that socket that has a film open which began when the test did, and then another.
+fn player(socket: &Path, films: [&'static str; 2]) -> std::sync::mpsc::Sender<()> {
+    let (listener, begun) =
+        (std::os::unix::net::UnixListener::bind(socket).expect("it is free"), Monotonic.now());
+    let (next, wanted) = std::sync::mpsc::channel();
+    thread::spawn(move || {
+        let (stream, _) = listener.accept().expect("it is looked for");
+        let (mut out, mut open) = (stream.try_clone().expect("it can be cloned"), None);
+        for line in std::io::BufRead::lines(std::io::BufReader::new(stream)) {
+            let asked: serde_json::Value = serde_json::from_str(&line.expect("text")).expect("JSON");
+            let film = if wanted.try_recv().is_ok() { Some(films[1]) } else { open.or(Some(films[0])) };
+            if film != open {
+                open = film;
+                let path = serde_json::json!({ "event": "property-change", "name": "path", "data": film });
+                writeln!(out, "{path}").expect("somebody listens");
+            }
+            let at = Monotonic.now().since(begun).as_secs_f64();
+            let id = &asked["request_id"];
+            writeln!(out, "{}", serde_json::json!({ "data": at, "error": "success", "request_id": id }))
+                .expect("somebody listens");
+        }
+    });
+    next
+}
+
+#[test]
+fn a_player_leads_nobody_with_a_film_that_is_none_of_its_own() {
+    let folder = TempDir::new().expect("there is room");
+    let socket = folder.path().join("mpv.sock");
+    let next = player(&socket, ["/srv/trailer.mkv", "/srv/feature.mkv"]);
+    let source = FilmSource::Mpv(socket);
+    let args = FilmArgs { films: vec!["feature.mkv".to_owned()], ..FilmArgs::of(source) };
+    let reader = FilmReader::start(&[args], RULES).expect("it can be asked");
+    let row = until(&reader, "refused", |table| table.sources[0].notes.refused.is_some()).sources.remove(0);
+    assert!(
+        row.notes
+            .refused
+            .as_deref()
+            .is_some_and(|why| why.starts_with("/srv/trailer.mkv is none of its films"))
+    );
+    assert_eq!((row.used, row.state), (0, FilmState::Absent));
+    next.send(()).expect("it lives");
+    assert_eq!(in_state(&reader, FilmState::Locked).notes.refused, None);
+}
+
 #[test]
 fn a_file_is_no_line_of_midi() {
     let folder = TempDir::new().expect("there is room");
