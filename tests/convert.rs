@@ -70,7 +70,7 @@ fn nothing_is_guessed_and_nothing_overwritten() {
         (&["a.csv", "c.csv", "--units", "mm"], "--from"),
         (
             &["a.csv", "c.csv", "--from", "rows", "--units", "cm"],
-            "units are fraction, percent, u8, mm or pulse",
+            "units are fraction, percent, u8, mm, deg or pulse",
         ),
         (&["a.csv", "c.xml"], "ends in .csv or .mcap"),
         (&["a.csv", "b.csv"], "b.csv exists; --force replaces it"),

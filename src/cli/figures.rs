@@ -3,11 +3,11 @@
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 use serde::Serialize;
 
-use crate::motion::{AxisGeometry, SeatAxis};
+use crate::motion::{AxisGeometry, AxisUnit, SeatAxis};
 use crate::proof::{AxisFigures, AxisProof, Quantity, SLACK, Worst};
 use crate::timeline::Figure;
 
-/// An axis in `--json`; positions in mm from the stroke's lower end.
+/// An axis in `--json`; positions in `unit` from its zero.
 #[derive(Debug, Serialize)]
 pub(super) struct AxisReport {
     name: String,
@@ -32,7 +32,9 @@ struct Position {
     line: u64,
     min_at_s: f64,
     min_line: u64,
+    /// The length of the stroke, and where its lower end is.
     stroke: f64,
+    low: f64,
     /// What is left to the nearer end, as a part of the stroke, vibration on top in `check`.
     margin: f64,
 }
@@ -70,6 +72,7 @@ impl Position {
             min_at_s: lowest.at.as_secs_f64(),
             min_line: lowest.line,
             stroke: axis.stroke(),
+            low: axis.low,
             margin,
         }
     }
@@ -84,7 +87,7 @@ pub(super) fn report(file: &str, figures: &[AxisFigures]) -> Vec<AxisReport> {
             name: format!("a{}", index + 1),
             file: file.to_owned(),
             seat: on.seat.name.clone(),
-            unit: "mm",
+            unit: geometry.unit.name(),
             position: Position::new(*lowest, *highest, geometry, room(lowest, highest, geometry)),
             velocity: Most::new(*velocity, geometry.max_velocity),
             step: None,
@@ -105,7 +108,7 @@ pub(super) fn proved(file: &str, axes: &[AxisProof]) -> Vec<AxisReport> {
         name: format!("a{}", proof.axis + 1),
         file: file.to_owned(),
         seat: proof.on.seat.name.clone(),
-        unit: "mm",
+        unit: proof.on.geometry().unit.name(),
         position: Position::new(proof.lowest, proof.highest, proof.on.geometry(), proof.position_margin()),
         velocity: Most::proved(proof.velocity),
         step: Some(Most::proved(proof.step)),
@@ -124,7 +127,7 @@ pub(super) fn proof_table(axes: &[AxisProof]) -> String {
         let name = format!("a{} {}", proof.axis + 1, proof.on.seat.name);
         table.add_row(position_row(name, proof));
         for (quantity, worst) in proof.worst() {
-            let unit = quantity.unit();
+            let unit = quantity.unit(proof.on.geometry().unit);
             let short = if quantity == Quantity::Step { "frame to frame" } else { quantity.name() };
             table.add_row([
                 String::new(),
@@ -144,6 +147,7 @@ pub(super) fn proof_table(axes: &[AxisProof]) -> String {
 /// The position that comes nearest to an end of the stroke, vibration on top.
 fn position_row(name: String, proof: &AxisProof) -> [String; 7] {
     let axis = proof.on.geometry();
+    let unit = axis.unit.name();
     let lowest = proof.lowest_shaken.filter(|shaken| shaken.value < proof.lowest.value);
     let highest = proof.highest_shaken.filter(|shaken| shaken.value > proof.highest.value);
     let (low, high) = (lowest.unwrap_or(proof.lowest), highest.unwrap_or(proof.highest));
@@ -152,8 +156,8 @@ fn position_row(name: String, proof: &AxisProof) -> [String; 7] {
     [
         name,
         "position".to_owned(),
-        format!("{:.0} to {:.0} mm", axis.low, axis.high),
-        format!("{:.1} to {:.1} mm", low.value + 0.0, high.value),
+        format!("{:.0} to {:.0} {unit}", axis.low, axis.high),
+        format!("{:.1} to {:.1} {unit}", low.value + 0.0, high.value),
         margin(left, left < -1e-6),
         near.at.to_string(),
         near.line.to_string(),
@@ -199,7 +203,11 @@ pub(super) fn table(figures: &[AxisFigures]) -> String {
         "at",
     ]);
     for (index, f) in figures.iter().enumerate() {
-        let mut row = vec![format!("a{}", index + 1)];
+        let unit = match f.on.geometry().unit {
+            AxisUnit::Millimetre => "",
+            AxisUnit::Degree => ", in deg",
+        };
+        let mut row = vec![format!("a{}{unit}", index + 1)];
         for figure in [f.lowest, f.highest] {
             // Added to 0, a small value below 0 is not shown as -0.0.
             row.extend([format!("{:.1}", (10.0 * figure.value).round() / 10.0 + 0.0), figure.at.to_string()]);

@@ -64,7 +64,7 @@ struct Info {
     length_s: f64,
     rows: usize,
     row_interval_ms: f64,
-    unit: &'static str,
+    unit: String,
     interpolation: &'static str,
     seat: String,
     rate_hz: f64,
@@ -153,7 +153,7 @@ impl Info {
             length_s: timeline.duration().as_secs_f64(),
             rows: cue.rows(),
             row_interval_ms: timeline.row_interval().as_secs_f64() * 1000.0,
-            unit: timeline.unit().name(),
+            unit: cue.unit_words(),
             interpolation: cue.interpolation().name(),
             seat: figures::seat_names(&seats),
             rate_hz: judge.rate_hz,
@@ -221,7 +221,7 @@ fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationRepor
         let shaking =
             steps.map(|step| Vibration::from(step.value)).filter(|v| v.hz > 0.0 && v.amplitude > 0.0);
         let (hz, amplitudes): (Vec<_>, Vec<_>) = shaking.map(|v| (v.hz, v.amplitude)).unzip();
-        let mm = timeline.unit().to_stroke(figures.on.geometry()) * figures.on.geometry().stroke();
+        let mm = timeline.unit(axis).to_stroke(figures.on.geometry()) * figures.on.geometry().stroke();
         Some(VibrationReport {
             axis: format!("a{}", axis + 1),
             min_hz: hz.iter().copied().reduce(f64::min)?,
@@ -235,10 +235,11 @@ fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationRepor
 /// What is held back at the ends of an axis's stroke.
 fn note(held: &Held, figures: &[AxisFigures], timeline: &Timeline) -> Option<String> {
     let axis = figures.get(held.axis)?.on.geometry();
-    let mm = held.over * timeline.unit().to_stroke(axis) * axis.stroke();
+    let unit = axis.unit.name();
+    let over = held.over * timeline.unit(held.axis).to_stroke(axis) * axis.stroke();
     let Held { axis, stretches, at, .. } = held;
     Some(format!(
-        "a{}: held at the stroke's end in {stretches} places, where the curve goes up to {mm:.4} mm past it ({at})",
+        "a{}: held at the stroke's end in {stretches} places, where the curve goes up to {over:.4} {unit} past it ({at})",
         axis + 1
     ))
 }
@@ -252,7 +253,7 @@ fn thousandths(value: f64) -> f64 {
 fn drawn(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<String> {
     const MARKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let slot = |(axis, figures): (usize, &AxisFigures)| {
-        timeline.unit().slot(&figures.on.seat, figures.on.index, Some(axis))
+        timeline.unit(axis).slot(&figures.on.seat, figures.on.index, Some(axis))
     };
     let mut curves: Vec<_> = figures.iter().enumerate().map(|one| (slot(one), String::new())).collect();
     let mut hint = Hint::default();

@@ -69,7 +69,7 @@ fn draw_curves(path: &Path, config: &Path, points: usize) -> Result<Drawing, Fai
         Err(faults) => return Ok(Drawing::Faults(faults.to_string().lines().map(str::to_owned).collect())),
     };
     let timeline = Timeline::new(cue);
-    let hall = needs_hall(timeline.unit()).then(|| load::config(config)).transpose()?;
+    let hall = needs_hall(&timeline).then(|| load::config(config)).transpose()?;
     Ok(Drawing::Curve(draw(&timeline, hall.as_ref(), points)))
 }
 

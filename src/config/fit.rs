@@ -282,7 +282,7 @@ fn overshake(axis: usize, on: &SeatAxis, timeline: &Timeline) -> Option<Misfit> 
     let stroke_pulses = geometry.stroke_pulses();
     let swing = |pulses: f64| Swing { mm: pulses / stroke_pulses * geometry.stroke(), pulses };
     // Whole pulses, as the wire has them.
-    let pulses = (strongest.amplitude * timeline.unit().to_stroke(geometry) * stroke_pulses).round();
+    let pulses = (strongest.amplitude * timeline.unit(axis).to_stroke(geometry) * stroke_pulses).round();
     let half = (stroke_pulses / 2.0).round();
     let most = f64::from(Vibration::MAX_AMPLITUDE);
     if pulses <= half.min(most) {

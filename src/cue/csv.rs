@@ -10,7 +10,8 @@ use super::header::{Column, Header};
 use super::limits::MAX_ROWS;
 use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
-use super::{Cue, DeclaredUnit, Effects, Interpolation, Origin, Steps, title_of, value};
+use super::unit::DeclaredUnits;
+use super::{Cue, Effects, Interpolation, Origin, Steps, title_of, value};
 use crate::channel::{Samples, TrackId};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
@@ -48,7 +49,9 @@ fn read_at_most(rows_at_most: usize, path: &Path, input: impl Read) -> Result<Cu
 struct Declared {
     seen: Vec<String>,
     title: Option<String>,
-    unit: DeclaredUnit,
+    units: DeclaredUnits,
+    /// Where they stand, if anywhere.
+    units_at: Option<Place>,
     interpolation: Interpolation,
 }
 
@@ -67,7 +70,11 @@ fn read_head<R: Read>(lines: &mut Lines<R>, faults: &mut Collector) -> Option<(D
         }
         ControlFlow::Break(())
     });
-    header.filter(|_| faults.is_empty()).map(|header| (declared, header))
+    let header = header?;
+    if let Some((place, problem)) = declared.units_at.clone().zip(declared.units.misfit(header.axes)) {
+        faults.add(place, Some("units"), problem);
+    }
+    faults.is_empty().then_some((declared, header))
 }
 
 impl Declared {
@@ -81,13 +88,16 @@ impl Declared {
                 self.title = Some(title_of(text)).filter(|title| !title.is_empty());
                 Ok(())
             }
-            "units" => parsed(text).map(|unit| self.unit = unit),
+            "units" => parsed(text).map(|units| self.units = units),
             "interpolation" => parsed(text).map(|interpolation| self.interpolation = interpolation),
             _ => return,
         };
         // The value is the end of the line.
         let column = (line.trim_end().chars().count() - text.chars().count()) as u64 + 1;
         let place = Place::Text { line: number, column };
+        if key == "units" {
+            self.units_at = Some(place.clone());
+        }
         if self.seen.contains(&key) {
             faults.add(place, Some(&key), Problem::DeclaredTwice);
         } else if let Err(allowed) = taken {
@@ -131,14 +141,14 @@ impl Rows {
         };
         let cue = Cue {
             title: declared.title.clone(),
-            unit: declared.unit.unit(),
+            units: declared.units.units(),
             interpolation: declared.interpolation,
             axes: header.axes,
             origin: Origin::Text { jumps: Vec::new(), cells: axis_cells },
             effects,
             ..Cue::blank(path)
         };
-        let row = Row::before_all(declared.unit, header.time_unit_ns);
+        let row = Row::before_all(declared.units, header.time_unit_ns);
         Self { header, tracks, splitter: Splitter::new(), row, cue }
     }
 
@@ -199,7 +209,7 @@ impl Rows {
 /// The row being read; before that the one before it, which an empty cell holds.
 #[derive(Debug, Clone, Copy)]
 struct Row {
-    unit: DeclaredUnit,
+    units: DeclaredUnits,
     time_unit_ns: f64,
     /// True if a row was read, so that an empty cell has something to hold.
     begun: bool,
@@ -212,9 +222,9 @@ struct Row {
 }
 
 impl Row {
-    const fn before_all(unit: DeclaredUnit, time_unit_ns: f64) -> Self {
+    const fn before_all(units: DeclaredUnits, time_unit_ns: f64) -> Self {
         Self {
-            unit,
+            units,
             time_unit_ns,
             begun: false,
             latest: None,
@@ -238,11 +248,11 @@ impl Row {
         match column {
             Column::Time => self.time = checked_time(text, self.time_unit_ns, &mut self.latest)?,
             Column::Position(axis) => {
-                self.positions[axis] = value::position(value::number(text)?, self.unit)?;
+                self.positions[axis] = value::position(value::number(text)?, self.units.of(axis))?;
             }
             Column::Part(track, part) => {
                 let mut sample = self.samples.of(track);
-                sample.0[part] = value::part(value::number(text)?, track, part, self.unit)?;
+                sample.0[part] = value::part(value::number(text)?, track, part, self.units.of(track.axis))?;
                 self.samples.set(track, sample);
             }
             Column::Effect(effect) => {

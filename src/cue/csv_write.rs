@@ -71,7 +71,7 @@ fn head(cue: &Cue) -> String {
         let one_line: String = title.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         head.push_str(&format!("# title: {one_line}\n"));
     }
-    head.push_str(&format!("# units: {}\n", cue.unit().name()));
+    head.push_str(&format!("# units: {}\n", cue.unit_words()));
     head.push_str(&format!("# interpolation: {}\ntime_ms", cue.interpolation().name()));
     (1..=cue.axes()).for_each(|axis| head.push_str(&format!(",a{axis}")));
     for (track, _) in cue.tracks().used() {

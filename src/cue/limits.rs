@@ -20,6 +20,8 @@ pub(super) const MAX_TITLE: usize = 1_024;
 pub(crate) const MAX_TIME: ShowTime = ShowTime::from_millis(86_400_000);
 /// The greatest position in mm, far beyond any seat.
 pub(super) const MAX_MILLIMETRES: f64 = 100_000.0;
+/// The greatest position in degrees, a hundred turns: far beyond any seat.
+pub(super) const MAX_DEGREES: f64 = 36_000.0;
 /// The greatest position in pulses: what a frame can carry (SMC manual 2.2.2.5).
 pub(super) const MAX_PULSES: f64 = i32::MAX as f64;
 /// The outputs that a controller has, Y01 to Y12 as bits 0 to 11 (SMC manual 2.2.2.5).

@@ -35,7 +35,7 @@ pub(crate) use problem::Problem;
 pub use steps::Step;
 pub(crate) use steps::Steps;
 pub(crate) use tracks::{Tracks, Vibration};
-pub(crate) use unit::{DeclaredUnit, Interpolation, Unit, UnknownInterpolation};
+pub(crate) use unit::{DeclaredUnit, Interpolation, Unit, Units, UnknownInterpolation};
 
 use crate::channel::{ChannelId, Sample};
 use crate::plain;
@@ -96,7 +96,7 @@ pub struct Marker {
 pub struct Cue {
     path: PathBuf,
     title: Option<String>,
-    unit: Unit,
+    units: Units,
     interpolation: Interpolation,
     axes: usize,
     times: Vec<ShowTime>,
@@ -113,7 +113,7 @@ impl Cue {
         Self {
             path: path.to_owned(),
             title: None,
-            unit: Unit::default(),
+            units: Units::default(),
             interpolation: Interpolation::default(),
             axes: 0,
             times: Vec::new(),
@@ -142,10 +142,16 @@ impl Cue {
         self.title = Some(title_of(&title));
     }
 
-    /// The unit of positions and amplitudes in memory.
+    /// The units of positions and amplitudes in memory.
     #[must_use]
-    pub(crate) const fn unit(&self) -> Unit {
-        self.unit
+    pub(crate) const fn units(&self) -> Units {
+        self.units
+    }
+
+    /// The word for these in a file.
+    #[must_use]
+    pub(crate) fn unit_words(&self) -> String {
+        self.units.words(self.axes)
     }
 
     /// How the curve runs between the rows.
@@ -172,7 +178,7 @@ impl Cue {
         &self.times
     }
 
-    /// Positions `[row][axis]`, row after row, in the cue's unit.
+    /// Positions `[row][axis]`, row after row, each in the unit of its axis.
     #[must_use]
     pub fn positions(&self) -> &[f64] {
         &self.positions

@@ -155,10 +155,12 @@ pub enum Problem {
         wanted: &'static str,
     },
     /// A position that no seat could take, whatever its stroke.
-    #[error("{value} is outside 0 to {high}{unit}; positions count from the stroke's lower end")]
+    #[error("{value} is outside {low} to {high}{unit}, and no seat goes there")]
     NoPosition {
         /// The position as the file has it.
         value: f64,
+        /// The least one that is taken, in the same unit.
+        low: f64,
         /// The greatest one that is taken, in the same unit.
         high: f64,
         /// The unit's name with a space before it.

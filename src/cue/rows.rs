@@ -9,7 +9,7 @@ use super::fault::{Collector, CueFaults, Place};
 use super::limits::{MAX_ROWS, MAX_TIME};
 use super::problem::Problem;
 use super::table::{Lines, Splitter, column_of};
-use super::{Cue, DeclaredUnit, Interpolation, Origin, value};
+use super::{Cue, DeclaredUnit, Interpolation, Origin, Units, value};
 use crate::motion::MAX_AXES;
 use crate::time::ShowTime;
 
@@ -75,7 +75,7 @@ impl Reading {
         let mut origin_cells = [0; MAX_AXES];
         origin_cells.iter_mut().enumerate().for_each(|(axis, cell)| *cell = axis + FIRST_AXIS);
         let cue = Cue {
-            unit: unit.unit(),
+            units: Units::all(unit.unit()),
             interpolation: Interpolation::Linear,
             axes,
             origin: Origin::Text { jumps: Vec::new(), cells: origin_cells },
@@ -181,12 +181,12 @@ mod tests {
     #[test]
     fn bad_rows_are_named_with_their_place() {
         assert_eq!(
-            faults("line,time_ms,x,y\n1,0,0,0\n2,-5,0,0\n3,9,,0\n4,9,0\nx,9,0,-1\n"),
+            faults("line,time_ms,x,y\n1,0,0,0\n2,-5,0,0\n3,9,,0\n4,9,0\nx,9,0,-200000\n"),
             "2:3: time_ms: a row's duration of 0 is not above 0\n\
              3:3: time_ms: a row's duration of -5 is not above 0\n\
              5:6: the row ends after 3 of 4 cells\n\
              6:1: line: \"x\" is not a number\n\
-             6:7: y: -1 is outside 0 to 100000 mm; positions count from the stroke's lower end"
+             6:7: y: -200000 is outside -100000 to 100000 mm, and no seat goes there"
         );
         assert_eq!(faults(""), " is empty; a cue needs at least two rows");
         assert_eq!(faults("line,time_ms\n1,2\n"), "1:13: x: the column is missing");

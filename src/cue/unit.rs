@@ -1,18 +1,21 @@
-//! The unit of a cue's positions, and what a file may declare it to be.
+//! The units of a cue's positions, and what a file may declare them to be.
 
 use std::str::FromStr;
 
-use super::limits::{MAX_MILLIMETRES, MAX_PULSES};
-use crate::motion::{AxisGeometry, AxisUnit, SeatType, Slot};
+use super::Problem;
+use super::limits::{MAX_DEGREES, MAX_MILLIMETRES, MAX_PULSES};
+use crate::motion::{AxisGeometry, AxisUnit, MAX_AXES, SeatType, Slot};
 
-/// The unit that positions and vibration amplitudes have in memory, counted from the stroke's lower end.
+/// The unit that positions and vibration amplitudes of an axis have in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Unit {
     /// Fraction of the stroke, 0 to 1.
     #[default]
     Fraction,
-    /// Millimetres.
+    /// Millimetres from the zero of the axis.
     Millimetre,
+    /// Degrees from the zero of the axis.
+    Degree,
     /// Motor pulses.
     Pulse,
 }
@@ -24,6 +27,7 @@ impl Unit {
         match self {
             Self::Fraction => "fraction",
             Self::Millimetre => "mm",
+            Self::Degree => "deg",
             Self::Pulse => "pulse",
         }
     }
@@ -34,6 +38,7 @@ impl Unit {
         match self {
             Self::Fraction | Self::Pulse => true,
             Self::Millimetre => axis.unit == AxisUnit::Millimetre,
+            Self::Degree => axis.unit == AxisUnit::Degree,
         }
     }
 
@@ -48,7 +53,7 @@ impl Unit {
     pub(crate) fn stroke(self, axis: &AxisGeometry) -> f64 {
         match self {
             Self::Fraction => 1.0,
-            Self::Millimetre => axis.stroke(),
+            Self::Millimetre | Self::Degree => axis.stroke(),
             Self::Pulse => axis.stroke_pulses(),
         }
     }
@@ -58,7 +63,7 @@ impl Unit {
     pub(crate) fn ends(self, axis: &AxisGeometry) -> (f64, f64) {
         match self {
             Self::Fraction => (0.0, 1.0),
-            Self::Millimetre => (axis.low, axis.high),
+            Self::Millimetre | Self::Degree => (axis.low, axis.high),
             Self::Pulse => {
                 let range = axis.pulse_range();
                 (range.low, range.high)
@@ -80,7 +85,37 @@ impl Unit {
         match self {
             Self::Fraction => "",
             Self::Millimetre => " mm",
+            Self::Degree => " deg",
             Self::Pulse => " pulses",
+        }
+    }
+}
+
+/// The unit of each axis of a cue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Units([Unit; MAX_AXES]);
+
+impl Units {
+    /// The same for all axes.
+    pub(super) const fn all(unit: Unit) -> Self {
+        Self([unit; MAX_AXES])
+    }
+
+    /// That of an axis, from 0.
+    #[must_use]
+    pub(crate) const fn of(self, axis: usize) -> Unit {
+        self.0[axis]
+    }
+
+    /// The word for them in a file: one for all of the axes, or one for each.
+    #[must_use]
+    pub(crate) fn words(self, axes: usize) -> String {
+        let own = &self.0[..axes];
+        match own {
+            [first, others @ ..] if others.iter().any(|unit| unit != first) => {
+                own.iter().map(|unit| unit.name()).collect::<Vec<_>>().join(", ")
+            }
+            _ => self.0[0].name().to_owned(),
         }
     }
 }
@@ -95,9 +130,11 @@ pub enum DeclaredUnit {
     Percent,
     /// Bytes, 0 to 255 over the stroke.
     U8,
-    /// Millimetres from the stroke's lower end.
+    /// Millimetres from the zero of the axis.
     Millimetre,
-    /// Motor pulses from the stroke's lower end.
+    /// Degrees from the zero of the axis.
+    Degree,
+    /// Motor pulses from the zero of the axis.
     Pulse,
 }
 
@@ -108,7 +145,17 @@ impl DeclaredUnit {
         match self {
             Self::Fraction | Self::Percent | Self::U8 => Unit::Fraction,
             Self::Millimetre => Unit::Millimetre,
+            Self::Degree => Unit::Degree,
             Self::Pulse => Unit::Pulse,
+        }
+    }
+
+    /// The least position in the file that can be right for any seat: below 0 where the zero of an axis may be inside its range.
+    #[must_use]
+    pub(super) const fn floor(self) -> f64 {
+        match self {
+            Self::Fraction | Self::Percent | Self::U8 => 0.0,
+            Self::Millimetre | Self::Degree | Self::Pulse => -self.ceiling(),
         }
     }
 
@@ -120,6 +167,7 @@ impl DeclaredUnit {
             Self::Percent => 100.0,
             Self::U8 => 255.0,
             Self::Millimetre => MAX_MILLIMETRES,
+            Self::Degree => MAX_DEGREES,
             Self::Pulse => MAX_PULSES,
         }
     }
@@ -139,14 +187,14 @@ impl DeclaredUnit {
         match self {
             Self::Percent => value / 100.0,
             Self::U8 => value / 255.0,
-            Self::Fraction | Self::Millimetre | Self::Pulse => value,
+            Self::Fraction | Self::Millimetre | Self::Degree | Self::Pulse => value,
         }
     }
 }
 
 /// The text is none of the units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("units are fraction, percent, u8, mm or pulse")]
+#[error("units are fraction, percent, u8, mm, deg or pulse")]
 pub struct UnknownUnit;
 
 impl FromStr for DeclaredUnit {
@@ -158,9 +206,57 @@ impl FromStr for DeclaredUnit {
             "percent" => Ok(Self::Percent),
             "u8" => Ok(Self::U8),
             "mm" => Ok(Self::Millimetre),
+            "deg" => Ok(Self::Degree),
             "pulse" => Ok(Self::Pulse),
             _ => Err(UnknownUnit),
         }
+    }
+}
+
+/// The units that a file declares: one for all of its axes, or one for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct DeclaredUnits {
+    each: [DeclaredUnit; MAX_AXES],
+    given: usize,
+}
+
+impl Default for DeclaredUnits {
+    fn default() -> Self {
+        Self { each: [DeclaredUnit::default(); MAX_AXES], given: 1 }
+    }
+}
+
+impl DeclaredUnits {
+    /// That of an axis, from 0.
+    pub(super) const fn of(&self, axis: usize) -> DeclaredUnit {
+        self.each[axis]
+    }
+
+    /// The units in memory.
+    pub(super) fn units(&self) -> Units {
+        Units(self.each.map(DeclaredUnit::unit))
+    }
+
+    /// What is wrong with them for a file of so many axes, if anything is.
+    pub(super) fn misfit(&self, axes: usize) -> Option<Problem> {
+        let allowed = format!("give one unit for all axes, or one for each of the {axes}");
+        let value = format!("{} units", self.given);
+        (self.given != 1 && self.given != axes).then_some(Problem::Declaration { value, allowed })
+    }
+}
+
+impl FromStr for DeclaredUnits {
+    type Err = UnknownUnit;
+
+    fn from_str(text: &str) -> Result<Self, UnknownUnit> {
+        let units: Vec<DeclaredUnit> =
+            text.split(',').map(|word| word.trim().parse()).collect::<Result<_, _>>()?;
+        let mut each = [DeclaredUnit::default(); MAX_AXES];
+        match units[..] {
+            [all] => each = [all; MAX_AXES],
+            _ => each.iter_mut().zip(&units).for_each(|(axis, unit)| *axis = *unit),
+        }
+        Ok(Self { each, given: units.len() })
     }
 }
 

@@ -25,13 +25,13 @@ pub(super) fn time(text: &str, unit_ns: f64) -> Result<ShowTime, Problem> {
 
 /// A position in the unit of memory, from one in the unit of the file.
 pub(super) fn position(value: f64, unit: DeclaredUnit) -> Result<f64, Problem> {
-    let high = unit.ceiling();
-    if (0.0..=high).contains(&value) {
+    let (low, high) = (unit.floor(), unit.ceiling());
+    if (low..=high).contains(&value) {
         Ok(unit.in_memory(value))
     } else if unit.unit() == Unit::Fraction {
-        Err(Problem::OutsideStroke { value, low: 0.0, high, unit: unit.suffix() })
+        Err(Problem::OutsideStroke { value, low, high, unit: unit.suffix() })
     } else {
-        Err(Problem::NoPosition { value, high, unit: unit.suffix() })
+        Err(Problem::NoPosition { value, low, high, unit: unit.suffix() })
     }
 }
 
@@ -125,7 +125,9 @@ mod tests {
         assert_eq!(position(255.0, DeclaredUnit::U8), Ok(1.0));
         assert_eq!(position(50.0, DeclaredUnit::Percent), Ok(0.5));
         assert!(position(100.1, DeclaredUnit::Percent).is_err());
-        assert!(position(-0.1, DeclaredUnit::Millimetre).is_err());
+        assert!(position(-0.1, DeclaredUnit::Fraction).is_err());
+        assert!(position(-100_000.1, DeclaredUnit::Millimetre).is_err());
+        assert_eq!(position(-90.0, DeclaredUnit::Degree), Ok(-90.0));
         assert_eq!(position(1234.5, DeclaredUnit::Millimetre), Ok(1234.5));
     }
 

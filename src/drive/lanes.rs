@@ -78,7 +78,7 @@ fn shared(config: &Config, controller: &Controller, slots: usize, timeline: &Tim
 }
 
 fn slot(seat: &SeatType, seat_axis: usize, axis: Option<usize>, timeline: &Timeline, level: f64) -> Slot {
-    timeline.unit().slot(seat, seat_axis, axis).at_level(level)
+    timeline.unit(axis.unwrap_or(0)).slot(seat, seat_axis, axis).at_level(level)
 }
 
 fn wiring(config: &Config, controller: &Controller, timeline: &Timeline) -> Wiring {

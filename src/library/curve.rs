@@ -51,7 +51,7 @@ pub(crate) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) ->
     let slot = |axis: usize| {
         let taker = hall.and_then(|hall| hall.named().find(|one| one.takes(axis)));
         let (seat, first) = taker.map_or((&bench, 0), |one| (&*one.seat, one.axis_offset));
-        timeline.unit().slot(seat, axis - first, Some(axis))
+        timeline.unit(axis).slot(seat, axis - first, Some(axis))
     };
     let length_s = timeline.duration().as_secs_f64();
     let span = length_s / count(points);
@@ -62,10 +62,10 @@ pub(crate) fn draw(timeline: &Timeline, hall: Option<&Config>, points: usize) ->
     }
 }
 
-/// True if the hall has to be known to draw a cue in that unit.
+/// True if the hall has to be known to draw a cue: some axis is not in fractions.
 #[must_use]
-pub(crate) fn needs_hall(unit: Unit) -> bool {
-    unit != Unit::Fraction
+pub(crate) fn needs_hall(timeline: &Timeline) -> bool {
+    (0..timeline.axes()).any(|axis| timeline.unit(axis) != Unit::Fraction)
 }
 
 fn axis_curve(timeline: &Timeline, axis: usize, slot: &Slot, points: usize) -> AxisCurve {

@@ -131,17 +131,24 @@ impl Subject<'_> {
     }
 
     fn restless(&self, pieces: &Pieces, no_rest: NoRest) -> Found {
-        let (mm, seat) = (self.geometry().stroke(), self.seat());
+        let (&AxisGeometry { unit, low, high, .. }, mm) = (self.geometry(), self.geometry().stroke());
+        let seat = self.seat();
         let at = ShowTime::from_nanos(pieces.end());
         let AxisState { position, velocity, .. } = pieces.last_motion();
         let (position, velocity) = (self.geometry().place(position), velocity * mm);
         let breach = match no_rest {
             NoRest::NoRoom { missing } => {
-                Breach::NoRoomToRest { velocity, position, missing: missing * mm, stroke: mm, seat, at }
+                Breach::NoRoomToRest { unit, velocity, position, missing: missing * mm, low, high, seat, at }
             }
-            NoRest::TooRough { quantity, value, limit } => {
-                Breach::TooRoughToRest { velocity, quantity, value: value * mm, limit: limit * mm, seat, at }
-            }
+            NoRest::TooRough { quantity, value, limit } => Breach::TooRoughToRest {
+                unit,
+                velocity,
+                quantity,
+                value: value * mm,
+                limit: limit * mm,
+                seat,
+                at,
+            },
         };
         Found { at, axis: Some(self.axis), column: format!("a{}", self.axis + 1), breach }
     }
@@ -164,6 +171,7 @@ impl Subject<'_> {
             axis: Some(self.axis),
             column: format!("a{}", self.axis + 1),
             breach: Breach::Motion {
+                unit: self.geometry().unit,
                 quantity,
                 value: stretch.worst * stroke,
                 limit: limit * stroke,

@@ -11,7 +11,7 @@ use crate::time::ShowTime;
 /// Bytes that are hashed at once.
 const CHUNK: usize = 1 << 16;
 
-/// The SHA-256 of what a cue does: rows, unit, interpolation, channels and effects, as they are in memory. Title, markers
+/// The SHA-256 of what a cue does: rows, units, interpolation, channels and effects, as they are in memory. Title, markers
 /// and the format of the file do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Digest(pub [u8; 32]);
@@ -21,7 +21,7 @@ impl Digest {
     #[must_use]
     pub fn of(cue: &Cue) -> Self {
         let mut sink = Sink { hash: Sha256::new(), buffer: Vec::with_capacity(CHUNK + 8) };
-        sink.text(cue.unit().name());
+        sink.text(&cue.unit_words());
         sink.text(cue.interpolation().name());
         sink.count(cue.axes());
         sink.count(cue.rows());

@@ -35,7 +35,7 @@ pub fn figures(timeline: &Timeline, rate: Rate, seats: &[SeatAxis]) -> Vec<AxisF
 }
 
 fn of_axis(timeline: &Timeline, axis: usize, on: &SeatAxis, stencils: &Stencils) -> AxisFigures {
-    let slot = timeline.unit().slot(&on.seat, on.index, Some(axis));
+    let slot = timeline.unit(axis).slot(&on.seat, on.index, Some(axis));
     let stroke = on.geometry().stroke();
     let pieces = Pieces::new(timeline, axis, &slot);
     let most = |stencils: &[Stencil], order| {

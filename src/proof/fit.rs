@@ -266,7 +266,8 @@ fn neutral(cue: &Cue, terms: &Terms) -> [f64; MAX_AXES] {
     for part in terms.parts.iter().rev() {
         for axis in part.axes.clone().filter(|axis| *axis < MAX_AXES) {
             let geometry = &part.seat.each[axis - part.axes.start];
-            pose[axis] = geometry.neutral * cue.unit().stroke(geometry);
+            let unit = cue.units().of(axis);
+            pose[axis] = unit.ends(geometry).0 + geometry.neutral * unit.stroke(geometry);
         }
     }
     pose
@@ -286,8 +287,8 @@ fn scale(cue: &Cue, factors: &[f64], neutral: &[f64; MAX_AXES]) -> Cue {
 fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
     let mut mm = [0.0; MAX_AXES];
     for part in &terms.parts {
-        for (mm, geometry) in mm[part.axes.start..].iter_mut().zip(&part.seat.each).take(part.axes.len()) {
-            *mm = cue.unit().to_stroke(geometry) * geometry.stroke();
+        for (axis, geometry) in part.axes.clone().zip(&part.seat.each).filter(|(axis, _)| *axis < MAX_AXES) {
+            mm[axis] = cue.units().of(axis).to_stroke(geometry) * geometry.stroke();
         }
     }
     let mut hint = crate::timeline::Hint::default();

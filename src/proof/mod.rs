@@ -159,7 +159,7 @@ fn subjects<'a>(timeline: &'a Timeline, terms: &'a Terms) -> Vec<Subject<'a>> {
     for part in &terms.parts {
         for axis in part.axes.clone().take_while(|axis| *axis < timeline.axes()) {
             let seat_axis = axis - part.axes.start;
-            let slot = timeline.unit().slot(&part.seat, seat_axis, Some(axis)).at_level(terms.level);
+            let slot = timeline.unit(axis).slot(&part.seat, seat_axis, Some(axis)).at_level(terms.level);
             let is_as = |one: &Subject<'_>| one.axis == axis && one.slot == slot;
             if !subjects.iter().any(|one| is_as(one) && one.on.seat.name == part.seat.name) {
                 subjects.push(Subject { timeline, axis, on: SeatAxis::new(&part.seat, seat_axis), slot });
@@ -188,6 +188,7 @@ fn hall(terms: &Terms, found: &mut Vec<Found>) {
 fn too_fast(seat: &SeatType, axis: &AxisGeometry) -> Option<Breach> {
     let (rpm, ceiling) = (f64::from(axis.max_rpm?), axis.speed_ceiling());
     (axis.max_velocity > ceiling * SLACK).then(|| Breach::SpeedCeiling {
+        unit: axis.unit,
         seat: seat.name.clone(),
         rpm,
         ceiling,

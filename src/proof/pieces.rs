@@ -63,7 +63,7 @@ fn place(slot: &Slot, value: f64) -> f64 {
 
 /// The lowest and highest position of the whole axis.
 pub(super) fn extremes(timeline: &Timeline, axis: usize, slot: &Slot) -> (At, At) {
-    let ends = ends(timeline.unit(), slot);
+    let ends = ends(timeline.unit(axis), slot);
     let extreme = |extreme: Extreme| At {
         value: place(slot, extreme.value).clamp(ends.0, ends.1),
         at: extreme.at.as_nanos(),
@@ -84,7 +84,7 @@ pub(super) struct Pieces {
 impl Pieces {
     /// Where `slot` stands while it follows its axis of the cue.
     pub(super) fn new(timeline: &Timeline, axis: usize, slot: &Slot) -> Self {
-        let (ends, (scale, shift)) = (ends(timeline.unit(), slot), slot.scale());
+        let (ends, (scale, shift)) = (ends(timeline.unit(axis), slot), slot.scale());
         let (cue, times) = (timeline.cue(), timeline.cue().times());
         let extremes = &timeline.extremes()[axis];
         let leaves = place(slot, extremes.min.value) < ends.0 || place(slot, extremes.max.value) > ends.1;
@@ -256,7 +256,7 @@ fn ends(unit: Unit, slot: &Slot) -> (f64, f64) {
     match unit {
         // Held at full level, and then scaled.
         Unit::Fraction => (shift.max(0.0), (shift + scale).min(1.0)),
-        Unit::Millimetre | Unit::Pulse => (0.0, 1.0),
+        Unit::Millimetre | Unit::Degree | Unit::Pulse => (0.0, 1.0),
     }
 }
 

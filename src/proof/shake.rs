@@ -145,7 +145,9 @@ impl Subject<'_> {
         let breach = Breach::VibrationPastStroke {
             amplitude: amplitude * mm,
             position: self.geometry().place(position),
-            stroke: mm,
+            unit: self.geometry().unit,
+            low: self.geometry().low,
+            high: self.geometry().high,
             seat: self.seat(),
             at,
         };
@@ -163,8 +165,8 @@ impl Subject<'_> {
         let worst = [of(0), of(1)].into_iter().max_by(|a, b| part(a).total_cmp(&part(b)))?;
         let (place, shaken, moved, limit) = worst;
         let quantity = [Quantity::Velocity, Quantity::Acceleration][place];
-        let (hz, seat) = (swing.hz, self.seat());
-        let breach = Breach::Shaken { quantity, amplitude, hz, shaken, moved, limit, seat, at };
+        let (hz, seat, unit) = (swing.hz, self.seat(), self.geometry().unit);
+        let breach = Breach::Shaken { unit, quantity, amplitude, hz, shaken, moved, limit, seat, at };
         (part(&worst) > SLACK).then(|| self.of_vibration(at, breach))
     }
 

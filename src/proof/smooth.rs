@@ -1,7 +1,7 @@
 //! A zero-phase low-pass for coarse sources: three running means over evenly spaced samples of the curve, each as far to
 //! the left as to the right, so that nothing is moved in time.
 
-use crate::cue::{Cue, Interpolation, limits};
+use crate::cue::{Cue, Interpolation, Unit, limits};
 use crate::time::{ShowTime, nanos};
 use crate::timeline::{Hint, Timeline};
 
@@ -73,13 +73,17 @@ impl Resampled {
             halves(strength).into_iter().fold(samples.clone(), |samples, half| running_mean(&samples, half))
         };
         let smooth: Vec<Vec<f64>> = self.samples.iter().map(pass).collect();
+        // The cubic between samples may dip below them; of what began at 0 nothing is to.
+        let least = |samples: &Vec<f64>| samples.iter().copied().fold(0.0, f64::min);
+        let lowest: Vec<f64> = smooth.iter().map(least).collect();
         let mut positions = Vec::with_capacity(self.times.len() * cue.axes());
         for at in &self.times {
             let at = at.as_nanos().unsigned_abs();
-            positions.extend(smooth.iter().map(|samples| self.between(samples, at).max(0.0)));
-        }
-        if cue.unit() == crate::cue::Unit::Fraction {
-            positions.iter_mut().for_each(|position| *position = position.min(1.0));
+            let held = |(axis, samples): (usize, &Vec<f64>)| {
+                let most = if cue.units().of(axis) == Unit::Fraction { 1.0 } else { f64::INFINITY };
+                self.between(samples, at).max(lowest[axis]).min(most)
+            };
+            positions.extend(smooth.iter().enumerate().map(held));
         }
         let smoothing = Smoothing { cut_off_hz: self.cut_off_hz(strength) };
         (cue.with_rows(self.times.clone(), positions, Interpolation::Spline), smoothing)

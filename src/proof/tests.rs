@@ -47,7 +47,7 @@ fn brute(timeline: &Timeline, seat: &SeatType, hz: f64, level: f64) -> [f64; 4] 
         let mut hint = Hint::default();
         while at <= end {
             let value =
-                timeline.sample(ShowTime::from_nanos(at), &mut hint)[0] * timeline.unit().to_stroke(axis);
+                timeline.sample(ShowTime::from_nanos(at), &mut hint)[0] * timeline.unit(0).to_stroke(axis);
             let scaled = axis.neutral + level * (value - axis.neutral);
             times.push(ShowTime::from_nanos(at).as_secs_f64());
             places.push(scaled.clamp(0.0, 1.0) * axis.stroke());

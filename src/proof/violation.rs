@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::cue::Place;
+use crate::motion::AxisUnit;
 use crate::time::ShowTime;
 
 /// One limit that is broken, and where in the file.
@@ -37,13 +38,13 @@ impl Violation {
 /// A figure of motion that has a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Quantity {
-    /// Distance over Time, mm/s.
+    /// Distance over Time.
     Velocity,
-    /// Change of velocity from one frame to the next, mm/s.
+    /// Change of velocity from one frame to the next.
     Step,
-    /// mm/s².
+    /// Change of velocity over Time.
     Acceleration,
-    /// mm/s³.
+    /// Change of acceleration over Time.
     Jerk,
 }
 
@@ -59,13 +60,16 @@ impl Quantity {
         }
     }
 
-    /// Its unit.
+    /// Its unit on an axis that is measured in `axis`.
     #[must_use]
-    pub(crate) const fn unit(self) -> &'static str {
-        match self {
-            Self::Velocity | Self::Step => "mm/s",
-            Self::Acceleration => "mm/s²",
-            Self::Jerk => "mm/s³",
+    pub(crate) const fn unit(self, axis: AxisUnit) -> &'static str {
+        match (self, axis) {
+            (Self::Velocity | Self::Step, AxisUnit::Millimetre) => "mm/s",
+            (Self::Velocity | Self::Step, AxisUnit::Degree) => "deg/s",
+            (Self::Acceleration, AxisUnit::Millimetre) => "mm/s²",
+            (Self::Acceleration, AxisUnit::Degree) => "deg/s²",
+            (Self::Jerk, AxisUnit::Millimetre) => "mm/s³",
+            (Self::Jerk, AxisUnit::Degree) => "deg/s³",
         }
     }
 }
@@ -77,9 +81,11 @@ pub(crate) enum Breach {
     /// An axis moves faster, or more roughly, than its seat may.
     #[error(
         "{} {value:.1} {} at {at} is over {limit:.1}, the limit of seat {seat} ({from} to {until})",
-        quantity.name(), quantity.unit()
+        quantity.name(), quantity.unit(*unit)
     )]
     Motion {
+        /// What the axis is measured in.
+        unit: AxisUnit,
         /// Which figure.
         quantity: Quantity,
         /// Its greatest size in this stretch, in its unit.
@@ -97,16 +103,20 @@ pub(crate) enum Breach {
     },
     /// Vibration takes an axis past an end of its stroke.
     #[error(
-        "vibration of {amplitude:.3} mm about {position:.3} mm at {at} leaves the stroke of seat {seat}, 0 to {stroke} mm; \
-         lower the amplitude, or keep away from the end"
+        "vibration of {amplitude:.3} {0} about {position:.3} {0} at {at} leaves the stroke of seat {seat}, {low} to {high} {0}; \
+         lower the amplitude, or keep away from the end", unit.name()
     )]
     VibrationPastStroke {
-        /// How far it swings to either side, mm.
+        /// What the axis is measured in.
+        unit: AxisUnit,
+        /// How far it swings to either side.
         amplitude: f64,
-        /// Where the axis stands, mm from the stroke's lower end.
+        /// Where the axis stands.
         position: f64,
-        /// The seat's stroke, mm.
-        stroke: f64,
+        /// The ends of the stroke.
+        low: f64,
+        /// The upper one.
+        high: f64,
         /// The seat type.
         seat: String,
         /// When it is worst.
@@ -114,18 +124,22 @@ pub(crate) enum Breach {
     },
     /// The cue ends in motion, and the stroke has no room to come to rest.
     #[error(
-        "the cue ends at {at} in motion, {velocity:.1} mm/s at {position:.3} mm, and to come to rest within the limits of seat \
-         {seat} it lacks {missing:.3} mm of the stroke, 0 to {stroke} mm; end more slowly, or further from the end"
+        "the cue ends at {at} in motion, {velocity:.1} {0}/s at {position:.3} {0}, and to come to rest within the limits of seat \
+         {seat} it lacks {missing:.3} {0} of the stroke, {low} to {high} {0}; end more slowly, or further from the end", unit.name()
     )]
     NoRoomToRest {
-        /// How fast the axis is at the last row, mm/s.
+        /// What the axis is measured in.
+        unit: AxisUnit,
+        /// How fast the axis is at the last row.
         velocity: f64,
-        /// Where it is then, mm from the stroke's lower end.
+        /// Where it is then.
         position: f64,
-        /// How far it would leave the stroke, mm.
+        /// How far it would leave the stroke.
         missing: f64,
-        /// The seat's stroke, mm.
-        stroke: f64,
+        /// The ends of the stroke.
+        low: f64,
+        /// The upper one.
+        high: f64,
         /// The seat type.
         seat: String,
         /// When the cue ends.
@@ -133,12 +147,14 @@ pub(crate) enum Breach {
     },
     /// The cue ends in such motion that every way to rest breaks a limit.
     #[error(
-        "the cue ends at {at} in motion, {velocity:.1} mm/s, and the gentlest way to rest from there takes {} {value:.1} {}, over \
+        "the cue ends at {at} in motion, {velocity:.1} {}/s, and the gentlest way to rest from there takes {} {value:.1} {}, over \
          {limit:.1}, the limit of seat {seat}; let the motion end more gently",
-        quantity.name(), quantity.unit()
+        unit.name(), quantity.name(), quantity.unit(*unit)
     )]
     TooRoughToRest {
-        /// How fast the axis is at the last row, mm/s.
+        /// What the axis is measured in.
+        unit: AxisUnit,
+        /// How fast the axis is at the last row.
         velocity: f64,
         /// Which figure is over its limit.
         quantity: Quantity,
@@ -153,14 +169,16 @@ pub(crate) enum Breach {
     },
     /// Motion and vibration together move an axis faster, or harder, than its seat may.
     #[error(
-        "vibration of {amplitude:.3} mm at {hz:.1} Hz, {shaken:.1} {unit} of {}, on motion of {moved:.1} {unit} is over \
-         {limit:.1} {unit} in all, the limit of seat {seat}, at {at}; lower the amplitude or the frequency",
-        quantity.name(), unit = quantity.unit()
+        "vibration of {amplitude:.3} {} at {hz:.1} Hz, {shaken:.1} {per_s} of {}, on motion of {moved:.1} {per_s} is over \
+         {limit:.1} {per_s} in all, the limit of seat {seat}, at {at}; lower the amplitude or the frequency",
+        unit.name(), quantity.name(), per_s = quantity.unit(*unit)
     )]
     Shaken {
+        /// What the axis is measured in.
+        unit: AxisUnit,
         /// Velocity or acceleration.
         quantity: Quantity,
-        /// How far it swings to either side, mm.
+        /// How far it swings to either side.
         amplitude: f64,
         /// How often, as controllers execute it.
         hz: f64,
@@ -219,19 +237,21 @@ pub(crate) enum Breach {
     },
     /// The seat may move faster than its controller lets it.
     #[error(
-        "axes may turn {rpm:.0} rpm (PA07), {ceiling:.1} mm/s at a lead of {lead} mm; seat {seat} goes up to {wanted} mm/s; \
-         allow {needed:.0} rpm and say so in max_rpm, or lower max_velocity_mm_s of the seat type"
+        "axes may turn {rpm:.0} rpm (PA07), {ceiling:.1} {0}/s at a lead of {lead} {0}; seat {seat} goes up to {wanted} {0}/s; \
+         allow {needed:.0} rpm and say so in max_rpm, or lower max_velocity_{0}_s of the seat type", unit.name()
     )]
     SpeedCeiling {
+        /// What the axis is measured in.
+        unit: AxisUnit,
         /// The seat type.
         seat: String,
         /// The controller's own limit, turns a minute.
         rpm: f64,
-        /// The same, mm/s.
+        /// The same.
         ceiling: f64,
-        /// Travel per turn, mm.
+        /// Travel per turn.
         lead: f64,
-        /// The seat's limit, mm/s.
+        /// The seat's limit.
         wanted: f64,
         /// Turns a minute that the seat's limit takes.
         needed: f64,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::Timeline;
-use crate::cue::{Collector, CueFaults, Problem};
+use crate::cue::{Collector, CueFaults, Problem, Unit};
 use crate::motion::SeatType;
 use crate::time::ShowTime;
 
@@ -36,15 +36,14 @@ pub(crate) struct Held {
 }
 
 impl Timeline {
-    /// Holds some of the cue's axes against a stroke. Without a seat the ends are those of the unit: of a cue in
-    /// fractions both, of one in mm or pulses the lower one only.
+    /// Holds some of the cue's axes against a stroke. Without a seat the ends are those of the unit: of an axis in
+    /// fractions both, of one in mm, degrees or pulses none.
     #[must_use]
     pub fn fits_stroke(&self, axes: Range<usize>, seat: Option<&SeatType>) -> StrokeFit {
-        let unit = self.unit();
-        let ends = |seat_axis: usize| match seat {
-            Some(seat) => unit.ends(&seat.each[seat_axis]),
-            None if unit == crate::cue::Unit::Fraction => (0.0, 1.0),
-            None => (0.0, f64::INFINITY),
+        let ends = |axis: usize| match (seat, self.unit(axis)) {
+            (Some(seat), unit) => unit.ends(&seat.each[axis - axes.start]),
+            (None, Unit::Fraction) => (0.0, 1.0),
+            (None, _) => (f64::NEG_INFINITY, f64::INFINITY),
         };
         let mut check = Check { timeline: self, faults: Collector::default(), held: Vec::new() };
         for (axis, seat) in axes.clone().enumerate().filter_map(|(index, axis)| Some((axis, (seat?, index))))
@@ -57,7 +56,7 @@ impl Timeline {
         }
         for row in 0..self.cue.rows() {
             for axis in axes.start..axes.end.min(self.axes()) {
-                let ends = ends(axis - axes.start);
+                let ends = ends(axis);
                 check.point(row, axis, ends);
                 if row + 1 < self.cue.rows() {
                     check.stretch(row, axis, ends);
@@ -78,7 +77,7 @@ struct Check<'a> {
 impl Check<'_> {
     /// The unit of an axis, which is axis `index` of the seat.
     fn unit(&mut self, axis: usize, (seat, index): (&SeatType, usize)) {
-        let (unit, geometry) = (self.timeline.unit(), &seat.each[index]);
+        let (unit, geometry) = (self.timeline.unit(axis), &seat.each[index]);
         if axis < self.timeline.axes() && !unit.suits(geometry) {
             let (seat, wanted) = (seat.name.clone(), geometry.unit.name());
             self.add(0, axis, Problem::OtherUnit { unit: unit.name(), seat, wanted });
@@ -88,7 +87,7 @@ impl Check<'_> {
     fn point(&mut self, row: usize, axis: usize, (low, high): (f64, f64)) {
         let value = self.timeline.cue.row(row)[axis];
         if !(low..=high).contains(&value) {
-            let unit = self.timeline.unit().suffix();
+            let unit = self.timeline.unit(axis).suffix();
             self.add(row, axis, Problem::OutsideStroke { value, low, high, unit });
         }
     }
@@ -106,7 +105,7 @@ impl Check<'_> {
         let at = self.timeline.time(row, u);
         // The end of a stroke of unknown length has nothing to take a part of: that is endless too.
         if over(value) > HELD_BACK * (high - low) {
-            let unit = self.timeline.unit().suffix();
+            let unit = self.timeline.unit(axis).suffix();
             self.add(row, axis, Problem::CurveOutsideStroke { value, at, low, high, unit });
         } else {
             self.hold(Held { axis, stretches: 1, over: over(value), at, line: self.timeline.cue.line(row) });

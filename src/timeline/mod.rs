@@ -72,8 +72,8 @@ impl Timeline {
 
     /// The unit of poses and amplitudes.
     #[must_use]
-    pub(crate) const fn unit(&self) -> Unit {
-        self.cue.unit()
+    pub(crate) const fn unit(&self, axis: usize) -> Unit {
+        self.cue.units().of(axis)
     }
 
     /// The time of the last row.
@@ -99,8 +99,11 @@ impl Timeline {
         } else {
             pose[..self.axes()].copy_from_slice(self.cue.row(row));
         }
-        if self.unit() == Unit::Fraction {
-            pose.iter_mut().for_each(|position| *position = position.clamp(0.0, 1.0));
+        let units = self.cue.units();
+        for (axis, position) in pose.iter_mut().enumerate() {
+            if units.of(axis) == Unit::Fraction {
+                *position = position.clamp(0.0, 1.0);
+            }
         }
         pose
     }

@@ -223,3 +223,37 @@ fn a_cue_in_millimetres_says_nothing_of_an_axis_that_is_measured_in_degrees() {
     assert!(!text.contains("a1"), "{text}");
     assert!(timeline(rows).fits_stroke(0..2, Some(&seat)).faults.is_none(), "fractions suit every axis");
 }
+
+#[test]
+fn a_cue_in_degrees_is_held_against_both_ends_of_the_range() {
+    let mut seat = SeatType::bench3(2);
+    let turns = &mut seat.each[1];
+    (turns.unit, turns.low, turns.high) = (AxisUnit::Degree, -180.0, 90.0);
+    let faults = |rows: &str| {
+        let text = format!("# units: mm, deg\n# interpolation: linear\ntime_s,a1,a2\n{rows}");
+        let fit = timeline(&text).fits_stroke(0..2, Some(&seat));
+        fit.faults.map_or_else(String::new, |faults| faults.to_string())
+    };
+    assert_eq!(faults("0,0,-180\n1,150,90\n"), "");
+    assert!(faults("0,0,-180.5\n1,0,0\n").ends_with("a2: -180.5 is outside the stroke, -180 to 90 deg"));
+    assert!(faults("0,0,0\n1,0,91\n").ends_with("a2: 91 is outside the stroke, -180 to 90 deg"));
+    assert!(faults("0,-1,0\n1,0,0\n").ends_with("a1: -1 is outside the stroke, 0 to 150 mm"));
+}
+
+#[test]
+fn degrees_become_fractions_of_the_range_and_pulses_about_its_zero() {
+    let mut seat = SeatType::bench3(1);
+    (seat.each[0].unit, seat.each[0].low, seat.each[0].high) = (AxisUnit::Degree, -180.0, 90.0);
+    (seat.each[0].lead, seat.each[0].pulses_per_rev) = (360.0, 36_000.0);
+    (seat.each[0].park, seat.each[0].neutral) = (2.0 / 3.0, 2.0 / 3.0);
+    let slot = timeline("# units: deg\ntime_s,a1\n0,0\n1,0\n").unit(0).slot(&seat, 0, Some(0));
+    for (degrees, fraction, pulses) in [(-180.0, 0.0, -18_000), (0.0, 2.0 / 3.0, 0), (45.0, 5.0 / 6.0, 4_500)]
+    {
+        assert_near(slot.place(degrees), fraction, 1e-12);
+        assert_eq!(slot.pulses(slot.place(degrees)).0, pulses, "{degrees} deg");
+    }
+    let half = slot.at_level(0.5);
+    assert_eq!(half.pulses(half.place(-90.0)).0, -4_500, "half the way from its neutral pose");
+    let (scale, shift) = half.scale();
+    assert_near(-90.0 * scale + shift, half.place(-90.0), 1e-12);
+}

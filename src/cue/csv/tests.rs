@@ -21,7 +21,7 @@ fn a_whole_cue_is_understood() {
                    time_s,a1,a2,v1_hz,v1_amp,fx_air,fx_water\n0,0,50,0,0,0,0\n0.5,100,,20,2.5,1,\n",
     );
     assert_eq!(
-        (cue.title(), cue.unit(), cue.interpolation()),
+        (cue.title(), cue.units().of(0), cue.interpolation()),
         (Some("Storm"), Unit::Fraction, Interpolation::Monotone)
     );
     assert_eq!((cue.axes(), cue.rows(), cue.duration()), (2, 2, ShowTime::from_millis(500)));
@@ -37,7 +37,7 @@ fn a_whole_cue_is_understood() {
 #[test]
 fn bom_crlf_blank_lines_quotes_and_spaces_are_accepted() {
     let cue = cue("\u{feff}# units: mm\r\n\r\n time_ms , a1 ,io\r\n0,\"0.5\" ,0x5\r\n\r\n\"10\", 1e1 ,7");
-    assert_eq!((cue.unit(), cue.positions()), (Unit::Millimetre, &[0.5, 10.0][..]));
+    assert_eq!((cue.units().of(0), cue.positions()), (Unit::Millimetre, &[0.5, 10.0][..]));
     assert_eq!((cue.line(0), cue.line(1)), (4, 6));
     let Effects::Words(words) = cue.effects() else { panic!("raw words") };
     assert_eq!(words.at(ShowTime::ZERO, &mut 0), 5);
@@ -90,8 +90,8 @@ fn positions_outside_the_stroke_are_refused_in_the_unit_of_the_file() {
         "3:3: a1: 100.5 is outside the stroke, 0 to 100 %"
     );
     assert_eq!(
-        faults("# units: mm\ntime_ms,a1\n0,-1\n1,0"),
-        "3:3: a1: -1 is outside 0 to 100000 mm; positions count from the stroke's lower end"
+        faults("# units: mm\ntime_ms,a1\n0,-200000\n1,0"),
+        "3:3: a1: -200000 is outside -100000 to 100000 mm, and no seat goes there"
     );
 }
 
@@ -149,7 +149,7 @@ fn declarations_that_are_not_known_are_refused_with_their_line() {
     assert_eq!(
         faults("# kinocue-csv: 2\n# units: cm\n#interpolation:bezier\n# units: mm\ntime_ms,a1\n0,0\n1,0"),
         "1:16: kinocue-csv: \"2\" is not known; this program reads version 1\n\
-         2:10: units: \"cm\" is not known; units are fraction, percent, u8, mm or pulse\n\
+         2:10: units: \"cm\" is not known; units are fraction, percent, u8, mm, deg or pulse\n\
          3:16: interpolation: \"bezier\" is not known; interpolations are spline, monotone, linear or hold\n\
          4:10: units: declared twice"
     );
@@ -206,4 +206,27 @@ proptest! {
         let text = format!("{header}\n{}", lines.join("\n"));
         let _ = read(Path::new("t.csv"), text.as_bytes());
     }
+}
+
+#[test]
+fn each_axis_may_have_a_unit_of_its_own_and_degrees_go_below_0() {
+    let rows = "time_s,a1,a2,v2_hz,v2_amp\n0,0,-180,20,0.5\n1,75,90,0,0\n";
+    let cue = read(Path::new("t.csv"), format!("# units: mm, deg\n{rows}").as_bytes()).unwrap();
+    assert_eq!((cue.units().of(0), cue.units().of(1)), (Unit::Millimetre, Unit::Degree));
+    assert_eq!((cue.positions(), cue.unit_words().as_str()), (&[0.0, -180.0, 75.0, 90.0][..], "mm, deg"));
+    let mut text = Vec::new();
+    super::super::csv_write::write(&cue, &mut text).unwrap();
+    let again = read(Path::new("t.csv"), &text[..]).unwrap();
+    assert_eq!((again.units(), again.positions()), (cue.units(), cue.positions()));
+}
+
+#[test]
+fn units_that_are_neither_one_nor_one_for_each_axis_are_refused_where_they_stand() {
+    let fault = |units: &str| {
+        let text = format!("# units: {units}\ntime_s,a1,a2,a3\n0,0,0,0\n1,0,0,0\n");
+        read(Path::new("t.csv"), text.as_bytes()).unwrap_err().to_string()
+    };
+    let text = fault("mm, deg");
+    assert!(text.starts_with("t.csv:1:10: units: ") && text.contains("or one for each of the 3"), "{text}");
+    assert!(fault("mm, inch, mm").contains("units are fraction, percent, u8, mm, deg or pulse"));
 }

@@ -13,7 +13,8 @@ use super::super::fault::{Collector, CueFaults, Place};
 use super::super::header::is_effect_name;
 use super::super::limits::{MAX_EFFECTS, MAX_LINE, MAX_MARKER_NAME, MAX_MARKERS, MAX_ROWS, MAX_TIME};
 use super::super::problem::Problem;
-use super::super::{Cue, DeclaredUnit, Effects, Marker, Origin, Steps, title_of, value};
+use super::super::unit::DeclaredUnits;
+use super::super::{Cue, Effects, Marker, Origin, Steps, title_of, value};
 use super::record::{self, ChannelRecord};
 use super::{METADATA, Topic, VERSION, message};
 use crate::channel::{ChannelId, Sample};
@@ -79,7 +80,7 @@ struct Reading {
     channels: HashMap<u16, Option<Topic>>,
     /// Messages so far and last log time, by topic.
     seen: HashMap<Topic, (u64, u64)>,
-    unit: Option<DeclaredUnit>,
+    units: Option<DeclaredUnits>,
     cue: Cue,
     samples: Vec<(At, ChannelId, message::TrackMessage)>,
     switched: u32,
@@ -92,7 +93,7 @@ impl Reading {
             schemas: HashSet::new(),
             channels: HashMap::new(),
             seen: HashMap::new(),
-            unit: None,
+            units: None,
             cue: Cue { origin: Origin::Messages, ..Cue::blank(path) },
             samples: Vec::new(),
             switched: 0,
@@ -167,11 +168,11 @@ impl Reading {
         if entry("version") != VERSION {
             refuse("version", entry("version"), format!("this program reads version {VERSION}"));
         }
-        let unit = entry("units").parse::<DeclaredUnit>();
+        let units = entry("units").parse::<DeclaredUnits>();
         let interpolation = entries.get("interpolation").copied().map(|text| (text, text.parse()));
-        match &unit {
+        match &units {
             Err(error) => refuse("units", entry("units"), error.to_string()),
-            Ok(unit) => self.cue.unit = unit.unit(),
+            Ok(units) => self.cue.units = units.units(),
         }
         match interpolation {
             Some((text, Err(error))) => {
@@ -180,10 +181,10 @@ impl Reading {
             Some((_, Ok(interpolation))) => self.cue.interpolation = interpolation,
             None => {}
         }
-        if self.unit.is_some() {
+        if self.units.is_some() {
             self.faults.add(Place::File, Some(METADATA), Problem::DeclaredTwice);
         }
-        self.unit = Some(unit.unwrap_or_default());
+        self.units = Some(units.unwrap_or_default());
         self.cue.title = entries.get("title").filter(|title| !title.is_empty()).map(|title| title_of(title));
     }
 
@@ -274,16 +275,18 @@ impl Reading {
 
     /// The cue, once every value is known to be right in its unit.
     fn finish(mut self) -> Result<Cue, CueFaults> {
-        let unit = self.unit.unwrap_or_default();
+        let units = self.units.unwrap_or_default();
         if self.faults.is_empty() {
-            if self.unit.is_none() {
+            if self.units.is_none() {
                 let problem = Problem::Foreign(format!("it has no metadata record {METADATA:?}"));
                 self.faults.add(Place::File, None, problem);
             } else if self.cue.rows() < 2 {
                 self.faults.add(Place::File, None, Problem::TooFewRows(self.cue.rows()));
+            } else if let Some(problem) = units.misfit(self.cue.axes) {
+                self.faults.add(Place::File, Some("units"), problem);
             } else {
-                self.check_positions(unit);
-                self.build_tracks(unit);
+                self.check_positions(&units);
+                self.build_tracks(&units);
             }
         }
         let Self { faults, cue, .. } = self;
@@ -293,10 +296,10 @@ impl Reading {
         }
     }
 
-    fn check_positions(&mut self, unit: DeclaredUnit) {
+    fn check_positions(&mut self, units: &DeclaredUnits) {
         let (axes, times) = (self.cue.axes, &self.cue.times);
         for (index, position) in self.cue.positions.iter_mut().enumerate() {
-            match value::position(*position, unit) {
+            match value::position(*position, units.of(index % axes)) {
                 Ok(value) => *position = value,
                 Err(problem) => {
                     let (row, axis) = (index / axes, index % axes);
@@ -308,9 +311,9 @@ impl Reading {
         }
     }
 
-    fn build_tracks(&mut self, unit: DeclaredUnit) {
+    fn build_tracks(&mut self, units: &DeclaredUnits) {
         for (at, id, parts) in std::mem::take(&mut self.samples) {
-            if let Err((name, problem)) = self.keep(at, id, parts, unit) {
+            if let Err((name, problem)) = self.keep(at, id, parts, units) {
                 self.faults.add(at.place(), name, problem);
             }
         }
@@ -321,7 +324,7 @@ impl Reading {
         at: At,
         id: ChannelId,
         message::TrackMessage { axis, sample }: message::TrackMessage,
-        unit: DeclaredUnit,
+        units: &DeclaredUnits,
     ) -> Result<(), (Option<&'static str>, Problem)> {
         let (channel, axes) = (id.row(), self.cue.axes);
         let track = axis.checked_sub(1).and_then(|axis| channel.tracks(axes).nth(axis));
@@ -329,7 +332,7 @@ impl Reading {
         let mut kept = Sample::default();
         let mut wrong = None;
         for (part, known) in channel.parts.iter().enumerate() {
-            match value::part(sample.0[part], track, part, unit) {
+            match value::part(sample.0[part], track, part, units.of(track.axis)) {
                 Ok(value) => kept.0[part] = value,
                 Err(problem) => {
                     if let Some((name, before)) = wrong.replace((Some(known.name), problem)) {

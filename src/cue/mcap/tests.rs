@@ -79,7 +79,7 @@ fn faults_behind_rows(messages: &[(&str, u64, &str)]) -> String {
 fn csv_to_mcap_to_csv_keeps_every_value() {
     let first = csv(CUE);
     let second = load(&mcap_of(&first)).unwrap();
-    assert_eq!((second.title(), second.unit()), (Some("Störm"), Unit::Millimetre));
+    assert_eq!((second.title(), second.units().of(0)), (Some("Störm"), Unit::Millimetre));
     assert_eq!(second.interpolation(), Interpolation::Monotone);
     assert_eq!((second.times(), second.positions()), (first.times(), first.positions()));
     assert_eq!((second.tracks(), second.effects()), (first.tracks(), first.effects()));
@@ -102,7 +102,7 @@ fn metadata_may_stand_behind_the_messages() {
             ("/cue/axes", 10, r#"{ "a" : [1e2, 0] }"#),
         ];
         let cue = load(&file_packed(compression, &metadata, &messages)).unwrap();
-        assert_eq!((cue.unit(), cue.positions()), (Unit::Fraction, &[0.0, 0.5, 1.0, 0.0][..]));
+        assert_eq!((cue.units().of(0), cue.positions()), (Unit::Fraction, &[0.0, 0.5, 1.0, 0.0][..]));
         assert_eq!((cue.markers().len(), cue.markers()[0].at), (1, ShowTime::from_nanos(5)));
         let cue::Effects::Named { names, steps } = cue.effects() else { panic!("named effects") };
         assert_eq!((names.join(" "), steps.at(cue.duration(), &mut 0)), ("wind air".to_owned(), 0b11));
@@ -204,7 +204,7 @@ fn foreign_files_are_refused() {
     assert_eq!(
         faults(&file(&[("version", "2"), ("interpolation", "sine")], &ROWS)),
         "version: \"2\" is not known; this program reads version 1\n\
-         units: \"\" is not known; units are fraction, percent, u8, mm or pulse\n\
+         units: \"\" is not known; units are fraction, percent, u8, mm, deg or pulse\n\
          interpolation: \"sine\" is not known; interpolations are spline, monotone, linear or hold"
     );
     assert!(

@@ -57,10 +57,11 @@ impl<W: Write + Seek> Messages<W> {
             .chunk_size(Some(CHUNK))
             .create(out)?;
         // Before the messages, so that a file that is cut short still says what its numbers are.
+        let units = cue.unit_words();
         let entries = [
             ("version", VERSION),
             ("title", cue.title().unwrap_or("")),
-            ("units", cue.unit().name()),
+            ("units", &units),
             ("interpolation", cue.interpolation().name()),
         ];
         let metadata = entries.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
