@@ -1,6 +1,7 @@
 //! `kinocue sync`: timecode for technicians and tests.
 
-use super::{Exit, Failure};
+use super::{Exit, Failure, OrExit as _};
+use crate::film::source::{FilmArgs, FilmSource};
 
 mod calibrate;
 mod check;
@@ -33,6 +34,24 @@ enum Command {
     Watch(watch::Args),
     Relay(relay::Args),
     Calibrate(calibrate::Args),
+}
+
+/// How a film is labelled.
+#[derive(Debug, clap::Args)]
+struct LabelArgs {
+    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
+    #[arg(long, value_name = "N")]
+    film_fps: Option<String>,
+    /// The timecode at which the cue, or the reel, begins, HH:MM:SS:FF [default: 00:00:00:00].
+    #[arg(long, value_name = "TIMECODE")]
+    tc_start: Option<String>,
+}
+
+impl LabelArgs {
+    /// A source whose film is labelled so.
+    fn of(&self, source: &FilmSource) -> Result<FilmArgs, Failure> {
+        FilmArgs::new(source.clone(), self.film_fps.as_deref(), self.tc_start.as_deref()).or_exit(Exit::Usage)
+    }
 }
 
 pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {

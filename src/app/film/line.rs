@@ -20,12 +20,12 @@ pub(super) trait LineTaker {
 }
 
 /// A line, and who takes what comes on it: another one each time that it is opened.
-pub(super) struct Line {
+pub(super) struct ByteLine {
     pub(super) told: WordSink,
     open: Box<dyn Fn() -> Box<dyn LineTaker> + Send>,
 }
 
-impl Line {
+impl ByteLine {
     pub(super) fn new<T: LineTaker + 'static>(told: WordSink, open: impl Fn() -> T + Send + 'static) -> Self {
         Self { told, open: Box::new(move || Box::new(open())) }
     }

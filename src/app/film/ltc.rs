@@ -12,7 +12,7 @@ use std::os::fd::AsFd as _;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::line::{Line, LineTaker};
+use super::line::{ByteLine, LineTaker};
 use super::riff::SampleStream;
 use super::{ChildSlot, FilmError, WordSink, start};
 use crate::film::ltc::LtcReader;
@@ -38,11 +38,11 @@ pub(super) fn start_reading(
         reader: None,
         paced: paced.then(|| (Monotonic.now(), 0)),
     };
-    start_line(input, Line::new(told, open), child)
+    start_line(input, ByteLine::new(told, open), child)
 }
 
 /// Begins to read an input.
-pub(super) fn start_line(input: &LtcInput, line: Line, child: &ChildSlot) -> Result<(), FilmError> {
+pub(super) fn start_line(input: &LtcInput, line: ByteLine, child: &ChildSlot) -> Result<(), FilmError> {
     let failed = |path: &Path| {
         let what = path.display().to_string();
         move |source| FilmError::Open { what, source }
@@ -82,7 +82,7 @@ pub(super) fn start_line(input: &LtcInput, line: Line, child: &ChildSlot) -> Res
 
 /// Reads what a command writes. One that fails, as a sound card does that is pulled out, is started anew; one that ends well has
 /// nothing more to say.
-fn run(mut command: Command, name: &str, line: Line, child: &ChildSlot) -> Result<(), FilmError> {
+fn run(mut command: Command, name: &str, line: ByteLine, child: &ChildSlot) -> Result<(), FilmError> {
     // In a group of its own: a shell is ended with all that it has started.
     command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
     let failed = |source| FilmError::Command { command: name.to_owned(), source };
@@ -129,7 +129,7 @@ fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
 }
 
 /// Nothing more can come: whoever wrote is gone for good, and the film over.
-fn end(line: &Line, _read: &io::Result<()>) {
+fn end(line: &ByteLine, _read: &io::Result<()>) {
     line.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
 }
 

@@ -4,7 +4,7 @@ use std::io;
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::Path;
 
-use super::line::{Line, LineTaker};
+use super::line::{ByteLine, LineTaker};
 use super::{FilmError, WordSink, start};
 use crate::film::mtc::MtcReader;
 use crate::film::source::{FilmArgs, LineKind, MtcInput};
@@ -14,11 +14,11 @@ use crate::time::MonoTime;
 pub(super) fn start_reading(input: &MtcInput, args: &FilmArgs, told: WordSink) -> Result<(), FilmError> {
     let (args, sink) = (args.clone(), told.clone());
     let open = move || MtcTaker { told: sink.clone(), reader: MtcReader::new(args.rate, args.start) };
-    start_line(input, Line::new(told, open))
+    start_line(input, ByteLine::new(told, open))
 }
 
 /// Begins to read a line of MIDI; a device that is pulled out may come back, a FIFO have another writer.
-pub(super) fn start_line(input: &MtcInput, line: Line) -> Result<(), FilmError> {
+pub(super) fn start_line(input: &MtcInput, line: ByteLine) -> Result<(), FilmError> {
     match input.clone() {
         MtcInput::Relay(socket) => {
             start("mtc", move || while line.told.again(line.read_relayed(&socket, LineKind::Mtc)) {})?;

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::line::{Line, LineTaker};
+use super::line::{ByteLine, LineTaker};
 use super::relayed::{greeting, record};
 use super::{ChildSlot, FilmError, WordSink, ltc, mtc, start};
 use crate::film::source::{FilmSource, LineKind, LtcInput, MtcInput};
@@ -56,7 +56,7 @@ impl Listeners {
         child: ChildSlot,
     ) -> Result<(), FilmError> {
         let listeners = self.clone();
-        let line = Line::new(told, move || listeners.begin());
+        let line = ByteLine::new(told, move || listeners.begin());
         match source {
             FilmSource::Ltc(input) => ltc::start_line(input, line, &child),
             FilmSource::Mtc(input) => mtc::start_line(input, line),

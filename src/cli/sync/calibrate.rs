@@ -2,6 +2,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use super::LabelArgs;
 use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::film::follower::PaceLimits;
@@ -22,12 +23,8 @@ pub(in crate::cli) struct Args {
     /// What knows where the same film is, as mpv does that plays the reel.
     #[arg(long, value_name = "SOURCE")]
     against: FilmSource,
-    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
-    #[arg(long, value_name = "N")]
-    film_fps: Option<String>,
-    /// The first label of the reel, HH:MM:SS:FF [default: 00:00:00:00].
-    #[arg(long, value_name = "TIMECODE")]
-    tc_start: Option<String>,
+    #[command(flatten)]
+    labels: LabelArgs,
     /// How long it measures.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3_600))]
     seconds: u32,
@@ -63,10 +60,10 @@ impl Lateness {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let of = |source: &FilmSource| {
-        // The other one tells the reel's own time, from its first label on.
-        let start = args.tc_start.as_deref().filter(|_| !matches!(source, FilmSource::Mpv(_)));
-        FilmArgs::new(source.clone(), args.film_fps.as_deref(), start).or_exit(Exit::Usage)
+    let of = |source: &FilmSource| match source {
+        // It tells the reel's own time, from its first label on.
+        FilmSource::Mpv(_) => Ok(FilmArgs::of(source.clone())),
+        _ => args.labels.of(source),
     };
     let sources = [of(&args.source)?, of(&args.against)?];
     let rules = SourceRules { allows_coarse: true, band: PaceLimits::default().band };

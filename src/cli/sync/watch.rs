@@ -2,10 +2,11 @@ use std::fmt::Write as _;
 use std::io::{self, IsTerminal as _};
 use std::time::Duration;
 
+use super::LabelArgs;
 use crate::app::film::{FilmReader, FilmTable, SourceRow, SourceRules};
 use crate::cli::{Exit, Failure, OrExit as _, print};
 use crate::film::follower::PaceLimits;
-use crate::film::source::{FilmArgs, FilmSource};
+use crate::film::source::FilmSource;
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, ShowTime};
 
@@ -15,12 +16,8 @@ pub(in crate::cli) struct Args {
     /// The sources in their ranking, as `play --chase` takes them.
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<FilmSource>,
-    /// Frames of the film a second: 23.976, 24, 25, 29.97 or 30 [default: as is heard].
-    #[arg(long, value_name = "N")]
-    film_fps: Option<String>,
-    /// The film's timecode at which the cue would begin, HH:MM:SS:FF [default: 00:00:00:00].
-    #[arg(long, value_name = "TIMECODE")]
-    tc_start: Option<String>,
+    #[command(flatten)]
+    labels: LabelArgs,
     /// Let coarse sources lead as well.
     #[arg(long)]
     allow_coarse: bool,
@@ -36,11 +33,7 @@ pub(in crate::cli) struct Args {
 const EVERY: Duration = Duration::from_millis(500);
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
-    let of = |source: &FilmSource| {
-        FilmArgs::new(source.clone(), args.film_fps.as_deref(), args.tc_start.as_deref())
-    };
-    let sources: Vec<FilmArgs> =
-        args.sources.iter().map(of).collect::<Result<_, _>>().or_exit(Exit::Usage)?;
+    let sources = args.sources.iter().map(|source| args.labels.of(source)).collect::<Result<Vec<_>, _>>()?;
     let rules = SourceRules { allows_coarse: args.allow_coarse, band: PaceLimits::default().band };
     let reader = FilmReader::start(&sources, rules).or_exit(Exit::System)?;
     let (table, draws) = (reader.table(), io::stdout().is_terminal() && !args.json);
