@@ -173,6 +173,8 @@ pub struct FilmStatus {
     pub(crate) disagrees: Option<FilmDisagreement>,
     /// The source that a person chose; null while the ranking decides.
     pub(crate) chosen: Option<String>,
+    /// How often another source took over.
+    pub(crate) switches: u64,
     /// All sources, in their ranking.
     pub(crate) sources: Vec<FilmSourceStatus>,
 }
@@ -199,6 +201,8 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) cause: String,
     /// Where the film is in the cue by this source, s.
     pub(crate) position_s: Option<f64>,
+    /// The label of the frame that it is at, if it has labels.
+    pub(crate) timecode: Option<String>,
     /// How much faster than the clock it runs, millionths.
     pub(crate) rate_ppm: Option<f64>,
     /// Deviation of where it is, ms.
