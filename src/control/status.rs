@@ -253,6 +253,8 @@ pub(crate) struct EntryStatus {
     pub(crate) level: Option<f64>,
     /// Its trim, ms; null if the hall's stays.
     pub(crate) trim_ms: Option<i32>,
+    /// The film that the player shows for it, as the playlist names it; null if it names none.
+    pub(crate) movie: Option<String>,
     /// What follows its end: `hold` (a person goes on) or `go`.
     pub(crate) then: Then,
     /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.
