@@ -6,7 +6,7 @@ use assert_cmd::Command;
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use kinocue::harness::control::model::{Ending, FrameCounts, Percentiles};
-use kinocue::harness::journal::{Action, Journal, Limits, Outcome, ShowRecord};
+use kinocue::harness::journal::{Action, FilmProof, Journal, Limits, Outcome, ShowRecord};
 use serde_json::Value;
 
 const LIMITS: Limits = Limits { max_size: 1 << 20, max_total: 1 << 24, max_age_days: 400 };
@@ -53,6 +53,11 @@ fn show(start: &str, cue: &str, title: &str, end: Option<(&str, Ending)>) -> Sho
             send_failed: 0,
             lateness: percentiles,
             ack: percentiles,
+            film: (cue == "ride").then(|| FilmProof {
+                sources: vec!["ltc:alsa:hw:2,0".to_owned(), "artnet:10.0.0.20".to_owned()],
+                switches: 1,
+                greatest_error_ms: Some(1.254),
+            }),
         }),
     }
 }
@@ -93,6 +98,8 @@ fn a_day_is_a_table_with_a_line_for_all_together() {
         assert!(run.stdout.contains(part), "{part}: {}", run.stdout);
     }
     assert!(run.stdout.contains("ride: A2 was lost at 00:12.000"), "{}", run.stdout);
+    let film = "ride: followed the film by ltc:alsa:hw:2,0, artnet:10.0.0.20, at the most 1.25 ms from it, sources changed 1 times\n";
+    assert!(run.stdout.contains(film) && !run.stdout.contains("storm: followed"), "{}", run.stdout);
     let totals = "3 shows on 2026-11-21: 1 completed, 1 stopped, 1 interrupted; 00:10:30 in all; 8000 frames sent, 7998 \
                   acked, 0 refused, 2 lost";
     assert_eq!(run.stdout.lines().last(), Some(totals));
@@ -138,6 +145,10 @@ fn csv_reads_back_whatever_a_title_holds() {
         (cell(1, "result"), cell(2, "result"), cell(2, "end")),
         ("stopped".into(), "interrupted".into(), String::new())
     );
+    let film =
+        |row: usize| ["film_sources", "film_switches", "film_error_max_ms"].map(|name| cell(row, name));
+    assert_eq!(film(0), ["", "", ""]);
+    assert_eq!(film(1), ["ltc:alsa:hw:2,0 artnet:10.0.0.20", "1", "1.254"]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
-//! `kinocue sync`: timecode for technicians and tests.
+//! `kinocue sync`: the film that a running hall follows; and timecode for technicians and tests.
 
+use super::client::{ServerArgs, UseArgs, choose_film_source, show_film};
 use super::{Exit, Failure, OrExit as _};
 use crate::film::source::{FilmArgs, FilmSource};
 
@@ -11,6 +12,10 @@ mod watch;
 
 const EXAMPLES: &str = "\
 Examples:
+  kinocue sync
+  kinocue sync --json | jq .error_ms
+  kinocue sync use artnet
+  kinocue sync use auto
   kinocue sync send --ltc --film-fps 25 --tc-start 01:00:00:00 --seconds 60 -o reel.wav
   kinocue sync check reel.wav
   kinocue sync send --artnet 10.0.0.255 --film-fps 24
@@ -19,16 +24,22 @@ Examples:
   kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock
   kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
 
-/// Makes timecode, and says what is heard of it, or is in a recording.
+/// Shows the film that a running hall follows; makes timecode, and says what is heard of it, or is in a recording.
+///
+/// Without a command it is the film of the running service: which source says what, how good it is, which one leads, and how far
+/// from the film the seats are. On a terminal it is shown until Ctrl-C, elsewhere once.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub(super) struct Args {
+    #[command(flatten)]
+    server: ServerArgs,
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Use(UseArgs),
     Send(send::Args),
     Check(check::Args),
     Watch(watch::Args),
@@ -54,12 +65,14 @@ impl LabelArgs {
     }
 }
 
-pub(super) fn run(Args { command }: &Args) -> Result<Exit, Failure> {
+pub(super) fn run(Args { server, command }: &Args) -> Result<Exit, Failure> {
     match command {
-        Command::Send(args) => send::run(args),
-        Command::Check(args) => check::run(args),
-        Command::Watch(args) => watch::run(args),
-        Command::Relay(args) => relay::run(args),
-        Command::Calibrate(args) => calibrate::run(args),
+        None => show_film(server),
+        Some(Command::Use(args)) => choose_film_source(args),
+        Some(Command::Send(args)) => send::run(args),
+        Some(Command::Check(args)) => check::run(args),
+        Some(Command::Watch(args)) => watch::run(args),
+        Some(Command::Relay(args)) => relay::run(args),
+        Some(Command::Calibrate(args)) => calibrate::run(args),
     }
 }

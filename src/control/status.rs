@@ -173,6 +173,8 @@ pub struct FilmStatus {
     pub(crate) disagrees: Option<FilmDisagreement>,
     /// The source that a person chose; null while the ranking decides.
     pub(crate) chosen: Option<String>,
+    /// How often another source took over.
+    pub(crate) switches: u64,
     /// All sources, in their ranking.
     pub(crate) sources: Vec<FilmSourceStatus>,
 }
@@ -199,6 +201,8 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) cause: String,
     /// Where the film is in the cue by this source, s.
     pub(crate) position_s: Option<f64>,
+    /// The label of the frame that it is at, if it has labels.
+    pub(crate) timecode: Option<String>,
     /// How much faster than the clock it runs, millionths.
     pub(crate) rate_ppm: Option<f64>,
     /// Deviation of where it is, ms.
@@ -249,6 +253,8 @@ pub(crate) struct EntryStatus {
     pub(crate) level: Option<f64>,
     /// Its trim, ms; null if the hall's stays.
     pub(crate) trim_ms: Option<i32>,
+    /// The film that the player shows for it, as the playlist names it; null if it names none.
+    pub(crate) movie: Option<String>,
     /// What follows its end: `hold` (a person goes on) or `go`.
     pub(crate) then: Then,
     /// The time of day at which it starts, HH:MM or HH:MM:SS; null if a person starts it.

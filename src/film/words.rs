@@ -50,9 +50,10 @@ impl FilmState {
         }
     }
 
-    /// What a person does next about the film.
-    pub(crate) const fn next(self) -> &'static str {
+    /// What a person does next about the film; that depends on whether seats follow it.
+    pub(crate) const fn next(self, is_followed: bool) -> &'static str {
         match self {
+            Self::FreeRunning | Self::Locked if is_followed => "nothing; the seats follow it",
             Self::FreeRunning | Self::Locked => "nothing; seats follow it once a person has let the show go",
             Self::Freewheeling | Self::Acquiring | Self::Jumped => "wait a moment",
             Self::Absent | Self::Lost => "start the film; see that its source is connected",

@@ -51,7 +51,7 @@ pub mod health {
     pub use crate::health::{Groups, HealthTable, Notice};
 }
 pub mod journal {
-    pub use crate::journal::{Action, Journal, Limits, Outcome, ShowRecord};
+    pub use crate::journal::{Action, FilmProof, Journal, Limits, Outcome, ShowRecord};
 }
 pub mod latency {
     pub use crate::latency::{Percentiles, read};

@@ -24,7 +24,7 @@ mod tests;
 mod writer;
 
 pub(crate) use fold::Folds;
-pub use record::{Action, Outcome, ShowRecord};
+pub use record::{Action, FilmProof, Outcome, ShowRecord};
 pub(crate) use record::{PlaylistPlace, stamp};
 pub(crate) use report::{JournalError, Most, Report, Shown, Totals, report};
 

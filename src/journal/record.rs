@@ -134,6 +134,20 @@ pub struct Outcome {
     pub lateness: Percentiles,
     /// How long acks took.
     pub ack: Percentiles,
+    /// The film that led it; null where the show was its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub film: Option<FilmProof>,
+}
+
+/// By which clock the seats followed a film, and how well.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct FilmProof {
+    /// The sources that led, in the order in which they first did.
+    pub sources: Vec<String>,
+    /// How often the film was led by another source than before.
+    pub switches: u64,
+    /// The farthest that the seats were from the film while they followed it, less the trim, ms; null if they never did.
+    pub greatest_error_ms: Option<f64>,
 }
 
 /// One line of a file.

@@ -66,6 +66,11 @@ fn outcome(end: &str, result: Ending) -> Outcome {
         send_failed: 0,
         lateness: Percentiles { p50_us: Some(3.0), p99_us: Some(9.5), p999_us: None, max_us: Some(60.0) },
         ack: Percentiles::default(),
+        film: Some(FilmProof {
+            sources: vec!["artnet:10.0.0.20".to_owned()],
+            switches: 0,
+            greatest_error_ms: Some(1.25),
+        }),
     }
 }
 

@@ -12,6 +12,7 @@ use prometheus_client::registry::Registry;
 use crate::control::{self, Status};
 
 mod controllers;
+mod film;
 mod shows;
 #[cfg(test)]
 mod tests;
@@ -35,6 +36,7 @@ pub(crate) fn render(status: &Status) -> String {
 fn families(status: &Status) -> Vec<Family> {
     let mut families = shows::families(status);
     families.extend(controllers::families(&status.controllers));
+    families.extend(status.film.iter().flat_map(film::families));
     families
 }
 

@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use super::*;
 use crate::control::model::FrameCounts;
 use crate::control::{
-    ControllerStatus, Health, Histogram, Levels, Percentiles, PreflightStatus, RealTimeStatus, Severity,
-    ShowStatus, Times, Warning,
+    ControllerStatus, FilmDisagreement, FilmSourceStatus, FilmStatus, Health, Histogram, Levels, Percentiles,
+    PreflightStatus, RealTimeStatus, Severity, ShowStatus, Times, Warning,
 };
 use crate::state::{PlayMode, State};
 
@@ -48,6 +48,35 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
     }
 }
 
+/// A film whose first source is silent.
+fn film() -> FilmStatus {
+    let silent = FilmSourceStatus {
+        source: "ltc:alsa:hw:2,0".to_owned(),
+        state: "lost".to_owned(),
+        dropouts: 3,
+        level_dbfs: Some(-60.0),
+        ..FilmSourceStatus::default()
+    };
+    let leading = FilmSourceStatus {
+        source: "artnet:10.0.0.20".to_owned(),
+        state: "locked".to_owned(),
+        rate_ppm: Some(12.5),
+        sigma_ms: Some(0.25),
+        jumps: 1,
+        ..FilmSourceStatus::default()
+    };
+    FilmStatus {
+        state: "locked".to_owned(),
+        leads: true,
+        source: Some(leading.source.clone()),
+        error_ms: Some(-0.5),
+        disagrees: Some(FilmDisagreement { source: silent.source.clone(), ahead_s: 3.25 }),
+        switches: 2,
+        sources: vec![silent, leading],
+        ..FilmStatus::default()
+    }
+}
+
 /// A hall in the middle of a show.
 fn playing() -> Status {
     let warning = |controller: &str| Warning {
@@ -71,7 +100,7 @@ fn playing() -> Status {
         since_s: 5.0,
         lapses_s: None,
         moving: true,
-        film: None,
+        film: Some(film()),
         show: Some(ShowStatus {
             cue: "storm".to_owned(),
             title: None,
@@ -115,6 +144,7 @@ fn booting() -> Status {
     Status {
         state: State::Boot.into(),
         moving: false,
+        film: None,
         show: None,
         lateness: Times::default(),
         ack_latency: Times::default(),
@@ -189,6 +219,33 @@ fn figures_are_in_base_units() {
     ] {
         assert_eq!(page.samples.get(series), Some(&value), "{series}");
     }
+}
+
+#[test]
+fn a_film_is_told_by_each_of_its_sources_and_not_at_all_where_none_is_followed() {
+    let page = page(&playing());
+    for (series, value) in [
+        ("kinocue_sync_state{state=\"locked\"}", 1.0),
+        ("kinocue_sync_follows", 1.0),
+        ("kinocue_sync_error_seconds", -0.000_5),
+        ("kinocue_sync_disagreement_seconds", 3.25),
+        ("kinocue_sync_switches_total", 2.0),
+        ("kinocue_sync_leads{source=\"ltc:alsa:hw:2,0\"}", 0.0),
+        ("kinocue_sync_leads{source=\"artnet:10.0.0.20\"}", 1.0),
+        ("kinocue_sync_chosen{source=\"artnet:10.0.0.20\"}", 0.0),
+        ("kinocue_sync_source_state{source=\"ltc:alsa:hw:2,0\",state=\"lost\"}", 1.0),
+        ("kinocue_sync_rate_ppm{source=\"artnet:10.0.0.20\"}", 12.5),
+        ("kinocue_sync_sigma_seconds{source=\"artnet:10.0.0.20\"}", 0.000_25),
+        ("kinocue_sync_level_dbfs{source=\"ltc:alsa:hw:2,0\"}", -60.0),
+        ("kinocue_sync_dropouts_total{source=\"ltc:alsa:hw:2,0\"}", 3.0),
+        ("kinocue_sync_jumps_total{source=\"artnet:10.0.0.20\"}", 1.0),
+    ] {
+        assert_eq!(page.samples.get(series), Some(&value), "{series}");
+    }
+    let silent = "kinocue_sync_rate_ppm{source=\"ltc:alsa:hw:2,0\"}";
+    assert_eq!(page.samples.get(silent), None, "nobody knows it");
+    let without = self::page(&booting());
+    assert!(!without.samples.keys().any(|series| series.starts_with("kinocue_sync_")));
 }
 
 #[test]

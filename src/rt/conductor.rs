@@ -157,7 +157,8 @@ impl Conductor {
         let (event, target) = film.tick(tick, engine.playhead().frame_time(), trim_ms, rides);
         // The pose that was sent a tick ago is reached now.
         let reached = engine.playhead().reached();
-        let follows = self.machine.state() == State::Playing(PlayMode::Following);
+        // At the tick that loses the film the point falls back to its last sample: that is no error of the seats.
+        let follows = self.machine.state() == State::Playing(PlayMode::Following) && film.leads();
         self.film_error_ns = film.error_ns(reached, tick.deadline, trim_ms).filter(|_| follows);
         if rides {
             self.machine.event(event, now);

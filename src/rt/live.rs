@@ -69,6 +69,8 @@ pub struct Live {
     show_ns: AtomicI64,
     /// Twice how far ahead of the film the seats are, and 1; 0 while they follow none.
     film_error_ns: AtomicI64,
+    /// The greatest amount of that since somebody asked, and 1; 0 if they followed none.
+    film_error_most: AtomicU64,
     ticks: AtomicU64,
     missed: AtomicU64,
     beats: AtomicU64,
@@ -190,6 +192,12 @@ impl Live {
         (twice != 0).then(|| ShowTime::from_nanos(twice >> 1).as_secs_f64())
     }
 
+    /// The farthest that the seats were from the film while they followed it, since this was asked last, seconds.
+    pub(crate) fn take_film_error_most_s(&self) -> Option<f64> {
+        let ns = self.film_error_most.swap(0, Ordering::Relaxed).checked_sub(1)?;
+        Some(Duration::from_nanos(ns).as_secs_f64())
+    }
+
     /// Ticks that sent so far.
     #[must_use]
     pub(crate) fn ticks(&self) -> u64 {
@@ -282,6 +290,9 @@ impl Live {
     /// Notes how far ahead of the film the seats are.
     pub(super) fn on_film_error(&self, ns: Option<i64>) {
         self.film_error_ns.store(ns.map_or(0, |ns| ns << 1 | 1), Ordering::Relaxed);
+        if let Some(ns) = ns {
+            self.film_error_most.fetch_max(ns.unsigned_abs().saturating_add(1), Ordering::Relaxed);
+        }
     }
 
     /// Notes where the film is.

@@ -96,6 +96,61 @@ fn each_command_is_one_request_in_the_words_of_the_api() {
     }
 }
 
+/// The film of a hall with two sources.
+fn film() -> Value {
+    json!({
+        "state": "locked", "cause": "the film runs", "next": "nothing", "leads": true, "source": "artnet:10.0.0.20",
+        "position_s": 5.48, "error_ms": 0.126, "timecode": "01:00:05:12",
+        "sources": [
+            {"source": "artnet:10.0.0.20", "state": "locked", "cause": "the film runs", "timecode": "01:00:05:12",
+                "rate_ppm": 12.0, "sigma_ms": 0.03},
+            {"source": "mtc:/dev/snd/midiC1D0", "state": "absent", "cause": "nothing has been heard of the film yet"},
+        ],
+    })
+}
+
+#[test]
+fn the_film_of_the_hall_is_shown_once_where_nobody_looks_at_a_terminal() {
+    let daemon = Daemon::with(film());
+    let run = daemon.run(&["sync"]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert_eq!((daemon.request().path.as_str(), daemon.is_done()), ("/api/v1/sync", true));
+    for part in [
+        "film locked by artnet:10.0.0.20",
+        "error +0.13 ms",
+        "> artnet:10.0.0.20 locked 01:00:05:12 +12 0.03",
+    ] {
+        assert!(squeezed(&run.stdout).contains(part), "{part}\n{}", run.stdout);
+    }
+    let json = Daemon::with(film()).run(&["sync", "--json"]);
+    assert_eq!(serde_json::from_str::<Value>(&json.stdout).expect("the film"), film());
+    let none = Daemon::refusing(404, "unknown").run(&["sync"]);
+    assert_eq!((none.code, none.stdout.as_str()), (Some(66), ""), "a hall that follows no film says so");
+}
+
+#[test]
+fn a_source_of_the_film_is_chosen_by_its_name_or_kind_or_left_to_the_ranking() {
+    for (wanted, source) in [
+        ("artnet:10.0.0.20", json!("artnet:10.0.0.20")),
+        ("mtc", json!("mtc:/dev/snd/midiC1D0")),
+        ("ltc", json!("ltc")),
+        ("auto", Value::Null),
+    ] {
+        let daemon = Daemon::start(|_, request| {
+            Answer::Reply(200, if request.method == "GET" { film() } else { hall("armed") })
+        });
+        let run = daemon.run(&["sync", "use", wanted]);
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let mut request = daemon.request();
+        if request.method == "GET" {
+            request = daemon.request();
+        }
+        assert_eq!((request.method.as_str(), request.path.as_str()), ("PUT", "/api/v1/sync/source"));
+        assert_eq!(request.json(), json!({ "source": source }), "{wanted}");
+        told(&run, "kinocue: armed");
+    }
+}
+
 #[test]
 fn all_effects_are_those_that_the_hall_has() {
     let daemon = Daemon::with(hall("armed"));

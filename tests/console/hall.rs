@@ -7,7 +7,7 @@ use std::net::SocketAddr;
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 
-use crate::process::Sim;
+use crate::process::{Guarded, Sim};
 use crate::serving::{self, Serving};
 
 /// What lets the page in; an engineer's, who alone may arm over TCP.
@@ -31,10 +31,25 @@ impl Hall {
 
     /// The same, with that role for whoever comes without a token.
     pub(crate) fn open_to(role: &str) -> Self {
+        Self::open_with(role, "")
+    }
+
+    /// The same, that follows a film by Art-Net timecode or by a device that is not there.
+    pub(crate) fn open_to_a_film() -> Self {
+        let (from, bind) = timecode();
+        let sync = format!(
+            "[sync]\nsources = [\"artnet\", \"mtc\"]\nfilm_fps = \"25\"\nstart = \"01:00:00:00\"\n\
+             [sync.artnet]\nfrom = \"{from}\"\nbind = \"{bind}\"\n[sync.mtc]\ndevice = \"/nowhere/midi\"\n\n"
+        );
+        Self::open_with("none", &sync)
+    }
+
+    fn open_with(role: &str, sync: &str) -> Self {
         let dir = tempfile::tempdir().expect("a folder");
         let sims: Vec<Sim> = (0..2).map(|_| Sim::start(SEATS, &["--safe"])).collect();
         let mut config = serving::hall(dir.path());
         write_api(&mut config, role);
+        config.push_str(sync);
         for (row, sim) in ["A", "B"].iter().zip(&sims) {
             serving::write_row(&mut config, row, &sim.addresses);
         }
@@ -72,6 +87,20 @@ impl Hall {
     pub(crate) fn pull(&mut self, row: usize) {
         self.sims[row] = None;
     }
+}
+
+/// Who sends timecode, and where it is heard: addresses of this machine that no other run of the tests has.
+fn timecode() -> (String, String) {
+    let [_, _, high, low] = std::process::id().to_be_bytes();
+    let place = |net: u8| format!("127.{net}.{high}.{}", low.max(1));
+    (place(60), format!("{}:6454", place(61)))
+}
+
+/// A film that runs from that label on, until it is dropped.
+pub(crate) fn film(start: &str) -> Guarded {
+    let (from, to) = timecode();
+    let args = ["sync", "send", "--seconds", "600", "--artnet", &to, "--from", &from, "--tc-start", start];
+    Guarded::start(&args)
 }
 
 /// Where it serves HTTP, once it does.

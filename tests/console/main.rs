@@ -19,7 +19,7 @@ use std::time::Duration;
 use serde_json::json;
 
 use browser::{Browser, ESCAPE};
-use hall::{Hall, TOKEN};
+use hall::{Hall, TOKEN, film};
 
 /// Landscape and portrait tablets, and a screen of the booth.
 const SIZES: [(u32, u32); 3] = [(1280, 800), (1024, 768), (768, 1024)];
@@ -64,6 +64,12 @@ fn a_show_is_armed_played_paused_turned_down_and_stopped_from_the_page() {
     let hall = Hall::open();
     enter(&browser, &hall);
     browser.shot("01-parked");
+    assert_eq!(
+        browser
+            .eval("return ['follow-panel', 'follow-badge'].map((id) => document.getElementById(id).hidden)"),
+        json!([true, true]),
+        "this hall follows no film"
+    );
     assert_eq!(browser.eval("return document.getElementById('go').disabled"), json!(true), "behind ARM");
 
     browser.press("#arm");
@@ -215,6 +221,57 @@ fn a_cue_is_taken_in_from_the_page_or_refused_with_every_fault() {
     browser.reads("playlist-reply", "done");
     browser.wait("document.getElementById('cues').value === 'bench-ride'");
     browser.wait("document.getElementById('upload-faults').children.length === 0");
+}
+
+#[test]
+fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_presses() {
+    let Some(browser) = Browser::start() else { return };
+    let hall = Hall::open_to_a_film();
+    enter(&browser, &hall);
+    browser.wait("!document.getElementById('follow-panel').hidden");
+    browser.reads("follow-word", "absent");
+    browser.reads("follow-next", "start the film");
+    browser.reads("sources", "/nowhere/midi cannot be opened");
+    let reel = film("01:00:02:00");
+    browser.reads("follow-word", "locked");
+    browser.reads("follow-badge", "film locked");
+    arm(&browser);
+    browser.wait("/^01:00:\\d\\d:\\d\\d$/.test(document.getElementById('timecode').textContent)");
+    assert_eq!(
+        browser.eval("return document.getElementById('error-curve').hidden"),
+        json!(true),
+        "nothing is followed"
+    );
+    go(&browser);
+    browser.wait("document.querySelector('#error-curve canvas') !== null");
+    browser.reads("error-scale", " ms; above 0");
+    browser.wait("/^\\d+\\.\\d\\d ms$/.test(document.getElementById('error-greatest').textContent)");
+    for (width, height) in [(1600, 1000), (768, 1024), (390, 844)] {
+        browser.resize(width, height);
+        browser
+            .wait(&format!("innerWidth === {width} && document.documentElement.scrollWidth <= innerWidth"));
+        browser.eval("document.getElementById('follow-panel').scrollIntoView()");
+        browser.shot(&format!("60-film-{width}x{height}"));
+    }
+
+    browser.press("#sources li:nth-child(2) button");
+    browser.reads("follow-reply", "press again");
+    assert_eq!(browser.eval("return document.getElementById('follow-word').textContent"), json!("locked"));
+    browser.wait("(window.usePressed ??= performance.now()) + 400 < performance.now()");
+    browser.press("#sources li:nth-child(2) button");
+    browser.reads("follow-word", "absent");
+    browser.wait(
+        "document.querySelector('#sources li:nth-child(2) button').getAttribute('aria-pressed') === 'true'",
+    );
+    browser.reads("state", "waiting"); // seats follow what a person chose, though nothing is heard of it
+    browser.shot("61-film-chosen");
+    browser.press("#by-rank");
+    browser.wait("(window.rankPressed ??= performance.now()) + 400 < performance.now()");
+    browser.press("#by-rank");
+    browser.reads("follow-word", "locked");
+    drop(reel);
+    browser.reads("follow-word", "lost");
+    assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
 #[test]

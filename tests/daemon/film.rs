@@ -2,7 +2,7 @@
 
 use crate::hall::Hall;
 use crate::http::Request;
-use crate::process::Guarded;
+use crate::process::{Guarded, kinocue};
 
 /// Where timecode is heard, and from whom: addresses of this machine that no other test and no other run of them has.
 fn network(test: u8) -> (String, String) {
@@ -69,6 +69,13 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
     assert_eq!(parked["film"]["leads"], true, "the show is still loaded");
     let lines = hall.close();
     assert!(lines.iter().any(|line| line.contains("the film has left the cue")), "{lines:?}");
+    let config = hall.path("hall.toml").to_str().expect("text").to_owned();
+    let report = kinocue(&["report", "--day", "today", "--json", "--config", &config]).report_of(0);
+    let (show, artnet) = (&report["shows"][0], format!("artnet:{}", network(0).0));
+    assert_eq!(show["result"], "stopped", "the film was not over");
+    let proof = &show["outcome"]["film"];
+    assert!(proof["sources"][0].as_str().is_some_and(|source| source.starts_with(&artnet)), "{proof}");
+    assert!(proof["greatest_error_ms"].as_f64().is_some_and(|ms| ms > 0.0 && ms < 1000.0), "{proof}");
     assert!(hall.end().rest_in_park());
 }
 

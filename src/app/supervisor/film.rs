@@ -12,21 +12,23 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
     let begin_s = follows.map_or(0.0, |film| film.begin.as_secs_f64());
     let best = table.leads.or(Some(0)).and_then(|place| table.sources.get(place));
     let state = best.map_or(FilmState::Absent, |row| row.state);
+    let error_ms = hall.live.film_error_s().map(|error_s| error_s * 1e3);
     FilmStatus {
         state: state.word().to_owned(),
         cause: best.map(cause).unwrap_or_default(),
-        next: state.next().to_owned(),
+        next: state.next(error_ms.is_some()).to_owned(),
         leads: follows.is_some(),
         source: table.leads.and(best).map(|row| row.source.clone()),
         position_s: best.and_then(|row| row.media_s).map(|at| at - begin_s),
         rate_ppm: best.and_then(|row| row.rate_ppm),
-        error_ms: hall.live.film_error_s().map(|error_s| error_s * 1e3),
+        error_ms,
         timecode: table.leads.and(best).and_then(|row| row.timecode.clone()),
         disagrees: table.disagrees.and_then(|two| {
             let source = table.sources.get(two.source)?.source.clone();
             Some(FilmDisagreement { source, ahead_s: two.ahead_s })
         }),
         chosen: table.chosen.and_then(|place| Some(table.sources.get(place)?.source.clone())),
+        switches: table.switches,
         sources: table.sources.iter().map(|row| source(row, begin_s)).collect(),
     }
 }
@@ -48,6 +50,7 @@ fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
         state: row.state.word().to_owned(),
         cause: cause(row),
         position_s: row.media_s.map(|at| at - begin_s),
+        timecode: row.timecode.clone(),
         rate_ppm: row.rate_ppm,
         sigma_ms: row.sigma_ms,
         may_lead: row.may_lead,

@@ -91,6 +91,7 @@ impl List {
             preset: entry.preset.clone(),
             level: entry.level,
             trim_ms: entry.trim_ms,
+            movie: entry.film.movie.clone(),
             then: entry.then,
             at: entry.at.as_ref().map(|at| at.time.to_string()),
         };

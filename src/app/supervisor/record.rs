@@ -7,9 +7,11 @@ use jiff::Zoned;
 
 use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
 use super::hall::{Counted, HallContext};
+use crate::app::film::{FilmTable, SharedTable};
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
-use crate::journal::{Action, Folds, Journal, Outcome, ShowRecord, stamp};
+use crate::film::chase::ParkCause;
+use crate::journal::{Action, FilmProof, Folds, Journal, Outcome, ShowRecord, stamp};
 use crate::rt::Row;
 use crate::state::{Cause, State};
 use crate::time::MonoTime;
@@ -36,6 +38,8 @@ struct OpenShow {
     record: ShowRecord,
     before: Counted,
     events: Vec<String>,
+    /// The film that leads it, if one does, and how often another source had taken over before.
+    film: Option<(FilmProof, u64)>,
     /// How it ended; none while it goes on.
     over: Option<ShowOver>,
 }
@@ -164,11 +168,23 @@ impl ShowRecords {
         };
         self.journal.begin(&record);
         let before = counted.clone();
-        self.open = Some(Box::new(OpenShow { record, before, events: Vec::new(), over: None }));
+        hall.live.take_film_error_most_s(); // that of the show before
+        let switches = |table: &SharedTable| (FilmProof::default(), table.read().switches);
+        let film = cued.film.and(hall.film.as_ref()).map(switches);
+        self.open = Some(Box::new(OpenShow { record, before, events: Vec::new(), film, over: None }));
+    }
+
+    /// Notes who leads, and how far the seats are from the film, while a show follows it.
+    fn follow(&mut self, hall: &HallContext) {
+        let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) else { return };
+        let Some((proof, before)) = open.film.as_mut() else { return };
+        let Some(table) = hall.film.as_ref().map(SharedTable::read) else { return };
+        note_film(proof, &table, *before, hall.live.take_film_error_most_s());
     }
 
     /// A show is over. It is written down once its last frames have met their fate.
     pub(super) fn end(&mut self, hall: &HallContext) {
+        self.follow(hall);
         let Some(open) = self.open.as_mut().filter(|open| open.over.is_none()) else { return };
         open.over = Some(ShowOver {
             cause: hall.ended,
@@ -191,16 +207,18 @@ impl ShowRecords {
     /// Writes down a show that is over, with what was counted so far.
     pub(super) fn close(&mut self, hall: &HallContext) {
         let Some(open) = self.open.take() else { return };
-        let OpenShow { mut record, before, events, over } = *open;
+        let OpenShow { mut record, before, events, film, over } = *open;
         let Some(ShowOver { cause, end, ticks, missed, .. }) = over else { return };
         let now = hall.live.table();
         let frames =
             |table: &[Row]| table.iter().map(|row| FrameCounts::from(&row.counts)).sum::<FrameCounts>();
         let failed = |table: &[Row]| table.iter().map(|row| row.counts.send_failed).sum::<u64>();
         let after = hall.live.times();
+        // Who was never led has seen nothing of a film that is over.
+        let saw_it = film.as_ref().is_none_or(|(proof, _)| proof.greatest_error_ms.is_some());
         record.outcome = Some(Outcome {
             end,
-            result: ending(cause),
+            result: if saw_it { ending(cause) } else { ending_unseen(cause) },
             events,
             ticks,
             missed_ticks: missed,
@@ -208,6 +226,7 @@ impl ShowRecords {
             send_failed: failed(&now).saturating_sub(failed(&before.table)),
             lateness: percentiles(after.lateness, &before.times.lateness),
             ack: percentiles(after.acks, &before.times.acks),
+            film: film.map(|(proof, _)| proof),
         });
         self.journal.show(&record);
     }
@@ -218,7 +237,10 @@ impl Feature for ShowRecords {
         match event {
             SupervisorEvent::Entered(to) => self.event(format!("{to}: {}", hall.cause())),
             SupervisorEvent::Begun(begun) => self.begin(begun, hall),
-            SupervisorEvent::Round(table) => self.settle(table, hall),
+            SupervisorEvent::Round(table) => {
+                self.follow(hall);
+                self.settle(table, hall);
+            }
             _ => {}
         }
     }
@@ -227,9 +249,30 @@ impl Feature for ShowRecords {
 /// How a show ended for that cause.
 pub(super) const fn ending(cause: Cause) -> Ending {
     match cause {
-        Cause::CueEnded => Ending::Completed,
+        Cause::CueEnded | Cause::FilmOver(ParkCause::FilmEnded) => Ending::Completed,
         Cause::Trouble(_) | Cause::EmergencyStop(_) => Ending::Fault,
         _ => Ending::Stopped,
+    }
+}
+
+/// How a show ended whose seats had never followed its film.
+const fn ending_unseen(cause: Cause) -> Ending {
+    match cause {
+        Cause::FilmOver(_) => Ending::Stopped,
+        cause => ending(cause),
+    }
+}
+
+/// Adds to what is told of a show's film who leads it now, and the farthest that the seats were from it since the last time. A
+/// source counts once seats have followed it.
+fn note_film(proof: &mut FilmProof, table: &FilmTable, switches_before: u64, error_s: Option<f64>) {
+    let Some(error_s) = error_s else { return };
+    let most = proof.greatest_error_ms.unwrap_or_default().max(error_s * 1e3);
+    proof.greatest_error_ms = Some(most);
+    proof.switches = table.switches.saturating_sub(switches_before);
+    let leads = table.leads.and_then(|place| table.sources.get(place)).map(|row| &row.source);
+    if let Some(source) = leads.filter(|source| !proof.sources.contains(source)) {
+        proof.sources.push(source.clone());
     }
 }
 
@@ -243,7 +286,9 @@ fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::film::SourceRow;
     use crate::app::supervisor::testing::{hall, row, told};
+    use crate::film::point::FilmState;
     use crate::journal::Limits;
 
     #[test]
@@ -276,5 +321,54 @@ mod tests {
             told(&mut records, &SupervisorEvent::Round(&[row]), &hall);
             assert_eq!(records.open.is_none(), settled, "{asked} open, {later:?} after the end");
         }
+    }
+
+    /// A source of which nothing is known but its name.
+    fn named(source: &str) -> SourceRow {
+        SourceRow {
+            source: source.to_owned(),
+            state: FilmState::Absent,
+            words: "",
+            media_s: None,
+            timecode: None,
+            rate_ppm: None,
+            sigma_ms: None,
+            may_lead: false,
+            used: 0,
+            rejected: 0,
+            jumps: 0,
+            dropouts: 0,
+            notes: Default::default(),
+        }
+    }
+
+    #[test]
+    fn proof_of_play_has_the_sources_that_were_followed_and_the_farthest_from_the_film() {
+        let table = |leads, switches| FilmTable {
+            sources: ["ltc", "artnet"].map(named).into(),
+            leads,
+            switches,
+            ..FilmTable::default()
+        };
+        let mut proof = FilmProof::default();
+        note_film(&mut proof, &table(Some(0), 7), 7, None);
+        assert_eq!(proof, FilmProof::default(), "nobody followed it yet");
+        for (leads, switches, error_s) in
+            [(Some(0), 7, 0.002), (None, 7, 0.001), (Some(1), 8, 0.000_5), (Some(0), 9, 0.001)]
+        {
+            note_film(&mut proof, &table(leads, switches), 7, Some(error_s));
+        }
+        let sources = ["ltc", "artnet"].map(str::to_owned).into();
+        assert_eq!(proof, FilmProof { sources, switches: 2, greatest_error_ms: Some(2.0) });
+    }
+
+    #[test]
+    fn a_show_that_ends_with_its_film_is_completed_if_seats_had_followed_it() {
+        let over = Cause::FilmOver(ParkCause::FilmEnded);
+        assert_eq!((ending(over), ending_unseen(over)), (Ending::Completed, Ending::Stopped));
+        for why in [ParkCause::CueLeft, ParkCause::HeldTooLong] {
+            assert_eq!(ending(Cause::FilmOver(why)), Ending::Stopped, "the film was not over");
+        }
+        assert_eq!(ending_unseen(Cause::CueEnded), Ending::Completed);
     }
 }

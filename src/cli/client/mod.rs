@@ -2,6 +2,7 @@
 
 mod cues;
 mod events;
+mod film;
 mod http;
 mod levels;
 mod panel;
@@ -17,6 +18,7 @@ mod test;
 mod view;
 mod watch;
 
+pub(super) use film::{UseArgs, choose as choose_film_source, show as show_film};
 pub(super) use server::ServerArgs;
 pub(super) use show::{home, preflight};
 

@@ -28,7 +28,12 @@ impl Panel {
 
     /// Shows the hall as it is.
     pub(super) fn show(&mut self, status: &Status) {
-        self.last = plain::lines(&text(status)).into_owned();
+        self.draw(&text(status));
+    }
+
+    /// Shows these lines.
+    pub(super) fn draw(&mut self, text: &str) {
+        self.last = plain::lines(text).into_owned();
         self.bar.set_message(self.last.clone());
         self.bar.tick();
     }

@@ -2,10 +2,11 @@
 
 use anyhow::anyhow;
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::http::Reply;
 use crate::cli::{Exit, Failure, OrExit as _};
-use crate::control::{HallFacts, Status};
+use crate::control::{FilmStatus, HallFacts, Status};
 
 /// Why something was not done (RFC 9457), as the daemon writes it.
 #[derive(Debug, Default, Deserialize)]
@@ -21,10 +22,19 @@ struct Problem {
 
 /// The status in a reply, or why there is none.
 pub(super) fn status(reply: &Reply) -> Result<Status, Failure> {
+    parsed(reply, "status")
+}
+
+/// The film in a reply, or why there is none.
+pub(super) fn film(reply: &Reply) -> Result<FilmStatus, Failure> {
+    parsed(reply, "film")
+}
+
+fn parsed<T: DeserializeOwned>(reply: &Reply, what: &str) -> Result<T, Failure> {
     done(reply)?;
     serde_json::from_str(&reply.text).map_err(|error| Failure {
         exit: Exit::Internal,
-        error: anyhow!(error).context("the daemon's reply is no status; is it of another version?"),
+        error: anyhow!(error).context(format!("the daemon's reply is no {what}; is it of another version?")),
     })
 }
 

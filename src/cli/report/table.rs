@@ -3,7 +3,7 @@
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::control::model::FrameCounts;
-use crate::journal::{Report, Shown, Totals};
+use crate::journal::{FilmProof, Report, Shown, Totals};
 
 /// A line under the header, and no other lines.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
@@ -83,12 +83,28 @@ fn show(show: &Shown) -> Vec<String> {
     row
 }
 
-/// What happened in a show, under its start.
+/// What happened in a show, under its start, and first how it followed its film.
 fn events(show: &Shown) -> String {
-    let events = show.record.outcome.iter().flat_map(|outcome| &outcome.events);
-    events
-        .map(|event| format!("{} {}: {}\n", short(&show.record.start), safe(&show.record.cue), safe(event)))
+    let outcome = show.record.outcome.as_ref();
+    let film = outcome.and_then(|outcome| outcome.film.as_ref()).map(film);
+    let events = outcome.iter().flat_map(|outcome| &outcome.events).cloned();
+    film.into_iter()
+        .chain(events)
+        .map(|event| format!("{} {}: {}\n", short(&show.record.start), safe(&show.record.cue), safe(&event)))
         .collect()
+}
+
+/// By which source a show followed its film, and how well.
+fn film(film: &FilmProof) -> String {
+    let FilmProof { sources, switches, greatest_error_ms } = film;
+    match greatest_error_ms {
+        None => "the seats never followed the film".to_owned(),
+        Some(ms) => {
+            let often =
+                if *switches == 0 { String::new() } else { format!(", sources changed {switches} times") };
+            format!("followed the film by {}, at the most {ms:.2} ms from it{often}", sources.join(", "))
+        }
+    }
 }
 
 fn totals(totals: &Totals, days: &str) -> String {

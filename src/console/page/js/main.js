@@ -5,11 +5,13 @@ import { showHeadline, startHeadline } from './headline.js';
 import { showController } from './controller.js';
 import { showCurves, startCurves } from './curves.js';
 import { showFilm, startFilm } from './film.js';
+import { showFollow, startFollow } from './follow.js';
 import { showHistograms } from './histogram.js';
 import { showLevels } from './levels.js';
 import { showMap, startMap } from './map.js';
 import { readLists, showPlaylist, startPlaylist } from './playlist.js';
 import { showReports, startReports } from './reports.js';
+import { startSources } from './sources.js';
 import { showTrim, startTrim } from './trim.js';
 import { showWarnings, startWarnings } from './warnings.js';
 import { startStream } from './stream.js';
@@ -19,10 +21,10 @@ import { watch } from './state.js';
 
 const STARTS = [
   startTransport, startToken, startHeadline, startFilm, startMap, startTrim, startPlaylist, startReports, startCurves,
-  startUpload, startWarnings,
+  startUpload, startWarnings, startFollow, startSources,
 ];
 const SHOWS = [
-  showHeadline, showTransport, showFilm, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
+  showHeadline, showTransport, showFilm, showFollow, showWarnings, showMap, showController, showLevels, showTrim, showPlaylist,
   showHistograms, showReports, showCurves,
 ];
 

@@ -19,6 +19,24 @@ export const HEALTH = {
 /** How a controller stands; one that a person took out is shown as that, however well it answers. */
 export const healthOf = ({ enabled, health }) => HEALTH[enabled || health === 'out' ? health : 'excluded'] ?? HEALTH.unknown;
 
+/** Every state of a film: its class of colour and its mark. */
+const FILM = {
+  locked: { look: 'good', mark: 'disc' },
+  acquiring: { look: 'calm', mark: 'turn' },
+  jumped: { look: 'calm', mark: 'turn' },
+  freewheeling: { look: 'weak', mark: 'half' },
+  stopped: { look: 'held', mark: 'block' },
+  ended: { look: 'away', mark: 'dash' },
+  absent: { look: 'away', mark: 'what' },
+  reverse: { look: 'bad', mark: 'peak' },
+  shuttle: { look: 'bad', mark: 'peak' },
+  unusable: { look: 'bad', mark: 'peak' },
+  lost: { look: 'bad', mark: 'cross' },
+};
+
+/** How a film or a source of one is shown. */
+export const filmLook = (state) => FILM[state] ?? FILM.absent;
+
 /** The bands of a figure. */
 export const BANDS = {
   good: { look: 'good', mark: 'disc', letters: 'A' },

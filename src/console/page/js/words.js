@@ -39,6 +39,13 @@ export const percent = (part) => `${Math.round(part * 100)} %`;
 /** A trim: +10 ms, −40 ms. */
 export const signed = (ms) => `${ms > 0 ? '+' : ms < 0 ? '−' : ''}${Math.abs(ms)} ms`;
 
+/** How far a film is ahead of another: 3.2 s later, 40 ms earlier. */
+export function span(seconds) {
+  const least = Math.abs(seconds);
+  const figure = least < 1 ? `${Math.round(least * 1000)} ms` : `${least.toFixed(1)} s`;
+  return `${figure} ${seconds < 0 ? 'earlier' : 'later'}`;
+}
+
 /** Acks over frames: never rounded up to 100 %, because one lost frame is one lost frame. */
 export function ackRate(rate) {
   if (rate === null || rate === undefined) return '–';

@@ -1,0 +1,59 @@
+// The film that the hall follows: its timecode in large figures, how well it is known and by which source, why, and what to do.
+// A hall that follows none shows nothing of it.
+
+import { byId, onChange, setAttribute, setProperty, setText } from './dom.js';
+import { addError, resizeErrors } from './error.js';
+import { filmLook, mark } from './marks.js';
+import { showSources } from './sources.js';
+import { clock, sentence, span } from './words.js';
+
+/** Keeps the curve as wide as its place. */
+export function startFollow() {
+  new ResizeObserver(resizeErrors).observe(byId('error-curve'));
+}
+
+/** Shows the film, and takes its error for the curve. */
+export function showFollow(status, link) {
+  const film = status?.film ?? null;
+  setProperty(byId('follow-panel'), 'hidden', film === null);
+  showBadge(film);
+  if (film === null) return;
+  showTimecode(film);
+  const look = filmLook(film.state);
+  setProperty(byId('follow-state'), 'className', `follow-state look-${look.look}`);
+  showMark(look.mark);
+  setText(byId('follow-word'), film.state);
+  setText(byId('follow-source'), film.source === null ? 'no source leads' : `by ${film.source}`);
+  setText(byId('follow-cause'), sentence(film.cause));
+  setText(byId('follow-next'), sentence(film.next));
+  setText(byId('follow-apart'), apart(film));
+  showSources(film);
+  addError(link === 'live' ? film.error_ms : null);
+}
+
+const showMark = onChange((name) => byId('follow-mark').replaceChildren(mark(name)));
+
+/** In view wherever the page is scrolled to. */
+function showBadge(film) {
+  const badge = byId('follow-badge');
+  setProperty(badge, 'hidden', film === null);
+  if (film === null) return;
+  setProperty(badge, 'className', `badge follow-badge look-${filmLook(film.state).look}`);
+  setText(badge, `film ${film.state}`);
+}
+
+/** The label of the frame; of a film without labels its place in the cue. */
+function showTimecode({ timecode, position_s: position }) {
+  const labelled = timecode !== null;
+  setText(byId('timecode'), labelled ? timecode : clock(position, 1, 3600));
+  setText(byId('timecode-of'), labelled ? 'timecode of the film' : 'film in the cue; its source has no labels');
+  setAttribute(byId('timecode'), 'data-known', String(labelled || position !== null));
+}
+
+function apart({ leads, disagrees }) {
+  if (disagrees !== null) {
+    const { source, ahead_s: ahead } = disagrees;
+    return `${source} says ${span(ahead)}: choose which is right.`;
+  }
+  return leads ? '' : 'No show that is loaded follows it.';
+}

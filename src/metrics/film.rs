@@ -1,0 +1,93 @@
+//! Figures of the film that a hall follows; of a hall that follows none there are none.
+
+use super::{Family, Labels, Values, flag};
+use crate::control::{FilmSourceStatus, FilmStatus};
+
+pub(super) fn families(film: &FilmStatus) -> Vec<Family> {
+    let mut all = whole(film);
+    all.extend(sources(film));
+    all.extend(counts(&film.sources));
+    all
+}
+
+fn whole(film: &FilmStatus) -> Vec<Family> {
+    let apart = film.disagrees.as_ref().map(|two| two.ahead_s);
+    vec![
+        Family {
+            name: "sync_state",
+            help: "1, with the state of the film",
+            values: Values::Gauges(vec![(vec![("state", film.state.clone())], 1.0)]),
+        },
+        Family::gauge("sync_follows", "1 where the loaded show follows the film", flag(film.leads)),
+        Family::gauge("sync_position_seconds", "Where the film is in the loaded cue", film.position_s),
+        Family::gauge(
+            "sync_error_seconds",
+            "How far ahead of the film, less the trim, the seats are while they follow it",
+            film.error_ms.map(|ms| ms / 1e3),
+        ),
+        Family::gauge(
+            "sync_disagreement_seconds",
+            "How far a source that ranks higher is ahead of the one that leads",
+            apart,
+        ),
+        Family::counter("sync_switches", "How often another source took over", film.switches),
+    ]
+}
+
+fn sources(film: &FilmStatus) -> Vec<Family> {
+    let all = &film.sources;
+    let is = |name: &Option<String>, one: &FilmSourceStatus| Some(flag(name.as_ref() == Some(&one.source)));
+    let states = all.iter().map(|one| {
+        let labels = vec![("source", one.source.clone()), ("state", one.state.clone())];
+        (labels, 1.0)
+    });
+    vec![
+        Family {
+            name: "sync_source_state",
+            help: "1, with the state of the source",
+            values: Values::Gauges(states.collect()),
+        },
+        gauges(all, "sync_leads", "1 for the source that leads", |one| is(&film.source, one)),
+        gauges(all, "sync_chosen", "1 for the source that a person chose", |one| is(&film.chosen, one)),
+        gauges(all, "sync_rate_ppm", "How much faster than the clock the film runs, millionths", |one| {
+            one.rate_ppm
+        }),
+        gauges(all, "sync_sigma_seconds", "Deviation of where the film is", |one| {
+            one.sigma_ms.map(|ms| ms / 1e3)
+        }),
+        gauges(all, "sync_level_dbfs", "How loud the line is, decibels of full scale", |one| one.level_dbfs),
+    ]
+}
+
+fn counts(all: &[FilmSourceStatus]) -> Vec<Family> {
+    vec![
+        counters(all, "sync_dropouts", "How often nothing was heard of the source", |one| one.dropouts),
+        counters(all, "sync_rejected", "Samples too far off to be used", |one| one.rejected),
+        counters(all, "sync_jumps", "How often the film jumped by the source", |one| one.jumps),
+        counters(all, "sync_foreign", "What others sent in place of the source", |one| one.foreign),
+    ]
+}
+
+fn gauges(
+    all: &[FilmSourceStatus],
+    name: &'static str,
+    help: &'static str,
+    figure: impl Fn(&FilmSourceStatus) -> Option<f64>,
+) -> Family {
+    let values = all.iter().filter_map(|one| Some((of(one), figure(one)?)));
+    Family { name, help, values: Values::Gauges(values.collect()) }
+}
+
+fn counters(
+    all: &[FilmSourceStatus],
+    name: &'static str,
+    help: &'static str,
+    figure: impl Fn(&FilmSourceStatus) -> u64,
+) -> Family {
+    let values = all.iter().map(|one| (of(one), figure(one)));
+    Family { name, help, values: Values::Counters(values.collect()) }
+}
+
+fn of(one: &FilmSourceStatus) -> Labels {
+    vec![("source", one.source.clone())]
+}
