@@ -29,6 +29,6 @@ mod reader;
 mod tests;
 mod trace;
 
-pub(crate) use file::{IndexFault, MOST_OCTETS};
+pub(crate) use file::{IndexFault, MOST_OCTETS, is_name};
 pub(crate) use index::{IndexMaker, SoundIndex};
 pub(crate) use reader::SoundReader;

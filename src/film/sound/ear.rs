@@ -128,7 +128,9 @@ impl SoundEar {
         while let Some(holder) = &mut self.holder
             && self.next_hold + half <= self.line.count()
         {
-            if let Some(place) = holder.hold(&mut self.compare, &self.line, &self.films, self.next_hold) {
+            let heard = holder.hold(&mut self.compare, &self.line, &self.films, self.next_hold);
+            // A piece that ends in silence says where the film was, and not that it runs on.
+            if let Some(place) = heard.filter(|_| self.silent < SILENT_SAMPLES) {
                 // Told for the end of the piece: a source that is asked where the film was would seem to be silent.
                 let at = place.at + half as f64;
                 out(HeardPlace {

@@ -37,6 +37,11 @@ pub(crate) enum IndexFault {
     /// Cut short, or more than that.
     #[error("it has {found} octets and says that it has {said}; copy it again, or make it anew")]
     Length { found: u64, said: u64 },
+    /// Longer than the index of any film.
+    #[error(
+        "it is longer than {MOST_OCTETS} octets, which is no film's; make an index with `kinocue sync index FILM -o FILE.kidx`"
+    )]
+    Long,
     /// Its sum is not that of what is in it.
     #[error("it was damaged: its sum does not fit; copy it again, or make it anew")]
     Sum,

@@ -22,6 +22,8 @@ const AGREES_Z: f64 = 2.5;
 /// Shares of what a piece is off that go into place and speed.
 const PLACE_SHARE: f64 = 0.25;
 const SPEED_SHARE: f64 = 0.03;
+/// How far the speed of a hold goes from that which was proved.
+const STRAYS: f64 = 0.003;
 /// What is off by more was cut: its speed says nothing.
 const CUT: f64 = 4.0;
 
@@ -196,8 +198,9 @@ impl Holder {
             self.fits = [0.0; WIDTH];
         } else {
             self.place.media += PLACE_SHARE * off;
-            let speed = self.place.speed + SPEED_SHARE * off / passed.max(1.0);
-            self.place.speed = speed.clamp(self.proved * 0.997, self.proved * 1.003);
+            // The first piece lies before the proof, and says nothing of the speed.
+            let speed = self.place.speed + if passed > 0.0 { SPEED_SHARE * off / passed } else { 0.0 };
+            self.place.speed = speed.clamp(self.proved * (1.0 - STRAYS), self.proved * (1.0 + STRAYS));
         }
         Some(heard)
     }

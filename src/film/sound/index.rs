@@ -43,6 +43,8 @@ pub(crate) fn to_sound(samples_per_s: u32, speed: f64) -> Resampler {
 
 /// Makes an index of the sound of a film, block by block.
 pub(crate) struct IndexMaker {
+    samples_per_s: u32,
+    count: usize,
     resampler: Resampler,
     landmarks: LandmarkStream,
     trace: TraceStream,
@@ -55,6 +57,8 @@ pub(crate) struct IndexMaker {
 impl IndexMaker {
     pub(crate) fn new(samples_per_s: u32) -> Self {
         Self {
+            samples_per_s,
+            count: 0,
             resampler: to_sound(samples_per_s, 1.0),
             landmarks: LandmarkStream::new(Density::INDEX),
             trace: TraceStream::new(),
@@ -67,6 +71,7 @@ impl IndexMaker {
 
     /// Takes samples, of full scale 1.
     pub(crate) fn push(&mut self, samples: &[f32]) {
+        self.count += samples.len();
         self.sound.clear();
         self.resampler.push(samples, &mut self.sound);
         self.landmarks.push(&self.sound, &mut self.found);
@@ -76,7 +81,9 @@ impl IndexMaker {
 
     /// The index of all that came.
     pub(crate) fn finish(mut self, name: &str) -> SoundIndex {
-        self.push(&vec![0.0; 48_000]); // what is still on its way through the filters
+        let seconds = self.count as f64 / f64::from(self.samples_per_s);
+        self.push(&vec![0.0; self.samples_per_s as usize / 2]); // what is still on its way through the filters
+        self.packed.cut((seconds * TRACE_RATE) as usize);
         self.found.sort_unstable();
         self.found.dedup();
         SoundIndex { name: name.to_owned(), landmarks: self.found, trace: self.packed }

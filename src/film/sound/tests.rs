@@ -68,9 +68,12 @@ fn index(name: &str, sound: &[f32]) -> SoundIndex {
     maker.finish(name)
 }
 
-/// The film that most tests play, and its index.
-fn the_film() -> &'static ([Vec<f32>; 2], Vec<f32>, Arc<[SoundIndex]>) {
-    static FILM: OnceLock<([Vec<f32>; 2], Vec<f32>, Arc<[SoundIndex]>)> = OnceLock::new();
+/// The parts of a film, the whole of it, and its index.
+type PlayedFilm = ([Vec<f32>; 2], Vec<f32>, Arc<[SoundIndex]>);
+
+/// The film that most tests play.
+fn the_film() -> &'static PlayedFilm {
+    static FILM: OnceLock<PlayedFilm> = OnceLock::new();
     FILM.get_or_init(|| {
         let parts = film(1);
         let whole = sum(&parts[0], &parts[1]);
@@ -266,5 +269,101 @@ mod file {
         assert!(with(8, 2).contains("version 2"));
         assert!(with(octets.len() - 1, !octets[octets.len() - 1]).contains("damaged"));
         assert_eq!(SoundIndex::of_octets(&vec![b'x'; 1 << 20]), Err(IndexFault::Foreign));
+    }
+}
+
+mod reader {
+    use super::super::reader::SoundReader;
+    use super::*;
+    use crate::film::observation::FilmWord;
+    use crate::film::point::FilmState;
+    use crate::film::tracker::{SourceKind, SourceTracker};
+    use crate::harness::shown::mono;
+    use crate::time::ShowTime;
+
+    /// What a tracker makes of a line: each state that it came to, and when, seconds; and where it thinks that the film is at the end.
+    fn track(films: &Arc<[SoundIndex]>, line: &[f32]) -> (Vec<(FilmState, f64)>, f64, SoundReader) {
+        let mut tracker = SourceTracker::new(SourceKind::Sound, 0.0015, mono(0.0));
+        let begin = ShowTime::from_secs_f64(2.0);
+        let mut reader =
+            SoundReader::new(RATE as u32, std::time::Duration::from_millis(20), begin, Arc::clone(films));
+        let mut states = vec![(tracker.state(), 0.0)];
+        let mut now_s = 0.0;
+        for block in line.chunks(80) {
+            now_s += block.len() as f64 / RATE as f64;
+            let samples: Vec<i16> = block.iter().map(|sample| (sample * 32_768.0) as i16).collect();
+            reader.hear(&samples, mono(now_s), &mut |told| tracker.hear(&told));
+            tracker.poll(mono(now_s));
+            if states.last().is_some_and(|(state, _)| *state != tracker.state()) {
+                states.push((tracker.state(), now_s));
+            }
+        }
+        (states, tracker.point(mono(now_s)).media.as_secs_f64() - now_s, reader)
+    }
+
+    fn when(states: &[(FilmState, f64)], wanted: FilmState) -> f64 {
+        states.iter().find(|(state, _)| *state == wanted).map_or(f64::INFINITY, |(_, at_s)| *at_s)
+    }
+
+    #[test]
+    fn a_chase_locks_within_four_seconds_and_knows_latency_and_the_cues_begin() {
+        let (_, whole, index) = the_film();
+        let (states, ahead_s, reader) = track(index, &whole[9 * RATE..15 * RATE]);
+        let locked_s = when(&states, FilmState::Locked);
+        assert!(
+            locked_s < 4.0 && states.last().is_some_and(|last| last.0 == FilmState::Locked),
+            "{states:?}"
+        );
+        // The cue begins 2 s into the film, and what is heard now was at the line 20 ms ago.
+        assert!((ahead_s - (9.0 - 2.0 + 0.02)).abs() < 0.002, "{ahead_s}");
+        assert_eq!((reader.film(), reader.refused()), (Some("The Storm"), None));
+    }
+
+    #[test]
+    fn a_line_that_falls_silent_is_lost_within_a_second_and_another_film_at_once_when_it_is_known() {
+        let (_, whole, index) = the_film();
+        let cut = [&whole[9 * RATE..13 * RATE], &vec![0.0; 2 * RATE]].concat();
+        let (states, _, _) = track(index, &cut);
+        let lost_s = when(&states, FilmState::Lost);
+        assert!((4.0..5.0).contains(&lost_s), "{states:?}");
+        let [effects, speech] = film(3);
+        let other = sum(&effects, &speech);
+        let films: Arc<[SoundIndex]> = Arc::from([index[0].clone(), self::index("Trailer", &other)]);
+        let (states, _, reader) =
+            track(&films, &[&whole[9 * RATE..13 * RATE], &other[9 * RATE..13 * RATE]].concat());
+        assert!(when(&states, FilmState::Locked) < 4.0 && when(&states, FilmState::Lost) < 7.5, "{states:?}");
+        assert!(states.last().is_some_and(|last| last.0 == FilmState::Lost), "{states:?}");
+        let why = reader.refused().expect("it is another film");
+        assert!(why.contains("Trailer is heard") && why.contains("The Storm"), "{why}");
+    }
+
+    #[test]
+    fn a_film_at_another_speed_is_known_and_leads_nobody() {
+        let (_, whole, index) = the_film();
+        let (states, _, reader) = track(index, &at_speed(&whole[9 * RATE..16 * RATE], 25.0 / 24.0));
+        assert_eq!(when(&states, FilmState::Locked), f64::INFINITY, "{states:?}");
+        assert_eq!(reader.film(), Some("The Storm"));
+    }
+
+    #[test]
+    fn noise_square_waves_and_nothing_say_nothing_of_any_film() {
+        let (_, _, index) = the_film();
+        let mut dice = Dice(5);
+        let mut noise = |_| 0.3 * dice.noise();
+        let lines: [Vec<f32>; 3] = [
+            (0..6 * RATE).map(&mut noise).collect(),
+            (0..6 * RATE).map(|n| if n / 20 % 2 == 0 { 0.99 } else { -0.99 }).collect(),
+            vec![0.0; 6 * RATE],
+        ];
+        for line in lines {
+            let mut reader =
+                SoundReader::new(RATE as u32, std::time::Duration::ZERO, ShowTime::ZERO, Arc::clone(index));
+            for (n, block) in line.chunks(80).enumerate() {
+                let samples: Vec<i16> = block.iter().map(|sample| (sample * 32_768.0) as i16).collect();
+                reader.hear(&samples, mono(n as f64 / 100.0), &mut |told| {
+                    assert!(!matches!(told.word, FilmWord::Position(_)), "{told:?}");
+                });
+            }
+        }
     }
 }

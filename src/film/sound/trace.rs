@@ -64,6 +64,11 @@ impl PackedTrace {
         self.octets.len() / BLOCK_OCTETS * BLOCK
     }
 
+    /// Leaves out the blocks after so many samples.
+    pub(crate) fn cut(&mut self, samples: usize) {
+        self.octets.truncate(samples.div_ceil(BLOCK) * BLOCK_OCTETS);
+    }
+
     /// Packs what is whole of `samples`, and takes it out.
     pub(crate) fn pack(&mut self, samples: &mut Vec<f32>) {
         let whole = samples.len() / BLOCK * BLOCK;

@@ -1,4 +1,4 @@
-//! LTC from wherever sound comes: blocks are read as they come, and each is stamped with the instant at which it was.
+//! Lines that carry LTC, or a film's own sound: blocks are read as they come, and each is stamped with the instant at which it was.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -11,11 +11,11 @@ use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::riff::SampleStream;
+use super::heard::{Listener, Listening};
+use super::riff::{Channels, SampleStream};
 use super::{ChildSlot, FilmError, LeftRead, WordSink, start};
-use crate::film::ltc::LtcReader;
 use crate::film::observation::{FilmWord, Observation};
-use crate::film::source::{FilmArgs, LtcInput};
+use crate::film::source::{FilmArgs, SoundLine};
 use crate::sys::clock::Monotonic;
 use crate::time::Clock as _;
 
@@ -24,40 +24,41 @@ const BLOCK: usize = 960;
 
 /// Begins to read an input; a command that is started for it is put there.
 pub(super) fn start_reading(
-    input: &LtcInput,
+    input: &SoundLine,
+    listening: Listening,
     args: &FilmArgs,
     told: WordSink,
     child: &ChildSlot,
 ) -> Result<(), FilmError> {
-    let line = LtcLine { args: args.clone(), told };
+    let line = HeardLine { listening, args: args.clone(), told };
     let failed = |path: &Path| {
         let what = path.display().to_string();
         move |source| FilmError::Open { what, source }
     };
     match input {
-        LtcInput::File(path) => {
+        SoundLine::File(path) => {
             let file = File::open(path).map_err(failed(path))?;
-            start("ltc", move || line.end(line.read(file, true)))?;
+            start("line", move || line.end(line.read(file, true)))?;
         }
-        LtcInput::Stdin => {
+        SoundLine::Stdin => {
             // Not through the buffer that is shared: what lies in there no poll tells of.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(failed(Path::new("stdin")))?;
-            start("ltc", move || line.end(line.read(File::from(input), false)))?;
+            start("line", move || line.end(line.read(File::from(input), false)))?;
         }
-        LtcInput::Fifo(path) => {
+        SoundLine::Fifo(path) => {
             let path = path.clone();
             path.metadata().map_err(failed(&path))?;
-            start("ltc", move || {
+            start("line", move || {
                 let read = || LeftRead::open(&path, &line.told).and_then(|fifo| line.read_from(fifo, false));
                 while line.told.again(read()) {}
             })?;
         }
-        LtcInput::Pipe(command) => {
+        SoundLine::Pipe(command) => {
             let mut shell = Command::new("sh");
             shell.args(["-c", command]);
             run(shell, command, line, child)?;
         }
-        LtcInput::Alsa(device) => {
+        SoundLine::Alsa(device) => {
             let mut arecord = Command::new("arecord");
             arecord.args(["-q", "-t", "raw", "-f", "S16_LE", "-c", "1", "-r", "48000", "-D", device]);
             run(arecord, "arecord", line, child)?;
@@ -68,13 +69,13 @@ pub(super) fn start_reading(
 
 /// Reads what a command writes. One that fails, as a sound card does that is pulled out, is started anew; one that ends well has
 /// nothing more to say.
-fn run(mut command: Command, name: &str, line: LtcLine, child: &ChildSlot) -> Result<(), FilmError> {
+fn run(mut command: Command, name: &str, line: HeardLine, child: &ChildSlot) -> Result<(), FilmError> {
     // In a group of its own: a shell is ended with all that it has started.
     command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
     let failed = |source| FilmError::Command { command: name.to_owned(), source };
     let mut output = put(command.spawn().map_err(failed)?, child);
     let child = Arc::clone(child);
-    start("ltc", move || {
+    start("line", move || {
         // Whoever ended what was started ends no more: this one was started meanwhile.
         while !line.told.is_over() {
             let read = output.take().map_or(Ok(()), |output| line.read(output, false));
@@ -114,23 +115,27 @@ fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
     child.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A line that carries LTC.
-struct LtcLine {
+/// A line, and what it is listened to for.
+struct HeardLine {
+    listening: Listening,
     args: FilmArgs,
     told: WordSink,
 }
 
-impl LtcLine {
+impl HeardLine {
     /// Reads to the end of a stream, or until nobody listens; one that is `paced`, at the speed of its sound.
     fn read(&self, stream: impl Read + AsFd, paced: bool) -> io::Result<()> {
         self.read_from(LeftRead::new(stream, &self.told), paced)
     }
 
     fn read_from(&self, mut stream: impl Read, paced: bool) -> io::Result<()> {
-        let (mut samples, mut block, mut octets) = (SampleStream::default(), Vec::new(), [0; BLOCK]);
-        let FilmArgs { rate, start, latency, .. } = self.args;
+        let channels = match self.listening {
+            Listening::Ltc => Channels::First,
+            Listening::Sound(_) => Channels::Mixed,
+        };
+        let (mut samples, mut block, mut octets) = (SampleStream::of(channels), Vec::new(), [0; BLOCK]);
         let (begun, mut heard) = (Monotonic.now(), 0_u64);
-        let mut reader: Option<LtcReader> = None;
+        let mut listener: Option<Listener> = None;
         loop {
             let count = stream.read(&mut octets)?;
             if count == 0 {
@@ -145,20 +150,12 @@ impl LtcLine {
                 at = begun + Duration::from_nanos(heard * 1_000_000_000 / u64::from(per_s));
                 Monotonic.sleep_until(at);
             }
-            let reader = reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
-            reader.hear(&block, at, &mut |what| {
+            let listener = listener.get_or_insert_with(|| self.listening.begin(per_s, &self.args));
+            listener.hear(&block, at, |what| {
                 self.told.tell(what);
             });
-            self.note(reader);
+            self.told.note(|notes| listener.note(notes));
         }
-    }
-
-    fn note(&self, reader: &LtcReader) {
-        let level = f64::from(reader.level());
-        self.told.note(|notes| {
-            notes.level_db = Some(20.0 * level.max(1e-6).log10());
-            notes.label(reader.labels());
-        });
     }
 
     /// Nothing more can come: whoever wrote is gone for good, and the film over.
