@@ -1,4 +1,4 @@
-//! `kinocue sync`: the film that a running hall follows; and timecode for technicians and tests.
+//! `kinocue sync`: the film that a running hall follows; timecode and the sound of films, for technicians and tests.
 
 use super::client::{ServerArgs, UseArgs, choose_film_source, show_film};
 use super::{Exit, Failure, OrExit as _};
@@ -6,6 +6,7 @@ use crate::film::source::{FilmArgs, FilmSource};
 
 mod calibrate;
 mod check;
+mod index;
 mod relay;
 mod send;
 mod watch;
@@ -19,12 +20,15 @@ Examples:
   kinocue sync send --ltc --film-fps 25 --tc-start 01:00:00:00 --seconds 60 -o reel.wav
   kinocue sync check reel.wav
   kinocue sync send --artnet 10.0.0.255 --film-fps 24
+  kinocue sync index film.mkv -o film.kidx
+  kinocue sync watch sound:alsa:hw:2,0,index=film.kidx,index=trailer.kidx
   kinocue sync watch artnet:10.0.0.20 mtc:/dev/snd/midiC1D0
   kinocue sync relay ltc:alsa:hw:2,0 --folder /tmp
   kinocue sync calibrate ltc:alsa:hw:2,0 --against mpv:/run/user/1000/film.sock
   kinocue sync send --ltc --seconds 60 | kinocue play cues/bench-ride.csv --to 127.0.0.1:7408 --chase ltc:-";
 
-/// Shows the film that a running hall follows; makes timecode, and says what is heard of it, or is in a recording.
+/// Shows the film that a running hall follows; makes timecode and indexes of films' sound, and says what is heard of a
+/// film, or is in a recording.
 ///
 /// Without a command it is the film of the running service: which source says what, how good it is, which one leads, and how far
 /// from the film the seats are. On a terminal it is shown until Ctrl-C, elsewhere once.
@@ -42,6 +46,7 @@ enum Command {
     Use(UseArgs),
     Send(send::Args),
     Check(check::Args),
+    Index(index::Args),
     Watch(watch::Args),
     Relay(relay::Args),
     Calibrate(calibrate::Args),
@@ -71,6 +76,7 @@ pub(super) fn run(Args { server, command }: &Args) -> Result<Exit, Failure> {
         Some(Command::Use(args)) => choose_film_source(args),
         Some(Command::Send(args)) => send::run(args),
         Some(Command::Check(args)) => check::run(args),
+        Some(Command::Index(args)) => index::run(args),
         Some(Command::Watch(args)) => watch::run(args),
         Some(Command::Relay(args)) => relay::run(args),
         Some(Command::Calibrate(args)) => calibrate::run(args),

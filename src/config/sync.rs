@@ -17,7 +17,7 @@ const BAND_MOST: f64 = 0.05;
 const SLEW: std::ops::RangeInclusive<f64> = 0.005..=0.02;
 
 /// Kinds of sources; each has a table of its name.
-const KINDS: [&str; 7] = ["ltc", "mpv", "mtc", "artnet", "osc", "http", "clock"];
+const KINDS: [&str; 8] = ["ltc", "mpv", "mtc", "artnet", "osc", "http", "clock", "sound"];
 
 /// The film that leads.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,11 +77,17 @@ pub(super) fn sync(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<FilmSync
     }
     let [fps, start] = ["film_fps", "start"].map(|key| section.text(key));
     let sources = names.iter().filter_map(|name| source(*name, &mut section)).collect::<Vec<_>>();
-    let latency = section.get("ltc").and_then(|entry| latency(entry, section.faults));
+    let [ltc, sound] =
+        ["ltc", "sound"].map(|kind| section.get(kind).and_then(|entry| latency(entry, section.faults)));
     let films = section.get("mpv").map(|entry| films(entry, section.faults)).unwrap_or_default();
     let args = |(name, source): (Entry<'_>, FilmSource)| {
         let films = if matches!(source, FilmSource::Mpv(_)) { films.clone() } else { Vec::new() };
-        let latency = latency.filter(|_| matches!(source, FilmSource::Ltc(_))).unwrap_or_default();
+        let latency = match source {
+            FilmSource::Ltc(_) => ltc,
+            FilmSource::Sound(_) => sound,
+            _ => None,
+        };
+        let latency = latency.unwrap_or_default();
         let args = FilmArgs::new(source, fps.as_deref(), start.as_deref());
         let args = args.map_err(|error| name.fault(section.faults, &error.to_string())).ok()?;
         Some(FilmArgs { latency, films, ..args })
@@ -117,8 +123,9 @@ fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) 
     };
     // The key that says who, and the one that may be beside it.
     let (needed, more) = match kind {
-        "ltc" => ("input", "latency"),
-        "mpv" => ("socket", "films"),
+        "ltc" => ("input", ""),
+        "sound" => ("input", "index"),
+        "mpv" => ("socket", ""),
         "mtc" => ("device", ""),
         "clock" => ("at", "max_error"),
         _ => ("from", "bind"),
@@ -129,12 +136,14 @@ fn of_table<'t>(name: Entry<'t>, text: &str, section: &mut Section<'t, '_, '_>) 
     };
     let mut table =
         Section::new(format!("[sync.{kind}]"), entry.at, entry.table(section.faults)?, section.faults);
-    table.require(&[needed]);
+    table.require(if kind == "sound" { &["input", "index"] } else { std::slice::from_ref(&needed) });
     let said = table.text(needed);
-    let beside = match more {
-        "latency" | "films" => table.get(more).and(None), // read on its own
-        "" => None,
-        _ => table.text(more),
+    let beside = if more.is_empty() { None } else { table.text(more) };
+    // How late it is, and which films count, are read for themselves.
+    match kind {
+        "ltc" | "sound" => table.get("latency"),
+        "mpv" => table.get("films"),
+        _ => None,
     };
     table.finish();
     let beside = beside.map(|value| format!(",{more}={value}"));
@@ -193,6 +202,7 @@ fn signed_ms(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<ShowTime> {
 #[cfg(test)]
 mod tests {
     use crate::config::tests::{faults_of, hall_with, with};
+    use crate::film::source::FilmSource;
 
     #[test]
     fn without_the_table_each_show_is_its_own_film() {
@@ -222,6 +232,18 @@ mod tests {
         assert_eq!(hall_with(text).sync.unwrap().sources[0].films, ["feature.mkv"]);
         let wrong = faults_of(&text.replace("[\"feature.mkv\"]", "\"feature.mkv\""));
         assert!(wrong.iter().any(|fault| fault.contains("films")), "{wrong:?}");
+    }
+
+    #[test]
+    fn the_sound_of_a_film_has_an_input_an_index_and_a_latency() {
+        let table = "[sync.sound]\ninput = \"alsa:hw:2,0\"\nlatency = \"5ms\"\n";
+        let sync =
+            hall_with(&format!("[sync]\nsources = [\"sound\"]\n{table}index = \"/films/storm.kidx\"\n")).sync;
+        let args = &sync.unwrap().sources[0];
+        let FilmSource::Sound(sound) = &args.source else { panic!("{args:?}") };
+        assert_eq!((sound.indexes[0].to_str(), args.latency.as_millis()), (Some("/films/storm.kidx"), 5));
+        let faults = faults_of(&format!("[sync]\nsources = [\"sound\"]\n{table}"));
+        assert!(faults.iter().any(|fault| fault.contains("index")), "{faults:?}");
     }
 
     #[test]

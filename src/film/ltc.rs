@@ -7,7 +7,6 @@ mod decoder;
 mod edges;
 mod generator;
 mod reader;
-mod samples;
 #[cfg(test)]
 mod tests;
 mod word;

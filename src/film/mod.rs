@@ -33,6 +33,8 @@ pub(crate) mod mpv;
 pub(crate) mod mtc;
 pub(crate) mod observation;
 pub(crate) mod point;
+mod samples;
+pub(crate) mod sound;
 pub(crate) mod source;
 #[cfg(test)]
 mod tests;

@@ -13,9 +13,9 @@ use super::timecode::{FrameRate, Label, Timecode, TimecodeError};
 use super::tracker::SourceKind;
 use crate::time::ShowTime;
 
-/// Where LTC comes from: sound, the first channel of it, 16 bits, raw at 48,000 samples a second or behind a RIFF header.
+/// Where sound comes from, LTC or a film's own: 16 bits, raw at 48,000 samples a second or behind a RIFF header.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum LtcInput {
+pub(crate) enum SoundLine {
     /// What a command writes.
     Pipe(String),
     /// A FIFO; it is opened anew when its writer is gone.
@@ -46,11 +46,21 @@ pub(crate) enum LineKind {
     Mtc,
 }
 
+/// A film that is found by its own sound.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct FilmSound {
+    pub(crate) line: SoundLine,
+    /// The index of the show's film, and those of others that may be heard.
+    pub(crate) indexes: Vec<PathBuf>,
+}
+
 /// Who says where the film is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FilmSource {
     /// Linear timecode.
-    Ltc(LtcInput),
+    Ltc(SoundLine),
+    /// The film's own sound.
+    Sound(FilmSound),
     /// mpv, by its socket (`--input-ipc-server`).
     Mpv(PathBuf),
     /// Timecode by MIDI.
@@ -95,9 +105,11 @@ const OSC_PORT: u16 = 8430;
 const HTTP_PORT: u16 = 8431;
 /// A clock that is off by more is no film clock: what is felt begins at some ten times that.
 const CLOCK_ERROR: Duration = Duration::from_millis(1);
+/// Films that a line is held against at once: each takes its share of the processor.
+const MOST_INDEXES: usize = 8;
 /// What there is to choose from.
-const FORMS: &str = "take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:relay:SOCKET, ltc:-, ltc:FILE.wav, mtc:DEVICE, \
-                     artnet:FROM, osc:FROM, http:FROM or clock:TIME";
+const FORMS: &str = "take mpv:SOCKET, ltc:pipe:COMMAND, ltc:fifo:PATH, ltc:alsa:DEVICE, ltc:relay:SOCKET, ltc:-, ltc:FILE.wav, \
+                     sound:INPUT,index=FILE.kidx with an INPUT as of ltc, mtc:DEVICE, artnet:FROM, osc:FROM, http:FROM or clock:TIME";
 
 /// How a film is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -175,6 +187,7 @@ impl FilmSource {
     pub(crate) const fn kind(&self) -> SourceKind {
         match self {
             Self::Ltc(_) => SourceKind::Ltc,
+            Self::Sound(_) => SourceKind::Sound,
             Self::Mpv(_) => SourceKind::Mpv,
             Self::Mtc(_) => SourceKind::Mtc,
             Self::ArtNet(_) => SourceKind::ArtNet,
@@ -187,19 +200,28 @@ impl FilmSource {
 impl fmt::Display for FilmSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Ltc(LtcInput::Pipe(_)) => f.write_str("ltc:pipe"), // a command may be long, or hold what nobody is to see
-            Self::Ltc(LtcInput::Fifo(path)) => write!(f, "ltc:fifo:{}", path.display()),
-            Self::Ltc(LtcInput::Stdin) => f.write_str("ltc:-"),
-            Self::Ltc(LtcInput::Alsa(device)) => write!(f, "ltc:alsa:{device}"),
-            Self::Ltc(LtcInput::File(path)) => write!(f, "ltc:{}", path.display()),
+            Self::Ltc(line) => write!(f, "ltc:{line}"),
+            Self::Sound(sound) => write!(f, "sound:{}", sound.line),
             Self::Mpv(path) => write!(f, "mpv:{}", path.display()),
-            Self::Ltc(LtcInput::Relay(socket)) => write!(f, "ltc:relay:{}", socket.display()),
             Self::Mtc(MtcInput::Device(path)) => write!(f, "mtc:{}", path.display()),
             Self::Mtc(MtcInput::Relay(socket)) => write!(f, "mtc:relay:{}", socket.display()),
             Self::ArtNet(sender) => write!(f, "artnet:{}", sender.from),
             Self::Osc(sender) => write!(f, "osc:{}", sender.from),
             Self::Http(sender) => write!(f, "http:{}", sender.from),
             Self::Clock(_) => f.write_str("clock"),
+        }
+    }
+}
+
+impl fmt::Display for SoundLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pipe(_) => f.write_str("pipe"), // a command may be long, or hold what nobody is to see
+            Self::Fifo(path) => write!(f, "fifo:{}", path.display()),
+            Self::Stdin => f.write_str("-"),
+            Self::Alsa(device) => write!(f, "alsa:{device}"),
+            Self::Relay(socket) => write!(f, "relay:{}", socket.display()),
+            Self::File(path) => write!(f, "{}", path.display()),
         }
     }
 }
@@ -212,7 +234,8 @@ impl FromStr for FilmSource {
         let (kind, input) = text.split_once(':').filter(|(_, input)| !input.is_empty()).ok_or_else(refuse)?;
         match kind {
             // Paths and commands are taken as they are: a comma in one is no option.
-            "ltc" => Ok(Self::Ltc(LtcInput::of(input))),
+            "ltc" => Ok(Self::Ltc(SoundLine::of(input))),
+            "sound" => FilmSound::of(input).map(Self::Sound),
             "mpv" => Ok(Self::Mpv(input.into())),
             "mtc" => Ok(Self::Mtc(MtcInput::of(input))),
             "artnet" => NamedSender::of(input, ARTNET_PORT).map(Self::ArtNet),
@@ -298,7 +321,28 @@ pub(crate) fn milliseconds(text: &str) -> Option<Duration> {
     Some(Duration::from_secs_f64(ms / 1e3))
 }
 
-impl LtcInput {
+impl FilmSound {
+    /// An input, and behind it each index: whatever else a command or a path holds is its own.
+    fn of(text: &str) -> Result<Self, FilmArgError> {
+        let mut parts = text.split(",index=");
+        let line = parts.next().unwrap_or_default();
+        let indexes: Vec<PathBuf> = parts.map(PathBuf::from).collect();
+        let is_named = |path: &PathBuf| !path.as_os_str().is_empty();
+        if line.is_empty()
+            || indexes.is_empty()
+            || !indexes.iter().all(is_named)
+            || indexes.len() > MOST_INDEXES
+        {
+            return Err(FilmArgError(format!(
+                "sound:{text} names no input with 1 to {MOST_INDEXES} indexes; write sound:alsa:hw:2,0,index=FILM.kidx, the show's film \
+                 first, and make the index with `kinocue sync index FILM -o FILM.kidx`"
+            )));
+        }
+        Ok(Self { line: SoundLine::of(line), indexes })
+    }
+}
+
+impl SoundLine {
     fn of(text: &str) -> Self {
         match text.split_once(':') {
             _ if text == "-" => Self::Stdin,
@@ -336,16 +380,16 @@ mod tests {
     fn each_form_of_a_source_is_read_and_others_are_told_what_there_is() {
         let of = |text: &str| text.parse::<FilmSource>();
         let ltc = |input| Ok(FilmSource::Ltc(input));
-        assert_eq!(of("ltc:-"), ltc(LtcInput::Stdin));
-        assert_eq!(of("ltc:pipe:sox a.wav -t raw -"), ltc(LtcInput::Pipe("sox a.wav -t raw -".to_owned())));
-        assert_eq!(of("ltc:fifo:/run/ltc"), ltc(LtcInput::Fifo("/run/ltc".into())));
-        assert_eq!(of("ltc:alsa:hw:2,0"), ltc(LtcInput::Alsa("hw:2,0".to_owned())));
+        assert_eq!(of("ltc:-"), ltc(SoundLine::Stdin));
+        assert_eq!(of("ltc:pipe:sox a.wav -t raw -"), ltc(SoundLine::Pipe("sox a.wav -t raw -".to_owned())));
+        assert_eq!(of("ltc:fifo:/run/ltc"), ltc(SoundLine::Fifo("/run/ltc".into())));
+        assert_eq!(of("ltc:alsa:hw:2,0"), ltc(SoundLine::Alsa("hw:2,0".to_owned())));
         assert_eq!(of("mpv:/run/mpv.sock"), Ok(FilmSource::Mpv("/run/mpv.sock".into())));
-        assert_eq!(of("ltc:reel:1.wav"), ltc(LtcInput::File("reel:1.wav".into())));
+        assert_eq!(of("ltc:reel:1.wav"), ltc(SoundLine::File("reel:1.wav".into())));
         let mtc = |input| Ok(FilmSource::Mtc(input));
         assert_eq!(of("mtc:/dev/snd/midiC1D0"), mtc(MtcInput::Device("/dev/snd/midiC1D0".into())));
         assert_eq!(of("mtc:relay:/run/mtc.sock"), mtc(MtcInput::Relay("/run/mtc.sock".into())));
-        assert_eq!(of("ltc:relay:/run/ltc.sock"), ltc(LtcInput::Relay("/run/ltc.sock".into())));
+        assert_eq!(of("ltc:relay:/run/ltc.sock"), ltc(SoundLine::Relay("/run/ltc.sock".into())));
         let named = |from: &str, bind: &str| NamedSender {
             from: from.parse().expect("an address"),
             bind: bind.parse().expect("an address and a port"),
@@ -354,6 +398,17 @@ mod tests {
         let osc = named("10.0.0.20", "127.0.0.1:9000");
         assert_eq!(of("osc:10.0.0.20,bind=127.0.0.1:9000"), Ok(FilmSource::Osc(osc)));
         assert_eq!(of("http:127.0.0.1"), Ok(FilmSource::Http(named("127.0.0.1", "0.0.0.0:8431"))));
+        let sound = FilmSound {
+            line: SoundLine::Alsa("hw:2,0".to_owned()),
+            indexes: vec!["film.kidx".into(), "trailer.kidx".into()],
+        };
+        let text = "sound:alsa:hw:2,0,index=film.kidx,index=trailer.kidx";
+        assert_eq!(of(text), Ok(FilmSource::Sound(sound)));
+        assert_eq!(of(text).map(|source| source.to_string()), Ok("sound:alsa:hw:2,0".to_owned()));
+        for text in ["sound:-", "sound:,index=film.kidx", "sound:-,index="] {
+            let error = of(text).expect_err(text).to_string();
+            assert!(error.contains("kinocue sync index"), "{error}");
+        }
         for text in ["", "ltc", "ltc:", "tape:1"] {
             let error = of(text).expect_err(text).to_string();
             assert!(error.contains("ltc:FILE.wav"), "{error}");
@@ -402,7 +457,7 @@ mod tests {
 
     #[test]
     fn rate_and_start_are_read_and_refused_in_words() {
-        let args = |rate, start| FilmArgs::new(FilmSource::Ltc(LtcInput::Stdin), rate, start);
+        let args = |rate, start| FilmArgs::new(FilmSource::Ltc(SoundLine::Stdin), rate, start);
         let read = args(Some("29.97"), Some("01:00:00;02")).expect("both are sound");
         assert_eq!((read.start.hours, read.start.drops), (1, true));
         for (rate, start) in [(Some("26"), None), (None, Some("1:2"))] {

@@ -295,3 +295,56 @@ fn a_technician_sees_timecode_move_with_no_hall_and_no_cue() {
     let text = kinocue(&["sync", "watch", &source, "--seconds", "1"]).stdout;
     assert!(text.contains(&format!("artnet:{named}: ")), "{text}");
 }
+
+/// The sound of a film: chords over noise, 48,000 samples a second, one channel.
+fn film_sound(seconds: u32) -> Vec<u8> {
+    let mut dice = 7_u32;
+    let mut throw = || {
+        dice = dice.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(dice >> 8) / f64::from(1 << 24)
+    };
+    let samples = seconds * 48_000;
+    let mut wav =
+        [b"RIFF".as_slice(), &(36 + 2 * samples).to_le_bytes(), b"WAVEfmt \x10\0\0\0\x01\0\x01\0"].concat();
+    wav.extend([48_000_u32.to_le_bytes(), 96_000_u32.to_le_bytes()].concat());
+    wav.extend([b"\x02\0\x10\0data".as_slice(), &(2 * samples).to_le_bytes()].concat());
+    let mut chord = [0.0; 4];
+    for n in 0..samples {
+        if n % 14_400 == 0 {
+            chord = [(); 4].map(|()| 120.0 * 20_f64.powf(throw()));
+        }
+        let turn = std::f64::consts::TAU * f64::from(n) / 48_000.0;
+        let notes: f64 = chord.iter().map(|hertz| (turn * hertz).sin()).sum();
+        let value = 2_000.0 * notes + 3_000.0 * (throw() - 0.5);
+        wav.extend(format!("{value:.0}").parse::<i16>().expect("it is within 16 bits").to_le_bytes());
+    }
+    wav
+}
+
+#[test]
+fn a_film_is_found_by_its_sound_with_the_index_that_was_made_of_it() {
+    let folder = Folder::new();
+    let path = |name: &str, octets: Vec<u8>| folder.write(name, octets).to_str().expect("text").to_owned();
+    let (film, index) = (path("storm.wav", film_sound(12)), path("storm.kidx", Vec::new()));
+    let made = kinocue(&["sync", "index", &film, "-o", &index, "--name", "The Storm", "--json"]);
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let made: Value = serde_json::from_str(&made.stdout).expect("JSON");
+    assert!(made["seconds"].as_f64().is_some_and(|seconds| (seconds - 12.0).abs() < 0.1), "{made}");
+    let source = format!("sound:{film},index={index}");
+    let seen = kinocue(&["sync", "watch", &source, "--seconds", "9", "--json"]);
+    assert_eq!(seen.code, Some(0), "{seen:?}");
+    let tables = seen.stdout.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    let leads = |table: &Value| {
+        let row = &table["sources"][0];
+        row["state"] == "locked" && row["film"] == "The Storm" && table["leads"] == 0
+    };
+    assert!(tables.into_iter().any(|table| leads(&table)), "{}", seen.stdout);
+    for (foreign, says) in
+        [(film.as_str(), "no index of a film's sound"), ("/nowhere.kidx", "cannot be opened")]
+    {
+        let refused = kinocue(&["sync", "watch", &format!("sound:-,index={foreign}")]);
+        assert!(refused.code != Some(0) && refused.stderr.contains(says), "{refused:?}");
+    }
+    let short = kinocue(&["sync", "index", &path("short.wav", film_sound(2)), "-o", &index]);
+    assert!(short.code != Some(0) && short.stderr.contains("s are needed"), "{short:?}");
+}

@@ -4,9 +4,10 @@
 mod clock;
 mod datagrams;
 mod hall;
+mod heard;
+mod indexed;
 mod left;
 mod line;
-mod ltc;
 mod mpv;
 mod mtc;
 mod network;
@@ -15,13 +16,14 @@ mod relayed;
 mod riff;
 mod sent;
 mod sound;
+mod sound_line;
 mod table;
 #[cfg(test)]
 mod tests;
 mod told;
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -30,6 +32,7 @@ use std::thread;
 use std::time::Duration;
 
 pub(crate) use hall::HallFilm;
+pub(crate) use indexed::{Indexed, index_film};
 pub(crate) use sent::TimecodeSent;
 pub(crate) use sound::{LtcFound, LtcSound, SAMPLES_PER_S, look_for_ltc, wav_header};
 pub(crate) use table::{FilmTable, SharedTable, SourceRow};
@@ -37,7 +40,9 @@ pub(crate) use table::{FilmTable, SharedTable, SourceRow};
 use super::player::FilmGate;
 use crate::film::chooser::MOST_SOURCES;
 use crate::film::point::PublishedPoint;
+use crate::film::sound::IndexFault;
 use crate::film::source::{FilmArgs, FilmSource};
+use heard::Listening;
 use left::LeftRead;
 use relay::Listeners;
 use table::Ranking;
@@ -57,6 +62,14 @@ pub(crate) enum FilmError {
         what: String,
         /// Why.
         source: io::Error,
+    },
+    /// A file is no index of a film's sound.
+    #[error("{} cannot be used", path.display())]
+    Index {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: IndexFault,
     },
     /// A command does not start.
     #[error("`{command}` cannot be started; see that it is installed")]
@@ -199,14 +212,18 @@ impl FilmReader {
 impl Drop for FilmReader {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        self.children.iter().for_each(|child| ltc::kill(child));
+        self.children.iter().for_each(|child| sound_line::kill(child));
     }
 }
 
 /// Begins to read a source; a command that is started for it is put there.
 fn read(args: &FilmArgs, told: WordSink, child: ChildSlot) -> Result<(), FilmError> {
     match &args.source {
-        FilmSource::Ltc(input) => ltc::start_reading(input, args, told, &child),
+        FilmSource::Ltc(input) => sound_line::start_reading(input, Listening::Ltc, args, told, &child),
+        FilmSource::Sound(sound) => {
+            let films = Listening::Sound(indexed::read_all(&sound.indexes)?);
+            sound_line::start_reading(&sound.line, films, args, told, &child)
+        }
         FilmSource::Mpv(socket) => Ok(mpv::start_reading(socket, args, told)?),
         FilmSource::Mtc(device) => mtc::start_reading(device, args, told),
         FilmSource::ArtNet(sender) => network::hear_artnet(sender, args, told),

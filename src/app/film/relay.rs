@@ -10,8 +10,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::line::{ByteLine, LineTaker};
 use super::relayed::{greeting, record};
-use super::{ChildSlot, FilmError, WordSink, ltc, mtc, start};
-use crate::film::source::{FilmSource, LineKind, LtcInput, MtcInput};
+use super::{ChildSlot, FilmError, WordSink, mtc, sound_line, start};
+use crate::film::source::{FilmSource, LineKind, MtcInput, SoundLine};
 use crate::time::MonoTime;
 
 /// Halls that hear one line at the most.
@@ -58,7 +58,7 @@ impl Listeners {
         let listeners = self.clone();
         let line = ByteLine::new(told, move || listeners.begin());
         match source {
-            FilmSource::Ltc(input) => ltc::start_line(input, line, &child),
+            FilmSource::Ltc(input) => sound_line::start_line(input, line, &child),
             FilmSource::Mtc(input) => mtc::start_line(input, line),
             _ => Err(FilmError::NoLine(source.to_string())),
         }
@@ -112,7 +112,7 @@ impl LineTaker for RelayTaker {
 /// The kind of line of a source that has a device of its own.
 fn kind_of(source: &FilmSource) -> Result<LineKind, FilmError> {
     match source {
-        FilmSource::Ltc(LtcInput::Pipe(_) | LtcInput::Fifo(_) | LtcInput::Stdin | LtcInput::Alsa(_)) => {
+        FilmSource::Ltc(SoundLine::Pipe(_) | SoundLine::Fifo(_) | SoundLine::Stdin | SoundLine::Alsa(_)) => {
             Ok(LineKind::Ltc)
         }
         FilmSource::Mtc(MtcInput::Device(_)) => Ok(LineKind::Mtc),
@@ -144,7 +144,7 @@ mod tests {
     fn what_is_read_of_a_line_is_heard_with_when_that_was_by_all_that_listen() {
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("ltc.sock");
-        let source = FilmSource::Ltc(LtcInput::Stdin);
+        let source = FilmSource::Ltc(SoundLine::Stdin);
         let listeners = Listeners::serve(&source, folder.path()).unwrap();
         let refused = RelayedRead::begin(UnixStream::connect(&socket).unwrap(), LineKind::Ltc).err().unwrap();
         assert!(refused.to_string().contains("has no line now"), "{refused}");

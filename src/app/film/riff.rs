@@ -13,7 +13,7 @@ const RATES: std::ops::RangeInclusive<u32> = 8_000..=192_000;
 
 /// Why a stream is none that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(super) enum RiffFault {
+pub(crate) enum RiffFault {
     #[error("only sound of 16 bits, uncompressed, is read")]
     Format,
     #[error("it begins like a WAV file and has no samples")]
@@ -26,6 +26,16 @@ pub(super) struct SampleStream {
     /// What came and was not used: a header that is not whole, or part of a frame.
     kept: Vec<u8>,
     format: Option<SoundFormat>,
+    channels: Channels,
+}
+
+/// Which of the channels is read.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Channels {
+    #[default]
+    First,
+    /// The mean of all.
+    Mixed,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,12 +45,16 @@ struct SoundFormat {
 }
 
 impl SampleStream {
+    pub(super) fn of(channels: Channels) -> Self {
+        Self { channels, ..Self::default() }
+    }
+
     /// SampleStream a second; none before that is known.
     pub(super) fn samples_per_s(&self) -> Option<u32> {
         self.format.map(|format| format.samples_per_s)
     }
 
-    /// Takes octets; adds to `out` the first channel's samples.
+    /// Takes octets; adds to `out` the samples of the channel that is read.
     pub(super) fn push(&mut self, octets: &[u8], out: &mut Vec<i16>) -> Result<(), RiffFault> {
         self.kept.extend_from_slice(octets);
         let format = match self.format {
@@ -55,10 +69,20 @@ impl SampleStream {
         };
         let frame = 2 * format.channels;
         let whole = self.kept.len() / frame * frame;
-        out.extend(self.kept[..whole].chunks_exact(frame).map(|one| i16::from_le_bytes([one[0], one[1]])));
+        let sample = |octets: &[u8]| i16::from_le_bytes([octets[0], octets[1]]);
+        let frames = self.kept[..whole].chunks_exact(frame);
+        match self.channels {
+            Channels::First => out.extend(frames.map(sample)),
+            Channels::Mixed => out.extend(frames.map(|one| mean(one.chunks_exact(2).map(sample)))),
+        }
         self.kept.drain(..whole);
         Ok(())
     }
+}
+
+fn mean(samples: impl Iterator<Item = i16>) -> i16 {
+    let (sum, count) = samples.fold((0_i32, 0), |(sum, count), sample| (sum + i32::from(sample), count + 1));
+    i16::try_from(sum / count.max(1)).expect("a mean is among its samples")
 }
 
 /// The format, and how long the header is; none while it is not whole.
@@ -131,6 +155,9 @@ mod tests {
                 assert_eq!(read(&octets, piece), (vec![1, 2, 3], Some(48_000)), "pieces of {piece}");
             }
         }
+        let mut mixed = (SampleStream::of(Channels::Mixed), Vec::new());
+        mixed.0.push(&wav(1, 2, 16, 8, &[4, 2, i16::MIN, i16::MIN]), &mut mixed.1).expect("it is sound");
+        assert_eq!(mixed.1, [3, i16::MIN], "of both channels");
         assert_eq!(read(&[1, 0, 2, 0, 9], 2), (vec![1, 2], Some(48_000)), "raw");
         assert_eq!(read(b"RIFX\0\0", 1).0.len(), 3, "it is none");
     }

@@ -24,7 +24,7 @@ pub(super) const AGAIN: Duration = Duration::from_secs(1);
 pub(crate) struct SourceNotes {
     /// Why it is not read at present.
     pub(crate) trouble: Option<String>,
-    /// Why its labels are none that can be used.
+    /// Why its labels, or its sound, are none that can be used.
     pub(crate) refused: Option<String>,
     /// Frames a second, as configured or found.
     pub(crate) fps: Option<String>,
@@ -38,7 +38,7 @@ pub(crate) struct SourceNotes {
     pub(crate) garbage: u64,
     /// How loud the line is, dB of full scale.
     pub(crate) level_db: Option<f64>,
-    /// The film that a player has open.
+    /// The film that a player has open, or that is heard.
     pub(crate) film: Option<String>,
     /// How far the player's picture is from its sound, milliseconds.
     pub(crate) avsync_ms: Option<f64>,

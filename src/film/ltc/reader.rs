@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use super::Label;
 use super::decoder::{LtcDecoder, LtcFrame};
-use super::samples::SampleClock;
 use crate::film::labels::LabelClock;
 use crate::film::observation::{FilmWord, Observation};
+use crate::film::samples::SampleClock;
 use crate::film::timecode::FrameRate;
 use crate::time::{MonoTime, ShowTime};
 

@@ -9,6 +9,8 @@ use super::{SAMPLES, SAMPLES_AGAIN};
 pub(crate) enum SourceKind {
     /// LTC, by the clock of its samples.
     Ltc,
+    /// The film's own sound, by the clock of its samples.
+    Sound,
     /// mpv: `audio-pts`, or `time-pos` less a frame where a film has no sound.
     Mpv,
     /// MTC quarter frames.
@@ -47,6 +49,7 @@ impl SourceKind {
     pub(super) const fn traits(self) -> Traits {
         let (sigma_ms, late_only, coarse) = match self {
             Self::Ltc => (0.05, false, false),
+            Self::Sound => (0.3, false, false),
             Self::Mpv => (0.2, false, false),
             Self::Mtc => (0.5, true, false),
             Self::ArtNet => (4.0, true, false),

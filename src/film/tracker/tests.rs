@@ -65,6 +65,7 @@ fn goals(kind: SourceKind) -> (f64, f64, f64) {
         SourceKind::Ltc | SourceKind::Mpv | SourceKind::Mtc | SourceKind::WallClock => (0.5, 0.5, 1.0),
         SourceKind::ArtNet => (1.0, 1.0, 1.0),
         SourceKind::Message => (11.0, 3.0, 6.0),
+        SourceKind::Sound => (2.0, 0.5, 4.0),
     }
 }
 

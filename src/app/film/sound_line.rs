@@ -1,4 +1,4 @@
-//! LTC from wherever sound comes: bytes as they are read, and when that was, into what they say of the film.
+//! Sound from wherever it comes, heard as LTC or as the film's own: bytes as they are read, and when that was, into what they say of the film.
 
 use std::io;
 use std::os::unix::process::CommandExt as _;
@@ -12,66 +12,71 @@ use std::os::fd::AsFd as _;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
+use super::heard::{Listener, Listening};
 use super::line::{ByteLine, LineTaker};
-use super::riff::SampleStream;
+use super::riff::{Channels, SampleStream};
 use super::{ChildSlot, FilmError, WordSink, start};
-use crate::film::ltc::LtcReader;
 use crate::film::observation::{FilmWord, Observation};
-use crate::film::source::{FilmArgs, LineKind, LtcInput};
+use crate::film::source::{FilmArgs, LineKind, SoundLine};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
-/// Begins to read an input as LTC; a command that is started for it is put there.
+/// Begins to read an input, and to listen to it; a command that is started for it is put there.
 pub(super) fn start_reading(
-    input: &LtcInput,
+    input: &SoundLine,
+    listening: Listening,
     args: &FilmArgs,
     told: WordSink,
     child: &ChildSlot,
 ) -> Result<(), FilmError> {
     let (args, sink) = (args.clone(), told.clone());
-    let paced = matches!(input, LtcInput::File(_));
-    let open = move || LtcTaker {
+    let paced = matches!(input, SoundLine::File(_));
+    let open = move || SoundTaker {
+        samples: SampleStream::of(match listening {
+            Listening::Ltc => Channels::First,
+            Listening::Sound(_) => Channels::Mixed,
+        }),
+        listening: listening.clone(),
         args: args.clone(),
         told: sink.clone(),
-        samples: SampleStream::default(),
         block: Vec::new(),
-        reader: None,
+        listener: None,
         paced: paced.then(|| (Monotonic.now(), 0)),
     };
     start_line(input, ByteLine::new(told, open), child)
 }
 
 /// Begins to read an input.
-pub(super) fn start_line(input: &LtcInput, line: ByteLine, child: &ChildSlot) -> Result<(), FilmError> {
+pub(super) fn start_line(input: &SoundLine, line: ByteLine, child: &ChildSlot) -> Result<(), FilmError> {
     let failed = |path: &Path| {
         let what = path.display().to_string();
         move |source| FilmError::Open { what, source }
     };
     match input {
-        LtcInput::File(path) => {
+        SoundLine::File(path) => {
             let file = File::open(path).map_err(failed(path))?;
-            start("ltc", move || end(&line, &line.read(file)))?;
+            start("line", move || end(&line, &line.read(file)))?;
         }
-        LtcInput::Stdin => {
+        SoundLine::Stdin => {
             // Not through the buffer that is shared: what lies in there no poll tells of.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(failed(Path::new("stdin")))?;
-            start("ltc", move || end(&line, &line.read(File::from(input))))?;
+            start("line", move || end(&line, &line.read(File::from(input))))?;
         }
-        LtcInput::Fifo(path) => {
+        SoundLine::Fifo(path) => {
             let path = path.clone();
             path.metadata().map_err(failed(&path))?;
-            start("ltc", move || while line.told.again(line.read_at(&path)) {})?;
+            start("line", move || while line.told.again(line.read_at(&path)) {})?;
         }
-        LtcInput::Relay(socket) => {
+        SoundLine::Relay(socket) => {
             let socket = socket.clone();
-            start("ltc", move || while line.told.again(line.read_relayed(&socket, LineKind::Ltc)) {})?;
+            start("line", move || while line.told.again(line.read_relayed(&socket, LineKind::Ltc)) {})?;
         }
-        LtcInput::Pipe(command) => {
+        SoundLine::Pipe(command) => {
             let mut shell = Command::new("sh");
             shell.args(["-c", command]);
             run(shell, command, line, child)?;
         }
-        LtcInput::Alsa(device) => {
+        SoundLine::Alsa(device) => {
             let mut arecord = Command::new("arecord");
             arecord.args(["-q", "-t", "raw", "-f", "S16_LE", "-c", "1", "-r", "48000", "-D", device]);
             run(arecord, "arecord", line, child)?;
@@ -88,7 +93,7 @@ fn run(mut command: Command, name: &str, line: ByteLine, child: &ChildSlot) -> R
     let failed = |source| FilmError::Command { command: name.to_owned(), source };
     let mut output = put(command.spawn().map_err(failed)?, child);
     let child = Arc::clone(child);
-    start("ltc", move || {
+    start("line", move || {
         // Whoever ended what was started ends no more: this one was started meanwhile.
         while !line.told.is_over() {
             let read = output.take().map_or(Ok(()), |output| line.read(output));
@@ -133,19 +138,20 @@ fn end(line: &ByteLine, _read: &io::Result<()>) {
     line.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
 }
 
-/// Hears LTC in the sound of a line.
-struct LtcTaker {
+/// Hears what the sound of a line says.
+struct SoundTaker {
+    listening: Listening,
     args: FilmArgs,
     told: WordSink,
     samples: SampleStream,
     block: Vec<i16>,
     /// None before it is known how many samples a second there are.
-    reader: Option<LtcReader>,
+    listener: Option<Listener>,
     /// Since when a recording is heard, at the speed of its sound, and how many samples of it were.
     paced: Option<(MonoTime, u64)>,
 }
 
-impl LineTaker for LtcTaker {
+impl LineTaker for SoundTaker {
     fn take(&mut self, bytes: &[u8], mut at: MonoTime) -> io::Result<()> {
         self.block.clear();
         self.samples.push(bytes, &mut self.block).map_err(io::Error::other)?;
@@ -155,16 +161,11 @@ impl LineTaker for LtcTaker {
             at = *begun + Duration::from_nanos(*heard * 1_000_000_000 / u64::from(per_s));
             Monotonic.sleep_until(at);
         }
-        let FilmArgs { rate, start, latency, .. } = self.args;
-        let reader = self.reader.get_or_insert_with(|| LtcReader::new(per_s, latency, rate, start));
-        reader.hear(&self.block, at, &mut |what| {
+        let listener = self.listener.get_or_insert_with(|| self.listening.begin(per_s, &self.args));
+        listener.hear(&self.block, at, |what| {
             self.told.tell(what);
         });
-        let level = f64::from(reader.level());
-        self.told.note(|notes| {
-            notes.level_db = Some(20.0 * level.max(1e-6).log10());
-            notes.label(reader.labels());
-        });
+        self.told.note(|notes| listener.note(notes));
         Ok(())
     }
 }
