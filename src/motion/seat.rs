@@ -39,7 +39,7 @@ impl SeatType {
 
     /// The same seat with a change to each axis.
     #[must_use]
-    pub fn with_each(mut self, change: impl FnMut(&mut AxisGeometry)) -> Self {
+    pub(crate) fn with_each(mut self, change: impl FnMut(&mut AxisGeometry)) -> Self {
         self.each.iter_mut().for_each(change);
         self
     }
@@ -74,9 +74,9 @@ impl SeatType {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeatAxis {
     /// The seat type.
-    pub seat: Arc<SeatType>,
+    pub(crate) seat: Arc<SeatType>,
     /// Which of its axes, from 0.
-    pub index: usize,
+    pub(crate) index: usize,
 }
 
 impl SeatAxis {
