@@ -162,8 +162,11 @@ checks! {
         "PA00 = 0 is the work mode of RS-485 units (SMC manual 5.2) and none of CAN units, whose work mode is 10; no \
          register tells which of them this is.";
     RotaryAxis "rotary-axis" Identity Fail
-        "With PA03 above 0 that axis has no stroke and takes for zero wherever it stands; kinocue proves and parks axes \
-         that have a stroke, and knows no others.";
+        "PA03 names the axis that takes for zero wherever it stands; the others search their zero at an end. Where that is not \
+         the axis with unit = \"deg\" of the seat type, positions mean other places, or a turntable runs to search an end.";
+    RotaryZero "rotary-zero" Identity Warn
+        "A rotary axis has no search for its zero: wherever it stands when its controller starts or is homed becomes 0, and its range \
+         lies about that. Homed a quarter turn off, it may be led a quarter turn past its end.";
     AxisOffset "axis-offset" Identity Fail
         "PA95 must be 0 where kinocue sends each controller its own axes (fan_out = slice), and axis_offset where each \
          takes its window of one frame (shared). Else the seat plays axes that are not its own.";
@@ -189,6 +192,8 @@ checks! {
         "A Time longer than PA0b is cut to it, so the move is made in less time: faster than anyone proved.";
     IntervalUnlimited "interval-unlimited" Motion Warn
         "PA0b = 0 means no limit by the SMC manual alone; the IMAX manual does not say what it does.";
+    SignedFilter "signed-filter" Motion Fail
+        "An IMAX controller filters positions (PA51); its manual wants that off where positions go below 0 (section 5.7).";
     TimeIgnored "time-ignored" Motion Fail
         "With PA0a = 1 an IMAX controller goes by the time between packets and not by the Time in them: a frame that comes \
          late or early is made slower or faster than anyone proved.";

@@ -59,6 +59,13 @@ pub enum PlayError {
         .0.join(", ")
     )]
     Unplaced(Vec<String>),
+    /// Seats with a rotary axis that do not tell where it is: a frame that is slow enough from anywhere there is not.
+    #[error(
+        "{}: has a rotary axis, and does not tell where all of its axes are; nothing was sent, as no frame is slow enough from \
+         anywhere. Play with acks to a controller that answers",
+        .0.join(", ")
+    )]
+    UnknownTurn(Vec<String>),
 }
 
 fn others(found: &[(String, u16)]) -> String {

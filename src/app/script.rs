@@ -218,7 +218,12 @@ impl PlayScript {
         if !moving.is_empty() {
             return Err(PlayError::Moving(moving));
         }
-        let untold = (0..self.lanes.len()).filter(|&lane| self.known(lane).is_none()).collect();
+        let untold: Vec<usize> = (0..self.lanes.len()).filter(|&lane| self.known(lane).is_none()).collect();
+        let turns = |lane: usize| self.handle.config.controllers[lane].seat.rotary_axis().is_some();
+        let unknown = self.names(|lane| untold.contains(&lane) && turns(lane));
+        if !unknown.is_empty() {
+            return Err(PlayError::UnknownTurn(unknown));
+        }
         let unsure = self.park_slowly(untold);
         if unsure.is_empty() || self.is_called_off() {
             return Ok(());

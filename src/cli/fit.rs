@@ -11,6 +11,7 @@ use super::figures::{self, AxisReport};
 use super::load::{self, SeatArgs, SourceArgs};
 use super::{Exit, Failure, OrExit as _, print};
 use crate::config::parse_level;
+use crate::motion::AxisUnit;
 use crate::proof::{self, Fitted, Manner};
 use crate::timeline::Timeline;
 
@@ -114,8 +115,10 @@ struct Report {
     eased_s: Option<f64>,
     /// The low-pass; null if none was used.
     cut_off_hz: Option<f64>,
-    /// The largest change of a position, its axis and its time.
-    change_mm: f64,
+    /// The largest change of a position, its axis and its time; null in mm if that axis turns.
+    change_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    change_deg: Option<f64>,
     change_axis: String,
     change_at_s: f64,
     /// Stretches of vibration that swing less than they did.
@@ -128,6 +131,9 @@ impl Report {
     fn new(args: &Args, fitted: &Fitted) -> Self {
         let seats: Vec<_> = fitted.after.axes.iter().map(|axis| axis.on.clone()).collect();
         let (cue, output) = (args.cue.display().to_string(), args.output.display().to_string());
+        let changed = fitted.after.axes.iter().find(|axis| axis.axis == fitted.change.axis);
+        let unit = changed.map_or(AxisUnit::Millimetre, |axis| axis.on.geometry().unit);
+        let change = |of: AxisUnit| (unit == of).then_some(fitted.change.by);
         Self {
             seat: figures::seat_names(&seats),
             rate_hz: fitted.after.terms.rate.hz(),
@@ -135,7 +141,8 @@ impl Report {
             factors: fitted.factors.clone(),
             eased_s: fitted.eased_s,
             cut_off_hz: fitted.smoothing.map(|smoothing| smoothing.cut_off_hz),
-            change_mm: fitted.change.mm,
+            change_mm: change(AxisUnit::Millimetre),
+            change_deg: change(AxisUnit::Degree),
             change_axis: format!("a{}", fitted.change.axis + 1),
             change_at_s: fitted.change.at.as_secs_f64(),
             vibration_lowered: fitted.lowered,
@@ -167,8 +174,9 @@ impl Report {
         if lines.is_empty() {
             lines.push("kept all limits before; written as it was".to_owned());
         } else {
-            let (mm, axis, at) = (self.change_mm, &self.change_axis, fitted.change.at);
-            lines.push(format!("largest change of position: {mm:.3} mm ({axis} at {at})"));
+            let (by, axis, at) = (fitted.change.by, &self.change_axis, fitted.change.at);
+            let unit = self.change_deg.map_or(AxisUnit::Millimetre, |_| AxisUnit::Degree).name();
+            lines.push(format!("largest change of position: {by:.3} {unit} ({axis} at {at})"));
         }
         let mut text: String = lines.iter().map(|line| format!("{}: {line}\n", self.cue)).collect();
         let after = figures::proof_table(&fitted.after.axes);

@@ -115,6 +115,12 @@ fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<R
             table().get(PA0E).and_then(|register| register.says(value)).unwrap_or("not in the manuals");
         let state = state(controller, &answer).map_or_else(String::new, |state| format!("; now {state}"));
         print::tell(&format!("{name}: PA0e = {value}: {meaning}{state}"));
+        if let Some(axis) = controller.seat.rotary_axis() {
+            print::tell(&format!(
+                "{name}: axis {} does not search its zero: where it stands now becomes its 0",
+                axis + 1
+            ));
+        }
         match hindrance(&answer, controller.dialect) {
             None => Ok(Duration::ZERO),
             Some(error) => {

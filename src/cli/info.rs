@@ -9,6 +9,7 @@ use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::cue::Vibration;
+use crate::motion::AxisUnit;
 use crate::plain;
 use crate::proof::{self, AxisFigures};
 use crate::time::{Rate, ShowTime};
@@ -121,13 +122,16 @@ struct VibrationReport {
     axis: String,
     min_hz: f64,
     max_hz: f64,
-    max_amplitude_mm: f64,
+    /// Null if the axis turns.
+    max_amplitude_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max_amplitude_deg: Option<f64>,
 }
 
 impl VibrationReport {
     /// True if another axis vibrates alike.
     fn is_as(&self, other: &Self) -> bool {
-        let figures = |v: &Self| (v.min_hz, v.max_hz, v.max_amplitude_mm);
+        let figures = |v: &Self| (v.min_hz, v.max_hz, v.max_amplitude_mm, v.max_amplitude_deg);
         figures(self) == figures(other)
     }
 }
@@ -201,10 +205,13 @@ impl Info {
         ];
         facts.extend(self.vibration.chunk_by(VibrationReport::is_as).map(|alike| {
             let axes: Vec<_> = alike.iter().map(|v| v.axis.as_str()).collect();
-            let VibrationReport { min_hz, max_hz, max_amplitude_mm, .. } = &alike[0];
+            let VibrationReport { min_hz, max_hz, max_amplitude_mm: mm, max_amplitude_deg: deg, .. } =
+                &alike[0];
+            let most =
+                mm.map_or_else(|| format!("{:.2} deg", deg.unwrap_or_default()), |mm| format!("{mm:.2} mm"));
             let axes = axes.join(", ");
             let hz = if min_hz == max_hz { min_hz.to_string() } else { format!("{min_hz} to {max_hz}") };
-            ("vibration", format!("{axes}: {hz} Hz, up to {max_amplitude_mm:.2} mm"))
+            ("vibration", format!("{axes}: {hz} Hz, up to {most}"))
         }));
         facts.extend(self.effects.iter().map(|effect| ("effect", effect.to_string())));
         let output = |OutputReport { usage, max_level }: &OutputReport| format!("{usage}, up to {max_level}");
@@ -221,12 +228,16 @@ fn vibration(timeline: &Timeline, figures: &[AxisFigures]) -> Vec<VibrationRepor
         let shaking =
             steps.map(|step| Vibration::from(step.value)).filter(|v| v.hz > 0.0 && v.amplitude > 0.0);
         let (hz, amplitudes): (Vec<_>, Vec<_>) = shaking.map(|v| (v.hz, v.amplitude)).unzip();
-        let mm = timeline.unit(axis).to_stroke(figures.on.geometry()) * figures.on.geometry().stroke();
+        let geometry = figures.on.geometry();
+        let per_unit = timeline.unit(axis).to_stroke(geometry) * geometry.stroke();
+        let most = per_unit * amplitudes.iter().copied().reduce(f64::max)?;
+        let of = |unit: AxisUnit| (geometry.unit == unit).then_some(most);
         Some(VibrationReport {
             axis: format!("a{}", axis + 1),
             min_hz: hz.iter().copied().reduce(f64::min)?,
             max_hz: hz.iter().copied().reduce(f64::max)?,
-            max_amplitude_mm: mm * amplitudes.iter().copied().reduce(f64::max)?,
+            max_amplitude_mm: of(AxisUnit::Millimetre),
+            max_amplitude_deg: of(AxisUnit::Degree),
         })
     });
     report.collect()

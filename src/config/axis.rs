@@ -23,7 +23,7 @@ pub(super) const NEEDED: [&str; 6] = [
 const TURN_DEG: f64 = 360.0;
 
 /// The keys of what is measured in a unit.
-struct Words {
+struct UnitKeys {
     lead: &'static str,
     velocity: &'static str,
     acceleration: &'static str,
@@ -32,7 +32,7 @@ struct Words {
     shaken_acceleration: &'static str,
 }
 
-const MILLIMETRES: Words = Words {
+const MILLIMETRES: UnitKeys = UnitKeys {
     lead: "lead_mm",
     velocity: "max_velocity_mm_s",
     acceleration: "max_acceleration_mm_s2",
@@ -40,7 +40,7 @@ const MILLIMETRES: Words = Words {
     shaken_velocity: "max_shaken_velocity_mm_s",
     shaken_acceleration: "max_shaken_acceleration_mm_s2",
 };
-const DEGREES: Words = Words {
+const DEGREES: UnitKeys = UnitKeys {
     lead: "lead_deg",
     velocity: "max_velocity_deg_s",
     acceleration: "max_acceleration_deg_s2",
@@ -51,7 +51,7 @@ const DEGREES: Words = Words {
 
 /// What keys say of an axis, `None` where they say nothing.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Said {
+pub(super) struct AxisKeys {
     /// The ends of the range.
     ends: Option<(f64, f64)>,
     lead: Option<f64>,
@@ -64,7 +64,7 @@ pub(super) struct Said {
     max_rpm: Option<u32>,
 }
 
-impl Said {
+impl AxisKeys {
     /// What the keys of a seat say of its cylinders.
     pub(super) fn of_seat(section: &mut Section<'_, '_, '_>) -> Self {
         let ends = section.above_zero("stroke_mm").map(|stroke| (0.0, stroke));
@@ -72,7 +72,7 @@ impl Said {
     }
 
     /// The same where a table says nothing else.
-    fn with(self, section: &mut Section<'_, '_, '_>, words: &Words) -> Self {
+    fn with(self, section: &mut Section<'_, '_, '_>, words: &UnitKeys) -> Self {
         let velocity = section.above_zero(words.velocity).or(self.velocity);
         let acceleration = section.above_zero(words.acceleration).or(self.acceleration);
         let shaken_velocity = shaken(section, words.shaken_velocity, words.velocity, velocity);
@@ -154,7 +154,12 @@ pub(super) fn leaves_to_seat(entry: &Entry<'_>, key: &str) -> bool {
 }
 
 /// Reads `[seat.NAME.axisN]`; `seat` is what the keys of the seat say of its cylinders.
-pub(super) fn own_axis(name: &str, entry: Entry<'_>, seat: Said, faults: &mut Faults<'_>) -> Option<OwnAxis> {
+pub(super) fn own_axis(
+    name: &str,
+    entry: Entry<'_>,
+    seat: AxisKeys,
+    faults: &mut Faults<'_>,
+) -> Option<OwnAxis> {
     let table = entry.table(faults)?;
     let mut section = Section::new(format!("[seat.{name}.{}]", entry.key), entry.at, table, faults);
     let unit = match section.get("unit") {
@@ -170,16 +175,16 @@ pub(super) fn own_axis(name: &str, entry: Entry<'_>, seat: Said, faults: &mut Fa
                 stroke.fault(section.faults, "range says that as well; leave one of them out");
             }
             let ends = section.above_zero("stroke_mm").map(|stroke| (0.0, stroke)).or(seat.ends);
-            Said { ends, ..seat }.with(&mut section, &MILLIMETRES)
+            AxisKeys { ends, ..seat }.with(&mut section, &MILLIMETRES)
         }
         AxisUnit::Degree => {
-            let Words { velocity, acceleration, jerk, .. } = DEGREES;
+            let UnitKeys { velocity, acceleration, jerk, .. } = DEGREES;
             section.require(&["range", "pulses_per_rev", velocity, acceleration, jerk]);
-            Said { lead: Some(TURN_DEG), ..Said::default() }.with(&mut section, &DEGREES)
+            AxisKeys { lead: Some(TURN_DEG), ..AxisKeys::default() }.with(&mut section, &DEGREES)
         }
     };
     let ends = range(&mut section, unit);
-    let axis = Said { ends: ends.unwrap_or(said.ends), ..said }.axis(unit);
+    let axis = AxisKeys { ends: ends.unwrap_or(said.ends), ..said }.axis(unit);
     let [park, neutral] = ["park", "neutral"].map(|key| place(&mut section, key, axis.as_ref()));
     section.finish();
     Some(OwnAxis { axis: axis?, park, neutral })

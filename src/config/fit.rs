@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::channel::{self, TrackId};
 use crate::cue::CueFaults;
-use crate::motion::{SeatAxis, SeatType};
+use crate::motion::{AxisUnit, SeatAxis, SeatType};
 use crate::time::ShowTime;
 use crate::timeline::{Held, Timeline};
 use crate::wire::{Vibration, motion_channel_and_slots};
@@ -120,15 +120,17 @@ pub enum Misfit {
 /// How far a vibration swings to either side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Swing {
-    /// Millimetres.
-    pub(crate) mm: f64,
+    /// How far, in the unit of the axis.
+    pub(crate) far: f64,
+    /// That unit.
+    pub(crate) unit: AxisUnit,
     /// Pulses.
     pub(crate) pulses: f64,
 }
 
 impl fmt::Display for Swing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.3} mm, {:.0} pulses", self.mm, self.pulses)
+        write!(f, "{:.3} {}, {:.0} pulses", self.far, self.unit.name(), self.pulses)
     }
 }
 
@@ -280,7 +282,8 @@ fn overshake(axis: usize, on: &SeatAxis, timeline: &Timeline) -> Option<Misfit> 
     let (at, strongest) = timeline.strongest_vibration(axis)?;
     let (seat, geometry) = (&on.seat, on.geometry());
     let stroke_pulses = geometry.stroke_pulses();
-    let swing = |pulses: f64| Swing { mm: pulses / stroke_pulses * geometry.stroke(), pulses };
+    let far = |pulses: f64| pulses / stroke_pulses * geometry.stroke();
+    let swing = |pulses: f64| Swing { far: far(pulses), unit: geometry.unit, pulses };
     // Whole pulses, as the wire has them.
     let pulses = (strongest.amplitude * timeline.unit(axis).to_stroke(geometry) * stroke_pulses).round();
     let half = (stroke_pulses / 2.0).round();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::axis::{NEEDED, OwnAxis, Said, TABLES, leaves_to_seat, own_axis};
+use super::axis::{AxisKeys, NEEDED, OwnAxis, TABLES, leaves_to_seat, own_axis};
 use super::fault::Faults;
 use super::section::{Entry, Section};
 use crate::motion::{AxisGeometry, AxisUnit, FACTORY_INTERVAL_MS, MAX_AXES, SeatType};
@@ -26,9 +26,9 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
     let own = &tables[..axes.unwrap_or(MAX_AXES)];
     section.require(&["axes"]);
     section.require(&needed(own));
-    let said = Said::of_seat(&mut section);
+    let said = AxisKeys::of_seat(&mut section);
     let interval = section.whole_in("max_interval_ms", 1..=65_535);
-    let [park, neutral] = ["park", "neutral"].map(|key| Pose::read(&mut section, key, axes));
+    let [park, neutral] = ["park", "neutral"].map(|key| SeatPose::read(&mut section, key, axes));
     let stroke = section.get("stroke_mm");
     section.finish();
     let (axes, cylinder) = (axes?, said.axis(AxisUnit::Millimetre));
@@ -88,9 +88,9 @@ fn refuse_second_rotary(each: &[AxisGeometry], own: &[Option<Entry<'_>>], faults
 }
 
 /// A pose of the seat: one fraction of the stroke for each axis.
-struct Pose<'t>(Option<(Entry<'t>, [f64; MAX_AXES])>);
+struct SeatPose<'t>(Option<(Entry<'t>, [f64; MAX_AXES])>);
 
-impl<'t> Pose<'t> {
+impl<'t> SeatPose<'t> {
     fn read(section: &mut Section<'t, '_, '_>, key: &'static str, axes: Option<usize>) -> Self {
         let entry = section.get(key);
         Self(entry.and_then(|entry| Some((entry, fractions(entry, axes, section.faults)?))))

@@ -325,8 +325,12 @@ pub struct ControllerStatus {
     pub belts_open: Option<Vec<u8>>,
     /// Outputs, bit 0 = Y01; null if it never told.
     pub outputs: Option<u16>,
-    /// Where its axes are, mm: measured where it measures, else as it was commanded; null if nobody knows.
+    /// Where its axes are, mm, and degrees of its rotary axis: measured where it measures, else as it was commanded; null if
+    /// nobody knows.
     pub positions_mm: Option<Vec<f64>>,
+    /// Its rotary axis, from 1; left out if it has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotary_axis: Option<usize>,
 }
 
 /// What the last preflight found.

@@ -67,8 +67,7 @@ pub mod log {
 }
 pub mod motion {
     pub use crate::motion::{
-        AxisGeometry, AxisUnit, Limits, MAX_AXES, Measure, Pose, Pulses, SeatAxis, SeatType, Slot, Spacing,
-        Window,
+        AxisGeometry, Limits, MAX_AXES, Measure, Pose, Pulses, SeatAxis, SeatType, Slot, Spacing, Window,
     };
 }
 pub mod net {

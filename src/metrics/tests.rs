@@ -45,6 +45,7 @@ fn controller(name: &str, row: Option<&str>) -> ControllerStatus {
         inputs: Some(0),
         outputs: None,
         positions_mm: None,
+        rotary_axis: None,
     }
 }
 

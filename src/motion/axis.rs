@@ -13,7 +13,7 @@ const PARK_VELOCITY_DEG_S: f64 = 10.0;
 
 /// What the places of an axis are told in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AxisUnit {
+pub(crate) enum AxisUnit {
     /// A cylinder: millimetres.
     Millimetre,
     /// A rotary axis: degrees.
@@ -46,13 +46,13 @@ pub struct AxisGeometry {
     /// What its places are told in.
     pub(crate) unit: AxisUnit,
     /// The lower end of the range; the motor is at pulse 0 at 0.
-    pub low: f64,
+    pub(crate) low: f64,
     /// The upper end of the range, above the lower one.
-    pub high: f64,
+    pub(crate) high: f64,
     /// Travel per turn of the motor, above 0.
-    pub lead: f64,
+    pub(crate) lead: f64,
     /// Pulses per turn of the motor, above 0.
-    pub pulses_per_rev: f64,
+    pub(crate) pulses_per_rev: f64,
     /// Greatest speed, above 0.
     pub max_velocity: f64,
     /// Greatest acceleration, above 0.

@@ -8,7 +8,8 @@ mod measure;
 mod seat;
 mod window;
 
-pub use axis::{AxisGeometry, AxisUnit};
+pub use axis::AxisGeometry;
+pub(crate) use axis::AxisUnit;
 pub(crate) use brake::{AxisState, Brake};
 pub(crate) use halt::{Begun, Halt, Means};
 #[cfg(test)]

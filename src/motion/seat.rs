@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::{AxisGeometry, MAX_AXES};
+use super::{AxisGeometry, AxisUnit, MAX_AXES};
 
 /// The longest Time that a controller executes as it leaves the factory, ms (PA0b, IMAX manual 2.3.1).
 pub(crate) const FACTORY_INTERVAL_MS: u32 = 3_000;
@@ -39,7 +39,7 @@ impl SeatType {
 
     /// The same seat with a change to each axis.
     #[must_use]
-    pub fn with_each(mut self, change: impl FnMut(&mut AxisGeometry)) -> Self {
+    pub(crate) fn with_each(mut self, change: impl FnMut(&mut AxisGeometry)) -> Self {
         self.each.iter_mut().for_each(change);
         self
     }
@@ -48,6 +48,13 @@ impl SeatType {
     #[must_use]
     pub(crate) fn own(&self) -> &[AxisGeometry] {
         &self.each[..self.axes]
+    }
+
+    /// The axis that turns, from 0, where it has one: it has no stop at its ends and no search for its zero, which is where it
+    /// stands when its controller starts or is homed (SMC manual 5.7).
+    #[must_use]
+    pub(crate) fn rotary_axis(&self) -> Option<usize> {
+        self.own().iter().position(|axis| axis.unit == AxisUnit::Degree)
     }
 
     /// Between which pulses the motor of each axis stands, and of each place of a frame behind them.
@@ -67,9 +74,9 @@ impl SeatType {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeatAxis {
     /// The seat type.
-    pub seat: Arc<SeatType>,
+    pub(crate) seat: Arc<SeatType>,
     /// Which of its axes, from 0.
-    pub index: usize,
+    pub(crate) index: usize,
 }
 
 impl SeatAxis {

@@ -12,11 +12,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     judge_company(subject, notes);
     judge_axes(subject, notes);
     judge_mode(subject, notes);
-    if let Some(axis) = subject.pa(0x03).filter(|axis| *axis != 0) {
-        let found =
-            format!("PA03 = {axis}: axis {axis} is a rotary one, which takes for zero wherever it stands");
-        notes.add(Check::RotaryAxis, found, "set PA03 = 0; kinocue plays to no rotary axis");
-    }
+    judge_rotary(subject, notes);
     judge_offset(subject, notes);
     if let Some(version) = version(subject) {
         notes.add(Check::Version, format!("software {version}"), "");
@@ -79,6 +75,36 @@ fn judge_axes(subject: &Subject<'_>, notes: &mut Notes) {
         Some(axes) => {
             let found = format!("PA02 = {works}: works with {works} axes, but seat {seat} has {axes}");
             notes.add(Check::AxisCount, found, format!("set PA02 = {axes}, or give it another seat type"));
+        }
+    }
+}
+
+/// The axis that takes its place at a reset for zero, against the one that turns here.
+fn judge_rotary(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(told) = subject.pa(0x03).map(usize::from) else { return };
+    let seat = &subject.controller.seat;
+    let own = seat.rotary_axis().map_or(0, |axis| axis + 1);
+    let name = &seat.name;
+    match (told, own) {
+        (0, 0) => {}
+        (told, own) if told == own => {
+            let found =
+                format!("PA03 = {told}: axis {told} takes for zero wherever it stands at a reset or start");
+            let remedy = format!("before either, see that axis {told} stands at its 0; then accept this");
+            notes.add(Check::RotaryZero, found, remedy);
+        }
+        (0, own) => {
+            let found = format!(
+                "PA03 = 0: the controller searches a zero for axis {own}, which is a rotary one of seat {name}"
+            );
+            notes.add(Check::RotaryAxis, found, format!("set PA03 = {own}, or describe the axis in mm"));
+        }
+        (told, _) => {
+            let found = format!(
+                "PA03 = {told}: axis {told} is a rotary one, which takes for zero wherever it stands"
+            );
+            let remedy = format!("set PA03 = {own}, or describe it: [seat.{name}.axis{told}] unit = \"deg\"");
+            notes.add(Check::RotaryAxis, found, remedy);
         }
     }
 }

@@ -28,6 +28,7 @@ pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
         _ => {}
     }
     judge_amplitude(subject, notes);
+    judge_signed(subject, notes);
     judge_source(subject, notes);
     judge_bus(subject, terms, notes);
     judge_delay(subject, terms, notes);
@@ -64,6 +65,16 @@ fn judge_bus(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
         let remedy =
             format!("set PA59 = 0, or play at {:.0} Hz or less", (1e3 / f64::from(ms)).floor().max(1.0));
         notes.add(Check::BusPeriod, found, remedy);
+    }
+}
+
+/// The filter of an IMAX controller has to be off where positions go below 0 (IMAX manual 5.7).
+fn judge_signed(subject: &Subject<'_>, notes: &mut Notes) {
+    let Some(depth) = subject.pa(0x51).filter(|depth| *depth != 0) else { return };
+    let below = subject.controller.seat.own().iter().position(|axis| axis.low < 0.0);
+    if let Some(axis) = below.filter(|_| subject.controller.dialect == Dialect::Mbox) {
+        let found = format!("PA51 = {depth}: filters positions, and those of axis {} go below 0", axis + 1);
+        notes.add(Check::SignedFilter, found, "set PA51 = 0");
     }
 }
 

@@ -393,3 +393,40 @@ proptest! {
         }
     }
 }
+
+/// A chair whose last axis turns, at a controller that takes axis `told` for a rotary one.
+fn chair(dialect: Dialect, told: u16) -> Case {
+    let mut case = Case::new(dialect).with(&[(0x03, told)]);
+    let mut seat = crate::motion::SeatType::bench3(3);
+    seat.each[2].unit = crate::motion::AxisUnit::Degree;
+    (seat.each[2].low, seat.each[2].high) = (-75.0, 75.0);
+    case.controller.seat = std::sync::Arc::new(seat);
+    case
+}
+
+#[test]
+fn the_axis_that_takes_its_place_for_zero_is_the_one_that_turns() {
+    for (told, fails, words) in [
+        (3, false, "PA03 = 3: axis 3 takes for zero wherever it stands"),
+        (
+            0,
+            true,
+            "PA03 = 0: the controller searches a zero for axis 3, which is a rotary one of seat bench3",
+        ),
+        (2, true, "PA03 = 2: axis 2 is a rotary one"),
+    ] {
+        let finding = only(&chair(Dialect::Smc, told)).expect("one finding");
+        assert!(finding.found.contains(words) && finding.fails() == fails, "{finding:?}");
+    }
+    assert_eq!(check(&chair(Dialect::Smc, 3)), Some(Check::RotaryZero));
+}
+
+#[test]
+fn an_imax_controller_does_not_filter_positions_that_go_below_0() {
+    let checks = |depth: u16| {
+        let told = chair(Dialect::Mbox, 3).with(&[(0x51, depth)]).told();
+        told.iter().any(|finding| finding.check == Check::SignedFilter && finding.fails())
+    };
+    assert!(checks(1) && checks(4) && !checks(0));
+    assert!(Case::new(Dialect::Mbox).with(&[(0x51, 1)]).told().is_empty(), "cylinders never go below 0");
+}

@@ -33,8 +33,8 @@ pub(crate) struct Manner {
 /// A change of position.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Change {
-    /// How far, mm.
-    pub(crate) mm: f64,
+    /// How far, in the unit of the axis.
+    pub(crate) by: f64,
     /// The axis, from 0.
     pub(crate) axis: usize,
     /// When.
@@ -102,7 +102,7 @@ pub(crate) fn fit(timeline: Timeline, terms: &Terms, manner: Manner) -> Result<F
             let candidate = best_of(&timeline, cue, terms, manner)?;
             Some(Candidate { eased_s: Some(seconds), ..candidate })
         });
-        best = best.into_iter().chain(other).reduce(|a, b| if b.change.mm < a.change.mm { b } else { a });
+        best = best.into_iter().chain(other).reduce(|a, b| if b.change.by < a.change.by { b } else { a });
     }
     let Some(Candidate { cue, factors, eased_s, smoothing, change }) = best else {
         return Err(FitError::NoAmplitude { smooth: manner.smooth });
@@ -170,7 +170,7 @@ fn smoothest(
         Some((strength, Candidate { smoothing: Some(smoothing), ..candidate }))
     };
     let least =
-        |a: (usize, Candidate), b: (usize, Candidate)| if b.1.change.mm < a.1.change.mm { b } else { a };
+        |a: (usize, Candidate), b: (usize, Candidate)| if b.1.change.by < a.1.change.by { b } else { a };
     let ladder = resampled.strengths();
     let (best, candidate) = ladder.iter().filter_map(|strength| attempt(*strength)).reduce(least)?;
     // Between the rungs beside the best one.
@@ -180,7 +180,7 @@ fn smoothest(
     let between = (low + 1..*high).step_by(step).filter(|strength| *strength != best);
     let (_, candidate) = between.filter_map(&mut attempt).fold((best, candidate), least);
     match plain {
-        Some(plain) if plain.change.mm <= candidate.change.mm => Some(plain),
+        Some(plain) if plain.change.by <= candidate.change.by => Some(plain),
         _ => Some(candidate),
     }
 }
@@ -285,10 +285,10 @@ fn scale(cue: &Cue, factors: &[f64], neutral: &[f64; MAX_AXES]) -> Cue {
 
 /// Where a cue stands farthest from where it stood, at its rows.
 fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
-    let mut mm = [0.0; MAX_AXES];
+    let mut per_unit = [0.0; MAX_AXES];
     for part in &terms.parts {
         for (axis, geometry) in part.axes.clone().zip(&part.seat.each).filter(|(axis, _)| *axis < MAX_AXES) {
-            mm[axis] = cue.units().of(axis).to_stroke(geometry) * geometry.stroke();
+            per_unit[axis] = cue.units().of(axis).to_stroke(geometry) * geometry.stroke();
         }
     }
     let mut hint = crate::timeline::Hint::default();
@@ -296,9 +296,9 @@ fn largest_change(original: &Timeline, cue: &Cue, terms: &Terms) -> Change {
     for (row, &at) in cue.times().iter().enumerate() {
         let before = original.sample(at, &mut hint);
         for (axis, after) in cue.row(row).iter().enumerate() {
-            let change = (after - before[axis]).abs() * mm[axis];
-            if change > most.mm {
-                most = Change { mm: change, axis, at };
+            let change = (after - before[axis]).abs() * per_unit[axis];
+            if change > most.by {
+                most = Change { by: change, axis, at };
             }
         }
     }

@@ -74,8 +74,9 @@ impl Resampled {
         };
         let smooth: Vec<Vec<f64>> = self.samples.iter().map(pass).collect();
         // The cubic between samples may dip below them; of what began at 0 nothing is to.
-        let least = |samples: &Vec<f64>| samples.iter().copied().fold(0.0, f64::min);
-        let lowest: Vec<f64> = smooth.iter().map(least).collect();
+        let rows = || cue.positions().chunks(cue.axes());
+        let least = |axis: usize| rows().map(|row| row[axis]).fold(0.0, f64::min);
+        let lowest: Vec<f64> = (0..cue.axes()).map(least).collect();
         let mut positions = Vec::with_capacity(self.times.len() * cue.axes());
         for at in &self.times {
             let at = at.as_nanos().unsigned_abs();

@@ -19,6 +19,7 @@ mod loss;
 mod motion;
 mod report;
 mod stopping;
+mod turntable;
 mod usage;
 mod wire;
 

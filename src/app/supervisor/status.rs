@@ -159,6 +159,7 @@ fn nameplate(controller: &Controller) -> ControllerStatus {
         seat: controller.seat.name.clone(),
         address: controller.address.to_string(),
         group: controller.group.clone(),
+        rotary_axis: controller.seat.rotary_axis().map(|axis| axis + 1),
         ..ControllerStatus::default()
     }
 }

@@ -26,8 +26,16 @@ const FIGURES = {
   'Belts open': ({ belts_open: belts }) => (belts === null ? 'no belts known' : belts.length === 0 ? 'none' : belts.map((input) => `X${String(input).padStart(2, '0')}`).join(', ')),
   'Inputs on': ({ inputs }) => bits(inputs, 'X'),
   'Outputs on': ({ outputs }) => bits(outputs, 'Y'),
-  'Positions': ({ positions_mm: mm }) => (mm === null ? 'unknown' : `${mm.map((each) => each.toFixed(1)).join(', ')} mm`),
+  'Positions': ({ positions_mm: places, rotary_axis: rotary }) => positions(places, rotary),
 };
+
+/** Where axes are, with the unit of each where one of them turns. */
+function positions(places, rotary) {
+  if (places === null) return 'unknown';
+  const unit = (index) => (index + 1 === rotary ? '°' : ' mm');
+  const figures = places.map((each) => each.toFixed(1));
+  return rotary ? figures.map((each, index) => each + unit(index)).join(', ') : `${figures.join(', ')} mm`;
+}
 
 let name = null;
 let parts = null;
