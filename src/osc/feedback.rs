@@ -3,7 +3,7 @@
 use rosc::{OscMessage, OscType};
 
 use crate::control::model::Word;
-use crate::control::{Severity, Status, Warning};
+use crate::control::{FilmStatus, Severity, Status, Warning};
 use crate::state::State;
 
 /// What one receiver has been told so far.
@@ -11,6 +11,7 @@ use crate::state::State;
 pub(super) struct Said {
     state: Option<Word<State>>,
     position: Option<f64>,
+    film: FilmSaid,
     /// Whole seconds of the hall.
     beat: Option<i32>,
     warnings: Vec<Warning>,
@@ -30,6 +31,7 @@ impl Said {
             news.push(message("position", vec![OscType::Float(s as f32)]));
         }
         self.position = position;
+        news.extend(status.film.iter().flat_map(|film| self.film.news(film)));
         let new = status.warnings.iter().filter(|warning| !self.warnings.contains(warning));
         news.extend(new.map(|warning| warn(warning.severity, &sentence(warning))));
         self.warnings.clone_from(&status.warnings);
@@ -38,6 +40,30 @@ impl Said {
         if self.beat.replace(beat) != Some(beat) {
             news.push(message("heartbeat", vec![OscType::Int(beat)]));
         }
+        news
+    }
+}
+
+/// What one receiver has been told of the film that the hall follows.
+#[derive(Debug, Default)]
+struct FilmSaid {
+    /// Its state, and why.
+    state: Option<[String; 2]>,
+    timecode: Option<String>,
+}
+
+impl FilmSaid {
+    fn news(&mut self, film: &FilmStatus) -> Vec<OscMessage> {
+        let mut news = Vec::new();
+        let state = [film.state.clone(), film.cause.clone()];
+        if self.state.as_ref() != Some(&state) {
+            news.push(message("film", state.iter().map(|text| OscType::from(text.as_str())).collect()));
+            self.state = Some(state);
+        }
+        if let Some(timecode) = film.timecode.as_ref().filter(|_| film.timecode != self.timecode) {
+            news.push(message("timecode", vec![OscType::from(timecode.as_str())]));
+        }
+        self.timecode.clone_from(&film.timecode);
         news
     }
 }

@@ -10,8 +10,8 @@ use tokio::runtime::Builder;
 use super::{Counts, open};
 use crate::config::{GearWord, OscPort};
 use crate::control::{
-    Code, Command, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status, StatusSource, Surface,
-    Warning, handle,
+    Code, Command, FilmStatus, Inbox, LevelsChange, Problem, Role, Severity, ShowStatus, Status,
+    StatusSource, Surface, Warning, handle,
 };
 use crate::rt::Desk;
 use crate::state::{PlayMode, State};
@@ -233,6 +233,25 @@ fn a_subscriber_hears_state_position_warnings_and_the_beat() {
     assert_eq!(stage.heard("position"), [OscType::Float(2.5)]);
     assert_eq!(stage.heard("warning"), [OscType::Int(2), OscType::from("A1: no ack; look at its plug")]);
     assert_eq!(stage.heard("heartbeat"), [OscType::Int(1)]);
+}
+
+#[test]
+fn a_subscriber_hears_of_the_film_what_is_new_of_it() {
+    let film = |state: &str, cause: &str, timecode: Option<&str>| {
+        let [state, cause] = [state, cause].map(str::to_owned);
+        let film = FilmStatus { state, cause, timecode: timecode.map(str::to_owned), ..<_>::default() };
+        Arc::new(Status { film: Some(film), ..playing_at(1.5) })
+    };
+    let stage = Stage::new();
+    stage.source.put(film("locked", "the film runs", Some("01:00:05:12")));
+    stage.subscribe(60);
+    assert_eq!(stage.heard("film"), ["locked", "the film runs"].map(OscType::from));
+    assert_eq!(stage.heard("timecode"), [OscType::from("01:00:05:12")]);
+    stage.source.put(film("locked", "the film runs", Some("01:00:05:14")));
+    assert_eq!(stage.heard("timecode"), [OscType::from("01:00:05:14")]);
+    stage.source.put(film("lost", "nothing is heard of the film any more", None));
+    let next = stage.heard("film");
+    assert_eq!(next[0], OscType::from("lost"), "what did not change was not told again");
 }
 
 #[test]

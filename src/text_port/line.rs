@@ -5,7 +5,7 @@ use crate::control::{Code, Command, LevelsChange, Problem};
 use crate::time::{parse_time, parse_trim};
 
 /// The lines that there are, as a refusal lists them.
-const LINES: &str = "go, pause, resume, stop, park, status, seek 12:30, trim +80ms, level 60%, level motion 60%, effect \
+const LINES: &str = "go, pause, resume, stop, park, status, film, seek 12:30, trim +80ms, level 60%, level motion 60%, effect \
                      water off, enable F4, disable F4";
 
 /// What a line asks.
@@ -15,6 +15,8 @@ pub(super) enum Order {
     Command(Command),
     /// How it is.
     Status,
+    /// How the film is that it follows.
+    Film,
 }
 
 /// Why a line is not obeyed.
@@ -39,6 +41,7 @@ pub(super) fn order(line: &[u8], allow: &[GearWord]) -> Result<Order, Fault> {
     let words: Vec<&str> = text.ok_or_else(no_ascii)?.split_ascii_whitespace().collect();
     let order = Order::Command(match words[..] {
         ["status"] => return Ok(Order::Status),
+        ["film"] => return Ok(Order::Film),
         [stop] if stop.eq_ignore_ascii_case("stop") => Command::Stop,
         ["go"] => Command::Go,
         ["pause"] => Command::Pause,

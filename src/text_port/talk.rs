@@ -13,7 +13,7 @@ use tokio::time::timeout;
 
 use super::line::{Fault, Order, order};
 use crate::config::GearWord;
-use crate::control::{Code, Command, Handle, Place, Posted, Problem, Status, Who};
+use crate::control::{Code, Command, FilmStatus, Handle, Place, Posted, Problem, Status, Who};
 use crate::time::ShowTime;
 
 /// Bytes of a line at the most, its end included.
@@ -32,6 +32,7 @@ type Answer = Result<Arc<Status>, Problem>;
 enum Read {
     Posted(Posted),
     Answered(Answer),
+    Film(Box<FilmStatus>),
 }
 
 /// Who speaks on a connection, with which hall, and what they may ask.
@@ -120,6 +121,10 @@ impl Talk {
         self.place.show(&self.who.name);
         let read = match order {
             Order::Status => Read::Answered(Ok(self.hall.status())),
+            Order::Film => match self.hall.status().film.clone() {
+                Some(film) => Read::Film(Box::new(film)),
+                None => Read::Answered(Err(Problem::no_film())),
+            },
             // A stop is done with this; its answer is for the journal and the peer.
             Order::Command(ask) => match self.hall.post(self.who.clone(), ask) {
                 Ok(posted) => Read::Posted(posted),
@@ -163,11 +168,12 @@ async fn part(incoming: &mut OwnedReadHalf) {
 /// Writes the answers in the order of the lines.
 async fn answer(mut outgoing: OwnedWriteHalf, mut read: mpsc::Receiver<Read>) {
     while let Some(read) = read.recv().await {
-        let answer = match read {
-            Read::Posted(posted) => posted.answer().await,
-            Read::Answered(answer) => answer,
+        let line = match read {
+            Read::Posted(posted) => reply(&posted.answer().await),
+            Read::Answered(answer) => reply(&answer),
+            Read::Film(film) => film_reply(&film),
         };
-        let written = timeout(WRITING, outgoing.write_all(reply(&answer).as_bytes())).await;
+        let written = timeout(WRITING, outgoing.write_all(line.as_bytes())).await;
         if !matches!(written, Ok(Ok(()))) {
             return;
         }
@@ -185,6 +191,16 @@ pub(super) fn reply(answer: &Answer) -> String {
         }
         Err(problem) => format!("error {} {}; {}", problem.code.word(), problem.detail, problem.remedy),
     };
+    ended(&text)
+}
+
+/// `ok STATE TIMECODE CAUSE` of the film, with the end of the line.
+fn film_reply(film: &FilmStatus) -> String {
+    ended(&format!("ok {} {} {}", film.state, film.timecode.as_deref().unwrap_or("-"), film.cause))
+}
+
+/// A text as one line, with its end.
+fn ended(text: &str) -> String {
     text.replace(['\r', '\n'], " ") + "\r\n"
 }
 

@@ -10,7 +10,9 @@ use tokio::runtime::Builder;
 
 use super::{CONNECTIONS, open};
 use crate::config::{GearWord, TextPort};
-use crate::control::{Code, Command, Inbox, Problem, Role, ShowStatus, Status, Surface, handle};
+use crate::control::{
+    Code, Command, FilmStatus, Inbox, Problem, Role, ShowStatus, Status, StatusSource, Surface, handle,
+};
 use crate::rt::Desk;
 
 /// Nothing is waited for longer; where all is well it takes milliseconds.
@@ -19,6 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 struct Stage {
     port: SocketAddr,
     inbox: Inbox,
+    source: StatusSource,
     desk: Arc<Desk>,
 }
 
@@ -29,7 +32,7 @@ impl Stage {
 
     fn with(source: Ipv4Addr, idle: Duration, token: Option<&str>) -> Self {
         let desk = Arc::new(Desk::new(std::iter::empty()));
-        let (hall, inbox, _source) = handle(Arc::clone(&desk), playing());
+        let (hall, inbox, statuses) = handle(Arc::clone(&desk), playing());
         let config = TextPort {
             listen: SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0),
             sources: vec![source],
@@ -41,7 +44,7 @@ impl Stage {
         let port = text.address().unwrap();
         let runtime = Builder::new_current_thread().enable_all().build().unwrap();
         std::thread::spawn(move || runtime.block_on(text.serve())); // as long as the tests run
-        Self { port, inbox, desk }
+        Self { port, inbox, source: statuses, desk }
     }
 
     fn connect(&self) -> Peer {
@@ -108,6 +111,24 @@ fn a_line_is_asked_and_answered_with_state_and_position() {
     assert_eq!(peer.line(), "error state cannot pause; go first\r\n");
     peer.send(b"status\n");
     assert_eq!(peer.line(), "ok playing 00:12.340\r\n");
+}
+
+#[test]
+fn the_film_is_told_in_a_line_where_the_hall_follows_one() {
+    let stage = Stage::new();
+    let mut peer = stage.connect();
+    peer.send(b"film\n");
+    assert!(peer.line().starts_with("error unknown this hall follows no film; "));
+    let film = |timecode: Option<&str>| {
+        let [state, cause] = ["locked", "the film\nruns"].map(str::to_owned);
+        let film = FilmStatus { state, cause, timecode: timecode.map(str::to_owned), ..<_>::default() };
+        Arc::new(Status { film: Some(film), ..playing() })
+    };
+    for (timecode, told) in [(Some("01:00:05:12"), "01:00:05:12"), (None, "-")] {
+        stage.source.put(film(timecode));
+        peer.send(b"film\r\n");
+        assert_eq!(peer.line(), format!("ok locked {told} the film runs\r\n"));
+    }
 }
 
 #[test]

@@ -223,6 +223,23 @@ fn a_cue_is_taken_in_from_the_page_or_refused_with_every_fault() {
     browser.wait("document.getElementById('upload-faults').children.length === 0");
 }
 
+/// Has the page draw a minute of errors of half a millisecond, then one that is far greater.
+fn draw_errors(browser: &Browser) {
+    let draw = |errors: &str| {
+        let script = format!("return import('/js/error.js').then(({{ addError }}) => {{ {errors} }})");
+        browser.eval(&script);
+    };
+    draw(
+        "for (let at = -599; at <= 0; at += 1) addError(Math.sin(at / 30) / 2, performance.now() + at * 100);",
+    );
+    browser.reads("error-greatest", "0.50 ms");
+    browser.reads("error-scale", "±1 ms");
+    browser.shot("60-film-error");
+    draw("addError(30);");
+    browser.reads("error-greatest", "30.00 ms");
+    browser.reads("error-scale", "±50 ms");
+}
+
 #[test]
 fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_presses() {
     let Some(browser) = Browser::start() else { return };
@@ -232,20 +249,21 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.reads("follow-word", "absent");
     browser.reads("follow-next", "start the film");
     browser.reads("sources", "/nowhere/midi cannot be opened");
-    let reel = film("01:00:02:00");
-    browser.reads("follow-word", "locked");
-    browser.reads("follow-badge", "film locked");
-    arm(&browser);
-    browser.wait("/^01:00:\\d\\d:\\d\\d$/.test(document.getElementById('timecode').textContent)");
     assert_eq!(
         browser.eval("return document.getElementById('error-curve').hidden"),
         json!(true),
         "nothing is followed"
     );
+    draw_errors(&browser);
+    let reel = film("01:00:02:00");
+    browser.reads("follow-word", "locked");
+    browser.reads("follow-badge", "film locked");
+    arm(&browser);
+    browser.wait("/^01:00:\\d\\d:\\d\\d$/.test(document.getElementById('timecode').textContent)");
     go(&browser);
     browser.wait("document.querySelector('#error-curve canvas') !== null");
     browser.reads("error-scale", " ms; above 0");
-    browser.wait("/^\\d+\\.\\d\\d ms$/.test(document.getElementById('error-greatest').textContent)");
+    browser.wait("/^[+−]?\\d+\\.\\d\\d ms$/.test(document.getElementById('error-now').textContent)");
     for (width, height) in [(1600, 1000), (768, 1024), (390, 844)] {
         browser.resize(width, height);
         browser

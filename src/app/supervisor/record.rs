@@ -7,10 +7,11 @@ use jiff::Zoned;
 
 use super::act::{Act, Feature, ShowBegun, SupervisorEvent};
 use super::hall::{Counted, HallContext};
-use crate::app::film::{FilmTable, SharedTable};
+use crate::app::film::{FilmTable, SharedTable, SourceRow};
 use crate::control::model::{Ending, FrameCounts, Percentiles};
 use crate::control::{Desired, JournalLine, Problem, Surface};
 use crate::film::chase::ParkCause;
+use crate::film::point::FilmState;
 use crate::journal::{Action, FilmProof, Folds, Journal, Outcome, ShowRecord, stamp};
 use crate::rt::Row;
 use crate::state::{Cause, State};
@@ -270,9 +271,11 @@ fn note_film(proof: &mut FilmProof, table: &FilmTable, switches_before: u64, err
     let most = proof.greatest_error_ms.unwrap_or_default().max(error_s * 1e3);
     proof.greatest_error_ms = Some(most);
     proof.switches = table.switches.saturating_sub(switches_before);
-    let leads = table.leads.and_then(|place| table.sources.get(place)).map(|row| &row.source);
-    if let Some(source) = leads.filter(|source| !proof.sources.contains(source)) {
-        proof.sources.push(source.clone());
+    // Whom a person has just chosen leads, though nobody may follow it yet.
+    let runs = |row: &&SourceRow| matches!(row.state, FilmState::Locked | FilmState::Freewheeling);
+    let leads = table.leads.and_then(|place| table.sources.get(place)).filter(runs);
+    if let Some(row) = leads.filter(|row| !proof.sources.contains(&row.source)) {
+        proof.sources.push(row.source.clone());
     }
 }
 
@@ -286,9 +289,7 @@ fn percentiles(mut now: Histogram, before: &Histogram) -> Percentiles {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::film::SourceRow;
     use crate::app::supervisor::testing::{hall, row, told};
-    use crate::film::point::FilmState;
     use crate::journal::Limits;
 
     #[test]
@@ -323,11 +324,11 @@ mod tests {
         }
     }
 
-    /// A source of which nothing is known but its name.
-    fn named(source: &str) -> SourceRow {
+    /// A source of which nothing is known but its name and state.
+    fn named((source, state): (&str, FilmState)) -> SourceRow {
         SourceRow {
             source: source.to_owned(),
-            state: FilmState::Absent,
+            state,
             words: "",
             media_s: None,
             timecode: None,
@@ -345,7 +346,13 @@ mod tests {
     #[test]
     fn proof_of_play_has_the_sources_that_were_followed_and_the_farthest_from_the_film() {
         let table = |leads, switches| FilmTable {
-            sources: ["ltc", "artnet"].map(named).into(),
+            sources: [
+                ("ltc", FilmState::Locked),
+                ("artnet", FilmState::Freewheeling),
+                ("mtc", FilmState::Absent),
+            ]
+            .map(named)
+            .into(),
             leads,
             switches,
             ..FilmTable::default()
@@ -354,7 +361,7 @@ mod tests {
         note_film(&mut proof, &table(Some(0), 7), 7, None);
         assert_eq!(proof, FilmProof::default(), "nobody followed it yet");
         for (leads, switches, error_s) in
-            [(Some(0), 7, 0.002), (None, 7, 0.001), (Some(1), 8, 0.000_5), (Some(0), 9, 0.001)]
+            [(Some(0), 7, 0.002), (None, 7, 0.001), (Some(1), 8, 0.000_5), (Some(2), 9, 0.001)]
         {
             note_film(&mut proof, &table(leads, switches), 7, Some(error_s));
         }

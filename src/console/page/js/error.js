@@ -21,7 +21,7 @@ let end = ENDS[0];
 export function addError(error, now = performance.now()) {
   const last = samples.at(-1);
   if (last && last.error !== null && now - last.at > GAP_MS) samples.push({ at: last.at + 1, error: null });
-  samples.push({ at: now, error });
+  if (error !== null || samples.length > 0) samples.push({ at: now, error });
   samples = samples.filter(({ at }) => now - at <= MINUTE_MS);
   const greatest = greatestOf(samples);
   end = ENDS.find((each) => greatest === null || each >= greatest * 1.05) ?? Math.ceil(greatest * 1.05);
