@@ -345,6 +345,8 @@ fn a_film_is_found_by_its_sound_with_the_index_that_was_made_of_it() {
         let refused = kinocue(&["sync", "watch", &format!("sound:-,index={foreign}")]);
         assert!(refused.code != Some(0) && refused.stderr.contains(says), "{refused:?}");
     }
+    let foreign = kinocue(&["sync", "index", &path("text.mkv", b"no film".to_vec()), "-o", &index]);
+    assert!(foreign.code != Some(0) && foreign.stderr.contains("mpv"), "{foreign:?}");
     let short = kinocue(&["sync", "index", &path("short.wav", film_sound(2)), "-o", &index]);
     assert!(short.code != Some(0) && short.stderr.contains("s are needed"), "{short:?}");
 }

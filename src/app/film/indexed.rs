@@ -104,8 +104,13 @@ fn index_by_mpv(film: &Path, name: &str) -> Result<SoundIndex, IndexingError> {
         let _ = running.kill(); // one that has ended cannot be
     }
     let ended = running.wait()?;
-    // What it says of itself comes first: without a film there is no sound either.
-    if made.is_ok() && !ended.success() { Err(IndexingError::Player(ended)) } else { made }
+    match made {
+        // One that was ended here has no code; what a player says of itself comes before what was heard of it.
+        Ok(_) | Err(IndexingError::Short(_)) if ended.code().is_some_and(|code| code != 0) => {
+            Err(IndexingError::Player(ended))
+        }
+        made => made,
+    }
 }
 
 fn index_stream(mut stream: impl Read, name: &str) -> Result<SoundIndex, IndexingError> {

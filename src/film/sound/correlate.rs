@@ -127,6 +127,7 @@ fn deviation(fit: &Fit, peak: usize) -> f64 {
 pub(crate) fn best(fit: &Fit) -> Option<BestLag> {
     let near = NOISE_LAGS - LAGS..=NOISE_LAGS + LAGS;
     let (peak, height) = near.map(|n| (n, fit[n])).max_by(|one, other| one.1.total_cmp(&other.1))?;
+    // Not by the greatest value that there could be: a long tone fits nearly as well at every turn of its wave.
     let noise = deviation(fit, peak);
     if noise <= 0.0 || height <= 0.0 {
         return None;

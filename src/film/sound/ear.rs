@@ -175,6 +175,7 @@ impl SoundEar {
 
     /// True if the film that is held has no sound where it is thought to be.
     fn film_is_quiet(&self) -> bool {
+        // In the index alone: on the line a film that was turned down and one that is quiet look alike.
         self.holder.as_ref().is_some_and(|holder| {
             let now = holder.place().media_at(self.line.count() as f64);
             let film = &self.films[holder.film()];

@@ -39,7 +39,7 @@ struct Hit {
 }
 
 /// Listens at one speed.
-struct Listener {
+struct SpeedListener {
     speed: f64,
     resampler: Resampler,
     landmarks: LandmarkStream,
@@ -49,14 +49,14 @@ struct Listener {
 
 /// Proposes places in films.
 pub(crate) struct Finder {
-    listeners: Vec<Listener>,
+    listeners: Vec<SpeedListener>,
     sound: Vec<f32>,
     found: Vec<Landmark>,
 }
 
 impl Finder {
     pub(crate) fn new(samples_per_s: u32, films: usize) -> Self {
-        let listener = |speed| Listener {
+        let listener = |speed| SpeedListener {
             speed,
             resampler: to_sound(samples_per_s, speed),
             landmarks: LandmarkStream::new(Density::LINE),
@@ -78,14 +78,15 @@ impl Finder {
 
     /// The places that most landmarks agree on, the best first.
     pub(crate) fn proposals(&self) -> Vec<Proposal> {
-        let mut all: Vec<Proposal> = self.listeners.iter().flat_map(Listener::proposals).collect();
+        let mut all: Vec<Proposal> = self.listeners.iter().flat_map(SpeedListener::proposals).collect();
+        // Chance makes places of three and four votes at any time: the best come first, and the traces sort out the rest.
         all.sort_by_key(|one| std::cmp::Reverse(one.votes));
         all.truncate(MOST_PLACES);
         all
     }
 }
 
-impl Listener {
+impl SpeedListener {
     fn look_up(&mut self, found: &[Landmark], films: &[SoundIndex]) {
         let oldest = self.landmarks.frames().saturating_sub(BACK);
         for (film, hits) in films.iter().zip(&mut self.hits) {
@@ -104,6 +105,7 @@ impl Listener {
         let of = |(film, hits): (usize, &VecDeque<Hit>)| {
             let mut begins: Vec<(i64, u32)> = hits.iter().map(|hit| (hit.begin, hit.heard)).collect();
             begins.sort_unstable();
+            // A peak beside another gives the same pair twice, and has one vote.
             begins.dedup();
             let propose = move |(begin, votes): (f64, u32)| Proposal {
                 film,

@@ -114,6 +114,7 @@ impl Comparer {
         films: &[SoundIndex],
         proposed: &Proposal,
     ) -> Option<FilmPlace> {
+        // A pull-down apart, the pieces of four seconds would smear what they have in common: each speed near has a sum of its own.
         let newest = line.count().checked_sub(PIECE / 2)?;
         let media = proposed.begin_s * TRACE_RATE + proposed.speed * newest as f64;
         let thought =
@@ -199,6 +200,7 @@ impl Holder {
         } else {
             self.place.media += PLACE_SHARE * off;
             // The first piece lies before the proof, and says nothing of the speed.
+            // Slowly: pieces overlap by five sixths, so that an error comes six times.
             let speed = self.place.speed + if passed > 0.0 { SPEED_SHARE * off / passed } else { 0.0 };
             self.place.speed = speed.clamp(self.proved * (1.0 - STRAYS), self.proved * (1.0 + STRAYS));
         }

@@ -84,6 +84,7 @@ impl IndexMaker {
         let seconds = self.count as f64 / f64::from(self.samples_per_s);
         self.push(&vec![0.0; self.samples_per_s as usize / 2]); // what is still on its way through the filters
         self.packed.cut((seconds * TRACE_RATE) as usize);
+        // By hash, so that a landmark is looked up by halving.
         self.found.sort_unstable();
         self.found.dedup();
         SoundIndex { name: name.to_owned(), landmarks: self.found, trace: self.packed }
