@@ -252,7 +252,7 @@ impl Belief {
         };
         if !slots_in(reading.slots & self.within).any(is_astray) {
             if reading.slots & self.own == self.own {
-                self.busy_at_most = self.busy_until + FOLLOWS;
+                self.busy_at_most = self.busy_until;
             }
             return Found::Nothing;
         }
