@@ -248,6 +248,7 @@ fn the_film_that_leads_is_seen_with_its_error_and_its_source_is_chosen_by_two_pr
     browser.wait("!document.getElementById('follow-panel').hidden");
     browser.reads("follow-word", "absent");
     browser.reads("follow-next", "start the film");
+    browser.reads("timecode-of", "not known");
     browser.reads("sources", "/nowhere/midi cannot be opened");
     assert_eq!(
         browser.eval("return document.getElementById('error-curve').hidden"),

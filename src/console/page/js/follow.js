@@ -45,9 +45,11 @@ function showBadge(film) {
 /** The label of the frame; of a film without labels its place in the cue. */
 function showTimecode({ timecode, position_s: position }) {
   const labelled = timecode !== null;
+  const known = labelled || position !== null;
   setText(byId('timecode'), labelled ? timecode : clock(position, 1, 3600));
-  setText(byId('timecode-of'), labelled ? 'timecode of the film' : 'film in the cue; its source has no labels');
-  setAttribute(byId('timecode'), 'data-known', String(labelled || position !== null));
+  const what = labelled ? 'timecode of the film' : 'film in the cue; its source has no labels';
+  setText(byId('timecode-of'), known ? what : 'where the film is, is not known');
+  setAttribute(byId('timecode'), 'data-known', String(known));
 }
 
 function apart({ leads, disagrees }) {
