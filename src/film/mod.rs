@@ -27,6 +27,7 @@ mod estimate;
 pub(crate) mod follower;
 pub(crate) mod labels;
 mod late;
+mod lines;
 pub(crate) mod ltc;
 pub(crate) mod message;
 pub(crate) mod mpv;
