@@ -14,3 +14,4 @@ pub(crate) mod own_folder;
 pub(crate) mod realtime;
 pub(crate) mod signal;
 pub(crate) mod terminal;
+pub(crate) mod unix_socket;

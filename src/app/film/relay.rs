@@ -2,8 +2,8 @@
 //! sound card, and several halls hear one line. Both are on one machine, whose clock they share.
 
 use std::io::{self, Write as _};
-use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::fs::PermissionsExt as _;
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,10 +12,12 @@ use super::line::{ByteLine, LineTaker};
 use super::relayed::{greeting, record};
 use super::{ChildSlot, FilmError, WordSink, mtc, sound_line, start};
 use crate::film::source::{FilmSource, LineKind, MtcInput, SoundLine};
+use crate::sys::unix_socket::listen_in_place;
 use crate::time::MonoTime;
 
 /// Halls that hear one line at the most.
 const LISTENERS: usize = 8;
+
 /// Those that hear a line.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Listeners {
@@ -33,12 +35,15 @@ impl Listeners {
         let kind = kind_of(source)?;
         let socket = folder.join(format!("{}.sock", kind.name()));
         let listeners = Self::default();
-        let served = listener_at(&socket).and_then(|listener| listeners.let_in_at(listener, kind));
         let failed = |source| FilmError::Open { what: socket.display().to_string(), source };
-        served.map(|()| listeners).map_err(failed)
+        listeners.let_in_at(&socket, kind).map_err(failed)?;
+        Ok(listeners)
     }
 
-    fn let_in_at(&self, listener: UnixListener, kind: LineKind) -> io::Result<()> {
+    fn let_in_at(&self, socket: &Path, kind: LineKind) -> io::Result<()> {
+        let listener = listen_in_place(socket)?;
+        // Who may hear it is a matter of the folder: it says nothing but what time it is in a film.
+        std::fs::set_permissions(socket, std::fs::Permissions::from_mode(0o666))?;
         let listeners = self.clone();
         start("relay", move || {
             for stream in listener.incoming() {
@@ -118,19 +123,6 @@ fn kind_of(source: &FilmSource) -> Result<LineKind, FilmError> {
         FilmSource::Mtc(MtcInput::Device(_)) => Ok(LineKind::Mtc),
         _ => Err(FilmError::NoLine(source.to_string())),
     }
-}
-
-/// A socket there, in place of that of one who was killed.
-fn listener_at(socket: &Path) -> io::Result<UnixListener> {
-    if socket.metadata().is_ok_and(|found| found.file_type().is_socket())
-        && UnixStream::connect(socket).is_err()
-    {
-        std::fs::remove_file(socket)?;
-    }
-    let listener = UnixListener::bind(socket)?;
-    // Who may hear it is a matter of the folder: it says nothing but what time it is in a film.
-    std::fs::set_permissions(socket, std::fs::Permissions::from_mode(0o666))?;
-    Ok(listener)
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
-//! Sound from wherever it comes, heard as LTC or as the film's own: bytes as they are read, and when that was, into what they say of the film.
+//! Sound from wherever it comes, heard as LTC or as the film's own: bytes as they are read, and when that was, into what they say of
+//! the film.
 
+use std::fs::File;
 use std::io;
+use std::os::fd::AsFd as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-
-use std::fs::File;
-use std::os::fd::AsFd as _;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
@@ -55,12 +55,12 @@ pub(super) fn start_line(input: &SoundLine, line: ByteLine, child: &ChildSlot) -
     match input {
         SoundLine::File(path) => {
             let file = File::open(path).map_err(failed(path))?;
-            start("line", move || end(&line, &line.read(file)))?;
+            start("line", move || end(&line, line.read(file)))?;
         }
         SoundLine::Stdin => {
             // Not through the buffer that is shared: what lies in there no poll tells of.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(failed(Path::new("stdin")))?;
-            start("line", move || end(&line, &line.read(File::from(input))))?;
+            start("line", move || end(&line, line.read(File::from(input))))?;
         }
         SoundLine::Fifo(path) => {
             let path = path.clone();
@@ -101,7 +101,7 @@ fn run(mut command: Command, name: &str, line: ByteLine, child: &ChildSlot) -> R
             let done = lock(&child).take();
             let ended = done.map(|mut one| one.wait());
             if matches!(ended, Some(Ok(status)) if status.success()) {
-                return end(&line, &read);
+                return end(&line, read);
             }
             if !line.told.again(read) {
                 return;
@@ -133,8 +133,8 @@ fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
     child.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Nothing more can come: whoever wrote is gone for good, and the film over.
-fn end(line: &ByteLine, _read: &io::Result<()>) {
+/// Nothing more can come, whatever ended it: whoever wrote is gone for good, and the film over.
+fn end(line: &ByteLine, _read: io::Result<()>) {
     line.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
 }
 

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::parse;
 use crate::sim::Remote;
+use crate::sys::unix_socket::listen_in_place;
 
 /// Connections at a time.
 const CONNECTIONS: usize = 16;
@@ -26,13 +27,7 @@ impl Control {
     /// # Errors
     /// A path that is taken or cannot be made, or a thread that cannot be had.
     pub(super) fn open(path: &Path, remote: Remote) -> io::Result<Self> {
-        let listener = match UnixListener::bind(path) {
-            Err(error) if error.kind() == io::ErrorKind::AddrInUse && is_stale(path) => {
-                std::fs::remove_file(path)?;
-                UnixListener::bind(path)?
-            }
-            bound => bound?,
-        };
+        let listener = listen_in_place(path)?;
         let control = Self { path: path.to_owned() };
         std::thread::Builder::new()
             .name("sim-control".to_owned())
@@ -45,11 +40,6 @@ impl Drop for Control {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.path); // it may be gone already
     }
-}
-
-/// True if it is a socket that nobody listens to.
-fn is_stale(path: &Path) -> bool {
-    UnixStream::connect(path).is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
 }
 
 /// Serves each connection on a thread of its own, until the program ends.

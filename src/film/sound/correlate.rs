@@ -64,9 +64,8 @@ impl Correlator {
             self.transform(place, piece);
         }
         self.weigh();
-        let whole = self.forward.get_scratch_len().max(self.back.get_scratch_len());
         self.back
-            .process_with_scratch(&mut self.spectra[0], &mut self.padded, &mut self.scratch[..whole])
+            .process_with_scratch(&mut self.spectra[0], &mut self.padded, &mut self.scratch)
             .expect("all lengths are the transform's own, and the ends are real");
         let mut fit = [0.0; WIDTH];
         for (n, to) in fit.iter_mut().enumerate() {

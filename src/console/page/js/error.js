@@ -2,6 +2,7 @@
 // the greatest of them, so that half a millisecond is seen where nothing is worse, and says its unit.
 
 import { byId, setAttribute, setProperty, setText } from './dom.js';
+import { minus } from './words.js';
 
 const MINUTE_MS = 60_000;
 const HEIGHT = 150;
@@ -66,7 +67,6 @@ function drawAll(now) {
 
 function options() {
   const axis = { stroke: NEUTRAL, grid: { stroke: GRID, width: 1 }, ticks: { stroke: GRID } };
-  const minus = (value) => String(value).replace('-', '−');
   return {
     ...size(),
     series: [{}, { stroke: LINE, width: 2, points: { show: false } }],

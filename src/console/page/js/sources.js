@@ -5,7 +5,7 @@ import { byId, make, onChange, setAttribute, setProperty, setText } from './dom.
 import { change } from './api.js';
 import { filmLook, mark } from './marks.js';
 import { ask, onTwoPresses } from './press.js';
-import { sentence, whole } from './words.js';
+import { minus, sentence, whole } from './words.js';
 
 let lines = [];
 
@@ -73,5 +73,3 @@ function figuresOf({ rate_ppm: rate, sigma_ms: sigma, level_dbfs: level, dropout
   ];
   return figures.filter((figure) => figure !== null).join(', ');
 }
-
-const minus = (figure) => figure.replace('-', '−');

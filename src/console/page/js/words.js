@@ -36,6 +36,9 @@ const rounded = (number, digits) => (number >= 10 ** digits ? String(Math.round(
 /** A part of 1: 60 %. */
 export const percent = (part) => `${Math.round(part * 100)} %`;
 
+/** A figure with the sign of a minus, not a hyphen. */
+export const minus = (figure) => String(figure).replace('-', '−');
+
 /** A trim: +10 ms, −40 ms. */
 export const signed = (ms) => `${ms > 0 ? '+' : ms < 0 ? '−' : ''}${Math.abs(ms)} ms`;
 
