@@ -8,7 +8,7 @@ const SEAT: &str = "[seat.s]\naxes = 6\nstroke_mm = 150\nlead_mm = 5\npulses_per
     max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n";
 const CONTROLLER: &str = "[[controller]]\nname = \"A1\"\nseat = \"s\"\naddress = \"10.0.0.1:7408\"\n";
 
-fn parse(text: &str) -> Result<Config, Vec<String>> {
+pub(super) fn parse(text: &str) -> Result<Config, Vec<String>> {
     read::document(Path::new("hall.toml"), text).map_err(|faults| match faults {
         ConfigFaults::Bad(faults) => faults.iter().map(ToString::to_string).collect(),
         ConfigFaults::Unreadable { .. } => unreachable!("a text is no file"),
