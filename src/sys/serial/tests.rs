@@ -153,6 +153,7 @@ fn the_latency_timer_is_that_of_the_device_behind_a_link() {
     assert_eq!(latency_timer_in(&devices, &link), Some(Duration::from_millis(16)));
     assert_eq!(latency_timer_in(&devices, &folder.path().join("none")), None);
     assert_eq!(latency_timer_in(&folder.path().join("none"), &device), None);
+    assert_eq!(latency_timer(Path::new("/dev/null")), None, "it is no adapter");
 }
 
 #[test]
