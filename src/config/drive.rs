@@ -1,6 +1,8 @@
 //! `[seat.NAME.drive]`: what a type of seat is beyond its axes where serial drives move it: how it finds its zero, how strong its
 //! motors are, what is a fault.
 
+use std::sync::Arc;
+
 use crate::motion::{AxisGeometry, AxisUnit, MAX_AXES, SeatType};
 
 use super::fault::Faults;
@@ -12,19 +14,19 @@ pub(crate) mod sixpack2;
 #[cfg(test)]
 mod tests;
 
-use homing::Homing;
+use homing::DriveHoming;
 use sixpack2::Sixpack2Drive;
 
 /// The families of serial drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Family {
+pub(crate) enum DriveFamily {
     /// SilverMax servos, one unit for each axis.
     SilverMax,
     /// SIXpack 2, six stepper motors on one unit.
     Sixpack2,
 }
 
-impl Family {
+impl DriveFamily {
     /// All of them, by the words of the configuration.
     pub(crate) const ALL: [(&'static str, Self); 2] =
         [("silvermax", Self::SilverMax), ("sixpack2", Self::Sixpack2)];
@@ -44,7 +46,7 @@ pub(crate) struct SeatDrive {
     /// Axes whose positive pulses go down.
     pub(crate) reverse: [bool; MAX_AXES],
     /// How an axis finds its zero.
-    pub(crate) homing: Homing,
+    pub(crate) homing: DriveHoming,
     /// How far outside the stroke the soft limits lie, mm.
     pub(crate) margin_mm: f64,
     /// What only a SilverMax has; `None` if its torque is not said.
@@ -88,23 +90,19 @@ pub(super) struct DriveEntry {
 }
 
 /// Reads the tables of all seat types that are sound.
-pub(super) fn seat_drives<'a>(
+pub(super) fn seat_drives(
     seats: Entry<'_>,
-    sound: impl Iterator<Item = &'a SeatType>,
+    sound: &[Arc<SeatType>],
     faults: &mut Faults<'_>,
 ) -> Vec<DriveEntry> {
     let Some(table) = seats.value.as_table() else { return Vec::new() };
-    let drive_of = |seat: &'a SeatType| {
+    let read = |seat: &Arc<SeatType>| {
         let value = table.get(seat.name.as_str())?.get_ref().as_table()?.get("drive")?;
-        Some((seat, Entry::new("drive", value)))
+        let entry = Entry::new("drive", value);
+        let drive = seat_drive(seat, entry, faults);
+        Some(DriveEntry { seat: seat.name.clone(), at: entry.at, drive })
     };
-    let found = sound.filter_map(drive_of);
-    found
-        .map(|(seat, entry)| {
-            let drive = seat_drive(seat, entry, faults);
-            DriveEntry { seat: seat.name.clone(), at: entry.at, drive }
-        })
-        .collect()
+    sound.iter().filter_map(read).collect()
 }
 
 fn seat_drive(seat: &SeatType, entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatDrive> {
@@ -172,7 +170,7 @@ fn share(section: &mut Section<'_, '_, '_>, key: &'static str) -> Option<f64> {
 }
 
 /// Notes an axis that drives cannot be asked for.
-pub(super) fn refuse_axes(entry: Entry<'_>, seat: &SeatType, family: Family, faults: &mut Faults<'_>) {
+pub(super) fn refuse_axes(entry: Entry<'_>, seat: &SeatType, family: DriveFamily, faults: &mut Faults<'_>) {
     if let Some(turns) = seat.own().iter().position(|axis| axis.unit == AxisUnit::Degree) {
         let message = format!(
             "axis {} of {} turns; serial drives move cylinders only: give the turntable a controller of its own",
@@ -181,7 +179,7 @@ pub(super) fn refuse_axes(entry: Entry<'_>, seat: &SeatType, family: Family, fau
         );
         entry.fault(faults, &message);
     }
-    if family == Family::SilverMax
+    if family == DriveFamily::SilverMax
         && let Some(fast) = seat.own().iter().find(|axis| axis.needed_rpm() > SILVERMAX_RPM)
     {
         let AxisGeometry { max_velocity, lead, .. } = fast;

@@ -10,11 +10,11 @@ use crate::motion::{MAX_AXES, SeatType};
 
 use super::accept::acceptances;
 use super::drive::homing::HomeWay;
-use super::drive::{DriveEntry, Family, SeatDrive, refuse_axes};
+use super::drive::{DriveEntry, DriveFamily, SeatDrive, refuse_axes};
 use super::fault::Faults;
-use super::link::{Link, LinkEntry, Wiring};
-use super::read::{Site, inputs_up_to, seat_of};
+use super::link::{Link, LinkEntry, LinkWiring};
 use super::section::{Entry, Section, did_you_mean};
+use super::site::{Site, inputs_up_to, seat_of};
 use super::{Acceptance, Controller};
 
 /// What an address begins with that names a link.
@@ -65,10 +65,10 @@ pub(crate) enum Motors {
 
 impl Motors {
     /// What they are.
-    pub(crate) const fn family(&self) -> Family {
+    pub(crate) const fn family(&self) -> DriveFamily {
         match self {
-            Self::SilverMax(_) => Family::SilverMax,
-            Self::Sixpack2 { .. } => Family::Sixpack2,
+            Self::SilverMax(_) => DriveFamily::SilverMax,
+            Self::Sixpack2 { .. } => DriveFamily::Sixpack2,
         }
     }
 }
@@ -124,6 +124,9 @@ pub(super) fn drive_controller<'t>(
     let (seat, family, seat_at) = (seat?, family?, seat_at?);
     refuse_axes(seat_at, &seat, family, faults);
     let drive = drive_of(seat_at, &seat, family, drives, faults);
+    if let (Some(drive), Some(value)) = (&drive, table.get("estop_inputs")) {
+        refuse_switch(Entry::new("estop_inputs", value), drive, estop_inputs, faults);
+    }
     let (motors, motors_at) = motors?;
     let name = name?;
     let controller = DriveController {
@@ -153,19 +156,19 @@ fn link_of(section: &mut Section<'_, '_, '_>, links: &[LinkEntry<'_>]) -> Option
     None
 }
 
-fn family(section: &mut Section<'_, '_, '_>) -> Option<Family> {
+fn family(section: &mut Section<'_, '_, '_>) -> Option<DriveFamily> {
     let entry = section.get("dialect")?;
     if matches!(entry.value.as_str(), Some("smc" | "mbox")) {
         let message = "is spoken over UDP; on a link it is \"silvermax\" or \"sixpack2\", else give address = \"IP:PORT\"";
         entry.fault(section.faults, message);
         return None;
     }
-    entry.choice(&Family::ALL, section.faults)
+    entry.choice(&DriveFamily::ALL, section.faults)
 }
 
 /// Inputs 1 to 7 of a SilverMax; a SIXpack 2 has none.
-fn estop_inputs(section: &mut Section<'_, '_, '_>, family: Family) -> u16 {
-    if let Some(entry) = section.get("estop_inputs").filter(|_| family == Family::Sixpack2) {
+fn estop_inputs(section: &mut Section<'_, '_, '_>, family: DriveFamily) -> u16 {
+    if let Some(entry) = section.get("estop_inputs").filter(|_| family == DriveFamily::Sixpack2) {
         entry.fault(section.faults, "kinocue reads no inputs of a SIXpack 2; leave it out");
         return 0;
     }
@@ -196,11 +199,11 @@ fn refuse_keys(section: &mut Section<'_, '_, '_>) {
 /// The drive of each axis, and the place of each.
 fn motors(
     section: &mut Section<'_, '_, '_>,
-    family: Family,
+    family: DriveFamily,
     axes: Option<usize>,
 ) -> Option<(Motors, Vec<usize>)> {
     match family {
-        Family::SilverMax => {
+        DriveFamily::SilverMax => {
             section.require(&["units"]);
             for key in ["unit", "motors"] {
                 section.refuse(key, "a SilverMax is one motor; list the unit of each axis as units");
@@ -208,7 +211,7 @@ fn motors(
             let (units, at) = numbers(section, "units", 1, 254, axes)?;
             Some((Motors::SilverMax(units), at))
         }
-        Family::Sixpack2 => {
+        DriveFamily::Sixpack2 => {
             section.require(&["unit", "motors"]);
             section
                 .refuse("units", "a SIXpack 2 is one unit of six motors; write unit = 1, motors = [0, 1, 2]");
@@ -241,7 +244,7 @@ fn numbers(
 fn drive_of(
     entry: Entry<'_>,
     seat: &SeatType,
-    family: Family,
+    family: DriveFamily,
     drives: &[DriveEntry],
     faults: &mut Faults<'_>,
 ) -> Option<SeatDrive> {
@@ -254,39 +257,50 @@ fn drive_of(
     let drive = found.drive.clone()?;
     let note = |faults: &mut Faults<'_>, text: String| faults.note(found.at, format!("drive: {text}"));
     match family {
-        Family::SilverMax if drive.silvermax.is_none() => {
+        DriveFamily::SilverMax if drive.silvermax.is_none() => {
             note(
                 faults,
                 "a SilverMax needs torque = { hold = \"60%\", move = \"100%\", full = N }".to_owned(),
             );
         }
-        Family::Sixpack2 if drive.sixpack2.is_none() => {
+        DriveFamily::Sixpack2 if drive.sixpack2.is_none() => {
             note(faults, "a SIXpack 2 needs current = { peak = N }".to_owned());
         }
         _ => {}
     }
     refuse_home(&drive, family, found.at, faults);
-    if let Some(why) = drive.sixpack2.as_ref().filter(|_| family == Family::Sixpack2) {
+    if let Some(why) = drive.sixpack2.as_ref().filter(|_| family == DriveFamily::Sixpack2) {
         why.too_slow_for(seat).into_iter().for_each(|why| note(faults, why));
     }
     Some(drive)
 }
 
 /// Notes a way home that the family does not have.
-fn refuse_home(drive: &SeatDrive, family: Family, at: usize, faults: &mut Faults<'_>) {
+fn refuse_home(drive: &SeatDrive, family: DriveFamily, at: usize, faults: &mut Faults<'_>) {
     let message = match (family, drive.homing.way) {
-        (Family::SilverMax, HomeWay::Switch { input: None, .. } | HomeWay::Index { input: None, .. }) => {
-            "home: a SilverMax needs the input of the switch, 1 to 7, as input = 1"
-        }
-        (Family::Sixpack2, HomeWay::Switch { input: Some(_), .. }) => {
+        (
+            DriveFamily::SilverMax,
+            HomeWay::Switch { input: None, .. } | HomeWay::Index { input: None, .. },
+        ) => "home: a SilverMax needs the input of the switch, 1 to 7, as input = 1",
+        (DriveFamily::Sixpack2, HomeWay::Switch { input: Some(_), .. }) => {
             "home: each motor of a SIXpack 2 has a reference switch of its own; leave input out"
         }
-        (Family::Sixpack2, HomeWay::Index { .. }) => {
+        (DriveFamily::Sixpack2, HomeWay::Index { .. }) => {
             "home: a SIXpack 2 has no index pulse; use way = \"switch\""
         }
         _ => return,
     };
     faults.note(at, format!("drive: {message}"));
+}
+
+/// Notes an input that would tell of an emergency stop whenever a seat is home.
+fn refuse_switch(entry: Entry<'_>, drive: &SeatDrive, estop_inputs: u16, faults: &mut Faults<'_>) {
+    if let HomeWay::Switch { input: Some(input), .. } | HomeWay::Index { input: Some(input), .. } =
+        drive.homing.way
+        && estop_inputs & 1 << (input - 1) != 0
+    {
+        entry.fault(faults, &format!("input {input} is the switch of home on these units; wire another"));
+    }
 }
 
 /// Settles the links for the drives that are on them, and notes what these cannot be together.
@@ -306,7 +320,7 @@ pub(super) fn settle(links: Vec<LinkEntry<'_>>, placed: &[Placed], faults: &mut 
     settled
 }
 
-fn refuse_two_families(on_it: &[&Placed], family: Option<Family>, faults: &mut Faults<'_>) {
+fn refuse_two_families(on_it: &[&Placed], family: Option<DriveFamily>, faults: &mut Faults<'_>) {
     let is_other = |one: &&&Placed| Some(one.controller.motors.family()) != family;
     for other in on_it.iter().filter(is_other) {
         let DriveController { link, motors, .. } = &other.controller;
@@ -314,7 +328,7 @@ fn refuse_two_families(on_it: &[&Placed], family: Option<Family>, faults: &mut F
         let message = format!(
             "dialect: link {link} has {} already, by {first}, and one line carries one dialect; put {word} on a link of its \
              own",
-            family.map_or("another", Family::word)
+            family.map_or("another", DriveFamily::word)
         );
         faults.note(other.unit_at, message);
     }
@@ -346,7 +360,7 @@ fn refuse_twins(on_it: &[&Placed], faults: &mut Faults<'_>) {
 
 /// A SIXpack 2 by RS-232 is alone on its line.
 fn refuse_units_of_rs232(link: &Link, on_it: &[&Placed], faults: &mut Faults<'_>) {
-    if (link.wiring, link.family) != (Wiring::Rs232, Some(Family::Sixpack2)) {
+    if (link.wiring, link.family) != (LinkWiring::Rs232, Some(DriveFamily::Sixpack2)) {
         return;
     }
     let unit = |one: &Placed| match one.controller.motors {

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::drive::Family;
+use super::drive::DriveFamily;
 use super::fault::Faults;
 use super::section::{Entry, Section};
 
@@ -29,7 +29,7 @@ pub(crate) struct Link {
     /// The device, or the interface of a bus.
     pub(crate) port: PathBuf,
     /// How it is wired.
-    pub(crate) wiring: Wiring,
+    pub(crate) wiring: LinkWiring,
     /// Bits a second as the drives make them.
     pub(crate) baud: u32,
     /// Bits a second as they stand in the file, or would.
@@ -41,12 +41,12 @@ pub(crate) struct Link {
     /// Segments or targets a second for each axis; `None` for the most that fit.
     pub(crate) rate_hz: Option<f64>,
     /// What its drives are; `None` if no controller is on it.
-    pub(crate) family: Option<Family>,
+    pub(crate) family: Option<DriveFamily>,
 }
 
 /// How a link is wired.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Wiring {
+pub(crate) enum LinkWiring {
     /// Point to point.
     Rs232,
     /// Two wires that all share.
@@ -60,7 +60,8 @@ pub(super) struct LinkEntry<'t> {
     pub(super) name: &'t str,
     pub(super) at: usize,
     port: Option<String>,
-    wiring: Wiring,
+    port_at: usize,
+    wiring: LinkWiring,
     wiring_at: usize,
     baud: Option<(u32, usize)>,
     stop_bits: Option<u8>,
@@ -72,7 +73,17 @@ pub(super) struct LinkEntry<'t> {
 pub(super) fn links<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Vec<LinkEntry<'t>> {
     let Some(table) = entry.table(faults) else { return Vec::new() };
     let entries = table.iter().map(|(name, value)| Entry::new(name.get_ref(), value));
-    entries.filter_map(|entry| link(entry, faults)).collect()
+    let links: Vec<_> = entries.filter_map(|entry| link(entry, faults)).collect();
+    for link in &links {
+        let is_twin = |other: &&LinkEntry<'_>| {
+            link.port.is_some() && other.port == link.port && other.port_at < link.port_at
+        };
+        if let Some(twin) = links.iter().find(is_twin) {
+            let message = format!("port: [link.{}] is on it already; one line is one link", twin.name);
+            faults.note(link.port_at, message);
+        }
+    }
+    links
 }
 
 fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> {
@@ -80,24 +91,29 @@ fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> 
     let mut section = Section::new(format!("[link.{}]", entry.key), entry.at, table, faults);
     section.require(&["port"]);
     let port = section.text("port");
-    let kinds = [("rs232", Wiring::Rs232), ("rs485", Wiring::Rs485), ("can", Wiring::Can)];
-    let wiring = section.choice("wiring", &kinds).unwrap_or(Wiring::Rs232);
+    let kinds = [("rs232", LinkWiring::Rs232), ("rs485", LinkWiring::Rs485), ("can", LinkWiring::Can)];
+    let wiring = section.choice("wiring", &kinds).unwrap_or(LinkWiring::Rs232);
     let wiring_at = section.get("wiring").map_or(entry.at, |entry| entry.at);
     let baud_at = section.get("baud").map_or(entry.at, |entry| entry.at);
     let baud = section.whole_in("baud", 1..=10_000_000).map(|baud| (baud, baud_at));
     let stop_bits = section.whole_in("stop_bits", 1..=2);
     let has_echo = section.get("echo").and_then(|entry| entry.switch(section.faults)).unwrap_or(false);
     let rate_hz = rate(&mut section);
-    if wiring == Wiring::Can {
+    if wiring == LinkWiring::Can {
         for key in ["stop_bits", "echo"] {
             section.refuse(key, "a CAN bus has none; leave it out");
         }
+    }
+    let port_entry = section.get("port");
+    if let (Some(entry), Some(port)) = (port_entry, port.as_deref()) {
+        refuse_port(entry, port, wiring, section.faults);
     }
     section.finish();
     Some(LinkEntry {
         name: entry.key,
         at: entry.at,
         port,
+        port_at: port_entry.map_or(entry.at, |entry| entry.at),
         wiring,
         wiring_at,
         baud,
@@ -105,6 +121,17 @@ fn link<'t>(entry: Entry<'t>, faults: &mut Faults<'_>) -> Option<LinkEntry<'t>> 
         has_echo,
         rate_hz,
     })
+}
+
+/// Notes a device without its folder, and an interface with one.
+fn refuse_port(entry: Entry<'_>, port: &str, wiring: LinkWiring, faults: &mut Faults<'_>) {
+    match (wiring, port.contains('/')) {
+        (LinkWiring::Can, true) => entry.fault(faults, &format!("{port:?} is no interface, as \"can0\"")),
+        (LinkWiring::Rs232 | LinkWiring::Rs485, false) => {
+            entry.fault(faults, &format!("{port:?} is no device; write its whole path, as \"/dev/ttyUSB0\""));
+        }
+        _ => {}
+    }
 }
 
 /// `None` for `"auto"`, and where nothing is said.
@@ -122,19 +149,19 @@ fn rate(section: &mut Section<'_, '_, '_>) -> Option<f64> {
 
 impl LinkEntry<'_> {
     /// The link for drives of `family`; notes what these cannot do.
-    pub(super) fn settle(self, family: Option<Family>, faults: &mut Faults<'_>) -> Option<Link> {
-        if family == Some(Family::SilverMax) && self.wiring == Wiring::Can {
+    pub(super) fn settle(self, family: Option<DriveFamily>, faults: &mut Faults<'_>) -> Option<Link> {
+        if family == Some(DriveFamily::SilverMax) && self.wiring == LinkWiring::Can {
             faults.note(self.wiring_at, "wiring: a SilverMax has no CAN; use \"rs485\" or \"rs232\"");
         }
-        let usual = if self.wiring == Wiring::Can { CAN_BAUD } else { 57_600 };
+        let usual = if self.wiring == LinkWiring::Can { CAN_BAUD } else { 57_600 };
         let (asked_baud, baud_at) = self.baud.unwrap_or((usual, self.at));
         let made = match (self.wiring, family) {
-            (Wiring::Can, _) | (_, None) => Ok(asked_baud),
-            (_, Some(Family::SilverMax)) => silvermax_baud(asked_baud),
-            (_, Some(Family::Sixpack2)) => sixpack2_baud(asked_baud),
+            (LinkWiring::Can, _) | (_, None) => Ok(asked_baud),
+            (_, Some(DriveFamily::SilverMax)) => silvermax_baud(asked_baud),
+            (_, Some(DriveFamily::Sixpack2)) => sixpack2_baud(asked_baud),
         };
         let baud = made.map_err(|reason| faults.note(baud_at, format!("baud: {reason}"))).ok();
-        let usual_stop = if family == Some(Family::Sixpack2) { 1 } else { 2 };
+        let usual_stop = if family == Some(DriveFamily::Sixpack2) { 1 } else { 2 };
         Some(Link {
             name: self.name.to_owned(),
             port: self.port?.into(),

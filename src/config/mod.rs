@@ -29,6 +29,7 @@ mod preset;
 mod read;
 mod seat;
 mod section;
+mod site;
 mod sync;
 mod target;
 #[cfg(test)]

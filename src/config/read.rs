@@ -4,12 +4,11 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use toml::de::DeTable;
 
 use crate::channel::{self, SWITCHES};
-use crate::motion::{MAX_AXES, SeatType};
+use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
 use super::api::api;
@@ -25,6 +24,7 @@ use super::osc::osc;
 use super::preset::presets;
 use super::seat::seats;
 use super::section::{Entry, Section, did_you_mean};
+use super::site::{Site, inputs_up_to, seat_of};
 use super::sync::{FilmSync, sync};
 use super::text::text;
 use super::{
@@ -94,12 +94,10 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
     let links = link_at.map_or_else(Vec::new, |entry| links(entry, faults));
-    let sound = seats.iter().map(|seat| &**seat);
-    let seat_drives = seat_at.map_or_else(Vec::new, |entry| seat_drives(entry, sound, faults));
+    let seat_drives = seat_at.map_or_else(Vec::new, |entry| seat_drives(entry, &seats, faults));
     let peers = controller_at
         .map_or_else(Peers::default, |entry| controllers(entry, &site, (&links, &seat_drives), faults));
-    let show_table = show_at.and_then(|entry| entry.value.as_table());
-    refuse_sparse_acks(show_table, &peers, faults);
+    refuse_sparse_acks(show_at, &peers, faults);
     let (links, drives) = on_links(links, &peers, faults);
     let Peers { present: controllers, absent, .. } = peers;
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
@@ -166,14 +164,6 @@ fn effects(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<Effect> {
     effects
 }
 
-/// What controllers refer to.
-pub(super) struct Site<'a> {
-    seats: &'a [Arc<SeatType>],
-    /// The names of all seat types, also of those with faults.
-    named: &'a [&'a str],
-    effects: &'a [Effect],
-}
-
 /// The controllers of a file: those that take part, those that are out for good, and those on links, which are both.
 #[derive(Default)]
 struct Peers {
@@ -235,10 +225,9 @@ fn on_links(
 }
 
 /// Notes a hall with drives that asks for few acks: what a drive does not answer is in doubt.
-fn refuse_sparse_acks(show: Option<&DeTable<'_>>, peers: &Peers, faults: &mut Faults<'_>) {
-    let Some(value) = show.and_then(|show| show.get("ack_every")).filter(|_| !peers.placed.is_empty()) else {
-        return;
-    };
+fn refuse_sparse_acks(show: Option<Entry<'_>>, peers: &Peers, faults: &mut Faults<'_>) {
+    let table = show.and_then(|entry| entry.value.as_table()).filter(|_| !peers.placed.is_empty());
+    let Some(value) = table.and_then(|table| table.get("ack_every")) else { return };
     let entry = Entry::new("ack_every", value);
     if entry.value.as_integer().is_some_and(|every| every.as_str() != "1") {
         entry.fault(
@@ -341,33 +330,11 @@ fn levels_of(section: &mut Section<'_, '_, '_>) -> [f64; SWITCHES] {
 
 /// The inputs of an emergency stop, and those of belts.
 fn named_inputs(section: &mut Section<'_, '_, '_>) -> (u16, u16) {
-    let [estop, belts] = ["estop_inputs", "belt_inputs"].map(|key| inputs_of(section, key));
+    let [estop, belts] = ["estop_inputs", "belt_inputs"].map(|key| inputs_up_to(section, key, 12));
     if let Some(entry) = section.get("belt_inputs").filter(|_| estop & belts != 0) {
         entry.fault(section.faults, "an input of estop_inputs is none of a belt");
     }
     (estop, belts)
-}
-
-/// A list of inputs, X01 to X12, as a word.
-fn inputs_of(section: &mut Section<'_, '_, '_>, key: &'static str) -> u16 {
-    inputs_up_to(section, key, 12)
-}
-
-/// A list of inputs, counted from 1, as a word.
-pub(super) fn inputs_up_to(section: &mut Section<'_, '_, '_>, key: &'static str, last: u8) -> u16 {
-    let Some(entries) = section.get(key).and_then(|entry| entry.array(section.faults)) else { return 0 };
-    let inputs = entries.iter().filter_map(|entry| entry.whole_in(1..=last, section.faults));
-    inputs.fold(0, |word, input: u8| word | 1 << (input - 1))
-}
-
-pub(super) fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<SeatType>> {
-    let entry = section.get("seat")?;
-    let name = entry.text(section.faults)?;
-    if !site.named.contains(&name) {
-        let hint = did_you_mean(name, site.named.iter().copied());
-        entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
-    }
-    site.seats.iter().find(|seat| seat.name == name).cloned()
 }
 
 fn dialect(section: &mut Section<'_, '_, '_>) -> Option<Dialect> {

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::config::Config;
-use crate::config::drive::Family;
-use crate::config::link::{Link, Wiring};
+use crate::config::drive::DriveFamily;
+use crate::config::link::{Link, LinkWiring};
 
 /// Octets of a SilverMax segment and its ack, as most are.
 pub(crate) const USUAL_EXCHANGE: u32 = 45;
@@ -40,9 +40,9 @@ const SIXPACK2_BAUDS: [u32; 4] = [56_818, 113_636, 125_000, 250_000];
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LinkLoad {
     /// What its drives are.
-    pub(crate) family: Family,
+    pub(crate) family: DriveFamily,
     /// How it is wired.
-    pub(crate) wiring: Wiring,
+    pub(crate) wiring: LinkWiring,
     /// Bits a second.
     pub(crate) baud: u32,
     /// Bits of an octet: a start bit, eight, and the stop bits.
@@ -67,9 +67,9 @@ impl LinkLoad {
         let family = link.family.filter(|_| axes > 0)?;
         let is_usb = is_usb(&link.port);
         let delay = match (family, link.wiring) {
-            (Family::SilverMax, Wiring::Rs485) => RS485_DELAY,
-            (Family::SilverMax, _) => Duration::ZERO,
-            (Family::Sixpack2, _) => SIXPACK2_DELAY,
+            (DriveFamily::SilverMax, LinkWiring::Rs485) => RS485_DELAY,
+            (DriveFamily::SilverMax, _) => Duration::ZERO,
+            (DriveFamily::Sixpack2, _) => SIXPACK2_DELAY,
         };
         Some(Self {
             family,
@@ -79,7 +79,7 @@ impl LinkLoad {
             axes,
             exchange_octets: USUAL_EXCHANGE,
             answer_delay: delay + if is_usb { USB_TURN } else { UART_TURN },
-            share: if is_usb && family == Family::SilverMax { USB_SHARE } else { SHARE },
+            share: if is_usb && family == DriveFamily::SilverMax { USB_SHARE } else { SHARE },
         })
     }
 
@@ -91,17 +91,21 @@ impl LinkLoad {
         let octets = |count: u32| f64::from(count * self.octet_bits) * bit;
         let delay = self.answer_delay.as_secs_f64();
         let an_axis = match (self.family, self.wiring) {
-            (Family::SilverMax, _) => octets(self.exchange_octets) + delay,
+            (DriveFamily::SilverMax, _) => octets(self.exchange_octets) + delay,
             // Targets, and now and then a query and its answer; on a bus others go on while one waits.
-            (Family::Sixpack2, Wiring::Can) => f64::from(CAN_BITS) * bit * (targets + 2.0) / targets,
-            (Family::Sixpack2, _) => (octets(SIXPACK2_OCTETS * (TARGETS_A_QUERY + 2)) + delay) / targets,
+            (DriveFamily::Sixpack2, LinkWiring::Can) => f64::from(CAN_BITS) * bit * (targets + 2.0) / targets,
+            (DriveFamily::Sixpack2, _) => (octets(SIXPACK2_OCTETS * (TARGETS_A_QUERY + 2)) + delay) / targets,
         };
-        let micros = whole_micros(f64::from(self.axes) * an_axis / self.share);
-        let fits = match self.wiring {
-            Wiring::Can => micros.next_multiple_of(SIXPACK2_TICK_US),
-            Wiring::Rs232 | Wiring::Rs485 => micros,
-        };
-        Duration::from_micros(fits)
+        self.on_ticks(f64::from(self.axes) * an_axis / self.share)
+    }
+
+    /// So long or a little longer: whole microseconds, on a bus the ticks of its drives.
+    fn on_ticks(&self, seconds: f64) -> Duration {
+        let micros = whole_micros(seconds);
+        Duration::from_micros(match self.wiring {
+            LinkWiring::Can => micros.next_multiple_of(SIXPACK2_TICK_US),
+            LinkWiring::Rs232 | LinkWiring::Rs485 => micros,
+        })
     }
 
     /// Times a second at the most.
@@ -116,7 +120,7 @@ impl LinkLoad {
     /// [`TooSlow`] where so much does not fit.
     pub(crate) fn period_for(&self, wanted: Option<f64>) -> Result<Duration, TooSlow> {
         let Some(wanted_hz) = wanted else { return Ok(self.period()) };
-        let period = Duration::from_micros(whole_micros(1.0 / wanted_hz));
+        let period = self.on_ticks(1.0 / wanted_hz);
         if period >= self.period() { Ok(period) } else { Err(TooSlow { load: *self, wanted_hz }) }
     }
 
@@ -124,9 +128,9 @@ impl LinkLoad {
     #[must_use]
     pub(crate) fn remedy(&self, wanted_hz: f64) -> String {
         let bauds: &[u32] = match (self.family, self.wiring) {
-            (_, Wiring::Can) => &[],
-            (Family::SilverMax, _) => &SILVERMAX_BAUDS,
-            (Family::Sixpack2, _) => &SIXPACK2_BAUDS,
+            (_, LinkWiring::Can) => &[],
+            (DriveFamily::SilverMax, _) => &SILVERMAX_BAUDS,
+            (DriveFamily::Sixpack2, _) => &SIXPACK2_BAUDS,
         };
         let fits = |load: &Self| load.rate_hz() >= wanted_hz;
         let baud = bauds.iter().copied().filter(|baud| *baud > self.baud);
@@ -228,8 +232,8 @@ mod tests {
 
     fn silver(baud: u32, delay: Duration, axes: u32) -> LinkLoad {
         LinkLoad {
-            family: Family::SilverMax,
-            wiring: Wiring::Rs232,
+            family: DriveFamily::SilverMax,
+            wiring: LinkWiring::Rs232,
             baud,
             octet_bits: 11,
             axes,
@@ -241,7 +245,7 @@ mod tests {
 
     fn six(baud: u32, delay: Duration, axes: u32) -> LinkLoad {
         LinkLoad {
-            family: Family::Sixpack2,
+            family: DriveFamily::Sixpack2,
             octet_bits: 10,
             answer_delay: delay + UART_TURN,
             ..silver(baud, delay, axes)
@@ -296,8 +300,9 @@ mod tests {
 
     #[test]
     fn a_bus_plays_on_the_ticks_of_its_drives() {
-        let bus = |axes| LinkLoad { wiring: Wiring::Can, ..six(500_000, SIXPACK2_DELAY, axes) };
+        let bus = |axes| LinkLoad { wiring: LinkWiring::Can, ..six(500_000, SIXPACK2_DELAY, axes) };
         assert_eq!([3, 6].map(|axes| bus(axes).rate_hz()), [500.0, 250.0]);
+        assert_eq!(bus(3).period_for(Some(300.0)), Ok(Duration::from_millis(4)));
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub(crate) mod pty;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use fault::{LineFault, SerialError};
+pub(crate) use fault::{PortFault, SerialError};
 pub(crate) use octets::OctetLine;
 
 /// How far the baud rate that is made may be from the one that was asked for: two ends together may differ by 4 %.
@@ -155,9 +155,9 @@ impl SerialPort {
     /// Holds the line in a break for so long, which every receiver takes for the end of what came before.
     ///
     /// # Errors
-    /// A [`LineFault`] where the port is gone.
+    /// A [`PortFault`] where the port is gone.
     #[expect(unsafe_code, reason = "the library's break lasts a quarter of a second at least")]
-    pub(crate) fn send_break(&self, span: Duration) -> Result<(), LineFault> {
+    pub(crate) fn send_break(&self, span: Duration) -> Result<(), PortFault> {
         // SAFETY: neither takes an argument.
         unsafe { ioctl(&self.line, NoArg::<{ code(libc::TIOCSBRK) }>::new()) }?;
         Monotonic.sleep_until(Monotonic.now() + span);

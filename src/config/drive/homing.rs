@@ -15,7 +15,7 @@ const LONGEST_TRAVEL: f64 = 1.5;
 
 /// How an axis finds its zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Homing {
+pub(crate) struct DriveHoming {
     /// What tells that it is there.
     pub(crate) way: HomeWay,
     /// At which end of the stroke that is.
@@ -65,7 +65,7 @@ pub(crate) enum Side {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Word {
+enum WayWord {
     Switch,
     Index,
     HardStop,
@@ -73,19 +73,23 @@ enum Word {
 }
 
 /// Reads the table, and holds it against the axes of the seat.
-pub(super) fn homing(entry: Entry<'_>, axes: &[AxisGeometry], faults: &mut Faults<'_>) -> Option<Homing> {
+pub(super) fn homing(
+    entry: Entry<'_>,
+    axes: &[AxisGeometry],
+    faults: &mut Faults<'_>,
+) -> Option<DriveHoming> {
     let mut section = Section::new("home", entry.at, entry.table(faults)?, faults);
     section.require(&["way"]);
     let ways = [
-        ("switch", Word::Switch),
-        ("index", Word::Index),
-        ("hard-stop", Word::HardStop),
-        ("here", Word::Here),
+        ("switch", WayWord::Switch),
+        ("index", WayWord::Index),
+        ("hard-stop", WayWord::HardStop),
+        ("here", WayWord::Here),
     ];
     let word = section.choice("way", &ways);
     let needed: &[&str] = match word {
-        Some(Word::Here) => &["zero_mm"],
-        Some(Word::HardStop) => &["toward", "travel_mm", "zero_mm", "torque"],
+        Some(WayWord::Here) => &["zero_mm"],
+        Some(WayWord::HardStop) => &["toward", "travel_mm", "zero_mm", "torque"],
         _ => &["toward", "travel_mm", "zero_mm"],
     };
     section.require(needed);
@@ -101,16 +105,16 @@ pub(super) fn homing(entry: Entry<'_>, axes: &[AxisGeometry], faults: &mut Fault
     let torque = share(&mut section, "torque");
     let together = section.get("together").and_then(|entry| entry.switch(section.faults)).unwrap_or(false);
     let way = match word? {
-        Word::Switch => HomeWay::Switch { input, active_high },
-        Word::Index => HomeWay::Index { input, active_high },
-        Word::HardStop => HomeWay::HardStop,
-        Word::Here => HomeWay::Here,
+        WayWord::Switch => HomeWay::Switch { input, active_high },
+        WayWord::Index => HomeWay::Index { input, active_high },
+        WayWord::HardStop => HomeWay::HardStop,
+        WayWord::Here => HomeWay::Here,
     };
     refuse_unused(&mut section, way, [input_at, active_at, travel_at]);
     section.finish();
     let toward = if way == HomeWay::Here { toward.unwrap_or(Side::Down) } else { toward? };
     let travel_mm = if way == HomeWay::Here { 0.0 } else { travel_mm? };
-    let homing = Homing { way, toward, speed_mm_s, travel_mm, zero_mm: zero_mm?, torque, together };
+    let homing = DriveHoming { way, toward, speed_mm_s, travel_mm, zero_mm: zero_mm?, torque, together };
     // An axis that turns is refused for itself.
     let cylinders: Vec<_> = axes.iter().filter(|axis| axis.unit == AxisUnit::Millimetre).copied().collect();
     zero_at.into_iter().for_each(|entry| homing.refuse_zero(entry, &cylinders, faults));
@@ -129,7 +133,7 @@ fn refuse_unused(section: &mut Section<'_, '_, '_>, way: HomeWay, keys: [Option<
     unused.iter().flatten().for_each(|entry| entry.fault(section.faults, why));
 }
 
-impl Homing {
+impl DriveHoming {
     /// Notes a zero on the wrong side of the stroke: seats would stop at it in mid-air, or never reach it.
     fn refuse_zero(&self, entry: Entry<'_>, axes: &[AxisGeometry], faults: &mut Faults<'_>) {
         let zero = self.zero_mm;

@@ -26,7 +26,7 @@ pub(crate) struct Sixpack2Drive {
     /// The speed that its motors take in one step, mm/s; `None` for what the seat's own acceleration gives in a segment.
     pub(crate) jump_mm_s: Option<f64>,
     /// Current of its motors.
-    pub(crate) current: Current,
+    pub(crate) current: MotorCurrent,
 }
 
 /// How the difference to the target is divided.
@@ -40,7 +40,7 @@ pub(crate) enum PropDiv {
 
 /// Current of a stepper motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Current {
+pub(crate) struct MotorCurrent {
     /// The greatest, as CMD $10 has it.
     pub(crate) peak: u8,
     /// Its share at rest, percent.
@@ -73,14 +73,14 @@ fn propdiv(section: &mut Section<'_, '_, '_>) -> PropDiv {
     }
 }
 
-fn current(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<Current> {
+fn current(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<MotorCurrent> {
     let mut section = Section::new("current", entry.at, entry.table(faults)?, faults);
     section.require(&["peak"]);
     let peak = section.whole_in("peak", 1..=255);
     let [stand, run, ramp] =
         [("stand", 50), ("run", 75), ("ramp", 100)].map(|(key, usual)| share_of(&mut section, key, usual));
     section.finish();
-    Some(Current { peak: peak?, stand, run, ramp })
+    Some(MotorCurrent { peak: peak?, stand, run, ramp })
 }
 
 /// One of the shares that it has, as `"50%"`.

@@ -1,11 +1,11 @@
 //! Halls with drives: what they read as, and every fault with its line and what to do.
 
 use super::homing::{HomeWay, Side};
-use super::sixpack2::{Current, PropDiv};
+use super::sixpack2::{MotorCurrent, PropDiv};
 use super::*;
 use crate::config::Config;
 use crate::config::drive_controller::Motors;
-use crate::config::link::Wiring;
+use crate::config::link::LinkWiring;
 use crate::config::tests::parse;
 
 const LINK: &str = "[link.stalls]\nport = \"/dev/ttyUSB0\"\n";
@@ -31,10 +31,14 @@ fn instead(of: &str, new: &str) -> Result<Config, Vec<String>> {
 }
 
 fn six(controllers: &str, link: &str) -> Result<Config, Vec<String>> {
+    parse(&sixpack_hall(controllers, &format!("{LINK}{link}")))
+}
+
+fn sixpack_hall(controllers: &str, link: &str) -> String {
     let seat = SEAT.replace("4000", "3200");
     let drive = "[seat.s.drive]\nclock_divider = 3\ncurrent = { peak = 238 }\n\
         home = { way = \"switch\", toward = \"down\", travel_mm = 165, zero_mm = -2 }\n";
-    parse(&format!("{LINK}{link}{seat}{drive}{controllers}"))
+    format!("{link}{seat}{drive}{controllers}")
 }
 
 const SIX: &str = "[[controller]]\nname = \"B1\"\nseat = \"s\"\naddress = \"link:stalls\"\ndialect = \"sixpack2\"\n\
@@ -50,8 +54,8 @@ fn only(faults: Result<Config, Vec<String>>) -> String {
 fn a_seat_of_silvermax_units_reads_as_it_is_written_with_defaults_for_the_rest() {
     let hall = silver("estop_inputs = [2]\naxis_offset = 3\n").unwrap();
     let [link] = &hall.links[..] else { panic!("one link") };
-    assert_eq!((link.wiring, link.baud, link.stop_bits), (Wiring::Rs232, 57_600, 2));
-    assert_eq!((link.has_echo, link.rate_hz, link.family), (false, None, Some(Family::SilverMax)));
+    assert_eq!((link.wiring, link.baud, link.stop_bits), (LinkWiring::Rs232, 57_600, 2));
+    assert_eq!((link.has_echo, link.rate_hz, link.family), (false, None, Some(DriveFamily::SilverMax)));
     let [one] = &hall.drives[..] else { panic!("one seat") };
     assert_eq!((one.name.as_str(), one.link.as_str(), one.group.as_str()), ("A1", "stalls", "A1"));
     assert_eq!((one.window(), one.estop_inputs, one.enabled), (3..6, 0b10, true));
@@ -74,10 +78,11 @@ fn a_seat_on_a_sixpack_reads_as_it_is_written_and_its_link_has_the_rate_that_is_
     assert_eq!((link.baud, link.stop_bits), (56_818, 1));
     assert_eq!(link.asked_baud, 57_600);
     let drive = hall.drives[0].drive.sixpack2.clone().unwrap();
-    assert_eq!(drive.current, Current { peak: 238, stand: 50, run: 75, ramp: 100 });
+    assert_eq!(drive.current, MotorCurrent { peak: 238, stand: 50, run: 75, ramp: 100 });
     assert_eq!((drive.clock_divider, drive.propdiv, drive.jump_mm_s), (3, PropDiv::Auto, None));
-    let can = six(SIX, "wiring = \"can\"\n").unwrap();
-    assert_eq!((can.links[0].wiring, can.links[0].baud), (Wiring::Can, 500_000));
+    let bus = LINK.replace("/dev/ttyUSB0", "can0") + "wiring = \"can\"\n";
+    let can = parse(&sixpack_hall(SIX, &bus)).unwrap();
+    assert_eq!((can.links[0].wiring, can.links[0].baud), (LinkWiring::Can, 500_000));
 }
 
 #[test]
@@ -130,9 +135,8 @@ fn a_baud_rate_that_cannot_be_made_is_refused_with_the_nearest() {
     assert!(
         fault.starts_with("hall.toml:3:8: baud: 56000 is no rate of a SilverMax (BRT); the nearest is 57600")
     );
-    assert!(
-        baud("wiring = \"can\"\n").contains("wiring: a SilverMax has no CAN; use \"rs485\" or \"rs232\"")
-    );
+    let bus = format!("{LINK}wiring = \"can\"\n{SEAT}{DRIVE}{A1}").replace("/dev/ttyUSB0", "can0");
+    assert!(only(parse(&bus)).contains("wiring: a SilverMax has no CAN; use \"rs485\" or \"rs232\""));
     for (asked, made) in
         [(19_200, Ok(19_231)), (115_200, Ok(113_636)), (125_000, Ok(125_000)), (230_400, Err(()))]
     {
@@ -262,4 +266,21 @@ fn a_seat_says_of_its_motors_what_their_family_needs() {
     assert!(six("[2]", "[2, 2]").contains("reverse: axis 2 stands there twice"));
     let fast = only(instead("max_velocity_mm_s = 240", "max_velocity_mm_s = 340"));
     assert!(fast.contains("seat: 340 mm/s at a lead of 5 mm are 4080 rpm, over 4000"), "{fast}");
+}
+
+#[test]
+fn a_link_is_a_line_of_its_own_by_its_whole_path() {
+    let port = |port: &str| only(instead("/dev/ttyUSB0", port));
+    assert!(port("ttyUSB0").contains("port: \"ttyUSB0\" is no device; write its whole path"));
+    let can = LINK.replace("[link.stalls]", "[link.bus]").replace("ttyUSB0", "can0") + "wiring = \"can\"\n";
+    assert!(only(silver(&can)).contains("port: \"/dev/can0\" is no interface, as \"can0\""));
+    let twin = LINK.replace("stalls", "circle");
+    let fault = only(silver(&twin));
+    assert!(fault.starts_with("hall.toml:21:8: port: [link.stalls] is on it already"), "{fault}");
+}
+
+#[test]
+fn the_input_of_a_switch_tells_of_no_emergency_stop() {
+    let fault = only(silver("estop_inputs = [1, 2]\n"));
+    assert!(fault.contains("estop_inputs: input 1 is the switch of home on these units"), "{fault}");
 }

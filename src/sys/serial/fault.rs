@@ -88,7 +88,7 @@ impl SerialError {
 
 /// What ends reading and writing. Made without allocating.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum LineFault {
+pub(crate) enum PortFault {
     /// The adapter was unplugged, or whoever was at the other end of a pseudo-terminal is gone.
     #[error("the port has vanished; look at the plug and the power of the adapter")]
     Vanished,
@@ -97,7 +97,7 @@ pub(crate) enum LineFault {
     System(Errno),
 }
 
-impl From<Errno> for LineFault {
+impl From<Errno> for PortFault {
     fn from(errno: Errno) -> Self {
         match errno {
             Errno::IO | Errno::NODEV | Errno::NXIO => Self::Vanished,

@@ -7,7 +7,7 @@ use rustix::io::Errno;
 use rustix::ioctl::{Getter, ioctl};
 use rustix::termios::{QueueSelector, tcflush};
 
-use super::{LineFault, code};
+use super::{PortFault, code};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
 
@@ -20,8 +20,8 @@ impl OctetLine {
     /// there already.
     ///
     /// # Errors
-    /// [`LineFault::Vanished`] once nobody is at the other end any more, by when octets that came before may be gone as well.
-    pub(crate) fn read(&self, octets: &mut [u8], deadline: MonoTime) -> Result<usize, LineFault> {
+    /// [`PortFault::Vanished`] once nobody is at the other end any more, by when octets that came before may be gone as well.
+    pub(crate) fn read(&self, octets: &mut [u8], deadline: MonoTime) -> Result<usize, PortFault> {
         loop {
             let found = self.wait(PollFlags::IN, deadline)?;
             if found.is_empty() {
@@ -29,7 +29,7 @@ impl OctetLine {
             }
             match rustix::io::read(&self.0, &mut *octets) {
                 Ok(0) | Err(Errno::AGAIN) if found.contains(PollFlags::HUP) => {
-                    return Err(LineFault::Vanished);
+                    return Err(PortFault::Vanished);
                 }
                 // Somebody flushed it in between.
                 Ok(0) | Err(Errno::AGAIN | Errno::INTR) => {}
@@ -45,13 +45,13 @@ impl OctetLine {
     /// Hands octets to the driver until `deadline`; says how many it took. They are not sent by then: [`OctetLine::unsent`].
     ///
     /// # Errors
-    /// [`LineFault::Vanished`] if nobody is at the other end.
-    pub(crate) fn write(&self, octets: &[u8], deadline: MonoTime) -> Result<usize, LineFault> {
+    /// [`PortFault::Vanished`] if nobody is at the other end.
+    pub(crate) fn write(&self, octets: &[u8], deadline: MonoTime) -> Result<usize, PortFault> {
         let mut taken = 0;
         while taken < octets.len() {
             let found = self.wait(PollFlags::OUT, deadline)?;
             if found.contains(PollFlags::HUP) {
-                return Err(LineFault::Vanished);
+                return Err(PortFault::Vanished);
             }
             if found.is_empty() {
                 break;
@@ -69,9 +69,9 @@ impl OctetLine {
     /// Octets that the driver holds and has not sent.
     ///
     /// # Errors
-    /// A [`LineFault`] where the port is gone.
+    /// A [`PortFault`] where the port is gone.
     #[expect(unsafe_code, reason = "no library has it")]
-    pub(crate) fn unsent(&self) -> Result<u32, LineFault> {
+    pub(crate) fn unsent(&self) -> Result<u32, PortFault> {
         // SAFETY: TIOCOUTQ writes one int.
         let count = unsafe { ioctl(&self.0, Getter::<{ code(libc::TIOCOUTQ) }, libc::c_int>::new()) }?;
         Ok(u32::try_from(count).unwrap_or(0))
@@ -80,16 +80,16 @@ impl OctetLine {
     /// Forgets what has come and what was not sent yet.
     ///
     /// # Errors
-    /// A [`LineFault`] where the port is gone.
-    pub(crate) fn discard(&self) -> Result<(), LineFault> {
+    /// A [`PortFault`] where the port is gone.
+    pub(crate) fn discard(&self) -> Result<(), PortFault> {
         Ok(tcflush(&self.0, QueueSelector::IOFlush)?)
     }
 
     /// What of `wanted` there is, or that the other end is gone; nothing at the deadline.
-    fn wait(&self, wanted: PollFlags, deadline: MonoTime) -> Result<PollFlags, LineFault> {
+    fn wait(&self, wanted: PollFlags, deadline: MonoTime) -> Result<PollFlags, PortFault> {
         loop {
             let left = deadline.since(Monotonic.now());
-            let wait = Timespec::try_from(left).map_err(|_| LineFault::System(Errno::INVAL))?;
+            let wait = Timespec::try_from(left).map_err(|_| PortFault::System(Errno::INVAL))?;
             let mut polled = [PollFd::new(&self.0, wanted)];
             match poll(&mut polled, Some(&wait)) {
                 Ok(0) => return Ok(PollFlags::empty()),
@@ -100,7 +100,7 @@ impl OctetLine {
             let [polled] = polled;
             let found = polled.revents();
             return if found.intersects(PollFlags::ERR | PollFlags::NVAL) && !found.intersects(wanted) {
-                Err(LineFault::Vanished)
+                Err(PortFault::Vanished)
             } else {
                 Ok(found)
             };

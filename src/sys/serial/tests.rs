@@ -83,8 +83,8 @@ fn a_line_that_is_unplugged_has_vanished() {
     let pty = Pty::open().unwrap();
     let port = SerialPort::open(pty.path(), SETTINGS).unwrap();
     drop(pty);
-    assert_eq!(port.line().read(&mut [0; 8], soon()), Err(LineFault::Vanished));
-    assert_eq!(port.line().write(b"@16 0\r", soon()), Err(LineFault::Vanished));
+    assert_eq!(port.line().read(&mut [0; 8], soon()), Err(PortFault::Vanished));
+    assert_eq!(port.line().write(b"@16 0\r", soon()), Err(PortFault::Vanished));
 }
 
 #[test]
