@@ -338,7 +338,16 @@ proptest! {
     }
 }
 
-const FRAGMENTS: [&str; 22] = [
+const FRAGMENTS: [&str; 31] = [
+    "[link.l]\nport = \"/dev/x\"\n",
+    "wiring = \"can\"\n",
+    "baud = 57600\n",
+    "[seat.s.drive]\n",
+    "home = { way = \"switch\", toward = \"up\", travel_mm = 1e300, zero_mm = -1e300 }\n",
+    "reverse = [0, 13, 1, 1]\n",
+    "address = \"link:l\"\n",
+    "dialect = \"sixpack2\"\n",
+    "unit = 1\nmotors = [0, 255, []]\n",
     "[show]\n",
     "[seat.s]\n",
     "[seat]\n",

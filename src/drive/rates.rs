@@ -293,7 +293,7 @@ mod tests {
                 let load = six(baud, Duration::from_millis(delay_ms), axes);
                 let full = LinkLoad { share: 1.0, ..load };
                 assert!((full.rate_hz() - whole).abs() < 0.6, "{full:?}: {}", full.rate_hz());
-                assert!((load.rate_hz() / full.rate_hz() - SHARE).abs() < 0.001);
+                assert!((load.rate_hz() / full.rate_hz() - 0.8).abs() < 0.001);
             }
         }
     }

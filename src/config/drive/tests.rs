@@ -284,3 +284,33 @@ fn the_input_of_a_switch_tells_of_no_emergency_stop() {
     let fault = only(silver("estop_inputs = [1, 2]\n"));
     assert!(fault.contains("estop_inputs: input 1 is the switch of home on these units"), "{fault}");
 }
+
+#[test]
+fn no_value_of_any_key_panics() {
+    let six = sixpack_hall(SIX, LINK);
+    for hall in [format!("{LINK}wiring = \"rs485\"\nbaud = 57600\nrate_hz = 20\n{SEAT}{DRIVE}{A1}"), six] {
+        assert!(parse(&hall).is_ok(), "{:?}", parse(&hall).err());
+        let ends = |from: usize| hall[from..].find([',', '\n', '}']).map_or(hall.len(), |end| from + end);
+        for (at, sign) in hall.match_indices("= ") {
+            let value = at + sign.len();
+            for odd in [
+                "0",
+                "-1",
+                "1e300",
+                "-1e-300",
+                "nan",
+                "\"\"",
+                "\"link:\"",
+                "[]",
+                "[0, 1e9, {}]",
+                "{}",
+                "9223372036854775807",
+            ] {
+                let text = format!("{}{odd}{}", &hall[..value], &hall[ends(value)..]);
+                if let Err(faults) = parse(&text) {
+                    assert!(faults.iter().all(|fault| fault.starts_with("hall.toml:")), "{faults:?}");
+                }
+            }
+        }
+    }
+}
