@@ -350,7 +350,7 @@ fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     for text in [
         "passed: 2 controllers, 2 links, 2 seat types",
-        "drives.toml: plays at 29.9 Hz on link stalls, 3 axes\n",
+        "drives.toml: plays at 29.98 Hz on link stalls, 3 axes\n",
         "drives.toml: link circle runs at 56818 baud, what its drives make of 57600\n",
         "Hz on link circle, 3 axes, by a USB adapter whose latency timer is 1 ms\n",
         "how far beside a cue drives play it was not looked at\n",
@@ -358,7 +358,7 @@ fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
         assert!(run.stdout.contains(text), "{text}: {}", run.stdout);
     }
     let cue = kinocue(&["info", CUE, "--config", DRIVES]);
-    assert!(cue.stdout.contains("plays at 29.9 Hz on link stalls"), "{}", cue.stdout);
+    assert!(cue.stdout.contains("plays at 29.98 Hz on link stalls"), "{}", cue.stdout);
 }
 
 #[test]
@@ -369,7 +369,7 @@ fn a_link_that_is_to_play_more_often_than_it_can_fails_the_check_with_what_would
         .replace("[link.stalls]", "[link.stalls]\nrate_hz = 50");
     let run = kinocue(&["check", &write(folder.path(), "fast.toml", &text)]);
     assert_eq!(run.code, Some(1), "{}", run.stdout);
-    let wanted = "rate_hz of [link.stalls]: 3 axes play at 29.9 Hz at 57600 baud, not at 50; use baud = 115200, or 3 links";
+    let wanted = "rate_hz of [link.stalls]: 3 axes play at 29.98 Hz at 57600 baud, not at 50; use baud = 115200, or 3 links";
     assert!(run.stderr.contains(wanted), "{}", run.stderr);
 }
 

@@ -201,13 +201,11 @@ fn plays_at(link: &Link, load: &LinkLoad, period: Duration) -> String {
     words
 }
 
-/// Rounded down, with a place behind the point below 100.
+/// Rounded down to hundredths, whole from 100 on: what is told can also be asked for.
 fn short(hz: f64) -> String {
-    if hz >= 100.0 {
-        format!("{:.0}", (hz + 0.001).floor())
-    } else {
-        format!("{}", ((hz + 0.001) * 10.0).floor() / 10.0)
-    }
+    let steps = if hz < 100.0 { 100.0 } else { 1.0 };
+    // A whole number may come out a hair below itself.
+    format!("{}", (hz * steps + 1e-6).floor() / steps)
 }
 
 /// True if the port is a USB adapter, by its name.
@@ -314,7 +312,7 @@ mod tests {
         let longest = LinkLoad { exchange_octets: LONGEST_EXCHANGE, ..load };
         assert!((26.0..27.0).contains(&longest.rate_hz()));
         let slow = load.period_for(Some(31.0)).unwrap_err().to_string();
-        assert_eq!(slow, "3 axes play at 29.9 Hz at 57600 baud, not at 31; use baud = 115200, or 2 links");
+        assert_eq!(slow, "3 axes play at 29.98 Hz at 57600 baud, not at 31; use baud = 115200, or 2 links");
     }
 
     #[test]
@@ -323,13 +321,25 @@ mod tests {
         assert_eq!(load.remedy(25.0), "use baud = 115200, or 2 links");
         assert_eq!(load.remedy(50.0), "use baud = 230400, or 6 links");
         assert_eq!(load.remedy(80.0), "use 6 links");
-        assert_eq!(load.remedy(400.0), "no link carries so much; at the most 14.9 Hz fit here");
+        assert_eq!(load.remedy(400.0), "no link carries so much; at the most 14.99 Hz fit here");
         let fastest = silver(230_400, UART_TURN, 1);
         assert_eq!(fastest.remedy(400.0), "no link carries so much; at the most 326 Hz fit here");
         for hz in [10.0, 25.0, 50.0] {
             let remedied = LinkLoad { baud: 230_400, ..load };
             assert!(remedied.period_for(Some(hz)).is_ok(), "{hz}");
         }
+    }
+
+    #[test]
+    fn the_rate_that_is_told_can_be_asked_for() {
+        for load in
+            [silver(57_600, UART_TURN, 3), silver(57_600, USB_TURN, 5), six(113_636, SIXPACK2_DELAY, 3)]
+        {
+            let told: f64 = short(load.rate_hz()).parse().unwrap();
+            assert!(load.period_for(Some(told)).is_ok(), "{told}");
+            assert!(load.rate_hz() - told < 1.0, "{told}");
+        }
+        assert_eq!([25.0, 500.0, 29.999].map(short), ["25", "500", "29.99"]);
     }
 
     #[test]
