@@ -341,3 +341,53 @@ fn info_measures_what_check_does_and_says_by_its_exit_code_that_a_curve_leaves_t
         run.stdout
     );
 }
+
+const DRIVES: &str = "tests/data/config/drives.toml";
+
+#[test]
+fn a_hall_with_drives_passes_its_check_which_says_how_often_its_links_play() {
+    let run = kinocue(&["check", DRIVES]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    for text in [
+        "passed: 2 controllers, 2 links, 2 seat types",
+        "drives.toml: plays at 29.98 Hz on link stalls, 3 axes\n",
+        "drives.toml: link circle runs at 56818 baud, what its drives make of 57600\n",
+        "Hz on link circle, 3 axes, by a USB adapter whose latency timer is 1 ms\n",
+        "how far beside a cue drives play it was not looked at\n",
+    ] {
+        assert!(run.stdout.contains(text), "{text}: {}", run.stdout);
+    }
+    let cue = kinocue(&["info", CUE, "--config", DRIVES]);
+    assert!(cue.stdout.contains("plays at 29.98 Hz on link stalls"), "{}", cue.stdout);
+}
+
+#[test]
+fn a_link_that_is_to_play_more_often_than_it_can_fails_the_check_with_what_would_fit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = std::fs::read_to_string(DRIVES)
+        .expect("it is there")
+        .replace("[link.stalls]", "[link.stalls]\nrate_hz = 50");
+    let run = kinocue(&["check", &write(folder.path(), "fast.toml", &text)]);
+    assert_eq!(run.code, Some(1), "{}", run.stdout);
+    let wanted = "rate_hz of [link.stalls]: 3 axes play at 29.98 Hz at 57600 baud, not at 50; use baud = 115200, or 3 links";
+    assert!(run.stderr.contains(wanted), "{}", run.stderr);
+}
+
+#[test]
+fn nothing_that_would_move_a_seat_takes_a_hall_with_drives() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let socket = folder.path().join("control.sock").display().to_string();
+    let serve = ["serve", "--config", DRIVES, "--socket", &socket, "--state", &socket];
+    for args in [
+        &["play", CUE, "--config", DRIVES][..],
+        &["home", "--config", DRIVES, "--seats-empty"],
+        &["preflight", "--config", DRIVES],
+        &["preflight", "--config", DRIVES, "D2"],
+        &["latency", "--config", DRIVES],
+        &serve,
+    ] {
+        let run = kinocue(args);
+        assert!(run.stderr.contains("drives are not played yet: D1, D2"), "{args:?}: {}", run.stderr);
+        assert_eq!(run.code, Some(78), "{args:?}");
+    }
+}

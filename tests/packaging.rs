@@ -149,6 +149,31 @@ fn who_reads_timecode_devices_has_no_network_and_who_moves_seats_no_device() {
 }
 
 #[test]
+fn serial_lines_are_the_only_devices_of_the_drop_in_for_drives_which_nobody_gets_unasked() {
+    let drop_in = text("systemd/kinocue-drives.conf");
+    let allowed: Vec<_> = drop_in.lines().filter_map(|line| line.strip_prefix("DeviceAllow=")).collect();
+    assert_eq!(allowed, ["char-ttyUSB rw", "char-ttyACM rw", "char-ttyS rw"]);
+    for line in ["DevicePolicy=closed", "SupplementaryGroups=dialout", "RestrictAddressFamilies=AF_CAN"] {
+        assert!(drop_in.lines().any(|found| found == line), "{line}");
+    }
+    assert!(!drop_in.contains("CAP_") && !drop_in.contains("ExecStart"));
+    let rule = text("systemd/60-kinocue-drives.rules");
+    let rules: Vec<_> = rule.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(
+        rules,
+        [r#"ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1""#]
+    );
+    let manifest = toml("Cargo.toml");
+    let assets = manifest["package"]["metadata"]["deb"]["assets"].as_array().unwrap();
+    for (file, name) in [(drop_in, "kinocue-drives.conf"), (rule, "60-kinocue-drives.rules")] {
+        let asset = assets.iter().find(|asset| asset[0].as_str().unwrap().ends_with(name)).unwrap();
+        let folder = asset[1].as_str().unwrap();
+        assert_eq!(folder, "usr/share/kinocue/drives/", "where neither systemd nor udev looks");
+        assert!(file.contains(&format!("/{folder}{name} /etc/")), "{name} says how it is installed");
+    }
+}
+
+#[test]
 fn alerts_are_what_prometheus_takes() {
     if let Some(output) = tool("promtool", &["check", "rules", "systemd/prometheus/kinocue.rules.yml"]) {
         assert!(output.status.success(), "{}", said(&output));

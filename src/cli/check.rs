@@ -9,6 +9,7 @@ use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
 use crate::cue::{self, CueFaults, Fault, Place, Source};
+use crate::drive::rates;
 use crate::plain;
 use crate::proof::{Proof, Violation, prove};
 use crate::time::parse_trim;
@@ -58,7 +59,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let mut report = Report { level: args.level, trim_ms: args.trim, ..Report::default() };
-    let judge = match args.seat.config.as_deref().map(|path| report.configuration(path)) {
+    let hall = args.seat.config.as_deref().map(|path| (path, report.configuration(path)));
+    if let Some((path, Some(hall))) = &hall {
+        report.links(path, hall);
+    }
+    let judge = match hall.map(|(_, hall)| hall) {
         Some(None) => None, // cues are then checked by themselves
         Some(hall) => Some(args.seat.judge(hall)?),
         None => Some(args.seat.judge(None)?),
@@ -67,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     for file in &args.files {
         if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             if let Some(hall) = report.configuration(file) {
-                report.passes(file, &hall_in_words(&hall));
+                report.hall(file, &hall);
             }
         } else {
             report.cue(file, &args.source.source(), judge.as_ref());
@@ -188,6 +193,31 @@ impl Report {
         None
     }
 
+    /// Notes of a configuration what passes, and how often its links play.
+    fn hall(&mut self, path: &Path, hall: &Config) {
+        let before = self.exits.len();
+        self.links(path, hall);
+        if self.exits.len() == before {
+            self.passes(path, &hall_in_words(hall));
+        }
+    }
+
+    /// Notes how often the links of a hall play, and those that are to play more often than they can.
+    fn links(&mut self, path: &Path, hall: &Config) {
+        let (told, faults) = rates::in_words(hall);
+        let unlooked = "how far beside a cue drives play it was not looked at".to_owned();
+        let unlooked = (!hall.drives.is_empty()).then_some(unlooked);
+        for text in told.into_iter().chain(unlooked) {
+            let note = format!("{}: {text}", plain::path(path));
+            if !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+        for fault in faults {
+            self.fault(Exit::CheckFailed, FaultReport::new(path, &Place::File, fault));
+        }
+    }
+
     fn cue(&mut self, path: &Path, source: &Source, judge: Option<&Judge>) {
         let timeline = match cue::load(path, source) {
             Ok(cue) => Timeline::new(cue),
@@ -278,11 +308,16 @@ fn unwired(path: &Path, timeline: &Timeline) -> Option<String> {
 
 fn hall_in_words(hall: &Config) -> String {
     let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
+    let (present, out): (Vec<_>, Vec<_>) = hall.drives.iter().partition(|drive| drive.enabled);
     let mut words = vec![
-        counted(hall.controllers.len(), "controller"),
+        counted(hall.controllers.len() + present.len(), "controller"),
         counted(hall.seats.len(), "seat type"),
         counted(hall.effects.len(), "effect"),
     ];
-    words.extend(hall.absent.iter().map(|one| format!("{} out for good", one.controller.name)));
+    if !hall.links.is_empty() {
+        words.insert(1, counted(hall.links.len(), "link"));
+    }
+    let out = hall.absent.iter().map(|one| &one.controller.name).chain(out.iter().map(|one| &one.name));
+    words.extend(out.map(|name| format!("{name} out for good")));
     words.join(", ")
 }

@@ -9,6 +9,7 @@ use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::cue::Vibration;
+use crate::drive::rates;
 use crate::motion::AxisUnit;
 use crate::plain;
 use crate::proof::{self, AxisFigures};
@@ -150,6 +151,8 @@ impl Info {
         let name = cue.path().display().to_string();
         let stroke = judge.stroke(timeline);
         let notes = stroke.held.iter().filter_map(|held| note(held, &figures, timeline));
+        let (told, faults) = judge.hall.as_ref().map(rates::in_words).unwrap_or_default();
+        let links = told.into_iter().chain(faults);
         Self {
             axes: figures::report(&name, &figures),
             cue: name,
@@ -169,7 +172,7 @@ impl Info {
                 .iter()
                 .map(|m| MarkerReport { name: m.name.clone(), at_s: m.at.as_secs_f64() })
                 .collect(),
-            notes: notes.chain(stroke.faults.iter().map(ToString::to_string)).collect(),
+            notes: notes.chain(stroke.faults.iter().map(ToString::to_string)).chain(links).collect(),
             figures,
         }
     }

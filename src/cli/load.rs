@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::anyhow;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
-use super::{Exit, Failure};
+use super::{Exit, Failure, OrExit as _};
 use crate::config::{self, Config, ConfigFaults, HallStroke};
 use crate::cue::{self, Cue, CueFaults, DeclaredUnit, FaultClass, Source};
 use crate::motion::{SeatAxis, SeatType};
@@ -114,11 +114,11 @@ impl Judge {
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
         let bench = Arc::new(SeatType::bench3(axes));
         let seat_of = |axis| {
-            let controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
-            let taker = controllers.into_iter().find(|controller| controller.takes(axis));
+            let mut windows = self.hall.iter().flat_map(Config::windows);
+            let taker = windows.find(|(axes, _)| axes.contains(&axis));
             match (&self.seat, taker) {
                 (Some(seat), _) => SeatAxis::new(seat, axis),
-                (None, Some(taker)) => SeatAxis::new(&taker.seat, axis - taker.axis_offset),
+                (None, Some((axes, seat))) => SeatAxis::new(seat, axis - axes.start),
                 (None, None) => SeatAxis::new(&bench, axis),
             }
         };
@@ -164,6 +164,13 @@ pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
 /// Reads a configuration; its faults end the program.
 pub(super) fn config(path: &Path) -> Result<Config, Failure> {
     config::load(path).map_err(|faults| Failure { exit: config_exit(&faults), error: faults.into() })
+}
+
+/// Reads a configuration whose seats are about to be moved; one that nothing can play ends the program.
+pub(super) fn playable(path: &Path) -> Result<Config, Failure> {
+    let config = config(path)?;
+    config.playable().or_exit(Exit::Config)?;
+    Ok(config)
 }
 
 /// Reads a cue; its faults end the program.

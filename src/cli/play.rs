@@ -177,7 +177,7 @@ fn uses_effects(timeline: &Timeline) -> bool {
 
 fn configuration(args: &Args, axes: usize) -> Result<Config, Failure> {
     let mut config = match &args.config {
-        Some(path) => load::config(path)?,
+        Some(path) => load::playable(path)?,
         None => from_to_args(&args.to, &args.effect, axes).or_exit(Exit::Usage)?,
     };
     if let Some(hz) = args.rate {

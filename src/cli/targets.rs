@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, load, print};
-use crate::config::{Config, Controller, Show, from_to_args};
+use crate::config::{Config, Controller, DriveController, Show, from_to_args};
 use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
 use crate::motion::MAX_AXES;
 use crate::net::NetError;
@@ -48,10 +48,18 @@ impl TargetArgs {
 
     /// The same, for a cue of `cue_axes` axes.
     pub(super) fn resolve_for(&self, names: &[String], cue_axes: usize) -> Result<Targets, Failure> {
-        let Config { mut show, controllers, absent, .. } = match &self.config {
+        let config = match &self.config {
             Some(path) => load::config(path)?,
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
+        let is_meant = |drive: &DriveController| {
+            let is_in_row = drive.row.as_ref().is_some_and(|row| self.row.contains(row));
+            names.contains(&drive.name) || is_in_row || (names.is_empty() && self.row.is_empty())
+        };
+        if config.drives.iter().any(is_meant) {
+            config.playable().or_exit(Exit::Config)?;
+        }
+        let Config { mut show, controllers, absent, .. } = config;
         show.bind = self.bind.unwrap_or(show.bind);
         // What is out for good is meant only where it is named: whoever repairs it has to reach it.
         let (meant, left): (Vec<Controller>, Vec<_>) =

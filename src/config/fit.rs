@@ -245,8 +245,7 @@ impl Config {
     pub(crate) fn fits_stroke(&self, timeline: &Timeline) -> HallStroke {
         let mut proved: Vec<(Range<usize>, &Arc<SeatType>)> = Vec::new();
         let mut result = HallStroke::default();
-        for controller in &self.controllers {
-            let window = (controller.window(), &controller.seat);
+        for window in self.windows() {
             if proved.contains(&window) {
                 continue;
             }

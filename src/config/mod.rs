@@ -13,6 +13,8 @@ use crate::motion::{MAX_AXES, SeatType};
 mod accept;
 mod api;
 mod axis;
+pub(crate) mod drive;
+pub(crate) mod drive_controller;
 mod effect_limits;
 mod fault;
 mod film;
@@ -20,12 +22,14 @@ mod fit;
 mod gear;
 mod level;
 mod library;
+pub(crate) mod link;
 mod log;
 mod osc;
 mod preset;
 mod read;
 mod seat;
 mod section;
+mod site;
 mod sync;
 mod target;
 #[cfg(test)]
@@ -34,6 +38,7 @@ mod text;
 
 pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
+pub(crate) use drive_controller::DriveController;
 pub(crate) use effect_limits::EffectLimit;
 pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
 pub(crate) use film::{FilmPlayer, OnStop, stays_below};
@@ -41,6 +46,7 @@ pub(crate) use fit::{HallStroke, Misfit};
 pub(crate) use gear::GearWord;
 pub(crate) use level::{level, parse_level, switches, trim};
 pub(crate) use library::Store;
+pub(crate) use link::Link;
 pub(crate) use log::Log;
 pub(crate) use osc::OscPort;
 pub(crate) use preset::Preset;
@@ -72,10 +78,14 @@ pub struct Config {
     pub(crate) store: Store,
     /// Where the journal is kept, and how much of it.
     pub(crate) log: Log,
-    /// The controllers that take part, at least one, in the order of the file.
+    /// The controllers that take part, in the order of the file: at least one, unless there are `drives`.
     pub controllers: Vec<Controller>,
     /// Those that are out for good, in the order of the file.
     pub(crate) absent: Vec<Absent>,
+    /// The serial lines and buses that drives share, in the order of their names.
+    pub(crate) links: Vec<Link>,
+    /// The seats that drives on links move, in the order of the file. Nothing plays them yet ([`Config::playable`]).
+    pub(crate) drives: Vec<DriveController>,
     /// The port that takes OSC, where there is one.
     pub(crate) osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
@@ -291,7 +301,25 @@ impl Config {
     /// The axes of a cue of `cue_axes` axes that are no controller's, also of none that is out for good, counted from 1.
     #[must_use]
     pub(crate) fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
-        (1..=cue_axes).filter(|&axis| !self.named().any(|c| c.takes(axis - 1))).collect()
+        let of_drive = |axis: usize| self.drives.iter().any(|drive| drive.window().contains(&axis));
+        let is_taken = |axis: usize| self.named().any(|c| c.takes(axis)) || of_drive(axis);
+        (1..=cue_axes).filter(|&axis| !is_taken(axis - 1)).collect()
+    }
+
+    /// The axes of a cue, from 0, that each controller takes which takes part, and on what seat.
+    pub(crate) fn windows(&self) -> impl Iterator<Item = (Range<usize>, &Arc<SeatType>)> {
+        let drives = self.drives.iter().filter(|drive| drive.enabled);
+        let of_drives = drives.map(|drive| (drive.window(), &drive.seat));
+        self.controllers.iter().map(|one| (one.window(), &one.seat)).chain(of_drives)
+    }
+
+    /// Checks that all of the hall can be played.
+    ///
+    /// # Errors
+    /// [`DrivesUnplayed`] where some of its seats have drives: no room plays these yet, and a part of a hall is not it.
+    pub(crate) fn playable(&self) -> Result<(), DrivesUnplayed> {
+        let names: Vec<_> = self.drives.iter().map(|drive| drive.name.as_str()).collect();
+        if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
     }
 
     /// The folder with the playlists: the one of the configuration, else `playlists` beside the library.
@@ -313,6 +341,14 @@ impl Config {
         self.seats.iter().find(|seat| seat.name == name)
     }
 }
+
+/// A hall that has seats with serial drives.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "drives are not played yet: {0} on serial links; `kinocue check` and `info` read such a hall, to play the rest of it take \
+     those controllers out of the file"
+)]
+pub(crate) struct DrivesUnplayed(String);
 
 /// Axes of a cue that has every axis of these controllers.
 #[must_use]

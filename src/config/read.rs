@@ -4,29 +4,33 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::net::SocketAddrV4;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use toml::de::DeTable;
 
 use crate::channel::{self, SWITCHES};
-use crate::motion::{MAX_AXES, SeatType};
+use crate::motion::MAX_AXES;
 
 use super::accept::acceptances;
 use super::api::api;
+use super::drive::{DriveEntry, seat_drives};
+use super::drive_controller::{Placed, drive_controller, is_on_link, refuse_parted_groups, settle};
 use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::film::film;
 use super::library::store;
+use super::link::{Link, LinkEntry, links};
 use super::log::log;
 use super::osc::osc;
 use super::preset::presets;
 use super::seat::seats;
 use super::section::{Entry, Section, did_you_mean};
+use super::site::{Site, inputs_up_to, seat_of};
 use super::sync::{FilmSync, sync};
 use super::text::text;
 use super::{
-    Absent, Accept, Api, Belts, Config, Controller, Dialect, Effect, FanOut, Log, LossPolicy, MAX_FILE_LEN,
-    Show, Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
+    Absent, Accept, Api, Belts, Config, Controller, Dialect, DriveController, Effect, FanOut, Log,
+    LossPolicy, MAX_FILE_LEN, Show, Store, Timing, VibrationPort, check_effect_name, check_peer,
+    check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] bytes.
@@ -74,7 +78,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let mut section = Section::new("the file", 0, table, faults);
     let [show_at, seat_at, effects_at, limits_at, controller_at] =
         ["show", "seat", "effects", "effect_limits", "controller"].map(|key| section.get(key));
-    let api_at = section.get("api");
+    let [api_at, link_at] = ["api", "link"].map(|key| section.get(key));
     if controller_at.is_none() {
         section.faults.note_missing(0, "there is no [[controller]]; name at least one");
     }
@@ -89,8 +93,13 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let store = library_at.map_or_else(|| Some(Store::default()), |entry| store(entry, faults));
     let log = log_at.map_or_else(|| Some(Log::default()), |entry| log(entry, faults));
     let site = Site { seats: &seats, named: &named, effects: &effects };
-    let (controllers, absent) =
-        controller_at.map_or_else(Default::default, |entry| controllers(entry, &site, faults));
+    let links = link_at.map_or_else(Vec::new, |entry| links(entry, faults));
+    let seat_drives = seat_at.map_or_else(Vec::new, |entry| seat_drives(entry, &seats, faults));
+    let peers = controller_at
+        .map_or_else(Peers::default, |entry| controllers(entry, &site, (&links, &seat_drives), faults));
+    refuse_sparse_acks(show_at, &peers, faults);
+    let (links, drives) = on_links(links, &peers, faults);
+    let Peers { present: controllers, absent, .. } = peers;
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -108,6 +117,8 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         log: log?,
         controllers,
         absent,
+        links,
+        drives,
         osc,
         text,
         api: api?,
@@ -153,44 +164,77 @@ fn effects(entry: Entry<'_>, faults: &mut Faults<'_>) -> Vec<Effect> {
     effects
 }
 
-/// What controllers refer to.
-struct Site<'a> {
-    seats: &'a [Arc<SeatType>],
-    /// The names of all seat types, also of those with faults.
-    named: &'a [&'a str],
-    effects: &'a [Effect],
+/// The controllers of a file: those that take part, those that are out for good, and those on links, which are both.
+#[derive(Default)]
+struct Peers {
+    present: Vec<Controller>,
+    absent: Vec<Absent>,
+    placed: Vec<Placed>,
 }
 
-/// Those that take part, and those that are out for good.
-fn controllers(entry: Entry<'_>, site: &Site<'_>, faults: &mut Faults<'_>) -> (Vec<Controller>, Vec<Absent>) {
+fn controllers(
+    entry: Entry<'_>,
+    site: &Site<'_>,
+    on_links: (&[LinkEntry<'_>], &[DriveEntry]),
+    faults: &mut Faults<'_>,
+) -> Peers {
     if entry.value.is_table() {
         entry.fault(faults, "write [[controller]], with two brackets, once for each controller");
-        return Default::default();
+        return Peers::default();
     }
-    let Some(entries) = entry.array(faults) else { return Default::default() };
-    let mut taken = Vec::new();
-    let (mut present, mut absent, mut at) = (Vec::new(), Vec::new(), Vec::new());
+    let Some(entries) = entry.array(faults) else { return Peers::default() };
+    let (mut taken, mut at, mut peers) = (Vec::new(), Vec::new(), Peers::default());
     for entry in entries {
         let Some(table) = entry.table(faults) else { continue };
-        match controller(entry.at, table, site, faults) {
-            Some((controller, true)) => present.push(controller),
-            Some((controller, false)) => {
-                absent.push(Absent { controller, after: present.len() });
-                at.push(table.get("enabled").map_or(entry.at, |value| value.span().start));
+        if is_on_link(table) {
+            peers.placed.extend(drive_controller(entry.at, table, site, on_links, faults));
+        } else {
+            match controller(entry.at, table, site, faults) {
+                Some((controller, true)) => peers.present.push(controller),
+                Some((controller, false)) => {
+                    peers.absent.push(Absent { controller, after: peers.present.len() });
+                    at.push(table.get("enabled").map_or(entry.at, |value| value.span().start));
+                }
+                None => {}
             }
-            None => {}
         }
-        for key in ["name", "address"] {
+        for key in ["name", "address"].into_iter().filter(|key| *key == "name" || !is_on_link(table)) {
             if let Some(value) = table.get(key) {
                 refuse_repeat(Entry::new(key, value), &mut taken, faults);
             }
         }
     }
-    absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &present, faults));
-    if let ([], [_, ..]) = (&present[..], &absent[..]) {
+    peers.absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &peers.present, faults));
+    let all_out = peers.placed.iter().all(|one| !one.controller.enabled);
+    if peers.present.is_empty() && all_out && peers.absent.len() + peers.placed.len() > 0 {
         faults.note_missing(entry.at, "enabled: every [[controller]] is out for good; leave at least one in");
     }
-    (present, absent)
+    peers
+}
+
+/// The links and what is on them, after what they cannot be together has been noted.
+fn on_links(
+    links: Vec<LinkEntry<'_>>,
+    peers: &Peers,
+    faults: &mut Faults<'_>,
+) -> (Vec<Link>, Vec<DriveController>) {
+    let by_udp: Vec<_> = peers.present.iter().chain(peers.absent.iter().map(|one| &one.controller)).collect();
+    refuse_parted_groups(&peers.placed, &by_udp, faults);
+    let drives = peers.placed.iter().map(|one| one.controller.clone()).collect();
+    (settle(links, &peers.placed, faults), drives)
+}
+
+/// Notes a hall with drives that asks for few acks: what a drive does not answer is in doubt.
+fn refuse_sparse_acks(show: Option<Entry<'_>>, peers: &Peers, faults: &mut Faults<'_>) {
+    let table = show.and_then(|entry| entry.value.as_table()).filter(|_| !peers.placed.is_empty());
+    let Some(value) = table.and_then(|table| table.get("ack_every")) else { return };
+    let entry = Entry::new("ack_every", value);
+    if entry.value.as_integer().is_some_and(|every| every.as_str() != "1") {
+        entry.fault(
+            faults,
+            "drives answer each segment, and what they do not answer is in doubt; leave it at 1",
+        );
+    }
 }
 
 /// Notes where a rigid seat is to move by only a part of its controllers.
@@ -286,34 +330,21 @@ fn levels_of(section: &mut Section<'_, '_, '_>) -> [f64; SWITCHES] {
 
 /// The inputs of an emergency stop, and those of belts.
 fn named_inputs(section: &mut Section<'_, '_, '_>) -> (u16, u16) {
-    let [estop, belts] = ["estop_inputs", "belt_inputs"].map(|key| inputs_of(section, key));
+    let [estop, belts] = ["estop_inputs", "belt_inputs"].map(|key| inputs_up_to(section, key, 12));
     if let Some(entry) = section.get("belt_inputs").filter(|_| estop & belts != 0) {
         entry.fault(section.faults, "an input of estop_inputs is none of a belt");
     }
     (estop, belts)
 }
 
-/// A list of inputs, X01 to X12, as a word.
-fn inputs_of(section: &mut Section<'_, '_, '_>, key: &'static str) -> u16 {
-    let Some(entries) = section.get(key).and_then(|entry| entry.array(section.faults)) else { return 0 };
-    let inputs = entries.iter().filter_map(|entry| entry.whole_in(1..=12, section.faults));
-    inputs.fold(0, |word, input: u8| word | 1 << (input - 1))
-}
-
-fn seat_of(section: &mut Section<'_, '_, '_>, site: &Site<'_>) -> Option<Arc<SeatType>> {
-    let entry = section.get("seat")?;
-    let name = entry.text(section.faults)?;
-    if !site.named.contains(&name) {
-        let hint = did_you_mean(name, site.named.iter().copied());
-        entry.fault(section.faults, &format!("there is no [seat.{name}]{hint}"));
-    }
-    site.seats.iter().find(|seat| seat.name == name).cloned()
-}
-
 fn dialect(section: &mut Section<'_, '_, '_>) -> Option<Dialect> {
     let entry = section.get("dialect")?;
     if entry.value.as_str() == Some("imax") {
         entry.fault(section.faults, "an IMAX controller is \"mbox\" here");
+        return None;
+    }
+    if let Some(drive @ ("silvermax" | "sixpack2")) = entry.value.as_str() {
+        entry.fault(section.faults, &format!("{drive} is on a serial line; write address = \"link:NAME\""));
         return None;
     }
     entry.choice(&[("smc", Dialect::Smc), ("mbox", Dialect::Mbox)], section.faults)

@@ -29,7 +29,8 @@ fn seat(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<SeatType> {
     let said = AxisKeys::of_seat(&mut section);
     let interval = section.whole_in("max_interval_ms", 1..=65_535);
     let [park, neutral] = ["park", "neutral"].map(|key| SeatPose::read(&mut section, key, axes));
-    let stroke = section.get("stroke_mm");
+    // The table of drives is read once all seats are known: `drive`.
+    let [stroke, _] = ["stroke_mm", "drive"].map(|key| section.get(key));
     section.finish();
     let (axes, cylinder) = (axes?, said.axis(AxisUnit::Millimetre));
     for beyond in tables[axes..].iter().flatten() {

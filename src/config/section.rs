@@ -186,6 +186,13 @@ impl<'t, 'f, 'x> Section<'t, 'f, 'x> {
         self.table.get(key).map(|value| Entry::new(key, value))
     }
 
+    /// Notes a key that says nothing here, and why.
+    pub(crate) fn refuse(&mut self, key: &'static str, why: &str) {
+        if let Some(entry) = self.get(key) {
+            entry.fault(self.faults, why);
+        }
+    }
+
     pub(crate) fn text(&mut self, key: &'static str) -> Option<String> {
         self.get(key)?.text(self.faults).map(str::to_owned)
     }

@@ -94,6 +94,8 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         log: Log::default(),
         controllers,
         absent: Vec::new(),
+        links: Vec::new(),
+        drives: Vec::new(),
         osc: None,
         text: None,
         api: Api::default(),

@@ -8,7 +8,7 @@ const SEAT: &str = "[seat.s]\naxes = 6\nstroke_mm = 150\nlead_mm = 5\npulses_per
     max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n";
 const CONTROLLER: &str = "[[controller]]\nname = \"A1\"\nseat = \"s\"\naddress = \"10.0.0.1:7408\"\n";
 
-fn parse(text: &str) -> Result<Config, Vec<String>> {
+pub(super) fn parse(text: &str) -> Result<Config, Vec<String>> {
     read::document(Path::new("hall.toml"), text).map_err(|faults| match faults {
         ConfigFaults::Bad(faults) => faults.iter().map(ToString::to_string).collect(),
         ConfigFaults::Unreadable { .. } => unreachable!("a text is no file"),
@@ -338,7 +338,16 @@ proptest! {
     }
 }
 
-const FRAGMENTS: [&str; 22] = [
+const FRAGMENTS: [&str; 31] = [
+    "[link.l]\nport = \"/dev/x\"\n",
+    "wiring = \"can\"\n",
+    "baud = 57600\n",
+    "[seat.s.drive]\n",
+    "home = { way = \"switch\", toward = \"up\", travel_mm = 1e300, zero_mm = -1e300 }\n",
+    "reverse = [0, 13, 1, 1]\n",
+    "address = \"link:l\"\n",
+    "dialect = \"sixpack2\"\n",
+    "unit = 1\nmotors = [0, 255, []]\n",
     "[show]\n",
     "[seat.s]\n",
     "[seat]\n",

@@ -7,6 +7,7 @@
 mod lane;
 mod lanes;
 mod mbox;
+pub(crate) mod rates;
 mod rounds;
 
 pub use lane::Lane;

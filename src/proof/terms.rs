@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Digest;
-use crate::config::{Config, Controller, EffectLimit};
+use crate::config::{Config, EffectLimit};
 use crate::motion::SeatType;
 use crate::time::Rate;
 
@@ -46,7 +46,7 @@ impl Terms {
     #[must_use]
     pub(crate) fn of_hall(config: &Config, cue: Digest, rate: Rate, level: f64) -> Self {
         let mut parts: Vec<Part> = Vec::new();
-        for part in config.controllers.iter().map(Part::of) {
+        for part in config.windows().map(|(axes, seat)| Part { seat: Arc::clone(seat), axes }) {
             if !parts.contains(&part) {
                 parts.push(part);
             }
@@ -72,11 +72,5 @@ impl Terms {
     pub(crate) fn cover(&self, other: &Self) -> bool {
         let same = Self { level: self.level, ..other.clone() } == *self;
         same && (0.0..=self.level).contains(&other.level)
-    }
-}
-
-impl Part {
-    fn of(controller: &Controller) -> Self {
-        Self { seat: Arc::clone(&controller.seat), axes: controller.window() }
     }
 }

@@ -1,0 +1,130 @@
+//! What of `[seat.NAME.drive]` only a SIXpack 2 has: its clock, its current, its position loop.
+
+use crate::config::fault::Faults;
+use crate::config::section::{Entry, Section};
+use crate::motion::SeatType;
+
+/// The shares of its peak current that it can be set to, percent (CMD $11).
+const SHARES: [u8; 9] = [100, 75, 50, 38, 25, 19, 13, 9, 0];
+/// The clock that its speeds are counted in, Hz.
+const CLOCK_HZ: f64 = 20_000_000.0;
+/// Its greatest speed, in its own units.
+const MOST_SPEED: f64 = 511.0;
+/// Microsteps a second that it makes at most.
+const MOST_STEPS: f64 = 200_000.0;
+/// The divider that its manual starts with.
+const USUAL_DIVIDER: u8 = 5;
+const GREATEST_DIVIDER: u8 = 31;
+
+/// Settings of a SIXpack 2.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sixpack2Drive {
+    /// Divides its clock (CMD $12): the smaller, the faster it can go.
+    pub(crate) clock_divider: u8,
+    /// Divides the difference to the target (CMD $19).
+    pub(crate) propdiv: PropDiv,
+    /// The speed that its motors take in one step, mm/s; `None` for what the seat's own acceleration gives in a segment.
+    pub(crate) jump_mm_s: Option<f64>,
+    /// Current of its motors.
+    pub(crate) current: MotorCurrent,
+}
+
+/// How the difference to the target is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PropDiv {
+    /// By the least that the seat type's limits allow.
+    Auto,
+    /// By so much.
+    Fixed(u8),
+}
+
+/// Current of a stepper motor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MotorCurrent {
+    /// The greatest, as CMD $10 has it.
+    pub(crate) peak: u8,
+    /// Its share at rest, percent.
+    pub(crate) stand: u8,
+    /// At constant speed.
+    pub(crate) run: u8,
+    /// While it speeds up or slows down.
+    pub(crate) ramp: u8,
+}
+
+/// What it says of a SIXpack 2, which may be nothing; `None` if that has faults.
+pub(super) fn sixpack2(section: &mut Section<'_, '_, '_>) -> Option<Option<Sixpack2Drive>> {
+    let clock_divider = section.whole_in("clock_divider", 0..=GREATEST_DIVIDER).unwrap_or(USUAL_DIVIDER);
+    let propdiv = propdiv(section);
+    let jump_mm_s = section.above_zero("jump_mm_s");
+    let Some(entry) = section.get("current") else { return Some(None) };
+    let current = current(entry, section.faults)?;
+    Some(Some(Sixpack2Drive { clock_divider, propdiv, jump_mm_s, current }))
+}
+
+fn propdiv(section: &mut Section<'_, '_, '_>) -> PropDiv {
+    let Some(entry) = section.get("propdiv") else { return PropDiv::Auto };
+    match entry.value.as_str() {
+        Some("auto") => PropDiv::Auto,
+        Some(_) => {
+            entry.fault(section.faults, "is neither a whole number nor \"auto\"");
+            PropDiv::Auto
+        }
+        None => entry.whole_in(1..=255, section.faults).map_or(PropDiv::Auto, PropDiv::Fixed),
+    }
+}
+
+fn current(entry: Entry<'_>, faults: &mut Faults<'_>) -> Option<MotorCurrent> {
+    let mut section = Section::new("current", entry.at, entry.table(faults)?, faults);
+    section.require(&["peak"]);
+    let peak = section.whole_in("peak", 1..=255);
+    let [stand, run, ramp] =
+        [("stand", 50), ("run", 75), ("ramp", 100)].map(|(key, usual)| share_of(&mut section, key, usual));
+    section.finish();
+    Some(MotorCurrent { peak: peak?, stand, run, ramp })
+}
+
+/// One of the shares that it has, as `"50%"`.
+fn share_of(section: &mut Section<'_, '_, '_>, key: &'static str, usual: u8) -> u8 {
+    let Some(entry) = section.get(key) else { return usual };
+    let Some(text) = entry.text(section.faults) else { return usual };
+    let percent = text.strip_suffix('%').and_then(|number| number.trim_end().parse().ok());
+    match percent.filter(|percent| SHARES.contains(percent)) {
+        Some(0) => entry.fault(section.faults, "0 holds nothing up: the seat would drop; give more"),
+        Some(percent) => return percent,
+        None => {
+            let shares = SHARES.map(|share| format!("{share}%")).join(", ");
+            entry.fault(section.faults, &format!("{text:?} is none of {shares}, which a SIXpack 2 has"));
+        }
+    }
+    usual
+}
+
+impl Sixpack2Drive {
+    /// Microsteps a second at its greatest speed with a divider (CMD $12, $13: the other divider is 0).
+    fn most_steps(divider: u8) -> f64 {
+        (CLOCK_HZ * MOST_SPEED / ((f64::from(divider) + 1.0) * f64::from(1 << 14))).min(MOST_STEPS)
+    }
+
+    /// Why the clock divider is too great for the seat's greatest speed.
+    pub(crate) fn too_slow_for(&self, seat: &SeatType) -> Option<String> {
+        let steps = |axis: &crate::motion::AxisGeometry| axis.max_velocity / axis.lead * axis.pulses_per_rev;
+        let (needed, speed) = seat
+            .own()
+            .iter()
+            .map(|axis| (steps(axis), axis.max_velocity))
+            .max_by(|(one, _), (other, _)| one.total_cmp(other))?;
+        if needed <= Self::most_steps(self.clock_divider) {
+            return None;
+        }
+        let enough = (0..=GREATEST_DIVIDER).rev().find(|divider| needed <= Self::most_steps(*divider));
+        Some(match enough {
+            Some(enough) => {
+                format!("{speed} mm/s needs clock_divider {enough} or less, it is {}", self.clock_divider)
+            }
+            None => format!(
+                "{speed} mm/s are {needed:.0} microsteps a second, over {MOST_STEPS:.0}; lower max_velocity_mm_s of {}",
+                seat.name
+            ),
+        })
+    }
+}

@@ -1,0 +1,401 @@
+//! `[[controller]]` with `address = "link:NAME"`: seats that serial drives move, and the links that they share.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use toml::de::DeTable;
+
+use crate::channel;
+use crate::motion::{MAX_AXES, SeatType};
+
+use super::accept::acceptances;
+use super::drive::homing::HomeWay;
+use super::drive::{DriveEntry, DriveFamily, SeatDrive, refuse_axes};
+use super::fault::Faults;
+use super::link::{Link, LinkEntry, LinkWiring};
+use super::section::{Entry, Section, did_you_mean};
+use super::site::{Site, inputs_up_to, seat_of};
+use super::{Acceptance, Controller};
+
+/// What an address begins with that names a link.
+const LINK: &str = "link:";
+/// The motors of a SIXpack 2.
+const MOTORS: u8 = 6;
+
+/// A seat that drives on a link move.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DriveController {
+    /// Its name in reports, unlike any other's.
+    pub(crate) name: String,
+    /// The row its seat stands in.
+    pub(crate) row: Option<String>,
+    /// What it moves.
+    pub(crate) seat: Arc<SeatType>,
+    /// How drives move that.
+    pub(crate) drive: Arc<SeatDrive>,
+    /// The name of the link that it is on.
+    pub(crate) link: String,
+    /// The drives, axis by axis.
+    pub(crate) motors: Motors,
+    /// Its first axis is axis `axis_offset + 1` of the cue; 0 to 11.
+    pub(crate) axis_offset: usize,
+    /// Controllers under one rigid seat share a group; its own name by default.
+    pub(crate) group: String,
+    /// Inputs that tell of an emergency stop, bit 0 = input 1: information, not a stop.
+    pub(crate) estop_inputs: u16,
+    /// Findings of preflight that are accepted for good.
+    pub(crate) accept_findings: Vec<Acceptance>,
+    /// False if it is out for good.
+    pub(crate) enabled: bool,
+}
+
+/// The drives of a seat.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Motors {
+    /// A SilverMax for each axis, by its number.
+    SilverMax(Vec<u8>),
+    /// A SIXpack 2, and a motor of it for each axis.
+    Sixpack2 {
+        /// Its number.
+        unit: u8,
+        /// Motors, 0 to 5.
+        motors: Vec<u8>,
+    },
+}
+
+impl Motors {
+    /// What they are.
+    pub(crate) const fn family(&self) -> DriveFamily {
+        match self {
+            Self::SilverMax(_) => DriveFamily::SilverMax,
+            Self::Sixpack2 { .. } => DriveFamily::Sixpack2,
+        }
+    }
+}
+
+impl DriveController {
+    /// The axes of the cue that are its own, counted from 0.
+    #[must_use]
+    pub(crate) fn window(&self) -> Range<usize> {
+        self.axis_offset..self.axis_offset + self.seat.axes
+    }
+}
+
+/// A controller, and the places of what is judged with its neighbours.
+pub(super) struct Placed {
+    pub(super) controller: DriveController,
+    /// Of each of its motors, else of `units` as a whole.
+    motors_at: Vec<usize>,
+    unit_at: usize,
+    group_at: usize,
+}
+
+/// True if the address of a controller names a link.
+pub(super) fn is_on_link(table: &DeTable<'_>) -> bool {
+    let address = table.get("address").and_then(|address| address.get_ref().as_str());
+    address.is_some_and(|address| address.starts_with(LINK))
+}
+
+/// Reads one controller; `links` and `drives` are what it may refer to.
+pub(super) fn drive_controller<'t>(
+    at: usize,
+    table: &'t DeTable<'t>,
+    site: &Site<'_>,
+    (links, drives): (&[LinkEntry<'_>], &[DriveEntry]),
+    faults: &mut Faults<'_>,
+) -> Option<Placed> {
+    let mut section = Section::new("[[controller]]", at, table, faults);
+    section.require(&["name", "seat", "dialect"]);
+    let [name, row, group] = ["name", "row", "group"].map(|key| section.text(key));
+    let group_at = section.get("group").map_or(at, |entry| entry.at);
+    let link = link_of(&mut section, links);
+    let family = family(&mut section);
+    let seat_at = section.get("seat");
+    let seat = seat_of(&mut section, site);
+    let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
+    let estop_inputs = family.map_or(0, |family| estop_inputs(&mut section, family));
+    let accept_findings = acceptances(&mut section);
+    let enabled = section.get("enabled").and_then(|entry| entry.switch(section.faults)).unwrap_or(true);
+    refuse_keys(&mut section);
+    let unit_at = section.get("unit").map_or(at, |entry| entry.at);
+    let axes = seat.as_ref().map(|seat| seat.axes);
+    let motors = family.and_then(|family| motors(&mut section, family, axes));
+    section.finish();
+    let (seat, family, seat_at) = (seat?, family?, seat_at?);
+    refuse_axes(seat_at, &seat, family, faults);
+    let drive = drive_of(seat_at, &seat, family, drives, faults);
+    if let (Some(drive), Some(value)) = (&drive, table.get("estop_inputs")) {
+        refuse_switch(Entry::new("estop_inputs", value), drive, estop_inputs, faults);
+    }
+    let (motors, motors_at) = motors?;
+    let name = name?;
+    let controller = DriveController {
+        group: group.unwrap_or_else(|| name.clone()),
+        name,
+        row,
+        seat,
+        drive: Arc::new(drive?),
+        link: link?,
+        motors,
+        axis_offset,
+        estop_inputs,
+        accept_findings,
+        enabled,
+    };
+    Some(Placed { controller, motors_at, unit_at, group_at })
+}
+
+fn link_of(section: &mut Section<'_, '_, '_>, links: &[LinkEntry<'_>]) -> Option<String> {
+    let entry = section.get("address")?;
+    let name = entry.text(section.faults)?.strip_prefix(LINK)?;
+    if links.iter().any(|link| link.name == name) {
+        return Some(name.to_owned());
+    }
+    let hint = did_you_mean(name, links.iter().map(|link| link.name));
+    entry.fault(section.faults, &format!("there is no [link.{name}]{hint}"));
+    None
+}
+
+fn family(section: &mut Section<'_, '_, '_>) -> Option<DriveFamily> {
+    let entry = section.get("dialect")?;
+    if matches!(entry.value.as_str(), Some("smc" | "mbox")) {
+        let message = "is spoken over UDP; on a link it is \"silvermax\" or \"sixpack2\", else give address = \"IP:PORT\"";
+        entry.fault(section.faults, message);
+        return None;
+    }
+    entry.choice(&DriveFamily::ALL, section.faults)
+}
+
+/// Inputs 1 to 7 of a SilverMax; a SIXpack 2 has none.
+fn estop_inputs(section: &mut Section<'_, '_, '_>, family: DriveFamily) -> u16 {
+    if let Some(entry) = section.get("estop_inputs").filter(|_| family == DriveFamily::Sixpack2) {
+        entry.fault(section.faults, "kinocue reads no inputs of a SIXpack 2; leave it out");
+        return 0;
+    }
+    inputs_up_to(section, "estop_inputs", 7)
+}
+
+/// Notes what controllers have and drives have not, by name.
+fn refuse_keys(section: &mut Section<'_, '_, '_>) {
+    if section.get("fan_out").is_some_and(|entry| entry.value.as_str() != Some("slice")) {
+        section.refuse("fan_out", "drives share no frame, each is sent its own; leave it out");
+    }
+    for (key, why) in [
+        ("accept", "drives have no accept code; leave it out"),
+        ("vibration_port_octets", "drives have no vibration frames; leave it out"),
+        ("belt_inputs", "kinocue reads no belts by drives; leave it out"),
+    ] {
+        section.refuse(key, why);
+    }
+    if section.get("effects").is_some_and(|entry| entry.value.as_array().is_none_or(|list| !list.is_empty()))
+    {
+        section.refuse("effects", "drives switch no effects; give them to a controller that does");
+    }
+    for (_, _, output) in channel::switches() {
+        section.refuse(output, "drives have no such output; give it to a controller that does");
+    }
+}
+
+/// The drive of each axis, and the place of each.
+fn motors(
+    section: &mut Section<'_, '_, '_>,
+    family: DriveFamily,
+    axes: Option<usize>,
+) -> Option<(Motors, Vec<usize>)> {
+    match family {
+        DriveFamily::SilverMax => {
+            section.require(&["units"]);
+            for key in ["unit", "motors"] {
+                section.refuse(key, "a SilverMax is one motor; list the unit of each axis as units");
+            }
+            let (units, at) = numbers(section, "units", 1, 254, axes)?;
+            Some((Motors::SilverMax(units), at))
+        }
+        DriveFamily::Sixpack2 => {
+            section.require(&["unit", "motors"]);
+            section
+                .refuse("units", "a SIXpack 2 is one unit of six motors; write unit = 1, motors = [0, 1, 2]");
+            let unit = section.whole_in("unit", 1..=254_u8);
+            let (motors, at) = numbers(section, "motors", 0, MOTORS - 1, axes)?;
+            Some((Motors::Sixpack2 { unit: unit?, motors }, at))
+        }
+    }
+}
+
+/// A list with one number for each axis.
+fn numbers(
+    section: &mut Section<'_, '_, '_>,
+    key: &'static str,
+    least: u8,
+    most: u8,
+    axes: Option<usize>,
+) -> Option<(Vec<u8>, Vec<usize>)> {
+    let entry = section.get(key)?;
+    let entries = entry.array(section.faults)?;
+    if let Some(axes) = axes.filter(|&axes| axes != entries.len()) {
+        let message = format!("{} numbers for {axes} axes; give one for each", entries.len());
+        entry.fault(section.faults, &message);
+        return None;
+    }
+    entries.iter().map(|one| Some((one.whole_in(least..=most, section.faults)?, one.at))).collect()
+}
+
+/// The drive of the seat type, which has to say what this family needs.
+fn drive_of(
+    entry: Entry<'_>,
+    seat: &SeatType,
+    family: DriveFamily,
+    drives: &[DriveEntry],
+    faults: &mut Faults<'_>,
+) -> Option<SeatDrive> {
+    let name = &seat.name;
+    let Some(found) = drives.iter().find(|drive| drive.seat == *name) else {
+        let message = format!("{name} has no [seat.{name}.drive], which says how {} move it", family.word());
+        entry.fault(faults, &message);
+        return None;
+    };
+    let drive = found.drive.clone()?;
+    let note = |faults: &mut Faults<'_>, text: String| faults.note(found.at, format!("drive: {text}"));
+    match family {
+        DriveFamily::SilverMax if drive.silvermax.is_none() => {
+            note(
+                faults,
+                "a SilverMax needs torque = { hold = \"60%\", move = \"100%\", full = N }".to_owned(),
+            );
+        }
+        DriveFamily::Sixpack2 if drive.sixpack2.is_none() => {
+            note(faults, "a SIXpack 2 needs current = { peak = N }".to_owned());
+        }
+        _ => {}
+    }
+    refuse_home(&drive, family, found.at, faults);
+    if let Some(why) = drive.sixpack2.as_ref().filter(|_| family == DriveFamily::Sixpack2) {
+        why.too_slow_for(seat).into_iter().for_each(|why| note(faults, why));
+    }
+    Some(drive)
+}
+
+/// Notes a way home that the family does not have.
+fn refuse_home(drive: &SeatDrive, family: DriveFamily, at: usize, faults: &mut Faults<'_>) {
+    let message = match (family, drive.homing.way) {
+        (
+            DriveFamily::SilverMax,
+            HomeWay::Switch { input: None, .. } | HomeWay::Index { input: None, .. },
+        ) => "home: a SilverMax needs the input of the switch, 1 to 7, as input = 1",
+        (DriveFamily::Sixpack2, HomeWay::Switch { input: Some(_), .. }) => {
+            "home: each motor of a SIXpack 2 has a reference switch of its own; leave input out"
+        }
+        (DriveFamily::Sixpack2, HomeWay::Index { .. }) => {
+            "home: a SIXpack 2 has no index pulse; use way = \"switch\""
+        }
+        _ => return,
+    };
+    faults.note(at, format!("drive: {message}"));
+}
+
+/// Notes an input that would tell of an emergency stop whenever a seat is home.
+fn refuse_switch(entry: Entry<'_>, drive: &SeatDrive, estop_inputs: u16, faults: &mut Faults<'_>) {
+    if let HomeWay::Switch { input: Some(input), .. } | HomeWay::Index { input: Some(input), .. } =
+        drive.homing.way
+        && estop_inputs & 1 << (input - 1) != 0
+    {
+        entry.fault(faults, &format!("input {input} is the switch of home on these units; wire another"));
+    }
+}
+
+/// Settles the links for the drives that are on them, and notes what these cannot be together.
+pub(super) fn settle(links: Vec<LinkEntry<'_>>, placed: &[Placed], faults: &mut Faults<'_>) -> Vec<Link> {
+    let mut settled = Vec::new();
+    for entry in links {
+        let on_it: Vec<_> = placed.iter().filter(|one| one.controller.link == entry.name).collect();
+        let family = on_it.first().map(|one| one.controller.motors.family());
+        refuse_two_families(&on_it, family, faults);
+        refuse_twins(&on_it, faults);
+        let link = entry.settle(family, faults);
+        if let Some(link) = link {
+            refuse_units_of_rs232(&link, &on_it, faults);
+            settled.push(link);
+        }
+    }
+    settled
+}
+
+fn refuse_two_families(on_it: &[&Placed], family: Option<DriveFamily>, faults: &mut Faults<'_>) {
+    let is_other = |one: &&&Placed| Some(one.controller.motors.family()) != family;
+    for other in on_it.iter().filter(is_other) {
+        let DriveController { link, motors, .. } = &other.controller;
+        let (word, first) = (motors.family().word(), &on_it[0].controller.name);
+        let message = format!(
+            "dialect: link {link} has {} already, by {first}, and one line carries one dialect; put {word} on a link of its \
+             own",
+            family.map_or("another", DriveFamily::word)
+        );
+        faults.note(other.unit_at, message);
+    }
+}
+
+/// Notes motors that move two axes.
+fn refuse_twins(on_it: &[&Placed], faults: &mut Faults<'_>) {
+    let mut taken: Vec<(u8, Option<u8>, usize)> = Vec::new();
+    for one in on_it {
+        let named: Vec<(u8, Option<u8>)> = match &one.controller.motors {
+            Motors::SilverMax(units) => units.iter().map(|unit| (*unit, None)).collect(),
+            Motors::Sixpack2 { unit, motors } => motors.iter().map(|motor| (*unit, Some(*motor))).collect(),
+        };
+        for ((unit, motor), at) in named.into_iter().zip(one.motors_at.iter().copied()) {
+            let Some((.., first)) = taken.iter().find(|(u, m, _)| (*u, *m) == (unit, motor)) else {
+                taken.push((unit, motor, at));
+                continue;
+            };
+            let line = faults.line(*first);
+            let (link, what) =
+                (&one.controller.link, motor.map_or(String::new(), |m| format!("motor {m} of ")));
+            let message = format!(
+                "units: {what}unit {unit} of link {link} moves another axis already, on line {line}; one motor moves one axis"
+            );
+            faults.note(at, message);
+        }
+    }
+}
+
+/// A SIXpack 2 by RS-232 is alone on its line.
+fn refuse_units_of_rs232(link: &Link, on_it: &[&Placed], faults: &mut Faults<'_>) {
+    if (link.wiring, link.family) != (LinkWiring::Rs232, Some(DriveFamily::Sixpack2)) {
+        return;
+    }
+    let unit = |one: &Placed| match one.controller.motors {
+        Motors::Sixpack2 { unit, .. } => Some(unit),
+        Motors::SilverMax(_) => None,
+    };
+    let first = on_it.first().and_then(|one| unit(one));
+    for other in on_it.iter().filter(|one| unit(one) != first) {
+        let message = format!(
+            "unit: link {} is RS-232, which has one SIXpack 2; use wiring = \"rs485\", or a link for each",
+            link.name
+        );
+        faults.note(other.unit_at, message);
+    }
+}
+
+/// Notes groups whose controllers cannot keep together: a rigid seat would be bent.
+pub(super) fn refuse_parted_groups(placed: &[Placed], others: &[&Controller], faults: &mut Faults<'_>) {
+    for (index, one) in placed.iter().enumerate() {
+        let DriveController { group, link, enabled, .. } = &one.controller;
+        let apart = placed[..index]
+            .iter()
+            .map(|other| &other.controller)
+            .find(|other| other.group == *group && (other.link != *link || other.enabled != *enabled));
+        let by_udp = others.iter().find(|other| other.group == *group);
+        let (name, why) = match (apart, by_udp) {
+            (Some(other), _) if other.link != *link => (&other.name, "is on another link"),
+            (Some(other), _) => (&other.name, "and this are not both enabled"),
+            (None, Some(other)) => (&other.name, "is on the network"),
+            (None, None) => continue,
+        };
+        let message = format!(
+            "group: {name} of the group {group} {why}, and a rigid seat moves by all of its controllers at one instant; put \
+             them on one link, with the same enabled"
+        );
+        faults.note(one.group_at, message);
+    }
+}

@@ -1,0 +1,107 @@
+//! What can be wrong with a serial line, in words with what to do.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use rustix::io::Errno;
+
+use crate::plain;
+
+/// Why a line cannot be opened, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub(crate) enum SerialError {
+    /// Nothing is there.
+    #[error(
+        "{}: there is no such port; plug the adapter in, and name it by its link in /dev/serial/by-id",
+        plain::path(.0)
+    )]
+    Missing(PathBuf),
+    /// Another program has it open.
+    #[error("{}: another program has it; end that, as two masters on one line garble each other", plain::path(.0))]
+    Taken(PathBuf),
+    /// The system refuses it to this user.
+    #[error(
+        "{}: not allowed to open it; add the user to the group dialout, and give the service the drop-in \
+         kinocue-drives.conf",
+        plain::path(.0)
+    )]
+    Forbidden(PathBuf),
+    /// It is something else.
+    #[error("{}: it is no serial line; name the adapter by its link in /dev/serial/by-id", plain::path(.0))]
+    NoLine(PathBuf),
+    /// It was there a moment ago.
+    #[error("{}: the port has vanished; look at the plug and the power of the adapter", plain::path(.0))]
+    Vanished(PathBuf),
+    /// The adapter makes another rate.
+    #[error(
+        "{}: the adapter makes {made} baud where {wanted} are wanted, more than 2 % off; set a baud it can make, or use \
+         another adapter",
+        plain::path(path)
+    )]
+    Baud {
+        /// The port.
+        path: PathBuf,
+        /// What was asked for.
+        wanted: u32,
+        /// What the driver says it makes.
+        made: u32,
+    },
+    /// The adapter makes other octets.
+    #[error("{}: the adapter cannot make these stop bits; set stop_bits = {can}", plain::path(path))]
+    StopBits {
+        /// The port.
+        path: PathBuf,
+        /// What it makes.
+        can: u8,
+    },
+    /// The driver took RS-485 and did not keep it.
+    #[error(
+        "{}: the driver does not turn the two wires of RS-485 although it takes the setting; use an adapter that turns \
+         by itself",
+        plain::path(.0)
+    )]
+    Rs485(PathBuf),
+    /// Anything else that the system says.
+    #[error("{}: cannot set up the line; look at the adapter and its driver", plain::path(path))]
+    System {
+        /// The port.
+        path: PathBuf,
+        /// What it says.
+        source: io::Error,
+    },
+}
+
+impl SerialError {
+    pub(super) fn of(path: &Path, errno: Errno) -> Self {
+        let path = path.to_owned();
+        match errno {
+            Errno::NOENT | Errno::NOTDIR => Self::Missing(path),
+            Errno::BUSY | Errno::WOULDBLOCK => Self::Taken(path),
+            Errno::ACCESS | Errno::PERM => Self::Forbidden(path),
+            Errno::NOTTY | Errno::ISDIR => Self::NoLine(path),
+            Errno::NODEV | Errno::NXIO | Errno::IO => Self::Vanished(path),
+            errno => Self::System { path, source: errno.into() },
+        }
+    }
+}
+
+/// What ends reading and writing. Made without allocating.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum PortFault {
+    /// The adapter was unplugged, or whoever was at the other end of a pseudo-terminal is gone.
+    #[error("the port has vanished; look at the plug and the power of the adapter")]
+    Vanished,
+    /// What else the system says.
+    #[error("the system refuses to read or write the port ({0}); look at the adapter and its driver")]
+    System(Errno),
+}
+
+impl From<Errno> for PortFault {
+    fn from(errno: Errno) -> Self {
+        match errno {
+            Errno::IO | Errno::NODEV | Errno::NXIO => Self::Vanished,
+            errno => Self::System(errno),
+        }
+    }
+}
