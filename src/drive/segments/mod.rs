@@ -1,0 +1,3 @@
+//! From the poses of an axis to what a serial drive is sent, and to what it makes of that. Pure; allocates nothing.
+
+mod segment;
