@@ -4,7 +4,10 @@
 const FULL_SCALE: i32 = i32::MAX;
 
 /// The least acceleration that a drive takes (register 21).
-pub(crate) const LEAST_ACCELERATION: u32 = 2;
+pub(super) const LEAST_ACCELERATION: u32 = 2;
+
+/// The greatest acceleration that a drive takes.
+pub(super) const MOST_ACCELERATION: u32 = 0x3fff_ffff;
 
 /// What a drive does for so many of its ticks: it ramps at the acceleration to the velocity, then holds that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
