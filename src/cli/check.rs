@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::drives::{DriveArgs, DriveReport, Driven};
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
-use crate::cue::{self, CueFaults, Fault, Place, Source};
+use crate::cue::{self, CueFaults, Fault, Place};
 use crate::plain;
 use crate::proof::{Proof, Violation, prove};
 use crate::time::parse_trim;
@@ -43,6 +44,9 @@ pub(super) struct Args {
     #[command(flatten)]
     seat: SeatArgs,
 
+    #[command(flatten)]
+    drives: DriveArgs,
+
     /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. What passes at a level passes below it.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
     level: f64,
@@ -70,7 +74,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
                 report.passes(file, &hall_in_words(&hall));
             }
         } else {
-            report.cue(file, &args.source.source(), judge.as_ref());
+            report.cue(file, args, judge.as_ref());
         }
     }
     report.passed = report.exits.is_empty();
@@ -99,6 +103,9 @@ struct Report {
     level: f64,
     trim_ms: i32,
     axes: Vec<AxisReport>,
+    /// What serial drives would execute, where somebody asks for them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    drives: Vec<DriveReport>,
     /// What was not looked at.
     notes: Vec<String>,
     #[serde(skip)]
@@ -188,8 +195,8 @@ impl Report {
         None
     }
 
-    fn cue(&mut self, path: &Path, source: &Source, judge: Option<&Judge>) {
-        let timeline = match cue::load(path, source) {
+    fn cue(&mut self, path: &Path, args: &Args, judge: Option<&Judge>) {
+        let timeline = match cue::load(path, &args.source.source()) {
             Ok(cue) => Timeline::new(cue),
             Err(faults) => return self.cue_faults(&faults),
         };
@@ -210,7 +217,10 @@ impl Report {
             let place = timeline.cue().column_place(&misfit.column(), misfit.at());
             self.fault(Exit::BadCue, FaultReport::new(path, &place, misfit.to_string()));
         }
-        self.proof(path, &prove(&timeline, judge.terms(&timeline, self.level)));
+        let terms = judge.terms(&timeline, self.level);
+        let driven = args.drives.judge(path, &timeline, &terms);
+        self.proof(path, &prove(&timeline, terms));
+        let driven = driven.map_or_else(String::new, |driven| self.driven(path, driven));
         if self.exits.len() == before {
             let axes = timeline.axes();
             let noun = if axes == 1 { "axis" } else { "axes" };
@@ -223,6 +233,7 @@ impl Report {
                 ),
             );
         }
+        self.text += &driven;
     }
 
     /// Notes what a proof shows: the table in any case, and what is broken.
@@ -236,6 +247,16 @@ impl Report {
         }
         self.faults_unlisted += proof.more;
         self.unfit |= !proof.passed();
+    }
+
+    /// Notes what serial drives would execute; gives what is to be said of it.
+    fn driven(&mut self, path: &Path, driven: Driven) -> String {
+        for violation in &driven.proof.violations {
+            self.fault(Exit::CheckFailed, FaultReport::of_proof(path, violation));
+        }
+        self.faults_unlisted += driven.proof.more;
+        self.drives.extend(driven.reports);
+        driven.words
     }
 
     fn passes(&mut self, path: &Path, words: &str) {

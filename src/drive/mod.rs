@@ -8,7 +8,6 @@ mod lane;
 mod lanes;
 mod mbox;
 mod rounds;
-#[cfg_attr(not(test), expect(dead_code, reason = "links of serial drives are played by the next step"))]
 mod segments;
 
 pub use lane::Lane;
@@ -16,6 +15,9 @@ pub(crate) use lane::Stamped;
 pub use lanes::Manner;
 pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
+pub(crate) use segments::{
+    Course, Fit, Knots, LOOP, Lag, Middles, Motor, Segment, Swing, TICK_NS, Targets, Units,
+};
 
 use crate::belief::Reading;
 use crate::config::Controller;

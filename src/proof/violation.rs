@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::drives::DriveBreach;
 use crate::cue::Place;
 use crate::motion::AxisUnit;
 use crate::time::ShowTime;
@@ -269,4 +270,7 @@ pub(crate) enum Breach {
         /// The longest Time of the show's frames, ms.
         frame: u32,
     },
+    /// Serial drives would not execute it as they must.
+    #[error(transparent)]
+    Drive(#[from] DriveBreach),
 }
