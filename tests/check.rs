@@ -130,6 +130,32 @@ fn a_cue_is_held_against_the_hall() {
 }
 
 #[test]
+fn what_serial_drives_execute_of_a_cue_is_judged_where_somebody_asks() {
+    let folder = tempfile::tempdir().unwrap();
+    let hall =
+        std::fs::read_to_string(HALL).unwrap().replace("pulses_per_rev = 10000", "pulses_per_rev = 4000");
+    let hall = write(folder.path(), "hall.toml", &hall);
+    let check = |more: &[&str]| {
+        let all =
+            ["check", "cues/seat-demo.csv", "--config", &hall, "--seat", "bench3", "--drive", "silvermax"];
+        kinocue(&[&all, more].concat())
+    };
+    let run = check(&["--link-rate", "30", "--drive-vibration", "0%"]);
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{}", run.stdout);
+    assert!(run.stdout.contains("seat-demo.csv: drives play it at 30.0 Hz, at most 0.0"), "{}", run.stdout);
+    let json = check(&["--link-rate", "30", "--drive-vibration", "0%", "--json"]).json();
+    assert!(json["drives"][0]["deviation"].as_f64().is_some_and(|mm| mm < 0.1), "{json}");
+    let run = check(&["--link-rate", "30"]);
+    assert_eq!(run.code, Some(1));
+    assert!(
+        run.stderr.contains(" is too quick for drives at 30.0 Hz, which swing at 3.8 Hz"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(check(&[]).code, Some(2), "a link has a rate");
+}
+
+#[test]
 fn an_editors_rows_are_judged_in_their_unit_against_the_seat() {
     let folder = tempfile::tempdir().unwrap();
     let rows = "1,2000,10,20\n2,2000,15,20\n3,2000,160,20\n";

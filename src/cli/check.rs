@@ -22,8 +22,8 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
 ///
 /// Proves format, units, axes and stroke of a cue, and with --config that each axis has a controller and each effect an
 /// output. Then proves its limits, over the whole cue and however the frames fall on it: velocity, acceleration and jerk of
-/// each axis, vibration on top of motion, the times of effects, and what the controllers themselves allow. Exit code 1 where
-/// a limit is broken; `kinocue fit` lowers the motion until it fits.
+/// each axis, vibration on top of motion, the times of effects, and what the controllers themselves allow; with --drive also
+/// what serial drives execute of it. Exit code 1 where a limit is broken; `kinocue fit` lowers the motion until it fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue check cues/*.csv",
@@ -31,6 +31,7 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
     "kinocue check cues/voyage.csv --config hall.toml",
     "kinocue check ride.csv --config hall.toml --level 60%",
     "kinocue check cues/coaster.csv --config hall.toml --seat platform6 --rate 1000 --json",
+    "kinocue check cues/bench-ride.csv --config hall.toml --drive silvermax --link-rate 30 --drive-vibration 0%",
     "kinocue check ride.txt --from rows --units percent",
 ]))]
 pub(super) struct Args {

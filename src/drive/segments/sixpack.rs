@@ -17,6 +17,8 @@ const CLOCK_HZ: f64 = 20e6;
 const MOST_SPEED: i32 = 511;
 /// How many slices are looked ahead at the most.
 const AHEAD: usize = 48;
+/// The longest lag that fits into that, in slices.
+const AHEAD_SLICES: f64 = 46.0;
 
 /// How a motor follows its target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +47,7 @@ impl Lag {
 
     /// True if it may be looked ahead so far.
     fn fits(self, period: Duration) -> bool {
-        self.tau() / period.as_secs_f64() + 2.0 <= 48.0
+        self.tau() / period.as_secs_f64() <= AHEAD_SLICES
     }
 
     /// Microsteps a second of one unit of speed.
@@ -90,7 +92,7 @@ impl Targets {
     /// be looked ahead is taken as the longest that is not.
     #[must_use]
     pub(crate) fn at_rest(lag: Lag, period: Duration, stroke: (f64, f64), position: f64) -> Self {
-        let slices = (lag.tau() / period.as_secs_f64()).min(46.0);
+        let slices = (lag.tau() / period.as_secs_f64()).min(AHEAD_SLICES);
         let stroke = (stroke.0.min(stroke.1), stroke.1.max(stroke.0));
         Self { lag, slices, stroke, middles: [Middle { position, velocity: 0.0 }; AHEAD], seen: 0 }
     }
@@ -124,10 +126,9 @@ impl Targets {
     /// Where the axis is to be a lag later: inside its stroke, and off by no more than half the acceleration times the lag
     /// squared.
     fn later(&self) -> f64 {
-        let (behind, part) = (self.behind(), self.slices.fract());
+        // The lag ends between the two newest.
         let (before, after) = (self.middles[1].position, self.middles[0].position);
-        debug_assert!(behind >= 1, "the lag ends between the two newest");
-        before + part * (after - before)
+        before + self.slices.fract() * (after - before)
     }
 }
 
@@ -214,6 +215,7 @@ mod tests {
         let (lag, stroke) = (Lag::new(3, 12), (0.0, 90_000.0));
         let mut targets = Targets::at_rest(lag, PERIOD, stroke, 500.0);
         let pose = |at: f64| 500.0 * at.cos();
+        let behind = u32::try_from(targets.behind()).expect("some slices");
         let mut met = 0;
         for slice in 0..200_u32 {
             let at = (f64::from(slice) + 0.5) * 0.3;
@@ -222,7 +224,7 @@ mod tests {
                 continue;
             };
             assert!(target >= 0, "{target}");
-            let at = at - targets.behind() as f64 * 0.3;
+            let at = at - f64::from(behind) * 0.3;
             let led = pose(at).max(0.0) - 500.0 * at.sin() * 0.3 / PERIOD.as_secs_f64() * lag.tau();
             let later = pose(at + 0.3 * lag.tau() / PERIOD.as_secs_f64()).max(0.0);
             if led < 0.0 {
