@@ -165,14 +165,14 @@ impl Driven<'_> {
         if Lag::new(divider, 1).most() < steps {
             let fits = (0..divider).rev().find(|divider| Lag::new(*divider, 1).most() >= steps);
             let breach = DriveBreach::TooFast { unit, velocity, divider, fits: fits.unwrap_or(0), seat };
-            found.push(self.found(show(0), breach));
+            self.of_seat(breach, found);
             return None;
         }
         let given = propdiv.map(|propdiv| Lag::new(divider, propdiv));
         let lag = given.or_else(|| Lag::gentlest(divider, period, velocity, jump));
         if lag.is_none() {
             let breach = DriveBreach::NoPropdiv { unit, velocity, jump, hz: self.hz(), seat };
-            found.push(self.found(show(0), breach));
+            self.of_seat(breach, found);
         }
         lag
     }
@@ -254,6 +254,14 @@ impl Driven<'_> {
                 found.push(Found { column, ..self.found(step.at, breach) });
             }
             before = told;
+        }
+    }
+
+    /// Notes once what no cue has a part in.
+    fn of_seat(&self, breach: DriveBreach, found: &mut Vec<Found>) {
+        let breach = Breach::Drive(breach);
+        if found.iter().all(|one| one.breach != breach) {
+            found.push(Found { at: ShowTime::ZERO, axis: None, column: String::new(), breach });
         }
     }
 

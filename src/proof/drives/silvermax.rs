@@ -1,7 +1,7 @@
 //! What a SilverMax executes: the very segments that a play would send, run by the model of the drive.
 
 use super::course::{Course, signed};
-use super::{DriveBreach, Driven, Found, Most, Roughness, Worst, show};
+use super::{DriveBreach, Driven, Found, Most, Roughness, Worst};
 use crate::drive::{Course as DriveCourse, Fit, Knots, Middles, Segment, TICK_NS, Units};
 
 /// How far outside its stroke an axis may be: counts that rounding makes.
@@ -12,7 +12,7 @@ pub(super) fn execute(driven: &Driven<'_>, course: &Course, found: &mut Vec<Foun
     let geometry = driven.subject.geometry();
     let Some(units) = Units::of(geometry.pulses_per_rev) else {
         let breach = DriveBreach::Counts { seat: driven.subject.seat(), counts: geometry.pulses_per_rev };
-        found.push(driven.found(show(0), breach));
+        driven.of_seat(breach, found);
         return None;
     };
     let mut run = Run::new(driven, course, units);

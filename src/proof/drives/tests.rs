@@ -131,8 +131,9 @@ fn swing(low: f64, high: f64, ms: u32) -> Timeline {
 
 #[test]
 fn a_seat_whose_turns_no_silvermax_counts_is_refused() {
-    let proof = prove(&swing(0.4, 0.6, 1_000), seat(10_000.0), &silvermax(30.0));
+    let proof = prove(&bench_ride(), seat(10_000.0), &silvermax(30.0));
     let said = messages(&proof);
+    assert_eq!(said.len(), 1, "{said:?}");
     assert!(proof.axes.is_empty() && said[0].contains("counts 4000, 8000 or 16000 a turn"), "{said:?}");
 }
 
