@@ -213,22 +213,19 @@ mod tests {
     #[test]
     fn a_target_that_would_lead_out_of_the_stroke_is_where_the_axis_is_a_lag_later() {
         let (lag, stroke) = (Lag::new(3, 12), (0.0, 90_000.0));
-        let mut targets = Targets::at_rest(lag, PERIOD, stroke, 500.0);
-        let pose = |at: f64| 500.0 * at.cos();
-        let behind = u32::try_from(targets.behind()).expect("some slices");
+        let mut targets = Targets::at_rest(lag, PERIOD, stroke, 0.0);
+        let slices = lag.tau() / PERIOD.as_secs_f64();
+        let pose = |slice: f64| 5_000.0 * (1.0 - (0.1 * slice).cos());
+        let speed = |slice: f64| 500.0 * (0.1 * slice).sin() / PERIOD.as_secs_f64();
+        let behind = f64::from(u32::try_from(targets.behind()).expect("some slices"));
         let mut met = 0;
-        for slice in 0..200_u32 {
-            let at = (f64::from(slice) + 0.5) * 0.3;
-            let velocity = -500.0 * at.sin() * 0.3 / PERIOD.as_secs_f64();
-            let Some(target) = targets.push(Middle { position: pose(at).max(0.0), velocity }) else {
-                continue;
-            };
-            assert!(target >= 0, "{target}");
-            let at = at - f64::from(behind) * 0.3;
-            let led = pose(at).max(0.0) - 500.0 * at.sin() * 0.3 / PERIOD.as_secs_f64() * lag.tau();
-            let later = pose(at + 0.3 * lag.tau() / PERIOD.as_secs_f64()).max(0.0);
-            if led < 0.0 {
+        for slice in (0..200_u32).map(|slice| f64::from(slice) + 0.5) {
+            let middle = Middle { position: pose(slice), velocity: speed(slice) };
+            let Some(target) = targets.push(middle) else { continue };
+            let at = slice - behind;
+            if pose(at) + lag.tau() * speed(at) < 0.0 {
                 met += 1;
+                let later = pose(at + slices);
                 assert!((f64::from(target) - later).abs() < 12.0, "{target} {later}");
             }
         }
