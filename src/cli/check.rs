@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::drives::{DriveArgs, DriveReport, Driven};
+use super::drives::{DriveArgs, DriveReport, DriveVerdict};
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
@@ -251,7 +251,7 @@ impl Report {
     }
 
     /// Notes what serial drives would execute; gives what is to be said of it.
-    fn driven(&mut self, path: &Path, driven: Driven) -> String {
+    fn driven(&mut self, path: &Path, driven: DriveVerdict) -> String {
         for violation in &driven.proof.violations {
             self.fault(Exit::CheckFailed, FaultReport::of_proof(path, violation));
         }

@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use crate::config::parse_level;
 use crate::plain;
-use crate::proof::{DriveFamily, DriveProof, DriveTerms, Executed, Terms, prove_driven, rate_that_fits};
+use crate::proof::{
+    DriveAxisProof, DriveFamily, DriveProof, DriveTerms, Terms, prove_driven, rate_that_fits,
+};
 use crate::timeline::Timeline;
 
 /// How far a drive may be beside a cue, in the unit of its axis, where no configuration says it.
@@ -22,7 +24,7 @@ const MOST_HZ: f64 = 500.0;
 pub(super) struct DriveArgs {
     /// Judge also what serial drives of this family execute of a cue; pulses of the seat are their counts or microsteps.
     #[arg(long, value_enum, value_name = "FAMILY", requires = "link_rate")]
-    drive: Option<Family>,
+    drive: Option<SerialFamily>,
 
     /// Segments, or targets, that their link carries for each axis, a second: 10 to 500.
     #[arg(long, value_name = "HZ", requires = "drive", value_parser = parse_link_rate)]
@@ -35,7 +37,7 @@ pub(super) struct DriveArgs {
 
 /// The families of serial drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Family {
+enum SerialFamily {
     /// SilverMax, by segments of its timed queue.
     Silvermax,
     /// SIXpack 2, by targets on the fly, with clock_divider 3 and propdiv as its seat needs it.
@@ -56,7 +58,7 @@ pub(super) struct DriveReport {
 }
 
 /// What drives would execute of a cue, in numbers and in words.
-pub(super) struct Driven {
+pub(super) struct DriveVerdict {
     pub(super) proof: DriveProof,
     pub(super) reports: Vec<DriveReport>,
     pub(super) words: String,
@@ -64,11 +66,11 @@ pub(super) struct Driven {
 
 impl DriveArgs {
     /// Judges a cue for them; none where nobody asks for drives.
-    pub(super) fn judge(&self, path: &Path, timeline: &Timeline, terms: &Terms) -> Option<Driven> {
+    pub(super) fn judge(&self, path: &Path, timeline: &Timeline, terms: &Terms) -> Option<DriveVerdict> {
         let (family, hz) = (self.drive?, self.link_rate?);
         let family = match family {
-            Family::Silvermax => DriveFamily::SilverMax,
-            Family::Sixpack2 => {
+            SerialFamily::Silvermax => DriveFamily::SilverMax,
+            SerialFamily::Sixpack2 => {
                 DriveFamily::SixPack { clock_divider: CLOCK_DIVIDER, propdiv: None, jump: None }
             }
         };
@@ -82,12 +84,12 @@ impl DriveArgs {
                 format!("{}: drives play it at {fits:.1} Hz or more\n", plain::path(path))
             })
         };
-        Some(Driven { reports: reports(path, &proof, hz), proof, words })
+        Some(DriveVerdict { reports: reports(path, &proof, hz), proof, words })
     }
 }
 
 fn reports(path: &Path, proof: &DriveProof, rate_hz: f64) -> Vec<DriveReport> {
-    let report = |axis: &Executed| DriveReport {
+    let report = |axis: &DriveAxisProof| DriveReport {
         file: path.display().to_string(),
         axis: format!("a{}", axis.axis + 1),
         seat: axis.on.seat.name.clone(),
@@ -102,7 +104,7 @@ fn reports(path: &Path, proof: &DriveProof, rate_hz: f64) -> Vec<DriveReport> {
 
 /// At which rate it is played, and how far beside the cue drives are at the most.
 fn passed(path: &Path, proof: &DriveProof, hz: f64) -> String {
-    let part = |axis: &&Executed| axis.deviation.value / axis.deviation.limit;
+    let part = |axis: &&DriveAxisProof| axis.deviation.value / axis.deviation.limit;
     let Some(worst) = proof.axes.iter().max_by(|a, b| part(a).total_cmp(&part(b))) else {
         return String::new();
     };

@@ -20,7 +20,8 @@ pub use lanes::Manner;
 pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
 pub(crate) use segments::{
-    Course, Fit, Knots, LOOP, Lag, Middles, Motor, Segment, Swing, TICK_NS, Targets, Units,
+    DriveCourse, DriveUnits, Knots, LOOP, Lag, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
+    TargetMaker,
 };
 
 use crate::belief::Reading;

@@ -25,7 +25,7 @@ mod violation;
 
 pub(crate) use axis::AxisProof;
 pub use digest::Digest;
-pub(crate) use drives::{DriveFamily, DriveProof, DriveTerms, Executed, prove_driven, rate_that_fits};
+pub(crate) use drives::{DriveAxisProof, DriveFamily, DriveProof, DriveTerms, prove_driven, rate_that_fits};
 pub(crate) use end::HURRY;
 pub(crate) use figures::AxisFigures;
 pub use figures::figures;

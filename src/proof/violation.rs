@@ -1,8 +1,11 @@
 //! What a cue does that it must not, in words.
 
+mod drives;
+
+pub(crate) use drives::{DriveBreach, OnDrive, OverLimit};
+
 use std::time::Duration;
 
-use super::drives::DriveBreach;
 use crate::cue::Place;
 use crate::motion::AxisUnit;
 use crate::time::ShowTime;

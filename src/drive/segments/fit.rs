@@ -6,7 +6,7 @@
 //! one before was not, and swing for ever.
 
 use super::knots::{Knot, Knots};
-use super::model::{Course, Units};
+use super::model::{DriveCourse, DriveUnits};
 use super::segment::{LEAST_ACCELERATION, MOST_ACCELERATION, Segment};
 
 /// What of what the drive lacks is added to each next velocity: rounding is made up for, and nothing swings.
@@ -16,8 +16,8 @@ const STILL: f64 = 1e-6;
 
 /// Makes segments of middles, one axis. The same for a proof and for a play.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Fit {
-    units: Units,
+pub(crate) struct SegmentFit {
+    units: DriveUnits,
     knots: Knots,
     /// The least and greatest control value, counts: the spline stays between them.
     reach: (f64, f64),
@@ -29,14 +29,14 @@ pub(crate) struct Fit {
     late: f64,
     /// How many middles are still needed.
     wanted: u32,
-    course: Course,
+    course: DriveCourse,
 }
 
-impl Fit {
+impl SegmentFit {
     /// At rest at `position`; never led outside `reach`, the lower first; all in counts.
     #[must_use]
-    pub(crate) fn at_rest(units: Units, knots: Knots, reach: (f64, f64), position: i32) -> Self {
-        let (place, course) = (f64::from(position), Course::at_rest(units, position));
+    pub(crate) fn at_rest(units: DriveUnits, knots: Knots, reach: (f64, f64), position: i32) -> Self {
+        let (place, course) = (f64::from(position), DriveCourse::at_rest(units, position));
         let (low, high) = (reach.0.max(f64::from(i32::MIN + 1)), reach.1.min(f64::from(i32::MAX - 1)));
         let reach = (low.min(place), high.max(place));
         Self { units, knots, reach, middles: [place; 4], before: place, late: 0.0, wanted: 3, course }
@@ -44,7 +44,7 @@ impl Fit {
 
     /// What the drive makes of the segments so far.
     #[must_use]
-    pub(crate) const fn course(&self) -> Course {
+    pub(crate) const fn course(&self) -> DriveCourse {
         self.course
     }
 
@@ -149,9 +149,9 @@ mod tests {
 
     const STROKE: (f64, f64) = (0.0, 120_000.0);
 
-    fn fit(hz: f64, position: i32) -> Fit {
-        let units = Units::of(4_000.0).expect("known");
-        Fit::at_rest(units, Knots::new(Duration::from_secs_f64(hz.recip())), STROKE, position)
+    fn fit(hz: f64, position: i32) -> SegmentFit {
+        let units = DriveUnits::of(4_000.0).expect("known");
+        SegmentFit::at_rest(units, Knots::new(Duration::from_secs_f64(hz.recip())), STROKE, position)
     }
 
     /// Swings and rests, counts at a time in slices.

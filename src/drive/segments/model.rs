@@ -10,21 +10,21 @@ pub(crate) const TICK_NS: u32 = 120_000;
 
 /// How a drive counts: 2 to the power of this, in velocity units, is a count a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Units {
+pub(crate) struct DriveUnits {
     bits: u32,
 }
 
 /// Where the target of a drive is, and how fast it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Course {
-    units: Units,
+pub(crate) struct DriveCourse {
+    units: DriveUnits,
     /// Velocity units, positive upwards.
     velocity: i64,
     /// Twice the sum of the velocity over all ticks, since half of one is no whole number.
     twice: i64,
 }
 
-impl Units {
+impl DriveUnits {
     /// Of a drive with so many counts a turn; none where full velocity is no power of two there.
     #[must_use]
     pub(crate) fn of(counts_per_turn: f64) -> Option<Self> {
@@ -40,10 +40,10 @@ impl Units {
     }
 }
 
-impl Course {
+impl DriveCourse {
     /// At rest at a place in counts.
     #[must_use]
-    pub(crate) fn at_rest(units: Units, position: i32) -> Self {
+    pub(crate) fn at_rest(units: DriveUnits, position: i32) -> Self {
         Self { units, velocity: 0, twice: i64::from(position) << (units.bits + 1) }
     }
 
@@ -117,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    const UNITS: Units = Units { bits: 26 };
+    const UNITS: DriveUnits = DriveUnits { bits: 26 };
 
     /// What a drive does tick by tick, and the same where it counts the velocity before or after each step: twice the sums.
     fn tick_by_tick(segments: &[Segment]) -> (i64, [i64; 3]) {
@@ -144,7 +144,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_model_is_what_a_drive_sums_up_tick_by_tick(segments in segments()) {
-            let from = Course::at_rest(UNITS, 0);
+            let from = DriveCourse::at_rest(UNITS, 0);
             let course = segments.iter().fold(from, |course, segment| course.after(*segment));
             let (velocity, [mean, before, after]) = tick_by_tick(&segments);
             prop_assert_eq!((course.velocity, course.twice), (velocity, mean));
@@ -154,32 +154,32 @@ mod tests {
 
         #[test]
         fn a_segment_in_two_parts_is_the_whole(segments in segments(), part in 0_u32..400) {
-            let whole = segments.iter().fold(Course::at_rest(UNITS, 9), |at, segment| at.after(*segment));
-            let halves = |at: Course, segment: &Segment| {
+            let whole = segments.iter().fold(DriveCourse::at_rest(UNITS, 9), |at, segment| at.after(*segment));
+            let halves = |at: DriveCourse, segment: &Segment| {
                 let first = Segment { ticks: part.min(segment.ticks), ..*segment };
                 at.after(first).after(Segment { ticks: segment.ticks - first.ticks, ..*segment })
             };
-            prop_assert_eq!(segments.iter().fold(Course::at_rest(UNITS, 9), halves), whole);
+            prop_assert_eq!(segments.iter().fold(DriveCourse::at_rest(UNITS, 9), halves), whole);
         }
     }
 
     #[test]
     fn full_velocity_is_4000_turns_a_minute() {
         for counts in [4_000.0, 8_000.0, 16_000.0] {
-            let units = Units::of(counts).expect("known");
+            let units = DriveUnits::of(counts).expect("known");
             let tick = f64::from(i32::MAX) / units.per_count();
             let turns = tick / counts / f64::from(TICK_NS) * 60e9;
             assert!((turns - 4_000.0).abs() < 0.01, "{turns}");
         }
-        assert_eq!(Units::of(10_000.0), None);
+        assert_eq!(DriveUnits::of(10_000.0), None);
     }
 
     #[test]
     fn a_segment_that_comes_to_rest_ends_at_its_place_whatever_came_before() {
-        let moving = Course::at_rest(UNITS, 100).after(Segment::moving(200, 2_000_000, 400_000_000));
+        let moving = DriveCourse::at_rest(UNITS, 100).after(Segment::moving(200, 2_000_000, 400_000_000));
         let to_rest = Segment::to_rest(200, 1_292, 2_000_000, 400_000_000);
         let half = moving.within(to_rest, 100);
-        assert_eq!(moving.after(to_rest), Course::at_rest(UNITS, 1_292));
+        assert_eq!(moving.after(to_rest), DriveCourse::at_rest(UNITS, 1_292));
         assert!((half.velocity() - 200_000_000).abs() < 200_000, "{half:?}");
         assert!((half.position() - moving.position() - 447.0).abs() < 0.5, "{half:?}");
     }

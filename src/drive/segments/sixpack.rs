@@ -1,4 +1,4 @@
-//! Targets of a SIXpack 2, and what its loop makes of them.
+//! TargetMaker of a SIXpack 2, and what its loop makes of them.
 //!
 //! Each 2 ms a motor's speed is its distance to the target over `propdiv`: a lag of the first order. So targets lead by
 //! what it lags. A new one makes the speed jump, which a motor without feedback may lose; what it jumps is judged, not
@@ -76,7 +76,7 @@ impl Lag {
 
 /// Makes targets of middles, one axis.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Targets {
+pub(crate) struct TargetMaker {
     lag: Lag,
     /// Slices that the lag lasts.
     slices: f64,
@@ -87,7 +87,7 @@ pub(crate) struct Targets {
     seen: usize,
 }
 
-impl Targets {
+impl TargetMaker {
     /// At rest at `position` in a stroke, the lower end first, in microsteps; a target each period. A lag that is too long to
     /// be looked ahead is taken as the longest that is not.
     #[must_use]
@@ -138,7 +138,7 @@ pub(crate) struct Motor {
     lag: Lag,
     /// Microsteps.
     position: f64,
-    /// Units of speed.
+    /// DriveUnits of speed.
     speed: i32,
 }
 
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn at_an_even_speed_targets_lead_by_the_lag_and_no_further_than_the_stroke() {
-        let mut targets = Targets::at_rest(Lag::new(3, 12), PERIOD, (0.0, 20_000.0), 0.0);
+        let mut targets = TargetMaker::at_rest(Lag::new(3, 12), PERIOD, (0.0, 20_000.0), 0.0);
         let (tau, mut made) = (Lag::new(3, 12).tau(), Vec::new());
         for slice in 0..400_u32 {
             let at = (f64::from(slice) + 0.5) * PERIOD.as_secs_f64();
@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn a_target_that_would_lead_out_of_the_stroke_is_where_the_axis_is_a_lag_later() {
         let (lag, stroke) = (Lag::new(3, 12), (0.0, 90_000.0));
-        let mut targets = Targets::at_rest(lag, PERIOD, stroke, 0.0);
+        let mut targets = TargetMaker::at_rest(lag, PERIOD, stroke, 0.0);
         let slices = lag.tau() / PERIOD.as_secs_f64();
         let pose = |slice: f64| 5_000.0 * (1.0 - (0.1 * slice).cos());
         let speed = |slice: f64| 500.0 * (0.1 * slice).sin() / PERIOD.as_secs_f64();

@@ -9,14 +9,14 @@ const NOTHING: f64 = 1e-6;
 /// The swing of one axis. Frequencies change without a jump in place; an amplitude is taken up, or let go of, within about
 /// a swing, so that nothing is switched at the top of one.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Swing {
+pub(crate) struct Shaker {
     /// Of a turn, 0 to 1.
     phase: f64,
     hz: f64,
     amplitude: f64,
 }
 
-impl Swing {
+impl Shaker {
     /// How many slices of a link's grid a swing has to have.
     pub(crate) const SLICES: f64 = 8.0;
 
@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn a_swing_grows_to_its_amplitude_and_ends_in_the_middle_without_a_jump() {
-        let mut swing = Swing::default();
+        let mut swing = Shaker::default();
         let told = |tick: u32| if (100..1_025).contains(&tick) { (5.0, 0.1) } else { (0.0, 0.0) };
         let way: Vec<f64> = (0..3_000).map(|tick| swing.after(TICK, told(tick).0, told(tick).1)).collect();
         let most = |of: &[f64]| of.iter().fold(0.0_f64, |most, one| most.max(one.abs()));
@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn nonsense_swings_nowhere() {
         for (hz, amplitude) in [(f64::NAN, 0.1), (-1.0, 0.1), (5.0, f64::NAN), (f64::INFINITY, 0.0)] {
-            let mut swing = Swing::default();
+            let mut swing = Shaker::default();
             assert!((0..50).all(|_| swing.after(TICK, hz, amplitude) == 0.0), "{hz} {amplitude}");
         }
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::super::axis::Subject;
 use super::super::pieces::Pieces;
 use crate::cue::Vibration;
-use crate::drive::Swing;
+use crate::drive::Shaker;
 use crate::motion::{AxisState, Halt, Slot};
 use crate::time::{ShowTime, nanos};
 use crate::timeline::Hint;
@@ -18,7 +18,7 @@ const SHARES: [f64; 2] = [0.85, 1.0];
 
 /// An axis at even times, in strokes.
 #[derive(Debug)]
-pub(super) struct Course {
+pub(super) struct WantedCourse {
     /// Show time of the first sample; slices of the link begin there. Nanoseconds.
     pub(super) from: i64,
     /// Between samples, ns; a whole part of the show's period.
@@ -30,7 +30,7 @@ pub(super) struct Course {
     pub(super) end: i64,
 }
 
-impl Course {
+impl WantedCourse {
     /// Of an axis of a cue, with vibration at a level of its own, for slices of a period, poses a `tick` apart.
     pub(super) fn of(subject: &Subject<'_>, tick: Duration, slice: Duration, shake: f64) -> Self {
         let ends = Ends::of(subject);
@@ -38,10 +38,11 @@ impl Course {
         let lead = i64::max(ends.lead() / slice + 2, 3) * slice;
         let per_tick = tick.as_nanos().div_ceil(FINE.as_nanos()).max(1);
         let per_tick = usize::try_from(per_tick).unwrap_or(1);
+        // Nothing that is told to a drive knows a finer time than the pose, but what it does is judged between poses as well.
         let step = (signed(tick) / i64::try_from(per_tick).unwrap_or(1)).max(1);
         let end = subject.timeline.duration().as_nanos();
         let until = end + ends.tail() + 6 * slice + 4 * signed(tick);
-        let mut sampler = Sampler { subject, ends, shake, swing: Swing::default(), hint: Hint::default() };
+        let mut sampler = Sampler { subject, ends, shake, swing: Shaker::default(), hint: Hint::default() };
         let (mut at, mut places) = (-lead, Vec::new());
         while at <= until {
             places.push(sampler.next(at, step));
@@ -118,7 +119,7 @@ struct Sampler<'a> {
     subject: &'a Subject<'a>,
     ends: Ends,
     shake: f64,
-    swing: Swing,
+    swing: Shaker,
     hint: Hint,
 }
 
@@ -131,6 +132,7 @@ impl Sampler<'_> {
         if self.shake <= 0.0 || !timeline.vibrates(*axis) {
             return place;
         }
+        // A play leaves vibration out of its joins and stops.
         let inside = (0..=self.ends.end).contains(&at);
         let sample = timeline.cue().tracks().vibration(*axis).at(time, &mut 0);
         let Vibration { hz, amplitude } = sample.into();

@@ -1,25 +1,23 @@
 //! Proves what serial drives execute of a cue: what is fitted for them at the rate of their link, after rounding to their
 //! ticks and units. Where [`super::prove`] judges the poses, this judges the course that the drive makes of them.
 
-mod breach;
 mod course;
 mod silvermax;
 mod sixpack;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use breach::DriveBreach;
-
 use std::time::Duration;
 
 use super::axis::Subject;
+use super::violation::{DriveBreach, OnDrive, OverLimit};
 use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, placed, subjects};
 use crate::cue::{FAULTS_TOLD, Vibration};
-use crate::drive::{Lag, Swing};
+use crate::drive::{Lag, Shaker};
 use crate::motion::SeatAxis;
 use crate::time::ShowTime;
 use crate::timeline::{Figure, Timeline};
-use course::Course;
+use course::WantedCourse;
 
 /// A way to play to serial drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +37,7 @@ pub(crate) struct DriveTerms {
 pub(crate) enum DriveFamily {
     /// Segments.
     SilverMax,
-    /// Targets, on the fly.
+    /// TargetMaker, on the fly.
     SixPack {
         /// The divider of the clock.
         clock_divider: u8,
@@ -53,7 +51,7 @@ pub(crate) enum DriveFamily {
 
 /// What a drive executes at most of one axis of a cue; all in the axis's unit.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Executed {
+pub(crate) struct DriveAxisProof {
     /// The axis of the cue, from 0.
     pub(crate) axis: usize,
     /// The axis of a seat that it was judged for.
@@ -88,7 +86,7 @@ pub(crate) enum Roughness {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DriveProof {
     /// One entry for each axis on each different seat.
-    pub(crate) axes: Vec<Executed>,
+    pub(crate) axes: Vec<DriveAxisProof>,
     /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
     pub(crate) violations: Vec<Violation>,
     /// How many there are beyond those.
@@ -140,10 +138,11 @@ struct Driven<'a> {
 }
 
 impl Driven<'_> {
-    fn prove(&self, found: &mut Vec<Found>) -> Option<Executed> {
+    fn prove(&self, found: &mut Vec<Found>) -> Option<DriveAxisProof> {
         let tick = self.terms.rate.period();
+        // An axis that never vibrates costs no swing.
         let shake = if self.subject.timeline.vibrates(self.subject.axis) { self.link.shake } else { 0.0 };
-        let course = Course::of(self.subject, tick, self.link.period, shake);
+        let course = WantedCourse::of(self.subject, tick, self.link.period, shake);
         let most = match self.link.family {
             DriveFamily::SilverMax => silvermax::execute(self, &course, found)?,
             DriveFamily::SixPack { clock_divider, propdiv, jump } => {
@@ -160,18 +159,18 @@ impl Driven<'_> {
     /// How motors of the seat follow; none where none of their settings would do.
     fn lag(&self, divider: u8, propdiv: Option<u8>, jump: f64, found: &mut Vec<Found>) -> Option<Lag> {
         let (axis, period) = (self.subject.geometry(), self.link.period);
-        let (unit, velocity, seat) = (axis.unit, axis.max_velocity, self.subject.seat());
+        let (velocity, on) = (axis.max_velocity, self.on(ShowTime::ZERO));
         let steps = velocity / axis.stroke() * axis.stroke_pulses();
         if Lag::new(divider, 1).most() < steps {
             let fits = (0..divider).rev().find(|divider| Lag::new(*divider, 1).most() >= steps);
-            let breach = DriveBreach::TooFast { unit, velocity, divider, fits: fits.unwrap_or(0), seat };
+            let breach = DriveBreach::TooFast { on, velocity, divider, fits: fits.unwrap_or(0) };
             self.of_seat(breach, found);
             return None;
         }
         let given = propdiv.map(|propdiv| Lag::new(divider, propdiv));
         let lag = given.or_else(|| Lag::gentlest(divider, period, velocity, jump));
         if lag.is_none() {
-            let breach = DriveBreach::NoPropdiv { unit, velocity, jump, hz: self.hz(), seat };
+            let breach = DriveBreach::NoPropdiv { on, velocity, jump };
             self.of_seat(breach, found);
         }
         lag
@@ -181,14 +180,19 @@ impl Driven<'_> {
         self.link.period.as_secs_f64().recip()
     }
 
+    /// What a breach is told of.
+    fn on(&self, at: ShowTime) -> OnDrive {
+        OnDrive { unit: self.subject.geometry().unit, seat: self.subject.seat(), hz: self.hz(), at }
+    }
+
     /// True if the axis vibrates on the drive at all.
     fn is_shaken(&self) -> bool {
         self.link.shake > 0.0 && self.subject.timeline.vibrates(self.subject.axis)
     }
 
-    fn executed(&self, most: &Most) -> Executed {
+    fn executed(&self, most: &MostExecuted) -> DriveAxisProof {
         let figure = |worst: Worst| Figure { value: worst.value, at: worst.at, line: worst.line };
-        Executed {
+        DriveAxisProof {
             axis: self.subject.axis,
             on: self.subject.on.clone(),
             deviation: most.deviation,
@@ -207,35 +211,30 @@ impl Driven<'_> {
         }
     }
 
-    fn judge(&self, most: &Most, found: &mut Vec<Found>) {
+    fn judge(&self, most: &MostExecuted, found: &mut Vec<Found>) {
         let mut motion = vec![(Quantity::Velocity, most.velocity)];
         if let Roughness::Segments { acceleration, jerk } = most.roughness {
             motion.push((Quantity::Acceleration, acceleration));
             // Vibration is rougher than any motion may be, and is judged by its acceleration.
             motion.extend((!self.is_shaken()).then_some((Quantity::Jerk, jerk)));
         }
-        let (unit, seat, hz) = (self.subject.geometry().unit, self.subject.seat(), self.hz());
-        for (quantity, worst) in motion {
-            let Worst { value, limit, at, .. } = worst;
-            if value > limit * SLACK {
-                let breach = DriveBreach::Motion { unit, quantity, value, limit, at, hz, seat: seat.clone() };
-                found.push(self.found(worst.at, breach));
-            }
+        let over = |worst: Worst| OverLimit { value: worst.value, limit: worst.limit };
+        for (quantity, worst) in motion.into_iter().filter(|(_, worst)| worst.value > worst.limit * SLACK) {
+            let breach = DriveBreach::Motion { on: self.on(worst.at), quantity, over: over(worst) };
+            found.push(self.found(worst.at, breach));
         }
-        let Worst { value, limit, at, .. } = most.deviation;
-        if value > limit {
-            let level = self.terms.level * limit / value;
-            found.push(
-                self.found(
-                    at,
-                    DriveBreach::Deviates { unit, value, limit, at, hz, level, seat: seat.clone() },
-                ),
-            );
+        let off = most.deviation;
+        if off.value > off.limit {
+            // What a spline misses is in proportion to what it follows, and that to the level.
+            let level = self.terms.level * off.limit / off.value;
+            let breach = DriveBreach::Deviates { on: self.on(off.at), over: over(off), level };
+            found.push(self.found(off.at, breach));
         }
-        if let Roughness::Jumps(Worst { value, limit, at, .. }) = most.roughness
-            && value > limit * SLACK
+        if let Roughness::Jumps(jump) = most.roughness
+            && jump.value > jump.limit * SLACK
         {
-            found.push(self.found(at, DriveBreach::Jumps { unit, value, limit, at, hz, seat }));
+            let breach = DriveBreach::Jumps { on: self.on(jump.at), over: over(jump) };
+            found.push(self.found(jump.at, breach));
         }
     }
 
@@ -244,12 +243,12 @@ impl Driven<'_> {
         if !self.is_shaken() {
             return;
         }
-        let (most, mut before) = (self.hz() / Swing::SLICES, 0.0);
+        let (most, mut before) = (self.hz() / Shaker::SLICES, 0.0);
         for step in self.subject.timeline.cue().tracks().vibration(self.subject.axis).as_slice() {
             let Vibration { hz, amplitude } = step.value.into();
             let told = if amplitude > 0.0 && hz > most { hz } else { 0.0 };
             if told > before {
-                let breach = DriveBreach::TooQuick { hz: told, most, link: self.hz(), at: step.at };
+                let breach = DriveBreach::TooQuick { on: self.on(step.at), hz: told, most };
                 let column = format!("v{}_hz", self.subject.axis + 1);
                 found.push(Found { column, ..self.found(step.at, breach) });
             }
@@ -272,7 +271,7 @@ impl Driven<'_> {
 }
 
 /// The most that was met of one axis, in its unit.
-struct Most {
+struct MostExecuted {
     deviation: Worst,
     /// Places; the limit is the end of the stroke.
     lowest: Worst,

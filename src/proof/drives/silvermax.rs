@@ -1,26 +1,31 @@
 //! What a SilverMax executes: the very segments that a play would send, run by the model of the drive.
 
-use super::course::{Course, signed};
-use super::{DriveBreach, Driven, Found, Most, Roughness, Worst};
-use crate::drive::{Course as DriveCourse, Fit, Knots, Middles, Segment, TICK_NS, Units};
+use super::super::violation::DriveBreach;
+use super::course::{WantedCourse, signed};
+use super::{Driven, Found, MostExecuted, Roughness, Worst};
+use crate::drive::{DriveCourse, DriveUnits, Knots, Middles, Segment, SegmentFit, TICK_NS};
 
 /// How far outside its stroke an axis may be: counts that rounding makes.
 const ROUNDING: f64 = 2.0;
 
 /// Runs the course; none where no such drive counts as the seat does.
-pub(super) fn execute(driven: &Driven<'_>, course: &Course, found: &mut Vec<Found>) -> Option<Most> {
+pub(super) fn execute(
+    driven: &Driven<'_>,
+    course: &WantedCourse,
+    found: &mut Vec<Found>,
+) -> Option<MostExecuted> {
     let geometry = driven.subject.geometry();
-    let Some(units) = Units::of(geometry.pulses_per_rev) else {
+    let Some(units) = DriveUnits::of(geometry.pulses_per_rev) else {
         let breach = DriveBreach::Counts { seat: driven.subject.seat(), counts: geometry.pulses_per_rev };
         driven.of_seat(breach, found);
         return None;
     };
-    let mut run = Run::new(driven, course, units);
+    let mut run = DriveRun::new(driven, course, units);
     let (period, slot) = (driven.link.period, &driven.subject.slot);
     let mut middles = Middles::at_rest(driven.terms.rate.period(), period, course.places[0]);
     let at_first = slot.pulses(course.places[0]).0;
     let ends = (slot.low_pulses, slot.low_pulses + slot.stroke_pulses);
-    let mut fit = Fit::at_rest(units, Knots::new(period), ends, at_first);
+    let mut fit = SegmentFit::at_rest(units, Knots::new(period), ends, at_first);
     for pose in course.poses() {
         middles.push(pose);
         while let Some(middle) = middles.next() {
@@ -34,9 +39,9 @@ pub(super) fn execute(driven: &Driven<'_>, course: &Course, found: &mut Vec<Foun
 }
 
 /// A drive on its way through a cue.
-struct Run<'a> {
+struct DriveRun<'a> {
     driven: &'a Driven<'a>,
-    course: &'a Course,
+    course: &'a WantedCourse,
     at_knot: DriveCourse,
     /// Since the first sample.
     ticks: i64,
@@ -44,7 +49,7 @@ struct Run<'a> {
     next: usize,
     /// Of the segment before, in the axis's unit.
     acceleration: f64,
-    most: Most,
+    most: MostExecuted,
     /// The farthest outside that it would stop, where its link died, and its speed there.
     stop: Worst,
     speed: f64,
@@ -53,16 +58,17 @@ struct Run<'a> {
     per_unit: f64,
 }
 
-impl<'a> Run<'a> {
-    fn new(driven: &'a Driven<'a>, course: &'a Course, units: Units) -> Self {
+impl<'a> DriveRun<'a> {
+    fn new(driven: &'a Driven<'a>, course: &'a WantedCourse, units: DriveUnits) -> Self {
         let (axis, slot) = (driven.subject.geometry(), &driven.subject.slot);
         let shaken = driven.is_shaken();
         let velocity = if shaken { axis.shaken_velocity() } else { axis.max_velocity };
         let acceleration = if shaken { axis.shaken_acceleration() } else { axis.max_acceleration };
+        // Nothing but the drive makes the vibration, so both are in what is measured, and the sum has its own limits.
         let of = |limit: f64| Worst { limit, ..Worst::default() };
         let place = axis.place(course.places[0]);
         let roughness = Roughness::Segments { acceleration: of(acceleration), jerk: of(axis.max_jerk) };
-        let most = Most {
+        let most = MostExecuted {
             deviation: of(driven.link.max_deviation),
             lowest: Worst { value: place, ..of(axis.low) },
             highest: Worst { value: place, ..of(axis.high) },
@@ -112,6 +118,7 @@ impl<'a> Run<'a> {
         let since = at - self.at(self.ticks);
         let whole = u32::try_from(since / i64::from(TICK_NS)).unwrap_or(0);
         let part = (since % i64::from(TICK_NS)) as f64 / f64::from(TICK_NS);
+        // At 240 mm/s a tick is 0.03 mm, so between ticks, too.
         let (here, then) = (self.at_knot.within(segment, whole), self.at_knot.within(segment, whole + 1));
         let counts = here.position() + part * (then.position() - here.position());
         let place = self.place(counts);
@@ -131,6 +138,7 @@ impl<'a> Run<'a> {
         self.driven.subject.geometry().low + (counts - slot.low_pulses) * self.per_count
     }
 
+    // A third difference over slices is a mean of the steps, so the steps alone are as strict.
     /// Velocity at the knot, acceleration of the segment, step from the one before.
     #[expect(clippy::cast_precision_loss, reason = "velocities are within full scale")]
     fn rough(&mut self, before: i64, ticks: u32) {
@@ -152,6 +160,7 @@ impl<'a> Run<'a> {
     fn brake(&mut self) {
         let axis = self.driven.subject.geometry();
         let velocity = self.at_knot.velocity() as f64 * self.per_unit;
+        // In the middle of a slice it would stop between where it stops from its ends: the brake is the harder.
         let rest =
             self.place(self.at_knot.position()) + velocity * velocity.abs() / (2.0 * axis.max_acceleration);
         let past = (rest - axis.high).max(axis.low - rest);
@@ -165,16 +174,17 @@ impl<'a> Run<'a> {
     /// Whether it leaves the stroke, or would.
     fn outside(&self, found: &mut Vec<Found>) {
         let (driven, axis) = (self.driven, self.driven.subject.geometry());
-        let (unit, seat, hz) = (axis.unit, driven.subject.seat(), driven.hz());
         let (low, high, slack) = (axis.low, axis.high, ROUNDING * self.per_count);
         let met = [self.most.lowest, self.most.highest];
+        // Soft limits lie a margin outside and are no matter of the cue.
         let past = met.iter().find(|met| met.value < low - slack || met.value > high + slack);
         if let Some(&Worst { value: place, at, .. }) = past {
-            let breach = DriveBreach::PastStroke { unit, place, low, high, at, hz, seat };
+            let breach = DriveBreach::PastStroke { on: driven.on(at), place, low, high };
             found.push(driven.found(at, breach));
         } else if self.stop.value > slack {
             let (missing, at, speed) = (self.stop.value, self.stop.at, self.speed);
-            found.push(driven.found(at, DriveBreach::NoRoomToBrake { unit, speed, missing, at, seat }));
+            let breach = DriveBreach::NoRoomToBrake { on: driven.on(at), speed, missing };
+            found.push(driven.found(at, breach));
         }
     }
 }

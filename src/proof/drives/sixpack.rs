@@ -1,17 +1,17 @@
 //! What the motors of a SIXpack 2 execute: their loop every 2 ms, after the very targets that a play would send.
 
-use super::course::{Course, signed};
-use super::{Driven, Most, Roughness, Worst};
-use crate::drive::{LOOP, Lag, Middles, Motor, Targets};
+use super::course::{WantedCourse, signed};
+use super::{Driven, MostExecuted, Roughness, Worst};
+use crate::drive::{LOOP, Lag, Middles, Motor, TargetMaker};
 
 /// Runs the course.
-pub(super) fn execute(driven: &Driven<'_>, course: &Course, lag: Lag, jump: f64) -> Most {
+pub(super) fn execute(driven: &Driven<'_>, course: &WantedCourse, lag: Lag, jump: f64) -> MostExecuted {
     let (period, slot) = (driven.link.period, &driven.subject.slot);
     let axis = driven.subject.geometry();
     let steps = |place: f64| slot.low_pulses + place * slot.stroke_pulses;
     let ends = (slot.low_pulses, slot.low_pulses + slot.stroke_pulses);
     let mut middles = Middles::at_rest(driven.terms.rate.period(), period, steps(course.places[0]));
-    let mut targets = Targets::at_rest(lag, period, ends, steps(course.places[0]));
+    let mut targets = TargetMaker::at_rest(lag, period, ends, steps(course.places[0]));
     let mut made = Vec::new();
     for pose in course.poses() {
         middles.push(steps(pose));
@@ -21,7 +21,7 @@ pub(super) fn execute(driven: &Driven<'_>, course: &Course, lag: Lag, jump: f64)
     }
     let of = |limit: f64| Worst { limit, ..Worst::default() };
     let place = axis.place(course.places[0]);
-    let mut most = Most {
+    let mut most = MostExecuted {
         deviation: of(driven.link.max_deviation),
         lowest: Worst { value: place, ..of(axis.low) },
         highest: Worst { value: place, ..of(axis.high) },
@@ -33,7 +33,13 @@ pub(super) fn execute(driven: &Driven<'_>, course: &Course, lag: Lag, jump: f64)
 }
 
 /// Runs the loop over all of the targets.
-fn run(driven: &Driven<'_>, course: &Course, mut motor: Motor, targets: &[i32], most: &mut Most) {
+fn run(
+    driven: &Driven<'_>,
+    course: &WantedCourse,
+    mut motor: Motor,
+    targets: &[i32],
+    most: &mut MostExecuted,
+) {
     let (slot, axis) = (&driven.subject.slot, driven.subject.geometry());
     let per_step = axis.stroke() / slot.stroke_pulses;
     // Nobody knows how the loop falls on the targets: in the middle it meets each half a loop late. Another place moves all
@@ -44,6 +50,7 @@ fn run(driven: &Driven<'_>, course: &Course, mut motor: Motor, targets: &[i32], 
         let Some(target) = targets.get(slice) else { break };
         let before = motor.velocity();
         motor.run(*target);
+        // Not the measure of poses: what a stepper loses, it loses at one jump.
         if let Roughness::Jumps(jump) = &mut most.roughness {
             driven.larger(jump, (motor.velocity() - before).abs() * per_step, at);
         }

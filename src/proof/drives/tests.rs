@@ -43,11 +43,11 @@ fn messages(proof: &DriveProof) -> Vec<String> {
 }
 
 /// The greatest of a figure over all axes.
-fn most(proof: &DriveProof, figure: impl Fn(&Executed) -> f64) -> f64 {
+fn most(proof: &DriveProof, figure: impl Fn(&DriveAxisProof) -> f64) -> f64 {
     proof.axes.iter().map(figure).fold(0.0, f64::max)
 }
 
-fn jumps(axis: &Executed) -> f64 {
+fn jumps(axis: &DriveAxisProof) -> f64 {
     match axis.roughness {
         Roughness::Jumps(jump) => jump.value,
         Roughness::Segments { .. } => f64::NAN,
@@ -55,7 +55,7 @@ fn jumps(axis: &Executed) -> f64 {
 }
 
 /// The greatest step of acceleration from one segment to the next.
-fn steps(axis: &Executed, hz: f64) -> f64 {
+fn steps(axis: &DriveAxisProof, hz: f64) -> f64 {
     match axis.roughness {
         Roughness::Segments { jerk, .. } => jerk.value / hz,
         Roughness::Jumps(_) => f64::NAN,
