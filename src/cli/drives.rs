@@ -80,7 +80,7 @@ impl DriveArgs {
         let words = if proof.violations.is_empty() {
             passed(path, &proof, hz)
         } else {
-            rate_that_fits(timeline, terms, &link, MOST_HZ).map_or_else(String::new, |fits| {
+            rate_that_fits(&proof, timeline, terms, &link, MOST_HZ).map_or_else(String::new, |fits| {
                 format!("{}: drives play it at {fits:.1} Hz or more\n", plain::path(path))
             })
         };

@@ -108,15 +108,20 @@ pub(crate) fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms
     DriveProof { axes, violations, more }
 }
 
-/// The least rate of a link, in steps of a tenth and up to `most` Hz, at which a cue is not refused; none where there is none
-/// above that of `link`.
+/// The least rate of a link, in steps of a tenth and up to `most` Hz, at which a cue is not refused that `proof` refuses; none
+/// where there is none, or where the rate is not what is wrong.
 #[must_use]
 pub(crate) fn rate_that_fits(
+    proof: &DriveProof,
     timeline: &Timeline,
     terms: &Terms,
     link: &DriveTerms,
     most: f64,
 ) -> Option<f64> {
+    // Proofs of a long film take a while: none is made that cannot pass.
+    if !proof.violations.iter().all(|one| one.breach.is_of_rate()) {
+        return None;
+    }
     let mut hz = link.period.as_secs_f64().recip();
     loop {
         hz = (11.0 * hz).ceil() / 10.0;

@@ -175,13 +175,16 @@ fn where_nobody_sets_propdiv_it_is_that_of_the_seat_and_a_motor_that_cannot_foll
 #[test]
 fn the_rate_that_fits_is_the_next_that_is_not_refused() {
     let ride = bench_ride();
-    let terms = |level| {
-        Terms::of_seat(Arc::new(seat(4_000.0)), 3, Digest::of(ride.cue()), Rate::from_hz(100.0), level)
+    let fits = |seat: SeatType, most: f64| {
+        let (link, digest) = (silvermax(10.0), Digest::of(ride.cue()));
+        let terms = Terms::of_seat(Arc::new(seat.clone()), 3, digest, Rate::from_hz(100.0), 1.0);
+        rate_that_fits(&prove(&ride, seat, &link), &ride, &terms, &link, most)
     };
-    let fits = rate_that_fits(&ride, &terms(1.0), &silvermax(10.0), 200.0).unwrap();
-    assert!((11.0..20.0).contains(&fits), "{fits}");
-    assert!(messages(&prove(&ride, seat(4_000.0), &silvermax(fits))).is_empty());
-    assert_eq!(rate_that_fits(&ride, &terms(1.0), &silvermax(10.0), 10.9), None);
+    let rate = fits(seat(4_000.0), 200.0).unwrap();
+    assert!((11.0..20.0).contains(&rate), "{rate}");
+    assert!(messages(&prove(&ride, seat(4_000.0), &silvermax(rate))).is_empty());
+    assert_eq!(fits(seat(4_000.0), 10.9), None);
+    assert_eq!(fits(seat(10_000.0), 200.0), None, "no rate makes a drive count otherwise");
 }
 
 #[test]

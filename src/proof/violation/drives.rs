@@ -86,3 +86,11 @@ pub(crate) enum DriveBreach {
     )]
     TooQuick { on: OnDrive, hz: f64, most: f64 },
 }
+
+impl DriveBreach {
+    /// True if a link with a higher rate may mend it.
+    #[must_use]
+    pub(crate) const fn is_of_rate(&self) -> bool {
+        !matches!(self, Self::Counts { .. } | Self::TooFast { .. } | Self::NoRoomToBrake { .. })
+    }
+}
