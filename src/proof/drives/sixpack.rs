@@ -11,12 +11,12 @@ pub(super) fn execute(driven: &Driven<'_>, course: &WantedCourse, lag: Lag, jump
     let steps = |place: f64| slot.low_pulses + place * slot.stroke_pulses;
     let ends = (slot.low_pulses, slot.low_pulses + slot.stroke_pulses);
     let mut middles = Middles::at_rest(driven.terms.rate.period(), period, steps(course.places[0]));
-    let mut targets = TargetMaker::at_rest(lag, period, ends, steps(course.places[0]));
+    let mut targets = TargetMaker::at_rest(lag, ends, steps(course.places[0]));
     let mut made = Vec::new();
     for pose in course.poses() {
         middles.push(steps(pose));
         while let Some(middle) = middles.next() {
-            made.extend(targets.push(middle));
+            made.push(targets.push(middle));
         }
     }
     let of = |limit: f64| Worst { limit, ..Worst::default() };

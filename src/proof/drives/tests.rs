@@ -110,12 +110,11 @@ fn targets_of_the_bench_ride_are_as_far_beside_it_and_jump_as_far_as_the_table_s
 }
 
 #[test]
-fn where_targets_may_not_lead_out_of_the_stroke_a_long_lag_is_too_far_beside_the_cue() {
-    let long = sixpack(15.0, Some(24), Some(1e3));
-    let proof = prove(&bench_ride(), seat(3_200.0), &long);
-    assert!(proof.axes[1].deviation.value < 0.1 && proof.axes[0].deviation.value > 1.0, "{proof:?}");
-    assert!(messages(&proof)[0].contains("beside the cue"), "{:?}", messages(&proof));
-    assert!(proof.axes.iter().all(|axis| axis.lowest.value > -0.01), "{proof:?}");
+fn targets_that_are_held_at_the_end_of_the_stroke_cost_a_long_lag_some_tenths_of_a_millimetre() {
+    let proof = prove(&bench_ride(), seat(3_200.0), &sixpack(15.0, Some(24), Some(1e3)));
+    assert!(messages(&proof).is_empty(), "{:?}", messages(&proof));
+    assert!(proof.axes[1].deviation.value < 0.1 && proof.axes[0].deviation.value > 0.3);
+    assert!(proof.axes.iter().all(|axis| axis.lowest.value > -0.01 && jumps(axis) < 53.0));
 }
 
 /// A swing of axis 1 between two places of the stroke, in so many milliseconds there, rows of 20 ms.
