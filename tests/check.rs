@@ -130,6 +130,38 @@ fn a_cue_is_held_against_the_hall() {
 }
 
 #[test]
+fn what_serial_drives_execute_of_a_cue_is_judged_where_somebody_asks() {
+    let folder = tempfile::tempdir().unwrap();
+    let hall = "[seat.silver3]\naxes = 3\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 4000\n\
+                max_velocity_mm_s = 240\nmax_acceleration_mm_s2 = 3000\nmax_jerk_mm_s3 = 60000\n\
+                [[controller]]\nname = \"A1\"\nseat = \"silver3\"\naddress = \"127.0.0.1:7408\"\n";
+    let hall = write(folder.path(), "hall.toml", hall);
+    let row = |row: u32| {
+        let place = 0.3 + 0.2 * (f64::from(row) * 0.05).cos();
+        format!("{},{place:.6},{},0.001\n", row * 20, if row > 50 { 20 } else { 0 })
+    };
+    let rows: String = (0..200).map(row).collect();
+    let cue = write(folder.path(), "swing.csv", &format!("time_ms,a1,v1_hz,v1_amp\n{rows}"));
+    let check = |more: &[&str]| {
+        let all = ["check", &cue, "--config", &hall, "--drive", "silvermax"];
+        kinocue(&[&all, more].concat())
+    };
+    let run = check(&["--link-rate", "30", "--drive-vibration", "0%"]);
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{}", run.stdout);
+    assert!(run.stdout.contains("swing.csv: drives play it at 30.0 Hz, at most 0.0"), "{}", run.stdout);
+    let json = check(&["--link-rate", "30", "--drive-vibration", "0%", "--json"]).json();
+    assert!(json["drives"][0]["deviation"].as_f64().is_some_and(|mm| mm < 0.1), "{json}");
+    let run = check(&["--link-rate", "30"]);
+    assert_eq!(run.code, Some(1));
+    assert!(
+        run.stderr.contains(" is too quick for drives at 30.0 Hz, which swing at 3.8 Hz"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(check(&[]).code, Some(64), "a link has a rate");
+}
+
+#[test]
 fn an_editors_rows_are_judged_in_their_unit_against_the_seat() {
     let folder = tempfile::tempdir().unwrap();
     let rows = "1,2000,10,20\n2,2000,15,20\n3,2000,160,20\n";

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::drives::{DriveArgs, DriveReport, DriveVerdict};
 use super::figures::{self, AxisReport};
 use super::load::{self, Judge, SeatArgs, SourceArgs};
 use super::{Exit, Failure, print};
 use crate::config::{self, Config, ConfigFault, ConfigFaults, parse_level};
-use crate::cue::{self, CueFaults, Fault, Place, Source};
+use crate::cue::{self, CueFaults, Fault, Place};
 use crate::drive::rates;
 use crate::plain;
 use crate::proof::{Proof, Violation, prove};
@@ -22,8 +23,8 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
 ///
 /// Proves format, units, axes and stroke of a cue, and with --config that each axis has a controller and each effect an
 /// output. Then proves its limits, over the whole cue and however the frames fall on it: velocity, acceleration and jerk of
-/// each axis, vibration on top of motion, the times of effects, and what the controllers themselves allow. Exit code 1 where
-/// a limit is broken; `kinocue fit` lowers the motion until it fits.
+/// each axis, vibration on top of motion, the times of effects, and what the controllers themselves allow; with --drive also
+/// what serial drives execute of it. Exit code 1 where a limit is broken; `kinocue fit` lowers the motion until it fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = load::after_help(&[
     "kinocue check cues/*.csv",
@@ -31,6 +32,7 @@ const WORST_FIRST: [Exit; 5] = [Exit::NoInput, Exit::Config, Exit::Io, Exit::Bad
     "kinocue check cues/voyage.csv --config hall.toml",
     "kinocue check ride.csv --config hall.toml --level 60%",
     "kinocue check cues/coaster.csv --config hall.toml --seat platform6 --rate 1000 --json",
+    "kinocue check cues/bench-ride.csv --config hall.toml --drive silvermax --link-rate 30 --drive-vibration 0%",
     "kinocue check ride.txt --from rows --units percent",
 ]))]
 pub(super) struct Args {
@@ -43,6 +45,9 @@ pub(super) struct Args {
 
     #[command(flatten)]
     seat: SeatArgs,
+
+    #[command(flatten)]
+    drives: DriveArgs,
 
     /// Level of motion and vibration about the seats' neutral pose: 60% or -6dB. What passes at a level passes below it.
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, default_value = "100%", allow_hyphen_values = true)]
@@ -75,7 +80,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
                 report.hall(file, &hall);
             }
         } else {
-            report.cue(file, &args.source.source(), judge.as_ref());
+            report.cue(file, args, judge.as_ref());
         }
     }
     report.passed = report.exits.is_empty();
@@ -104,6 +109,9 @@ struct Report {
     level: f64,
     trim_ms: i32,
     axes: Vec<AxisReport>,
+    /// What serial drives would execute, where somebody asks for them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    drives: Vec<DriveReport>,
     /// What was not looked at.
     notes: Vec<String>,
     #[serde(skip)]
@@ -218,8 +226,8 @@ impl Report {
         }
     }
 
-    fn cue(&mut self, path: &Path, source: &Source, judge: Option<&Judge>) {
-        let timeline = match cue::load(path, source) {
+    fn cue(&mut self, path: &Path, args: &Args, judge: Option<&Judge>) {
+        let timeline = match cue::load(path, &args.source.source()) {
             Ok(cue) => Timeline::new(cue),
             Err(faults) => return self.cue_faults(&faults),
         };
@@ -240,7 +248,10 @@ impl Report {
             let place = timeline.cue().column_place(&misfit.column(), misfit.at());
             self.fault(Exit::BadCue, FaultReport::new(path, &place, misfit.to_string()));
         }
-        self.proof(path, &prove(&timeline, judge.terms(&timeline, self.level)));
+        let terms = judge.terms(&timeline, self.level);
+        let driven = args.drives.judge(path, &timeline, &terms);
+        self.proof(path, &prove(&timeline, terms));
+        let driven = driven.map_or_else(String::new, |driven| self.driven(path, driven));
         if self.exits.len() == before {
             let axes = timeline.axes();
             let noun = if axes == 1 { "axis" } else { "axes" };
@@ -253,6 +264,7 @@ impl Report {
                 ),
             );
         }
+        self.text += &driven;
     }
 
     /// Notes what a proof shows: the table in any case, and what is broken.
@@ -266,6 +278,16 @@ impl Report {
         }
         self.faults_unlisted += proof.more;
         self.unfit |= !proof.passed();
+    }
+
+    /// Notes what serial drives would execute; gives what is to be said of it.
+    fn driven(&mut self, path: &Path, driven: DriveVerdict) -> String {
+        for violation in &driven.proof.violations {
+            self.fault(Exit::CheckFailed, FaultReport::of_proof(path, violation));
+        }
+        self.faults_unlisted += driven.proof.more;
+        self.drives.extend(driven.reports);
+        driven.words
     }
 
     fn passes(&mut self, path: &Path, words: &str) {

@@ -17,6 +17,7 @@ mod convert;
 mod decode;
 mod demo;
 mod doctor;
+mod drives;
 mod exit;
 mod figures;
 mod film_player;

@@ -9,12 +9,21 @@ mod lanes;
 mod mbox;
 pub(crate) mod rates;
 mod rounds;
+#[cfg_attr(
+    not(test),
+    expect(dead_code, reason = "the clocks of drives, and their settings, come with their links")
+)]
+mod segments;
 
 pub use lane::Lane;
 pub(crate) use lane::Stamped;
 pub use lanes::Manner;
 pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
+pub(crate) use segments::{
+    DriveCourse, DriveUnits, Knots, LOOP, Lag, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
+    TargetMaker,
+};
 
 use crate::belief::Reading;
 use crate::config::Controller;

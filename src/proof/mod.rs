@@ -6,6 +6,7 @@
 
 mod axis;
 mod digest;
+mod drives;
 mod ease;
 mod effects;
 mod end;
@@ -24,6 +25,7 @@ mod violation;
 
 pub(crate) use axis::AxisProof;
 pub use digest::Digest;
+pub(crate) use drives::{DriveAxisProof, DriveProof, DriveTerms, DrivenBy, prove_driven, rate_that_fits};
 pub(crate) use end::HURRY;
 pub(crate) use figures::AxisFigures;
 pub use figures::figures;

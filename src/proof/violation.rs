@@ -1,5 +1,9 @@
 //! What a cue does that it must not, in words.
 
+mod drives;
+
+pub(crate) use drives::{DriveBreach, OnDrive, OverLimit};
+
 use std::time::Duration;
 
 use crate::cue::Place;
@@ -269,4 +273,15 @@ pub(crate) enum Breach {
         /// The longest Time of the show's frames, ms.
         frame: u32,
     },
+    /// Serial drives would not execute it as they must.
+    #[error(transparent)]
+    Drive(#[from] DriveBreach),
+}
+
+impl Breach {
+    /// True if it is of a serial link, and one with a higher rate may mend it.
+    #[must_use]
+    pub(crate) const fn is_of_rate(&self) -> bool {
+        matches!(self, Self::Drive(breach) if breach.is_of_rate())
+    }
 }

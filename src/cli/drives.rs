@@ -1,0 +1,120 @@
+//! What `check` says of serial drives: what they would execute of a cue, at the rate of a link.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::config::parse_level;
+use crate::plain;
+use crate::proof::{DriveAxisProof, DriveProof, DriveTerms, DrivenBy, Terms, prove_driven, rate_that_fits};
+use crate::timeline::Timeline;
+
+/// How far a drive may be beside a cue, in the unit of its axis, where no configuration says it.
+const MAX_DEVIATION: f64 = 0.5;
+/// The divider of the clock of a SIXpack 2 that the fastest bench seat takes.
+const CLOCK_DIVIDER: u8 = 3;
+/// The highest rate of a link that is advised.
+const MOST_HZ: f64 = 500.0;
+
+/// Serial drives that a cue is judged for as well.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct DriveArgs {
+    /// Judge also what serial drives of this family execute of a cue; pulses of the seat are their counts or microsteps.
+    #[arg(long, value_enum, value_name = "FAMILY", requires = "link_rate")]
+    drive: Option<SerialFamily>,
+
+    /// Segments, or targets, that their link carries for each axis, a second: 10 to 500.
+    #[arg(long, value_name = "HZ", requires = "drive", value_parser = parse_link_rate)]
+    link_rate: Option<f64>,
+
+    /// Level of vibration on drives, on top of --level.
+    #[arg(long, value_name = "LEVEL", requires = "drive", value_parser = parse_level, default_value = "100%")]
+    drive_vibration: f64,
+}
+
+/// The families of serial drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum SerialFamily {
+    /// SilverMax, by segments of its timed queue.
+    Silvermax,
+    /// SIXpack 2, by targets on the fly, with clock_divider 3 and propdiv as its seat needs it.
+    Sixpack2,
+}
+
+/// One axis on drives, in `--json`.
+#[derive(Debug, Serialize)]
+pub(super) struct DriveReport {
+    file: String,
+    axis: String,
+    seat: String,
+    unit: &'static str,
+    rate_hz: f64,
+    deviation: f64,
+    max_deviation: f64,
+    at_s: f64,
+}
+
+/// What drives would execute of a cue, in numbers and in words.
+pub(super) struct DriveVerdict {
+    pub(super) proof: DriveProof,
+    pub(super) reports: Vec<DriveReport>,
+    pub(super) words: String,
+}
+
+impl DriveArgs {
+    /// Judges a cue for them; none where nobody asks for drives.
+    pub(super) fn judge(&self, path: &Path, timeline: &Timeline, terms: &Terms) -> Option<DriveVerdict> {
+        let (family, hz) = (self.drive?, self.link_rate?);
+        let family = match family {
+            SerialFamily::Silvermax => DrivenBy::SilverMax,
+            SerialFamily::Sixpack2 => {
+                DrivenBy::SixPack { clock_divider: CLOCK_DIVIDER, propdiv: None, jump: None }
+            }
+        };
+        let period = Duration::from_secs_f64(hz.recip());
+        let link = DriveTerms { family, period, max_deviation: MAX_DEVIATION, shake: self.drive_vibration };
+        let proof = prove_driven(timeline, terms, &link);
+        let words = if proof.violations.is_empty() {
+            passed(path, &proof, hz)
+        } else {
+            rate_that_fits(&proof, timeline, terms, &link, MOST_HZ).map_or_else(String::new, |fits| {
+                format!("{}: drives play it at {fits:.1} Hz or more\n", plain::path(path))
+            })
+        };
+        Some(DriveVerdict { reports: reports(path, &proof, hz), proof, words })
+    }
+}
+
+fn reports(path: &Path, proof: &DriveProof, rate_hz: f64) -> Vec<DriveReport> {
+    let report = |axis: &DriveAxisProof| DriveReport {
+        file: path.display().to_string(),
+        axis: format!("a{}", axis.axis + 1),
+        seat: axis.on.seat.name.clone(),
+        unit: axis.on.geometry().unit.name(),
+        rate_hz,
+        deviation: axis.deviation.value,
+        max_deviation: axis.deviation.limit,
+        at_s: axis.deviation.at.as_secs_f64(),
+    };
+    proof.axes.iter().map(report).collect()
+}
+
+/// At which rate it is played, and how far beside the cue drives are at the most.
+fn passed(path: &Path, proof: &DriveProof, hz: f64) -> String {
+    let part = |axis: &&DriveAxisProof| axis.deviation.value / axis.deviation.limit;
+    let Some(worst) = proof.axes.iter().max_by(|a, b| part(a).total_cmp(&part(b))) else {
+        return String::new();
+    };
+    let (deviation, unit, axis) = (worst.deviation, worst.on.geometry().unit.name(), worst.axis + 1);
+    let (path, value) = (plain::path(path), (100.0 * deviation.value).ceil() / 100.0);
+    format!(
+        "{path}: drives play it at {hz:.1} Hz, at most {value:.2} {unit} beside the cue (a{axis} at {})\n",
+        deviation.at
+    )
+}
+
+fn parse_link_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (10.0..=500.0).contains(rate));
+    rate.ok_or_else(|| "a link carries 10 to 500 segments or targets an axis a second".to_owned())
+}

@@ -1,0 +1,291 @@
+//! Proves what serial drives execute of a cue: what is fitted for them at the rate of their link, after rounding to their
+//! ticks and units. Where [`super::prove`] judges the poses, this judges the course that the drive makes of them.
+
+mod course;
+mod silvermax;
+mod sixpack;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use super::axis::Subject;
+use super::violation::{DriveBreach, OnDrive, OverLimit};
+use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, placed, subjects};
+use crate::cue::{FAULTS_TOLD, Vibration};
+use crate::drive::{Lag, Shaker};
+use crate::motion::SeatAxis;
+use crate::time::ShowTime;
+use crate::timeline::{Figure, Timeline};
+use course::WantedCourse;
+
+/// A way to play to serial drives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DriveTerms {
+    /// Which family, and what of its settings counts.
+    pub(crate) family: DrivenBy,
+    /// From one segment or target of an axis to the next.
+    pub(crate) period: Duration,
+    /// The farthest that a drive may be beside the cue, in the axis's unit.
+    pub(crate) max_deviation: f64,
+    /// Level of vibration, on top of that of the terms, 0 to 1.
+    pub(crate) shake: f64,
+}
+
+/// A family of serial drives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum DrivenBy {
+    /// Segments.
+    SilverMax,
+    /// TargetMaker, on the fly.
+    SixPack {
+        /// The divider of the clock.
+        clock_divider: u8,
+        /// How soft motors follow; `None` for the least that lets the seat's full speed jump no further than it may.
+        propdiv: Option<u8>,
+        /// The most that a motor's speed may change at once, in the axis's unit a second; what the acceleration of the seat makes in
+        /// a period, where nobody says more.
+        jump: Option<f64>,
+    },
+}
+
+/// What a drive executes at most of one axis of a cue; all in the axis's unit.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DriveAxisProof {
+    /// The axis of the cue, from 0.
+    pub(crate) axis: usize,
+    /// The axis of a seat that it was judged for.
+    pub(crate) on: SeatAxis,
+    /// How far it is beside the cue.
+    pub(crate) deviation: Worst,
+    /// The lowest position.
+    pub(crate) lowest: Figure,
+    /// The highest position.
+    pub(crate) highest: Figure,
+    /// Velocity.
+    pub(crate) velocity: Worst,
+    /// How rough it is.
+    pub(crate) roughness: Roughness,
+}
+
+/// How rough the course of a drive is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Roughness {
+    /// Of segments: exact for each, and steps of the acceleration over a period.
+    Segments {
+        /// Acceleration.
+        acceleration: Worst,
+        /// Jerk.
+        jerk: Worst,
+    },
+    /// Of targets: the greatest change of speed at once.
+    Jumps(Worst),
+}
+
+/// What drives execute of a cue, one entry for each axis on each different seat, and what of it may not be.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DriveProof {
+    /// One entry for each axis on each different seat.
+    pub(crate) axes: Vec<DriveAxisProof>,
+    /// What is broken, in order of show time; the first [`FAULTS_TOLD`].
+    pub(crate) violations: Vec<Violation>,
+    /// How many there are beyond those.
+    pub(crate) more: u64,
+}
+
+/// Proves a cue for serial drives. Takes time in proportion to its length.
+#[must_use]
+pub(crate) fn prove_driven(timeline: &Timeline, terms: &Terms, link: &DriveTerms) -> DriveProof {
+    let mut found = Vec::new();
+    let axes: Vec<_> = subjects(timeline, terms)
+        .iter()
+        .filter_map(|subject| Driven { subject, terms, link }.prove(&mut found))
+        .collect();
+    found.sort_by_key(|one| one.at);
+    let more = found.len().saturating_sub(FAULTS_TOLD) as u64;
+    found.truncate(FAULTS_TOLD);
+    let violations = found.into_iter().map(|one| placed(timeline, one)).collect();
+    DriveProof { axes, violations, more }
+}
+
+/// The least rate of a link, in steps of a tenth and up to `most` Hz, at which a cue is not refused that `proof` refuses; none
+/// where there is none, or where the rate is not what is wrong.
+#[must_use]
+pub(crate) fn rate_that_fits(
+    proof: &DriveProof,
+    timeline: &Timeline,
+    terms: &Terms,
+    link: &DriveTerms,
+    most: f64,
+) -> Option<f64> {
+    // Proofs of a long film take a while: none is made that cannot pass.
+    if !proof.violations.iter().all(|one| one.breach.is_of_rate()) {
+        return None;
+    }
+    let mut hz = link.period.as_secs_f64().recip();
+    loop {
+        hz = (11.0 * hz).ceil() / 10.0;
+        if hz > most {
+            return None;
+        }
+        let faster = DriveTerms { period: Duration::from_secs_f64(hz.recip()), ..*link };
+        if prove_driven(timeline, terms, &faster).violations.is_empty() {
+            return Some(hz);
+        }
+    }
+}
+
+/// One axis on its way to a drive.
+struct Driven<'a> {
+    subject: &'a Subject<'a>,
+    terms: &'a Terms,
+    link: &'a DriveTerms,
+}
+
+impl Driven<'_> {
+    fn prove(&self, found: &mut Vec<Found>) -> Option<DriveAxisProof> {
+        let tick = self.terms.rate.period();
+        // An axis that never vibrates costs no swing.
+        let shake = if self.subject.timeline.vibrates(self.subject.axis) { self.link.shake } else { 0.0 };
+        let course = WantedCourse::of(self.subject, tick, self.link.period, shake);
+        let most = match self.link.family {
+            DrivenBy::SilverMax => silvermax::execute(self, &course, found)?,
+            DrivenBy::SixPack { clock_divider, propdiv, jump } => {
+                let axis = self.subject.geometry();
+                let jump = jump.unwrap_or(axis.max_acceleration * self.link.period.as_secs_f64());
+                sixpack::execute(self, &course, self.lag(clock_divider, propdiv, jump, found)?, jump)
+            }
+        };
+        self.judge(&most, found);
+        self.too_quick(found);
+        Some(self.executed(&most))
+    }
+
+    /// How motors of the seat follow; none where none of their settings would do.
+    fn lag(&self, divider: u8, propdiv: Option<u8>, jump: f64, found: &mut Vec<Found>) -> Option<Lag> {
+        let (axis, period) = (self.subject.geometry(), self.link.period);
+        let (velocity, on) = (axis.max_velocity, self.on(ShowTime::ZERO));
+        let steps = velocity / axis.stroke() * axis.stroke_pulses();
+        if Lag::new(divider, 1).most() < steps {
+            let fits = (0..divider).rev().find(|divider| Lag::new(*divider, 1).most() >= steps);
+            let breach = DriveBreach::TooFast { on, velocity, divider, fits: fits.unwrap_or(0) };
+            self.of_seat(breach, found);
+            return None;
+        }
+        let given = propdiv.map(|propdiv| Lag::new(divider, propdiv));
+        let lag = given.or_else(|| Lag::gentlest(divider, period, velocity, jump));
+        if lag.is_none() {
+            let breach = DriveBreach::NoPropdiv { on, velocity, jump };
+            self.of_seat(breach, found);
+        }
+        lag
+    }
+
+    fn hz(&self) -> f64 {
+        self.link.period.as_secs_f64().recip()
+    }
+
+    /// What a breach is told of.
+    fn on(&self, at: ShowTime) -> OnDrive {
+        OnDrive { unit: self.subject.geometry().unit, seat: self.subject.seat(), hz: self.hz(), at }
+    }
+
+    /// True if the axis vibrates on the drive at all.
+    fn is_shaken(&self) -> bool {
+        self.link.shake > 0.0 && self.subject.timeline.vibrates(self.subject.axis)
+    }
+
+    fn executed(&self, most: &MostExecuted) -> DriveAxisProof {
+        let figure = |worst: Worst| Figure { value: worst.value, at: worst.at, line: worst.line };
+        DriveAxisProof {
+            axis: self.subject.axis,
+            on: self.subject.on.clone(),
+            deviation: most.deviation,
+            lowest: figure(most.lowest),
+            highest: figure(most.highest),
+            velocity: most.velocity,
+            roughness: most.roughness,
+        }
+    }
+
+    /// The first of what is met, in the axis's unit, that is larger than all before.
+    fn larger(&self, worst: &mut Worst, value: f64, at: i64) {
+        if value > worst.value {
+            let line = self.subject.timeline.cue().line(self.subject.timeline.row_before(show(at)));
+            *worst = Worst { value, at: show(at), line, ..*worst };
+        }
+    }
+
+    fn judge(&self, most: &MostExecuted, found: &mut Vec<Found>) {
+        let mut motion = vec![(Quantity::Velocity, most.velocity)];
+        if let Roughness::Segments { acceleration, jerk } = most.roughness {
+            motion.push((Quantity::Acceleration, acceleration));
+            // Vibration is rougher than any motion may be, and is judged by its acceleration.
+            motion.extend((!self.is_shaken()).then_some((Quantity::Jerk, jerk)));
+        }
+        let over = |worst: Worst| OverLimit { value: worst.value, limit: worst.limit };
+        for (quantity, worst) in motion.into_iter().filter(|(_, worst)| worst.value > worst.limit * SLACK) {
+            let breach = DriveBreach::Motion { on: self.on(worst.at), quantity, over: over(worst) };
+            found.push(self.found(worst.at, breach));
+        }
+        let off = most.deviation;
+        if off.value > off.limit {
+            // What a spline misses is in proportion to what it follows, and that to the level.
+            let level = self.terms.level * off.limit / off.value;
+            let breach = DriveBreach::Deviates { on: self.on(off.at), over: over(off), level };
+            found.push(self.found(off.at, breach));
+        }
+        if let Roughness::Jumps(jump) = most.roughness
+            && jump.value > jump.limit * SLACK
+        {
+            let breach = DriveBreach::Jumps { on: self.on(jump.at), over: over(jump) };
+            found.push(self.found(jump.at, breach));
+        }
+    }
+
+    /// Vibrations that a link is too slow for, the first of each stretch of them.
+    fn too_quick(&self, found: &mut Vec<Found>) {
+        if !self.is_shaken() {
+            return;
+        }
+        let (most, mut before) = (self.hz() / Shaker::SLICES, 0.0);
+        for step in self.subject.timeline.cue().tracks().vibration(self.subject.axis).as_slice() {
+            let Vibration { hz, amplitude } = step.value.into();
+            let told = if amplitude > 0.0 && hz > most { hz } else { 0.0 };
+            if told > before {
+                let breach = DriveBreach::TooQuick { on: self.on(step.at), hz: told, most };
+                let column = format!("v{}_hz", self.subject.axis + 1);
+                found.push(Found { column, ..self.found(step.at, breach) });
+            }
+            before = told;
+        }
+    }
+
+    /// Notes once what no cue has a part in.
+    fn of_seat(&self, breach: DriveBreach, found: &mut Vec<Found>) {
+        let breach = Breach::Drive(breach);
+        if found.iter().all(|one| one.breach != breach) {
+            found.push(Found { at: ShowTime::ZERO, axis: None, column: String::new(), breach });
+        }
+    }
+
+    fn found(&self, at: ShowTime, breach: DriveBreach) -> Found {
+        let column = format!("a{}", self.subject.axis + 1);
+        Found { at, axis: Some(self.subject.axis), column, breach: Breach::Drive(breach) }
+    }
+}
+
+/// The most that was met of one axis, in its unit.
+struct MostExecuted {
+    deviation: Worst,
+    /// Places; the limit is the end of the stroke.
+    lowest: Worst,
+    highest: Worst,
+    velocity: Worst,
+    roughness: Roughness,
+}
+
+/// A show time inside any cue.
+fn show(at: i64) -> ShowTime {
+    ShowTime::from_nanos(at.max(0))
+}
