@@ -44,7 +44,7 @@ const ROWS: &[Row] = &[
     // replies and faults apart; 130 for sources of a film that are left at once and looked for again, and for a film that is known to
     // be over; 1,020 for a player that the service starts, keeps and leads with the seats, and for films in playlists and in the demo;
     // 155 for how far seats are from their film, its timecode, a source that a person chooses, and seats that are left where nobody knows.
-    ("lines of code", counts::lines_of_code, Less, 59_484.0, 39_800.0),
+    ("lines of code", counts::lines_of_code, Less, 62_225.0, 39_800.0),
     // Two more for the film in the status, which tests make.
     ("public items and fields", counts::public_items, Less, 1_161.0, 400.0),
     ("lines of the longest function", counts::longest_function, Less, 52.0, 48.0),
