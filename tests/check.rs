@@ -406,6 +406,22 @@ fn a_link_that_is_to_play_more_often_than_it_can_fails_the_check_with_what_would
 }
 
 #[test]
+fn a_seat_with_axes_that_no_cue_can_have_is_checked_without_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let drives = std::fs::read_to_string(DRIVES).expect("it is there");
+    let udp = drives[drives.find("[seat.silver3]").expect("a seat")
+        ..drives.find("[seat.silver3.drive]").expect("its drive")]
+        .to_owned()
+        + "[[controller]]\nname = \"A1\"\nseat = \"silver3\"\naddress = \"127.0.0.1:7408\"\naxis_offset = 11\n";
+    let on_link = drives.replace("name = \"D1\"", "name = \"D1\"\naxis_offset = 11");
+    for (name, text) in [("udp.toml", udp), ("link.toml", on_link)] {
+        let run = kinocue(&["check", CUE, "--config", &write(folder.path(), name, &text)]);
+        assert_eq!(run.code, Some(65), "{name}: {}", run.stderr);
+        assert!(run.stderr.contains("a4: no controller takes this axis"), "{name}: {}", run.stderr);
+    }
+}
+
+#[test]
 fn nothing_that_would_move_a_seat_takes_a_hall_with_drives() {
     let folder = tempfile::tempdir().expect("a folder");
     let socket = folder.path().join("control.sock").display().to_string();

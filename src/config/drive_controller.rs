@@ -77,7 +77,7 @@ impl DriveController {
     /// The axes of the cue that are its own, counted from 0.
     #[must_use]
     pub(crate) fn window(&self) -> Range<usize> {
-        self.axis_offset..self.axis_offset + self.seat.axes
+        self.seat.axes_from(self.axis_offset)
     }
 }
 

@@ -384,7 +384,7 @@ impl Controller {
     /// The axes of the cue that are its own, counted from 0.
     #[must_use]
     pub(crate) fn window(&self) -> Range<usize> {
-        self.axis_offset..self.axis_offset + self.seat.axes
+        self.seat.axes_from(self.axis_offset)
     }
 
     /// The axes of a cue of `cue_axes` axes that its frames carry, also those of others, from 0.

@@ -1,6 +1,7 @@
 //! A seat type: the axes of one controller, and where their motors may be found.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::{AxisGeometry, AxisUnit, MAX_AXES};
@@ -26,6 +27,12 @@ pub struct SeatType {
 }
 
 impl SeatType {
+    /// The axes of a cue, from 0, that such a seat takes from `first` on. It may have more: no cue has anything for those.
+    #[must_use]
+    pub(crate) fn axes_from(&self, first: usize) -> Range<usize> {
+        first..MAX_AXES.min(first + self.axes)
+    }
+
     /// The seat that `--to` means: the bench seat with that many axes.
     #[must_use]
     pub fn bench3(axes: usize) -> Self {
