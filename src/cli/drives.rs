@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
+use crate::config::drive::DriveFamily;
 use crate::config::parse_level;
 use crate::plain;
 use crate::proof::{DriveAxisProof, DriveProof, DriveTerms, DrivenBy, Terms, prove_driven, rate_that_fits};
@@ -21,8 +23,11 @@ const MOST_HZ: f64 = 500.0;
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct DriveArgs {
     /// Judge also what serial drives of this family execute of a cue; pulses of the seat are their counts or microsteps.
-    #[arg(long, value_enum, value_name = "FAMILY", requires = "link_rate")]
-    drive: Option<SerialFamily>,
+    ///
+    /// A SilverMax is judged by segments of its timed queue, a SIXpack 2 by targets on the fly, with clock_divider 3 and propdiv as its
+    /// seat needs it.
+    #[arg(long, value_name = "FAMILY", requires = "link_rate", value_parser = drive_family())]
+    drive: Option<DriveFamily>,
 
     /// Segments, or targets, that their link carries for each axis, a second: 10 to 500.
     #[arg(long, value_name = "HZ", requires = "drive", value_parser = parse_link_rate)]
@@ -31,15 +36,6 @@ pub(super) struct DriveArgs {
     /// Level of vibration on drives, on top of --level.
     #[arg(long, value_name = "LEVEL", requires = "drive", value_parser = parse_level, default_value = "100%")]
     drive_vibration: f64,
-}
-
-/// The families of serial drives.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum SerialFamily {
-    /// SilverMax, by segments of its timed queue.
-    Silvermax,
-    /// SIXpack 2, by targets on the fly, with clock_divider 3 and propdiv as its seat needs it.
-    Sixpack2,
 }
 
 /// One axis on drives, in `--json`.
@@ -67,8 +63,8 @@ impl DriveArgs {
     pub(super) fn judge(&self, path: &Path, timeline: &Timeline, terms: &Terms) -> Option<DriveVerdict> {
         let (family, hz) = (self.drive?, self.link_rate?);
         let family = match family {
-            SerialFamily::Silvermax => DrivenBy::SilverMax,
-            SerialFamily::Sixpack2 => {
+            DriveFamily::SilverMax => DrivenBy::SilverMax,
+            DriveFamily::Sixpack2 => {
                 DrivenBy::SixPack { clock_divider: CLOCK_DIVIDER, propdiv: None, jump: None }
             }
         };
@@ -112,6 +108,13 @@ fn passed(path: &Path, proof: &DriveProof, hz: f64) -> String {
         "{path}: drives play it at {hz:.1} Hz, at most {value:.2} {unit} beside the cue (a{axis} at {})\n",
         deviation.at
     )
+}
+
+/// Reads a family by its word in the configuration.
+fn drive_family() -> impl TypedValueParser<Value = DriveFamily> {
+    let known = |word: &String| DriveFamily::ALL.into_iter().find(|(known, _)| known == word);
+    PossibleValuesParser::new(DriveFamily::ALL.map(|(word, _)| word))
+        .try_map(move |word| known(&word).map(|(_, family)| family).ok_or("no family of drives"))
 }
 
 fn parse_link_rate(text: &str) -> Result<f64, String> {

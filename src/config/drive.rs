@@ -27,9 +27,9 @@ pub(crate) enum DriveFamily {
 }
 
 impl DriveFamily {
-    /// All of them, by the words of the configuration.
+    /// All of them, by their words.
     pub(crate) const ALL: [(&'static str, Self); 2] =
-        [("silvermax", Self::SilverMax), ("sixpack2", Self::Sixpack2)];
+        [(Self::SilverMax.word(), Self::SilverMax), (Self::Sixpack2.word(), Self::Sixpack2)];
 
     /// What `dialect` calls it.
     pub(crate) const fn word(self) -> &'static str {

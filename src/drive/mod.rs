@@ -21,7 +21,7 @@ pub use lanes::Manner;
 pub(crate) use lanes::lanes;
 pub(crate) use rounds::Rounds;
 pub(crate) use segments::{
-    DriveCourse, DriveUnits, Knots, LOOP, Lag, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
+    DriveCourse, DriveUnits, Knots, LOOP, Lag, Middle, Middles, Motor, Segment, SegmentFit, Shaker, TICK_NS,
     TargetMaker,
 };
 

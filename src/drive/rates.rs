@@ -8,6 +8,8 @@ use std::time::Duration;
 use crate::config::Config;
 use crate::config::drive::DriveFamily;
 use crate::config::link::{Link, LinkWiring};
+use crate::drive::LOOP;
+use crate::time::nanos;
 
 /// Octets of a SilverMax segment and its ack, as most are.
 pub(crate) const USUAL_EXCHANGE: u32 = 45;
@@ -24,8 +26,6 @@ const SIXPACK2_OCTETS: u32 = 9;
 const TARGETS_A_QUERY: u32 = 10;
 /// A frame on a CAN bus of 500,000 bits a second takes so many bits with its gap.
 const CAN_BITS: u32 = 135;
-/// A SIXpack 2 looks at its targets so often; what comes in between on a bus is of no use.
-const SIXPACK2_TICK_US: u64 = 2_000;
 /// The part of a line that motion may take; polls take the rest, over USB a quarter.
 const SHARE: f64 = 0.80;
 const USB_SHARE: f64 = 0.75;
@@ -103,7 +103,8 @@ impl LinkLoad {
     fn on_ticks(&self, seconds: f64) -> Duration {
         let micros = whole_micros(seconds);
         Duration::from_micros(match self.wiring {
-            LinkWiring::Can => micros.next_multiple_of(SIXPACK2_TICK_US),
+            // What comes between two rounds of the drive's loop is of no use.
+            LinkWiring::Can => micros.next_multiple_of(nanos(LOOP) / 1_000),
             LinkWiring::Rs232 | LinkWiring::Rs485 => micros,
         })
     }

@@ -277,11 +277,3 @@ pub(crate) enum Breach {
     #[error(transparent)]
     Drive(#[from] DriveBreach),
 }
-
-impl Breach {
-    /// True if it is of a serial link, and one with a higher rate may mend it.
-    #[must_use]
-    pub(crate) const fn is_of_rate(&self) -> bool {
-        matches!(self, Self::Drive(breach) if breach.is_of_rate())
-    }
-}

@@ -18,6 +18,7 @@ mod register;
 mod reply;
 mod report;
 mod servo;
+pub(crate) mod sixpack2;
 mod status;
 mod vibration;
 mod word_order;

@@ -2,19 +2,13 @@
 
 use crate::config::fault::Faults;
 use crate::config::section::{Entry, Section};
-use crate::motion::SeatType;
+use crate::motion::{AxisGeometry, SeatType};
+use crate::wire::sixpack2::{GREATEST_DIVIDER, MOST_STEPS, greatest_divider};
 
 /// The shares of its peak current that it can be set to, percent (CMD $11).
 const SHARES: [u8; 9] = [100, 75, 50, 38, 25, 19, 13, 9, 0];
-/// The clock that its speeds are counted in, Hz.
-const CLOCK_HZ: f64 = 20_000_000.0;
-/// Its greatest speed, in its own units.
-const MOST_SPEED: f64 = 511.0;
-/// Microsteps a second that it makes at most.
-const MOST_STEPS: f64 = 200_000.0;
 /// The divider that its manual starts with.
 const USUAL_DIVIDER: u8 = 5;
-const GREATEST_DIVIDER: u8 = 31;
 
 /// Settings of a SIXpack 2.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,24 +94,16 @@ fn share_of(section: &mut Section<'_, '_, '_>, key: &'static str, usual: u8) -> 
 }
 
 impl Sixpack2Drive {
-    /// Microsteps a second at its greatest speed with a divider (CMD $12, $13: the other divider is 0).
-    fn most_steps(divider: u8) -> f64 {
-        (CLOCK_HZ * MOST_SPEED / ((f64::from(divider) + 1.0) * f64::from(1 << 14))).min(MOST_STEPS)
-    }
-
     /// Why the clock divider is too great for the seat's greatest speed.
     pub(crate) fn too_slow_for(&self, seat: &SeatType) -> Option<String> {
-        let steps = |axis: &crate::motion::AxisGeometry| axis.max_velocity / axis.lead * axis.pulses_per_rev;
+        let steps = |axis: &AxisGeometry| axis.max_velocity / axis.lead * axis.pulses_per_rev;
         let (needed, speed) = seat
             .own()
             .iter()
             .map(|axis| (steps(axis), axis.max_velocity))
             .max_by(|(one, _), (other, _)| one.total_cmp(other))?;
-        if needed <= Self::most_steps(self.clock_divider) {
-            return None;
-        }
-        let enough = (0..=GREATEST_DIVIDER).rev().find(|divider| needed <= Self::most_steps(*divider));
-        Some(match enough {
+        Some(match greatest_divider(needed) {
+            Some(enough) if self.clock_divider <= enough => return None,
             Some(enough) => {
                 format!("{speed} mm/s needs clock_divider {enough} or less, it is {}", self.clock_divider)
             }

@@ -14,7 +14,7 @@ mod vibration;
 
 pub(crate) use fit::SegmentFit;
 pub(crate) use knots::Knots;
-pub(crate) use middles::Middles;
+pub(crate) use middles::{Middle, Middles};
 pub(crate) use model::{DriveCourse, DriveUnits, TICK_NS};
 pub(crate) use segment::Segment;
 pub(crate) use sixpack::{LOOP, Lag, Motor, TargetMaker};

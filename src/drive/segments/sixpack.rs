@@ -1,4 +1,4 @@
-//! TargetMaker of a SIXpack 2, and what its loop makes of them.
+//! Targets of a SIXpack 2, and what its loop makes of them.
 //!
 //! Each 2 ms a motor's speed is its distance to the target over `propdiv`: a lag of the first order. So targets lead by
 //! what it lags. A new one makes the speed jump, which a motor without feedback may lose; what it jumps is judged, not
@@ -7,14 +7,11 @@
 use std::time::Duration;
 
 use super::middles::Middle;
+use crate::wire::sixpack2::{MOST_SPEED, steps_of_a_unit};
 
 /// How often the loop runs.
 pub(crate) const LOOP: Duration = Duration::from_millis(2);
 
-/// The clock of the unit, Hz.
-const CLOCK_HZ: f64 = 20e6;
-/// The greatest speed, in the unit's own units.
-const MOST_SPEED: i32 = 511;
 /// How a motor follows its target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Lag {
@@ -42,7 +39,7 @@ impl Lag {
 
     /// Microsteps a second of one unit of speed.
     fn unit(self) -> f64 {
-        CLOCK_HZ / (f64::from(self.clock_divider) + 1.0) / f64::from(1_u32 << 14)
+        steps_of_a_unit(self.clock_divider)
     }
 
     /// How long it lags behind, seconds.
@@ -55,12 +52,6 @@ impl Lag {
     #[must_use]
     pub(crate) const fn propdiv(self) -> u8 {
         self.propdiv
-    }
-
-    /// The greatest speed, microsteps a second.
-    #[must_use]
-    pub(crate) fn most(self) -> f64 {
-        f64::from(MOST_SPEED) * self.unit()
     }
 }
 
@@ -103,7 +94,7 @@ pub(crate) struct Motor {
     lag: Lag,
     /// Microsteps.
     position: f64,
-    /// DriveUnits of speed.
+    /// In the unit's own units.
     speed: i32,
 }
 
@@ -145,7 +136,6 @@ mod tests {
     fn the_lag_is_that_of_the_dividers() {
         let ms = |clock_divider, propdiv| Lag::new(clock_divider, propdiv).tau() * 1e3;
         assert!((ms(5, 8) - 39.3).abs() < 0.1 && (ms(3, 1) - 3.28).abs() < 0.01, "{} {}", ms(5, 8), ms(3, 1));
-        assert!((Lag::new(5, 8).most() / 640.0 - 162.0).abs() < 1.0, "mm/s at a lead of 5 mm");
     }
 
     #[test]

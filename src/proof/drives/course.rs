@@ -31,18 +31,19 @@ pub(super) struct WantedCourse {
 }
 
 impl WantedCourse {
-    /// Of an axis of a cue, with vibration at a level of its own, for slices of a period, poses a `tick` apart.
-    pub(super) fn of(subject: &Subject<'_>, tick: Duration, slice: Duration, shake: f64) -> Self {
+    /// Of an axis of a cue, with vibration at a level of its own where there is any, for slices of a period, poses a `tick` apart.
+    pub(super) fn of(subject: &Subject<'_>, tick: Duration, slice: Duration, shake: Option<f64>) -> Self {
         let ends = Ends::of(subject);
         let slice = signed(slice);
-        let lead = i64::max(ends.lead() / slice + 2, 3) * slice;
+        let lead = i64::max(Ends::span(ends.before.as_ref()) / slice + 2, 3) * slice;
         let per_tick = tick.as_nanos().div_ceil(FINE.as_nanos()).max(1);
         let per_tick = usize::try_from(per_tick).unwrap_or(1);
         // Nothing that is told to a drive knows a finer time than the pose, but what it does is judged between poses as well.
         let step = (signed(tick) / i64::try_from(per_tick).unwrap_or(1)).max(1);
         let end = subject.timeline.duration().as_nanos();
-        let until = end + ends.tail() + 6 * slice + 4 * signed(tick);
-        let mut sampler = Sampler { subject, ends, shake, swing: Shaker::default(), hint: Hint::default() };
+        let until = end + Ends::span(ends.after.as_ref()) + 6 * slice + 4 * signed(tick);
+        let mut sampler =
+            Sampler { subject, ends, shake, swing: Shaker::default(), hints: Default::default() };
         let (mut at, mut places) = (-lead, Vec::new());
         while at <= until {
             places.push(sampler.next(at, step));
@@ -93,12 +94,9 @@ impl Ends {
         Self { before: halt(first, &subject.slot), after, end: pieces.end() }
     }
 
-    fn lead(&self) -> i64 {
-        self.before.as_ref().map_or(0, |halt| signed(Duration::from_secs_f64(halt.seconds().min(60.0))))
-    }
-
-    fn tail(&self) -> i64 {
-        self.after.as_ref().map_or(0, |halt| signed(Duration::from_secs_f64(halt.seconds().min(60.0))))
+    /// How long a way to rest takes, nanoseconds.
+    fn span(way: Option<&Halt>) -> i64 {
+        way.map_or(0, |halt| signed(Duration::from_secs_f64(halt.seconds().min(60.0))))
     }
 
     /// The place outside the cue, where it moves there.
@@ -118,25 +116,24 @@ impl Ends {
 struct Sampler<'a> {
     subject: &'a Subject<'a>,
     ends: Ends,
-    shake: f64,
+    shake: Option<f64>,
     swing: Shaker,
-    hint: Hint,
+    /// Where cue and vibration were found last.
+    hints: (Hint, usize),
 }
 
 impl Sampler<'_> {
     fn next(&mut self, at: i64, step: i64) -> f64 {
         let Subject { timeline, axis, slot, .. } = self.subject;
         let time = ShowTime::from_nanos(at);
-        let own = || slot.place(timeline.sample(time, &mut self.hint)[*axis]);
+        let own = || slot.place(timeline.sample(time, &mut self.hints.0)[*axis]);
         let place = self.ends.place(at).unwrap_or_else(own);
-        if self.shake <= 0.0 || !timeline.vibrates(*axis) {
-            return place;
-        }
+        let Some(shake) = self.shake else { return place };
         // A play leaves vibration out of its joins and stops.
         let inside = (0..=self.ends.end).contains(&at);
-        let sample = timeline.cue().tracks().vibration(*axis).at(time, &mut 0);
+        let sample = timeline.cue().tracks().vibration(*axis).at(time, &mut self.hints.1);
         let Vibration { hz, amplitude } = sample.into();
-        let amplitude = if inside { amplitude * slot.scale().0 * self.shake } else { 0.0 };
+        let amplitude = if inside { amplitude * slot.scale().0 * shake } else { 0.0 };
         place + self.swing.after(Duration::from_nanos(step.unsigned_abs()), hz, amplitude)
     }
 }

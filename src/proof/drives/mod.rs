@@ -13,10 +13,11 @@ use super::axis::Subject;
 use super::violation::{DriveBreach, OnDrive, OverLimit};
 use super::{Breach, Found, Quantity, SLACK, Terms, Violation, Worst, placed, subjects};
 use crate::cue::{FAULTS_TOLD, Vibration};
-use crate::drive::{Lag, Shaker};
+use crate::drive::{Lag, Middle, Middles, Shaker};
 use crate::motion::SeatAxis;
 use crate::time::ShowTime;
 use crate::timeline::{Figure, Timeline};
+use crate::wire::sixpack2::greatest_divider;
 use course::WantedCourse;
 
 /// A way to play to serial drives.
@@ -37,7 +38,7 @@ pub(crate) struct DriveTerms {
 pub(crate) enum DrivenBy {
     /// Segments.
     SilverMax,
-    /// TargetMaker, on the fly.
+    /// Targets, on the fly.
     SixPack {
         /// The divider of the clock.
         clock_divider: u8,
@@ -119,7 +120,8 @@ pub(crate) fn rate_that_fits(
     most: f64,
 ) -> Option<f64> {
     // Proofs of a long film take a while: none is made that cannot pass.
-    if !proof.violations.iter().all(|one| one.breach.is_of_rate()) {
+    let is_of_rate = |one: &Violation| matches!(&one.breach, Breach::Drive(drive) if drive.is_of_rate());
+    if !proof.violations.iter().all(is_of_rate) {
         return None;
     }
     let mut hz = link.period.as_secs_f64().recip();
@@ -144,10 +146,9 @@ struct Driven<'a> {
 
 impl Driven<'_> {
     fn prove(&self, found: &mut Vec<Found>) -> Option<DriveAxisProof> {
-        let tick = self.terms.rate.period();
         // An axis that never vibrates costs no swing.
-        let shake = if self.subject.timeline.vibrates(self.subject.axis) { self.link.shake } else { 0.0 };
-        let course = WantedCourse::of(self.subject, tick, self.link.period, shake);
+        let shake = self.is_shaken().then_some(self.link.shake);
+        let course = WantedCourse::of(self.subject, self.terms.rate.period(), self.link.period, shake);
         let most = match self.link.family {
             DrivenBy::SilverMax => silvermax::execute(self, &course, found)?,
             DrivenBy::SixPack { clock_divider, propdiv, jump } => {
@@ -161,14 +162,32 @@ impl Driven<'_> {
         Some(self.executed(&most))
     }
 
+    /// What the axis does in the middle of each slice, of poses as a play would push them, each in the unit that `scale` makes of strokes.
+    fn middles(&self, course: &WantedCourse, scale: impl Fn(f64) -> f64, mut take: impl FnMut(Middle)) {
+        let first = scale(course.places[0]);
+        let mut middles = Middles::at_rest(self.terms.rate.period(), self.link.period, first);
+        for pose in course.poses() {
+            middles.push(scale(pose));
+            while let Some(middle) = middles.next() {
+                take(middle);
+            }
+        }
+    }
+
+    /// The ends of the stroke in pulses, the lower first.
+    fn ends(&self) -> (f64, f64) {
+        let slot = &self.subject.slot;
+        (slot.low_pulses, slot.low_pulses + slot.stroke_pulses)
+    }
+
     /// How motors of the seat follow; none where none of their settings would do.
     fn lag(&self, divider: u8, propdiv: Option<u8>, jump: f64, found: &mut Vec<Found>) -> Option<Lag> {
         let (axis, period) = (self.subject.geometry(), self.link.period);
         let (velocity, on) = (axis.max_velocity, self.on(ShowTime::ZERO));
         let steps = velocity / axis.stroke() * axis.stroke_pulses();
-        if Lag::new(divider, 1).most() < steps {
-            let fits = (0..divider).rev().find(|divider| Lag::new(*divider, 1).most() >= steps);
-            let breach = DriveBreach::TooFast { on, velocity, divider, fits: fits.unwrap_or(0) };
+        let fits = greatest_divider(steps);
+        if fits.is_none_or(|fits| fits < divider) {
+            let breach = DriveBreach::TooFast { on, velocity, divider, fits };
             self.of_seat(breach, found);
             return None;
         }
@@ -283,6 +302,37 @@ struct MostExecuted {
     highest: Worst,
     velocity: Worst,
     roughness: Roughness,
+}
+
+impl MostExecuted {
+    /// At rest at `place`, before anything else was met; with the limits of velocity and roughness.
+    fn at_rest(driven: &Driven<'_>, place: f64, velocity: f64, roughness: Roughness) -> Self {
+        let axis = driven.subject.geometry();
+        Self {
+            deviation: below(driven.link.max_deviation),
+            lowest: Worst { value: place, ..below(axis.low) },
+            highest: Worst { value: place, ..below(axis.high) },
+            velocity: below(velocity),
+            roughness,
+        }
+    }
+
+    /// The axis is at `place` at a show time, and was to be at `wanted`, a fraction of the stroke, if that is of the cue.
+    fn be_at(&mut self, driven: &Driven<'_>, at: i64, place: f64, wanted: Option<f64>) {
+        driven.larger(&mut self.highest, place, at);
+        let mut lowest = Worst { value: -self.lowest.value, ..self.lowest };
+        driven.larger(&mut lowest, -place, at);
+        self.lowest = Worst { value: -lowest.value, ..lowest };
+        if let Some(wanted) = wanted {
+            let off = (place - driven.subject.geometry().place(wanted)).abs();
+            driven.larger(&mut self.deviation, off, at);
+        }
+    }
+}
+
+/// Nothing yet of what may be no larger than that.
+fn below(limit: f64) -> Worst {
+    Worst { limit, ..Worst::default() }
 }
 
 /// A show time inside any cue.

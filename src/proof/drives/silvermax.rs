@@ -2,8 +2,8 @@
 
 use super::super::violation::DriveBreach;
 use super::course::{WantedCourse, signed};
-use super::{Driven, Found, MostExecuted, Roughness, Worst};
-use crate::drive::{DriveCourse, DriveUnits, Knots, Middles, Segment, SegmentFit, TICK_NS};
+use super::{Driven, Found, MostExecuted, Roughness, Worst, below};
+use crate::drive::{DriveCourse, DriveUnits, Knots, Segment, SegmentFit, TICK_NS};
 
 /// How far outside its stroke an axis may be: counts that rounding makes.
 const ROUNDING: f64 = 2.0;
@@ -21,19 +21,14 @@ pub(super) fn execute(
         return None;
     };
     let mut run = DriveRun::new(driven, course, units);
-    let (period, slot) = (driven.link.period, &driven.subject.slot);
-    let mut middles = Middles::at_rest(driven.terms.rate.period(), period, course.places[0]);
+    let slot = &driven.subject.slot;
     let at_first = slot.pulses(course.places[0]).0;
-    let ends = (slot.low_pulses, slot.low_pulses + slot.stroke_pulses);
-    let mut fit = SegmentFit::at_rest(units, Knots::new(period), ends, at_first);
-    for pose in course.poses() {
-        middles.push(pose);
-        while let Some(middle) = middles.next() {
-            if let Some(segment) = fit.push(slot.low_pulses + middle.position * slot.stroke_pulses) {
-                run.take(segment);
-            }
+    let mut fit = SegmentFit::at_rest(units, Knots::new(driven.link.period), driven.ends(), at_first);
+    driven.middles(course, std::convert::identity, |middle| {
+        if let Some(segment) = fit.push(slot.low_pulses + middle.position * slot.stroke_pulses) {
+            run.take(segment);
         }
-    }
+    });
     run.outside(found);
     Some(run.most)
 }
@@ -65,20 +60,11 @@ impl<'a> DriveRun<'a> {
         let velocity = if shaken { axis.shaken_velocity() } else { axis.max_velocity };
         let acceleration = if shaken { axis.shaken_acceleration() } else { axis.max_acceleration };
         // Nothing but the drive makes the vibration, so both are in what is measured, and the sum has its own limits.
-        let of = |limit: f64| Worst { limit, ..Worst::default() };
-        let place = axis.place(course.places[0]);
-        let roughness = Roughness::Segments { acceleration: of(acceleration), jerk: of(axis.max_jerk) };
-        let most = MostExecuted {
-            deviation: of(driven.link.max_deviation),
-            lowest: Worst { value: place, ..of(axis.low) },
-            highest: Worst { value: place, ..of(axis.high) },
-            velocity: of(velocity),
-            roughness,
-        };
+        let roughness = Roughness::Segments { acceleration: below(acceleration), jerk: below(axis.max_jerk) };
+        let most = MostExecuted::at_rest(driven, axis.place(course.places[0]), velocity, roughness);
         let per_count = axis.stroke() / slot.stroke_pulses;
         let at_knot = DriveCourse::at_rest(units, slot.pulses(course.places[0]).0);
         let per_unit = per_count / units.per_count() / (f64::from(TICK_NS) * 1e-9);
-        let (stop, speed) = (of(0.0), 0.0);
         Self {
             driven,
             course,
@@ -87,8 +73,8 @@ impl<'a> DriveRun<'a> {
             next: 0,
             acceleration: 0.0,
             most,
-            stop,
-            speed,
+            stop: below(0.0),
+            speed: 0.0,
             per_count,
             per_unit,
         }
@@ -121,16 +107,8 @@ impl<'a> DriveRun<'a> {
         // At 240 mm/s a tick is 0.03 mm, so between ticks, too.
         let (here, then) = (self.at_knot.within(segment, whole), self.at_knot.within(segment, whole + 1));
         let counts = here.position() + part * (then.position() - here.position());
-        let place = self.place(counts);
-        let (driven, axis) = (self.driven, self.driven.subject.geometry());
-        driven.larger(&mut self.most.highest, place, at);
-        let mut lowest = Worst { value: -self.most.lowest.value, ..self.most.lowest };
-        driven.larger(&mut lowest, -place, at);
-        self.most.lowest = Worst { value: -lowest.value, ..lowest };
-        if (0..=self.course.end).contains(&at) {
-            let off = (place - axis.place(self.course.places[self.next])).abs();
-            driven.larger(&mut self.most.deviation, off, at);
-        }
+        let wanted = (0..=self.course.end).contains(&at).then_some(self.course.places[self.next]);
+        self.most.be_at(self.driven, at, self.place(counts), wanted);
     }
 
     fn place(&self, counts: f64) -> f64 {

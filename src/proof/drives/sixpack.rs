@@ -1,33 +1,18 @@
 //! What the motors of a SIXpack 2 execute: their loop every 2 ms, after the very targets that a play would send.
 
 use super::course::{WantedCourse, signed};
-use super::{Driven, MostExecuted, Roughness, Worst};
-use crate::drive::{LOOP, Lag, Middles, Motor, TargetMaker};
+use super::{Driven, MostExecuted, Roughness, below};
+use crate::drive::{LOOP, Lag, Motor, TargetMaker};
 
 /// Runs the course.
 pub(super) fn execute(driven: &Driven<'_>, course: &WantedCourse, lag: Lag, jump: f64) -> MostExecuted {
-    let (period, slot) = (driven.link.period, &driven.subject.slot);
-    let axis = driven.subject.geometry();
+    let (slot, axis) = (&driven.subject.slot, driven.subject.geometry());
     let steps = |place: f64| slot.low_pulses + place * slot.stroke_pulses;
-    let ends = (slot.low_pulses, slot.low_pulses + slot.stroke_pulses);
-    let mut middles = Middles::at_rest(driven.terms.rate.period(), period, steps(course.places[0]));
-    let mut targets = TargetMaker::at_rest(lag, ends, steps(course.places[0]));
+    let mut targets = TargetMaker::at_rest(lag, driven.ends(), steps(course.places[0]));
     let mut made = Vec::new();
-    for pose in course.poses() {
-        middles.push(steps(pose));
-        while let Some(middle) = middles.next() {
-            made.push(targets.push(middle));
-        }
-    }
-    let of = |limit: f64| Worst { limit, ..Worst::default() };
+    driven.middles(course, steps, |middle| made.push(targets.push(middle)));
     let place = axis.place(course.places[0]);
-    let mut most = MostExecuted {
-        deviation: of(driven.link.max_deviation),
-        lowest: Worst { value: place, ..of(axis.low) },
-        highest: Worst { value: place, ..of(axis.high) },
-        velocity: of(axis.max_velocity),
-        roughness: Roughness::Jumps(of(jump)),
-    };
+    let mut most = MostExecuted::at_rest(driven, place, axis.max_velocity, Roughness::Jumps(below(jump)));
     run(driven, course, Motor::at_rest(lag, steps(course.places[0])), &made, &mut most);
     most
 }
@@ -57,14 +42,7 @@ fn run(
         driven.larger(&mut most.velocity, motor.velocity().abs() * per_step, at);
         at += signed(LOOP);
         let place = axis.low + (motor.position() - slot.low_pulses) * per_step;
-        driven.larger(&mut most.highest, place, at);
-        let mut lowest = Worst { value: -most.lowest.value, ..most.lowest };
-        driven.larger(&mut lowest, -place, at);
-        most.lowest = Worst { value: -lowest.value, ..lowest };
-        if let Some(wanted) = course.place(at)
-            && (0..=course.end).contains(&at)
-        {
-            driven.larger(&mut most.deviation, (place - axis.place(wanted)).abs(), at);
-        }
+        let wanted = course.place(at).filter(|_| (0..=course.end).contains(&at));
+        most.be_at(driven, at, place, wanted);
     }
 }

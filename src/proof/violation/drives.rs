@@ -69,8 +69,8 @@ pub(crate) enum DriveBreach {
     )]
     Jumps { on: OnDrive, over: OverLimit },
     /// The seat may be faster than its motors, which would take a smaller divider of their clock.
-    #[error("{velocity} {}/s of seat {} needs clock_divider {fits} or less, it is {divider}", on.unit.name(), on.seat)]
-    TooFast { on: OnDrive, velocity: f64, divider: u8, fits: u8 },
+    #[error("{velocity} {}/s of seat {} {}", on.unit.name(), on.seat, needed(*fits, *divider))]
+    TooFast { on: OnDrive, velocity: f64, divider: u8, fits: Option<u8> },
     /// Nothing that a motor can be told makes its speed jump so little.
     #[error(
         "at {:.1} Hz no propdiv lets a motor at {velocity} {unit}/s jump by no more than {jump:.1} {unit}/s (jump_{unit}_s of seat {}); raise \
@@ -93,4 +93,12 @@ impl DriveBreach {
     pub(crate) const fn is_of_rate(&self) -> bool {
         !matches!(self, Self::Counts { .. } | Self::TooFast { .. } | Self::NoRoomToBrake { .. })
     }
+}
+
+/// What a divider would have to be, if any would do.
+fn needed(fits: Option<u8>, divider: u8) -> String {
+    fits.map_or_else(
+        || "is more than a SIXpack 2 makes with any clock_divider; lower its max_velocity".to_owned(),
+        |fits| format!("needs clock_divider {fits} or less, it is {divider}"),
+    )
 }
