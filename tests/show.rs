@@ -264,3 +264,63 @@ fn a_show_that_is_paused_or_stopped_before_its_first_frame_can_be_parked() {
         assert!(played.frames.iter().all(|frame| frame.request.positions[0].0 == 0), "nothing has moved");
     }
 }
+
+/// Two seats of one hall, the second of which executes what it is sent a tenth of a second later.
+fn one_led_ahead(cue: impl Into<String>) -> Virtual {
+    let mut hall = Virtual::new(cue);
+    hall.to.push("127.0.0.1:7409".to_owned());
+    hall.leads = vec![Duration::ZERO, Duration::from_millis(100)];
+    hall
+}
+
+#[test]
+fn a_seat_that_is_led_ahead_gets_each_pose_of_the_cue_by_its_lead_before_the_others() {
+    let cue = "time_ms,a1,v1_hz,v1_amp\n0,0,0,0\n500,0,0,0\n1000,0.1,20,0.002\n1500,0.2,20,0.002\n2000,0.1,0,0\n2500,0,0,0\n3000,0,0,0\n";
+    let played = one_led_ahead(cue).play();
+    assert_eq!(played.ended.ending, Ending::Completed);
+    let [own, ahead] = [0, 1].map(|lane| played.lane(lane).collect::<Vec<_>>());
+    assert_eq!((own.len(), ahead.len()), (310 + 7, 310 + 7), "both begin by the lead before the cue");
+    for (k, frame) in own.iter().enumerate().skip(10) {
+        let sooner = ahead[k - 10];
+        assert_eq!(frame.request.positions[0], sooner.request.positions[0], "frame {k}");
+        if k < 310 {
+            assert_eq!(frame.request.vibration, sooner.request.vibration, "frame {k}");
+        }
+    }
+    assert!(own.iter().any(|frame| frame.request.vibration.is_some_and(|axes| axes[0].amplitude > 0)));
+    assert_eq!(own[109].request.positions[0].0, 30_000, "at 1 s the cue stands at a tenth");
+}
+
+/// Begins and ends at rest at half of the stroke.
+fn gentle_ride() -> String {
+    let row = |ms: i32| {
+        let t = f64::from(ms) / 1e3;
+        let swell = (std::f64::consts::PI * t / 20.0).sin().powi(2);
+        format!("{ms},{:.6}\n", 0.5 + 0.3 * swell * (std::f64::consts::TAU * 0.25 * t).sin())
+    };
+    (0..=1_000).fold("time_ms,a1\n".to_owned(), |text, n| text + &row(20 * n))
+}
+
+#[test]
+fn seats_that_are_led_ahead_keep_the_limits_through_stops_pauses_seeks_and_late_ticks() {
+    let seek = Event::Seek(ShowTime::from_millis(12_000));
+    let late = Event::Late(Duration::from_millis(35));
+    let gap = Event::Late(Duration::from_millis(200));
+    let [pause, resume] = [Transition::Pause, Transition::Resume].map(Event::Ask);
+    let scripts: [&[(u64, Event)]; 5] = [
+        &[],
+        &[(400, seek)],
+        &[(600, late), (900, gap)],
+        &[(800, pause), (1100, resume)],
+        &[(850, Event::Stop), (1200, Event::Leave)],
+    ];
+    for script in scripts {
+        let mut hall = one_led_ahead(gentle_ride());
+        hall.script = script.to_vec();
+        let played = hall.play();
+        for lane in 0..2 {
+            assert_within(played.worst_of_lane(lane, 0..played.lane(lane).count()));
+            assert_eq!(played.clamps[lane].clamps, 0, "{script:?}, lane {lane}");
+        }
+    }
+}

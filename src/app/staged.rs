@@ -76,7 +76,29 @@ impl StagedShow {
         mixes: &[Mix],
         silent: bool,
     ) -> Result<Self, PlanError> {
-        let mut lanes = lanes(config, timeline, Manner { level: 1.0, silent });
+        Self::of_lanes(
+            lanes(config, timeline, Manner { level: 1.0, silent }),
+            timeline,
+            headroom,
+            show,
+            mixes,
+        )
+    }
+
+    /// The same for lanes that are made. One that is led ahead has the beginning of the cue before the others, so that show time begins
+    /// by the longest lead before the show's start.
+    ///
+    /// # Errors
+    /// As [`StagedShow::new`].
+    pub(crate) fn of_lanes(
+        mut lanes: Vec<Lane>,
+        timeline: &Arc<Timeline>,
+        headroom: Headroom,
+        show: Show,
+        mixes: &[Mix],
+    ) -> Result<Self, PlanError> {
+        let lead = lanes.iter().map(|lane| lane.window.lead()).max().unwrap_or_default();
+        let show = Show { start: show.start - lead, ..show };
         for (lane, mix) in lanes.iter_mut().zip(mixes) {
             lane.window.set_level(mix.motion);
         }

@@ -8,9 +8,9 @@ use crate::time::MonoTime;
 
 /// Frames so far apart are kept together; one that takes longer is alone.
 const BUCKET: Duration = Duration::from_millis(40);
-/// What is looked back to at the most ([`super::FOLLOWS`] and three periods of 50 ms, and [`super::STALE`]), and one bucket for what
-/// only a part of is that old.
-const BUCKETS: usize = 15;
+/// What is looked back to at the most ([`super::FOLLOWS`] and three periods of 50 ms, the longest lead, and [`super::STALE`]), and one
+/// bucket for what only a part of is that old.
+const BUCKETS: usize = 26;
 
 /// The places that some frames lead through.
 #[derive(Debug, Clone, Copy)]

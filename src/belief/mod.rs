@@ -108,6 +108,8 @@ pub(crate) struct Belief {
     asks: bool,
     gap: bool,
     period: Duration,
+    /// How long before the seat executes them its frames are made: they may be confirmed so much later.
+    lead: Duration,
     tally: Tally,
 }
 
@@ -140,6 +142,7 @@ impl Belief {
             asks,
             gap: false,
             period,
+            lead: window.lead(),
             tally: Tally::default(),
         }
     }
@@ -195,14 +198,14 @@ impl Belief {
     /// the kernel took counts as confirmed then, and README says what that costs.
     fn settle(&mut self, now: MonoTime) {
         let confirmed = !self.asks || self.acked.is_some_and(|acked| self.spans.are_confirmed(acked));
-        if !confirmed || now + self.period / 2 < self.busy_until {
+        if !confirmed || now + self.period / 2 < self.executed_until() {
             return;
         }
         self.spans.end_at_last();
         self.shaking.on_all_taken();
         (self.within, self.sways) = (self.own, 0.0);
         // Since then it may have been moved.
-        let over = self.busy_until.min(now);
+        let over = self.executed_until().min(now);
         self.known = if self.asks { Known::Confirmed(over) } else { Known::Commanded(over) };
         self.gap &= self.asks;
     }
@@ -211,7 +214,7 @@ impl Belief {
     /// finds it where it was left confirms that; else it has to have found the seat at rest, or nobody knows any more where it
     /// is. Axes that a reading does not tell are where they were if those that it tells are.
     fn measure(&mut self, reading: &Reading, now: MonoTime) -> Found {
-        let is_led = self.busy_until > MonoTime::default() && reading.at < self.busy_until + SETTLE;
+        let is_led = self.busy_until > MonoTime::default() && reading.at < self.executed_until() + SETTLE;
         if is_led || reading.by == Source::Passing {
             return self.hold_against(reading, now);
         }
@@ -242,7 +245,7 @@ impl Belief {
         if now.since(reading.at) > STALE {
             return Found::Nothing;
         }
-        let since = reading.at.before(FOLLOWS + 3 * self.period);
+        let since = reading.at.before(FOLLOWS + self.lead + 3 * self.period);
         let is_astray = |slot: usize| {
             let (low, high) = self.spans.reach(slot);
             let led = self.history.reach(slot, since);
@@ -267,7 +270,8 @@ impl Belief {
     /// frame counts, so that a frame is missed after 40 to 50 ms.
     fn has_gap(&self, told: MonoTime, now: MonoTime) -> bool {
         let refused = self.refused_since.is_some_and(|since| now.since(since) > GAP);
-        let is_missed = |since| told.since(since) > GAP || now.since(since) > GAP_UNTOLD;
+        let is_missed =
+            |since| told.since(since) > GAP + self.lead || now.since(since) > GAP_UNTOLD + self.lead;
         let unheard = || self.spans.waiting_since(self.acked).is_some_and(is_missed);
         refused || (self.asks && unheard())
     }
@@ -350,10 +354,15 @@ impl Belief {
         }
     }
 
+    /// When the seat has executed all that the controller was sent.
+    fn executed_until(&self) -> MonoTime {
+        self.busy_until + self.lead
+    }
+
     /// Whether no frame has been under way for so long that the next is the first of a motion.
     #[must_use]
     pub(crate) fn is_quiet(&self, now: MonoTime) -> bool {
-        now > self.busy_until + QUIET.max(2 * self.period)
+        now > self.executed_until() + QUIET.max(2 * self.period)
     }
 
     /// Whether a frame to `pose`, to be reached in so many milliseconds, keeps the greatest speed of every axis from wherever

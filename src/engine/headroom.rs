@@ -1,6 +1,9 @@
 //! What the cue's motion leaves of the limits, tenth of a second by tenth: how much faster than the film it may run, and
 //! how quickly a level may change.
 
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
 use super::fader::{GATHER, RATE};
 use super::slew::{CHANGE_PER_S, MAX_SPEED_UP};
 use crate::motion::{Limits, Slot, Spacing, Window};
@@ -37,12 +40,14 @@ impl Headroom {
         let spans = usize::try_from(timeline.duration().as_nanos().max(0) / SPAN).unwrap_or(0) + 1;
         let mut loads = vec![Load::default(); spans];
         let slots = different_slots(windows);
-        for (axis, slot) in &slots {
+        for (lead, axis, slot) in &slots {
             let met = Loads::of(timeline, *axis, slot, rate, SPAN, LIGHT);
             for (index, load) in loads.iter_mut().enumerate() {
-                let [velocity, acceleration, jerk] =
-                    [&met.velocity, &met.acceleration, &met.jerk].map(|met| f64::from(met[index]));
-                load.note(velocity, acceleration, jerk, slot.limits);
+                for met_in in spans_seen(index, *lead).take_while(|span| *span < spans) {
+                    let [velocity, acceleration, jerk] =
+                        [&met.velocity, &met.acceleration, &met.jerk].map(|met| f64::from(met[met_in]));
+                    load.note(velocity, acceleration, jerk, slot.limits);
+                }
             }
         }
         let greatest = loads.iter().fold(0.0, |greatest: f64, load| greatest.max(load.greatest()));
@@ -86,22 +91,33 @@ fn turn(rate: Rate) -> f64 {
     2.0 * if n == 1 { 1.0 } else { 7.0 / 9.0 } / shortest_s
 }
 
-fn least_limits(slots: &[(usize, Slot)]) -> Limits {
+/// The spans of the cue that a lane is in while the hall is in one: its own, and where it is led ahead those that lie so much later; in
+/// the first also those before, since show time begins below 0 for such a lane.
+fn spans_seen(index: usize, lead: Duration) -> RangeInclusive<usize> {
+    let span = u128::from(SPAN.unsigned_abs());
+    let [whole, begun] = [lead.as_nanos() / span, lead.as_nanos().div_ceil(span)]
+        .map(|ahead| index.saturating_add(usize::try_from(ahead).unwrap_or(usize::MAX)));
+    if index == 0 { 0..=begun } else { whole..=begun }
+}
+
+fn least_limits(slots: &[(Duration, usize, Slot)]) -> Limits {
     let free = Limits { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
-    slots.iter().fold(free, |least, (_, Slot { limits, .. })| Limits {
+    slots.iter().fold(free, |least, (_, _, Slot { limits, .. })| Limits {
         velocity: least.velocity.min(limits.velocity),
         acceleration: least.acceleration.min(limits.acceleration),
         jerk: least.jerk.min(limits.jerk),
     })
 }
 
-fn different_slots(windows: &[Window]) -> Vec<(usize, Slot)> {
-    let mut slots: Vec<(usize, Slot)> = Vec::new();
-    for (_, slot) in windows.iter().flat_map(Window::moving) {
+fn different_slots(windows: &[Window]) -> Vec<(Duration, usize, Slot)> {
+    let mut slots: Vec<(Duration, usize, Slot)> = Vec::new();
+    for (lead, slot) in
+        windows.iter().flat_map(|window| window.moving().map(|(_, slot)| (window.lead(), slot)))
+    {
         let slot = slot.at_level(1.0);
         let Some(axis) = slot.axis else { continue };
-        if !slots.contains(&(axis, slot)) {
-            slots.push((axis, slot));
+        if !slots.contains(&(lead, axis, slot)) {
+            slots.push((lead, axis, slot));
         }
     }
     slots

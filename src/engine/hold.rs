@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use super::Engine;
 use super::lane::LaneMotion;
 use super::phase::{Following, Holding, Phase, Rest, hold_frames};
-use super::{Beat, Engine, Step};
 use crate::plan::Curve;
 use crate::timeline::Hint;
 
@@ -41,7 +41,8 @@ impl Engine {
         let curve = Curve { pose: &pose, end: timeline.duration() };
         let (reached, pace) = (playhead.reached(), playhead.pace());
         lanes.all[lane].brake(|window| {
-            course.states_by_slot(lane, reached, window, &curve).map(|state| state.at_pace(pace))
+            let states = curve.ahead(window.lead(), |cue| course.states_by_slot(lane, reached, window, cue));
+            states.map(|state| state.at_pace(pace))
         });
     }
 
@@ -81,16 +82,14 @@ impl Engine {
         }
     }
 
-    /// What a tick at rest sends; none where the lanes have been told so.
-    pub(super) fn hold(&mut self, time_ms: u32) -> Step {
+    /// Another frame tells lanes at rest to stay there.
+    pub(super) fn count_hold(&mut self) {
         if let Phase::Holding(Holding { why, frames, .. }) = &mut self.phase {
             *frames = frames.saturating_sub(1);
             if matches!(why, Rest::Paused | Rest::Stopped) {
                 self.stamps.hold();
             }
         }
-        let (timing, stamp_ms) = self.stamps.next(time_ms);
-        Step::Send(Beat::still(timing, stamp_ms).lasting(time_ms))
     }
 
     /// True if no frame tells a lane that it is to rest: lanes in a lasting rest were told so, or so often that it is known which of

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::cue_ahead::CueAhead;
 use super::events::{EngineEvent, EngineEvents, Unplanned};
 use super::headroom::Headroom;
 use super::lane::{LaneMode, LaneMotion};
@@ -81,12 +82,13 @@ impl Lanes {
         frame: (u64, Duration),
         mut course: Option<&mut Course>,
         at: ShowTime,
-        cue: &Pose,
+        cues: &[CueAhead],
     ) {
         // The frames of one that is blind are made as they leave, from what is known by then.
         let is_led = |motion: &LaneMotion| motion.is_there() && !motion.is_blind();
         let led = self.all.iter_mut().enumerate().filter(|(_, motion)| is_led(motion));
         for (lane, motion) in led {
+            let cue = &CueAhead::of(cues, motion.window.lead()).pose;
             if !motion.advance(frame, course.as_deref_mut().map(|course| (course, lane)), at, cue) {
                 self.events.push(EngineEvent::LimiterFault);
             }

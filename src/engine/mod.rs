@@ -5,6 +5,7 @@ mod ahead;
 mod beat;
 mod between;
 mod blind;
+mod cue_ahead;
 mod directive;
 mod events;
 mod fader;
@@ -39,8 +40,9 @@ use std::time::Duration;
 use crate::motion::Window;
 use crate::plan::{Course, Scene};
 use crate::time::{Rate, ShowTime};
-use crate::timeline::{Hint, Timeline};
+use crate::timeline::Timeline;
 use crate::wire::Timing;
+use cue_ahead::CueAhead;
 use lanes::Lanes;
 use phase::{Following, Holding, Phase};
 use replan::Replanner;
@@ -99,7 +101,7 @@ pub struct Engine {
     timeline: Arc<Timeline>,
     headroom: Headroom,
     lanes: Lanes,
-    hint: Hint,
+    cues: Box<[CueAhead]>,
     phase: Phase,
     ending: Ending,
     planner: Replanner,
@@ -123,8 +125,8 @@ impl Engine {
     ) -> Self {
         Self {
             planner: Replanner::new(&Scene::parked(&windows), course.serial),
+            cues: CueAhead::each(&windows),
             lanes: Lanes::unseen(windows, headroom.greatest_level(), show.rate),
-            hint: Hint::default(),
             phase: Phase::first(&show, course),
             ending: Ending::Completed,
             plays_left: show.plays.checked_sub(1),
@@ -197,20 +199,27 @@ impl Engine {
         target.into_iter().for_each(|target| self.chase(target, time));
         let show = self.playhead.at();
         self.move_on(time);
-        if let Phase::Holding(_) = self.phase {
-            let is_quiet = self.sends_nothing();
-            self.look_ahead();
-            return if is_quiet { Step::Quiet } else { self.hold(time_ms) };
+        let is_held = matches!(self.phase, Phase::Holding(_));
+        let is_quiet = is_held && self.sends_nothing();
+        // Channels and effects act when the frame comes, not when its pose is reached.
+        let says = self.phase.is_following().then_some(show);
+        self.look_ahead();
+        if is_quiet {
+            return Step::Quiet;
+        }
+        if is_held {
+            self.count_hold();
         }
         let (timing, stamp_ms) = self.stamps.next(time_ms);
-        let mut beat = Beat::still(timing, stamp_ms).lasting(time_ms);
-        if self.phase.is_following() {
-            // They act when the frame comes, not when its pose is reached.
-            beat.samples = self.timeline.samples(show, &mut self.hint);
-            beat.effects = self.timeline.effects(show, &mut self.hint);
-        }
-        self.look_ahead();
-        Step::Send(beat)
+        let still = Beat::still(timing, stamp_ms).lasting(time_ms);
+        self.cues.iter_mut().for_each(|cue| cue.fill(&still, &self.timeline, says));
+        Step::Send(self.cues.first().map_or(still, |cue| cue.beat))
+    }
+
+    /// The beat of this tick as a lane has it: the cue's channels and effects are those of so much later as it is led ahead.
+    #[must_use]
+    pub(crate) fn beat_of(&self, lane: usize) -> &Beat {
+        &CueAhead::of(&self.cues, self.lanes.all[lane].window.lead()).beat
     }
 
     /// Advances show time by one frame and sets the poses.
@@ -240,8 +249,8 @@ impl Engine {
 
     fn set_poses(&mut self, time: Duration) {
         let at = self.playhead.reach();
-        let cue = self.timeline.sample(at, &mut self.hint);
-        self.lanes.advance((self.playhead.frames() - 1, time), self.phase.course(), at, &cue);
+        self.cues.iter_mut().for_each(|cue| cue.reach(&self.timeline, at));
+        self.lanes.advance((self.playhead.frames() - 1, time), self.phase.course(), at, &self.cues);
     }
 
     /// Counts a hold frame at the end.

@@ -15,11 +15,11 @@ use crate::app::StagedShow;
 use crate::belief::Reading;
 use crate::config::{Config, from_to_args};
 use crate::cue::{self, Source};
-use crate::drive::Manner;
-use crate::engine::{Mix, Show};
+use crate::drive::{Manner, lanes};
+use crate::engine::{Headroom, Mix, Show};
 use crate::film::chase::ChaseRules;
 use crate::film::point::{FilmPoint, FilmState, PublishedPoint};
-use crate::motion::{AxisGeometry, MAX_AXES, Pose};
+use crate::motion::{AxisGeometry, MAX_AXES, Pose, Window};
 use crate::net::Delivery;
 use crate::rt::{
     Alarm, Answer, Command, Conductor, Desk, FilmLead, FrameSink, Live, MailEnds, Places, PlanLoop, Planning,
@@ -70,6 +70,8 @@ pub enum Event {
 pub struct Virtual {
     pub cue: String,
     pub to: Vec<String>,
+    /// How long before it executes them each controller is sent its poses; 0 where nothing is said.
+    pub leads: Vec<Duration>,
     pub rate_hz: f64,
     pub timing: Timing,
     pub start: ShowTime,
@@ -91,6 +93,7 @@ impl Virtual {
         Self {
             cue: cue.into(),
             to: vec!["127.0.0.1:7408".to_owned()],
+            leads: Vec::new(),
             rate_hz: 100.0,
             timing: Timing::Relative,
             start: ShowTime::ZERO,
@@ -123,13 +126,25 @@ impl Virtual {
         from_to_args(&self.to, &[], self.timeline().cue().axes()).expect("the addresses are sound")
     }
 
+    fn stage(&self, show: Show) -> StagedShow {
+        let timeline = Arc::new(self.timeline());
+        let mut lanes = lanes(&self.config(), &timeline, Manner { level: 1.0, silent: false });
+        for (lane, lead) in lanes.iter_mut().zip(&self.leads) {
+            lane.window = lane.window.clone().led_ahead(*lead);
+        }
+        let windows: Vec<Window> = lanes.iter().map(|lane| lane.window.clone()).collect();
+        let headroom = Headroom::measure(&windows, &timeline, show.rate);
+        let level = Mix { motion: self.level, vibration: self.level, ..Mix::FULL };
+        let mixes = vec![level; lanes.len()];
+        StagedShow::of_lanes(lanes, &timeline, headroom, show, &mixes).expect("there is a join")
+    }
+
     /// Plays it to its end.
     pub fn play(&self) -> Played {
         let rate = Rate::from_hz(self.rate_hz);
         let show = Show { rate, timing: self.timing, start: self.start, plays: self.plays };
-        let manner = Manner { level: self.level, silent: false };
-        let staged = StagedShow::new(&self.config(), self.timeline(), show, manner).expect("there is a join");
-        let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - self.start.as_nanos());
+        let staged = self.stage(show);
+        let join = ShowTime::from_nanos(staged.course.settled().as_nanos() - staged.show.start.as_nanos());
         let desk = staged.desk();
         let (mut engine, lanes, planner, timeline) = staged.split();
         if self.chases {

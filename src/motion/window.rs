@@ -1,5 +1,7 @@
 //! The axes of one controller's frame: which axis of the cue each slot carries, and on what seat.
 
+use std::time::Duration;
+
 use super::{AxisGeometry, AxisUnit, MAX_AXES, Pose, Pulses, SeatType};
 
 /// What an axis may do, in strokes per second, second squared and second cubed.
@@ -127,10 +129,14 @@ impl Slot {
     }
 }
 
+/// The longest time between a pose and its execution: what is stopped goes on for so long.
+pub(crate) const MAX_LEAD: Duration = Duration::from_millis(320);
+
 /// The slots of one frame, in frame order: 3, 6, 10 or 12 of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window {
     slots: Vec<Slot>,
+    lead: Duration,
 }
 
 impl Window {
@@ -141,13 +147,26 @@ impl Window {
     #[must_use]
     pub fn new(slots: Vec<Slot>) -> Self {
         assert!(slots.len() <= MAX_AXES, "a frame has at most {MAX_AXES} slots");
-        Self { slots }
+        Self { slots, lead: Duration::ZERO }
+    }
+
+    /// The same window of a controller that executes poses so long after they are made, [`MAX_LEAD`] at the most.
+    #[must_use]
+    pub fn led_ahead(self, lead: Duration) -> Self {
+        Self { lead: lead.min(MAX_LEAD), ..self }
+    }
+
+    /// How long before its controller executes them its poses are made: what it gets now is what the cue says so much later, and a
+    /// stop takes so much longer. 0 where frames are executed as they come.
+    #[must_use]
+    pub(crate) const fn lead(&self) -> Duration {
+        self.lead
     }
 
     /// The same window with motion at `level`, 0 to 1.
     #[must_use]
     pub(crate) fn at_level(&self, level: f64) -> Self {
-        Self { slots: self.slots.iter().map(|slot| slot.at_level(level)).collect() }
+        Self { slots: self.slots.iter().map(|slot| slot.at_level(level)).collect(), lead: self.lead }
     }
 
     /// The level of its slots; 1 where it has none.

@@ -18,6 +18,8 @@ pub(crate) use planner::Planner;
 pub use planner::{From, Request, To};
 pub use scene::{LaneScene, Place, Scene};
 
+use std::time::Duration;
+
 use rsruckig::prelude::{DataArrayOrVec, Trajectory};
 
 use crate::motion::{AxisState, Pose, Window};
@@ -30,6 +32,14 @@ pub struct Curve<'a> {
     pub pose: &'a dyn Fn(ShowTime) -> Pose,
     /// Its last row.
     pub end: ShowTime,
+}
+
+impl Curve<'_> {
+    /// Has `job` done with the cue as a lane sees it whose controller executes poses `lead` after they are made.
+    pub(crate) fn ahead<T>(&self, lead: Duration, job: impl FnOnce(&Curve<'_>) -> T) -> T {
+        let pose = |at: ShowTime| (self.pose)(at + lead);
+        job(&Curve { pose: &pose, end: self.end - lead })
+    }
 }
 
 /// Why no move could be planned.

@@ -107,7 +107,9 @@ impl Planner {
             let leg = match (twin, old.as_ref().filter(|_| task.to == To::Same)) {
                 (Some(twin), _) => legs[twin].clone(),
                 (None, Some(old)) => old.leg(index).clone(),
-                (None, None) => self.leg(&task, request, curve, old.as_mut())?,
+                (None, None) => {
+                    curve.ahead(task.window.lead(), |cue| self.leg(&task, request, cue, old.as_mut()))?
+                }
             };
             legs.push(leg);
             tasks.push(task);
@@ -139,7 +141,7 @@ impl Planner {
         };
         let states = match (scene.place, old, request.from) {
             (Place::OnCourse, Some(course), From::Course { at, pace, .. }) => {
-                let states = course.states(index, at, &window, curve);
+                let states = curve.ahead(window.lead(), |cue| course.states(index, at, &window, cue));
                 states.into_iter().map(|state| state.at_pace(pace)).collect()
             }
             (Place::OnCourse, ..) => return Err(PlanError::UnknownPlace(index)),

@@ -45,7 +45,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::belief::Taken;
 use crate::drive::{Lane, Stamped};
-use crate::engine::{Beat, Ending, Engine, EngineEvent, Step};
+use crate::engine::{Ending, Engine, EngineEvent, Step};
 use crate::motion::Pose;
 use crate::net::{Delivery, Sender};
 use crate::state::{Refusal, State, Transition, Why};
@@ -140,10 +140,10 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         let step = if goes_on { self.engine.tick(tick.missed, film) } else { Step::Quiet };
         match step {
             // Asked once more: whatever the engine does, no frame leaves in a state that sends none.
-            Step::Send(beat) if self.conductor.machine().may_send_motion() => {
+            Step::Send(_) if self.conductor.machine().may_send_motion() => {
                 ticked.missed += tick.missed;
                 ticked.ticks += 1;
-                self.send(tick, &beat);
+                self.send(tick);
             }
             Step::Send(_) | Step::Quiet | Step::Over => {}
         }
@@ -235,7 +235,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
         Ok(())
     }
 
-    fn send(&mut self, tick: Tick, beat: &Beat) {
+    fn send(&mut self, tick: Tick) {
         let mut buf = [0; MAX_LEN];
         let mut first = None;
         let Self { lanes, places, engine, mail, sink, clock, .. } = self;
@@ -244,7 +244,7 @@ impl<C: Clock, S: FrameSink> TickLoop<'_, C, S> {
                 continue;
             }
             let at = clock.now();
-            let Some(beat) = places.admit(index, engine, beat, at) else { continue };
+            let Some(beat) = places.admit(index, engine, at) else { continue };
             let (motion, pose) = (engine.lane(index), engine.lane(index).pose());
             let (stamped, datagram) = lane.encode(&beat, pose, motion.mix(), &mut buf);
             first.get_or_insert(at);

@@ -2,7 +2,6 @@
 //! which nobody knows which frames arrive go blind, and each frame is held against what is known before it leaves. Tick
 //! thread; allocates nothing.
 
-use std::borrow::Cow;
 use std::time::Duration;
 
 use super::mail::{Mail, Sent};
@@ -204,17 +203,11 @@ impl Places {
     /// the seat may be, the lane is held: nothing is sent to it, and it is looked at. One that is blind gets a frame of its own.
     #[inline]
     #[must_use]
-    pub fn admit<'b>(
-        &mut self,
-        lane: usize,
-        engine: &mut Engine,
-        beat: &'b Beat,
-        at: MonoTime,
-    ) -> Option<Cow<'b, Beat>> {
+    pub fn admit(&mut self, lane: usize, engine: &mut Engine, at: MonoTime) -> Option<Beat> {
         let beat = if engine.lane(lane).is_blind() {
-            Cow::Owned(self.slow_down(lane, engine, at)?)
+            self.slow_down(lane, engine, at)?
         } else {
-            Cow::Borrowed(beat)
+            *engine.beat_of(lane)
         };
         let belief = &mut self.lanes[lane].belief;
         if belief.allows(engine.lane(lane).pose(), beat.lasts_ms, at) {
