@@ -7,7 +7,7 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
-use kinocue::harness::config::{Controller, from_to_args};
+use kinocue::harness::config::{Controller, Station, from_to_args};
 use kinocue::harness::device::{Address, Patience, Talk, reads, table};
 use kinocue::harness::sim::{Farm, Options, Setup};
 use kinocue::wire::Dialect;
@@ -33,9 +33,9 @@ fn said(args: &[&str], more: Vec<String>) -> Said {
     Said::of(output)
 }
 
-fn controllers(farm: &Farm) -> Vec<Controller> {
+fn controllers(farm: &Farm) -> Vec<Controller<Station>> {
     let tos: Vec<_> = farm.addresses().iter().map(ToString::to_string).collect();
-    from_to_args(&tos, &[], 12).expect("addresses").controllers
+    from_to_args(&tos, &[], 12).expect("addresses").stations()
 }
 
 #[test]

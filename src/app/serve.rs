@@ -219,7 +219,7 @@ fn serve_halls(
             break Served { config, closed: left.closed, ended: left.ended };
         };
         // Also of controllers that come back with a later configuration.
-        numbers.extend(&left.closed.numbers);
+        numbers.extend(left.closed.numbers.clone());
         (runtime, config) =
             reopen(next, config, &numbers, &mut ports.carryover, &ports.signals.leave, &mut film)?;
     };

@@ -107,7 +107,7 @@ fn entry(index: usize, controller: &Controller, prepared: &Prepared, run: &Run) 
     let counts = tracker.counts(index);
     ControllerReport {
         name: controller.name.clone(),
-        address: controller.address.to_string(),
+        address: controller.address(),
         frames: (&counts).into(),
         park_frames: prepared.park_frames[index],
         duplicate: counts.duplicate,

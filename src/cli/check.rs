@@ -214,7 +214,7 @@ impl Report {
     fn links(&mut self, path: &Path, hall: &Config) {
         let (told, faults) = rates::in_words(hall);
         let unlooked = "how far beside a cue drives play it was not looked at".to_owned();
-        let unlooked = (!hall.drives.is_empty()).then_some(unlooked);
+        let unlooked = hall.named().any(|one| one.drives().is_some()).then_some(unlooked);
         for text in told.into_iter().chain(unlooked) {
             let note = format!("{}: {text}", plain::path(path));
             if !self.notes.contains(&note) {
@@ -330,16 +330,14 @@ fn unwired(path: &Path, timeline: &Timeline) -> Option<String> {
 
 fn hall_in_words(hall: &Config) -> String {
     let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
-    let (present, out): (Vec<_>, Vec<_>) = hall.drives.iter().partition(|drive| drive.enabled);
     let mut words = vec![
-        counted(hall.controllers.len() + present.len(), "controller"),
+        counted(hall.controllers.len(), "controller"),
         counted(hall.seats.len(), "seat type"),
         counted(hall.effects.len(), "effect"),
     ];
     if !hall.links.is_empty() {
         words.insert(1, counted(hall.links.len(), "link"));
     }
-    let out = hall.absent.iter().map(|one| &one.controller.name).chain(out.iter().map(|one| &one.name));
-    words.extend(out.map(|name| format!("{name} out for good")));
+    words.extend(hall.absent.iter().map(|one| format!("{} out for good", one.controller.name)));
     words.join(", ")
 }

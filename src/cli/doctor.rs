@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 fn hall(config: &Config) -> Hall {
-    let addresses = config.controllers.iter().map(|one| *one.address.ip());
+    let addresses = config.stations().into_iter().map(|one| *one.connection.address.ip());
     let elsewhere: HashSet<_> = addresses.filter(|ip| !ip.is_loopback()).collect();
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     Hall { controllers: count(config.controllers.len()), neighbours: count(elsewhere.len()) }

@@ -10,7 +10,7 @@ use super::ask::{agreed, somebody};
 use super::client;
 use super::targets::{TargetArgs, Targets, Troubles, state};
 use super::{Exit, Failure, print};
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::device::home::{HomeError, PA0E, Progress, hindrance, home};
 use crate::device::{Outcome, Patience, Request, Talk, table};
 
@@ -121,7 +121,7 @@ fn explain(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) -> Vec<R
                 axis + 1
             ));
         }
-        match hindrance(&answer, controller.dialect) {
+        match hindrance(&answer, controller.connection.dialect) {
             None => Ok(Duration::ZERO),
             Some(error) => {
                 troubles.refuse(name, &error.to_string());
@@ -138,20 +138,22 @@ fn move_home(
     ready: &[usize],
     timeout: Duration,
 ) -> Vec<Result<Duration, HomeError>> {
-    let lanes: Vec<_> = ready.iter().map(|&lane| (lane, targets.controllers[lane].dialect)).collect();
+    let lanes: Vec<_> =
+        ready.iter().map(|&lane| (lane, targets.controllers[lane].connection.dialect)).collect();
     let mut display = Display::new(targets, ready);
     home(talk, &lanes, timeout, &mut |lane, progress| display.show(lane, progress))
 }
 
 impl<'a> Report<'a> {
     fn new(targets: &'a Targets, results: &[Result<Duration, String>]) -> Self {
-        let one = |(controller, result): (&'a Controller, &Result<Duration, String>)| ControllerReport {
-            name: &controller.name,
-            address: controller.address.to_string(),
-            home: result.is_ok(),
-            seconds: result.as_ref().ok().map(Duration::as_secs_f64),
-            fault: result.as_ref().err().cloned(),
-        };
+        let one =
+            |(controller, result): (&'a Controller<Station>, &Result<Duration, String>)| ControllerReport {
+                name: &controller.name,
+                address: controller.connection.address.to_string(),
+                home: result.is_ok(),
+                seconds: result.as_ref().ok().map(Duration::as_secs_f64),
+                fault: result.as_ref().err().cloned(),
+            };
         Self { controllers: targets.controllers.iter().zip(results).map(one).collect() }
     }
 }

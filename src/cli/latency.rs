@@ -184,12 +184,12 @@ fn send(args: &Args, config: Config, about: &str) -> Result<(Times, Played), Fai
 /// The configuration with only those controllers whose seats can be held, parked where they stand; and the others, which
 /// are told of.
 fn standing(config: Config) -> Result<(Config, Vec<Refused>), Failure> {
-    let targets = Targets { controllers: config.controllers.clone(), show: config.show.clone() };
+    let targets = Targets { controllers: config.stations(), show: config.show.clone() };
     let mut talk = targets.open()?;
     let stood = stand(&mut talk, &targets.controllers);
     drop(talk);
     let (mut controllers, mut places, mut refused) = (Vec::new(), Vec::<Vec<Pulses>>::new(), Vec::new());
-    for (controller, stood) in targets.controllers.into_iter().zip(stood) {
+    for (controller, stood) in config.controllers.into_iter().zip(stood) {
         match stood {
             Ok(stands) => {
                 controllers.push(controller);

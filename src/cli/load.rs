@@ -114,11 +114,10 @@ impl Judge {
     pub(super) fn seats(&self, axes: usize) -> Vec<SeatAxis> {
         let bench = Arc::new(SeatType::bench3(axes));
         let seat_of = |axis| {
-            let mut windows = self.hall.iter().flat_map(Config::windows);
-            let taker = windows.find(|(axes, _)| axes.contains(&axis));
-            match (&self.seat, taker) {
+            let mut controllers = self.hall.iter().flat_map(|hall| &hall.controllers);
+            match (&self.seat, controllers.find(|one| one.takes(axis))) {
                 (Some(seat), _) => SeatAxis::new(seat, axis),
-                (None, Some((axes, seat))) => SeatAxis::new(seat, axis - axes.start),
+                (None, Some(taker)) => SeatAxis::new(&taker.seat, axis - taker.axis_offset),
                 (None, None) => SeatAxis::new(&bench, axis),
             }
         };

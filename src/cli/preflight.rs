@@ -133,7 +133,8 @@ struct Asked {
 fn ask(targets: &Targets) -> Result<Vec<Asked>, Failure> {
     let bind = *targets.show.bind.ip();
     let way = |address| route(bind, address).map_err(|error| error.to_string());
-    let routes: Vec<_> = targets.controllers.iter().map(|controller| way(controller.address)).collect();
+    let routes: Vec<_> =
+        targets.controllers.iter().map(|controller| way(controller.connection.address)).collect();
     let reached = targets.controllers.iter().zip(&routes).filter(|(_, route)| route.is_ok());
     let reached = Targets {
         controllers: reached.map(|(controller, _)| controller.clone()).collect(),

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, anyhow};
 
 use super::{Exit, Failure, OrExit as _, load, print};
-use crate::config::{Config, Controller, DriveController, Show, from_to_args};
+use crate::config::{Config, Controller, Show, Station, from_to_args};
 use crate::device::{Answer, Fault, Outcome, Request, Talk, refusal};
 use crate::motion::MAX_AXES;
 use crate::net::NetError;
@@ -34,7 +34,7 @@ pub(super) struct TargetArgs {
 /// The controllers that are meant, and from where they are spoken to.
 #[derive(Debug)]
 pub(super) struct Targets {
-    pub(super) controllers: Vec<Controller>,
+    pub(super) controllers: Vec<Controller<Station>>,
     /// How they are played to, and from where.
     pub(super) show: Show,
 }
@@ -52,11 +52,11 @@ impl TargetArgs {
             Some(path) => load::config(path)?,
             None => from_to_args(&self.to, &[], cue_axes).or_exit(Exit::Usage)?,
         };
-        let is_meant = |drive: &DriveController| {
-            let is_in_row = drive.row.as_ref().is_some_and(|row| self.row.contains(row));
-            names.contains(&drive.name) || is_in_row || (names.is_empty() && self.row.is_empty())
+        let is_meant = |one: &Controller| {
+            let is_in_row = one.row.as_ref().is_some_and(|row| self.row.contains(row));
+            names.contains(&one.name) || is_in_row || (names.is_empty() && self.row.is_empty())
         };
-        if config.drives.iter().any(is_meant) {
+        if config.named().any(|one| one.drives().is_some() && is_meant(one)) {
             config.playable().or_exit(Exit::Config)?;
         }
         let Config { mut show, controllers, absent, .. } = config;
@@ -67,7 +67,8 @@ impl TargetArgs {
         if names.is_empty() && self.row.is_empty() {
             left.iter().for_each(tell_absent);
         }
-        Ok(Targets { controllers: self.choose(controllers.into_iter().chain(meant).collect(), names)?, show })
+        let stations = controllers.iter().chain(&meant).filter_map(Controller::on_network).collect();
+        Ok(Targets { controllers: self.choose(stations, names)?, show })
     }
 
     /// True if anybody is meant: without, `home` and `preflight` ask the daemon for its own.
@@ -91,7 +92,11 @@ impl TargetArgs {
     }
 
     /// Those of the rows and of the names, in the order of the configuration; all where neither chooses.
-    fn choose(&self, all: Vec<Controller>, names: &[String]) -> Result<Vec<Controller>, Failure> {
+    fn choose(
+        &self,
+        all: Vec<Controller<Station>>,
+        names: &[String],
+    ) -> Result<Vec<Controller<Station>>, Failure> {
         if self.row.is_empty() && names.is_empty() {
             return Ok(all);
         }
@@ -107,7 +112,7 @@ impl TargetArgs {
                 return Err(anyhow!("no controller stands in row {row}")).or_exit(Exit::Usage);
             }
         }
-        let chosen = |one: &Controller| {
+        let chosen = |one: &Controller<Station>| {
             names.contains(&one.name) || one.row.as_ref().is_some_and(|row| self.row.contains(row))
         };
         Ok(all.into_iter().filter(chosen).collect())
@@ -199,8 +204,9 @@ pub(super) fn tell_absent(controller: &Controller) {
 }
 
 /// What a controller's state is, where it is not the normal one.
-pub(super) fn state(controller: &Controller, answer: &Answer) -> Option<String> {
-    (answer.code != ReplyCode::Running).then(|| refusal(answer.code, answer.error, controller.dialect))
+pub(super) fn state(controller: &Controller<Station>, answer: &Answer) -> Option<String> {
+    (answer.code != ReplyCode::Running)
+        .then(|| refusal(answer.code, answer.error, controller.connection.dialect))
 }
 
 /// Reads a file whole.

@@ -1,11 +1,10 @@
 //! `[[controller]]` with `address = "link:NAME"`: seats that serial drives move, and the links that they share.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use toml::de::DeTable;
 
-use crate::channel;
+use crate::channel::{self, SWITCHES};
 use crate::motion::{MAX_AXES, SeatType};
 
 use super::accept::acceptances;
@@ -15,41 +14,25 @@ use super::fault::Faults;
 use super::link::{Link, LinkEntry, LinkWiring};
 use super::section::{Entry, Section, did_you_mean};
 use super::site::{Site, inputs_up_to, seat_of};
-use super::{Acceptance, Controller};
+use super::{Connection, Controller};
 
 /// What an address begins with that names a link.
 const LINK: &str = "link:";
 /// The motors of a SIXpack 2.
 const MOTORS: u8 = 6;
 
-/// A seat that drives on a link move.
+/// The drives of a seat, and the link that they are on.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct DriveController {
-    /// Its name in reports, unlike any other's.
-    pub(crate) name: String,
-    /// The row its seat stands in.
-    pub(crate) row: Option<String>,
-    /// What it moves.
-    pub(crate) seat: Arc<SeatType>,
-    /// How drives move that.
+pub struct Drives {
+    /// How they move it.
     pub(crate) drive: Arc<SeatDrive>,
-    /// The name of the link that it is on.
+    /// The name of their link.
     pub(crate) link: String,
     /// The drives, axis by axis.
     pub(crate) motors: Motors,
-    /// Its first axis is axis `axis_offset + 1` of the cue; 0 to 11.
-    pub(crate) axis_offset: usize,
-    /// Controllers under one rigid seat share a group; its own name by default.
-    pub(crate) group: String,
-    /// Inputs that tell of an emergency stop, bit 0 = input 1: information, not a stop.
-    pub(crate) estop_inputs: u16,
-    /// Findings of preflight that are accepted for good.
-    pub(crate) accept_findings: Vec<Acceptance>,
-    /// False if it is out for good.
-    pub(crate) enabled: bool,
 }
 
-/// The drives of a seat.
+/// Which drives move the axes of a seat.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Motors {
     /// A SilverMax for each axis, by its number.
@@ -73,17 +56,13 @@ impl Motors {
     }
 }
 
-impl DriveController {
-    /// The axes of the cue that are its own, counted from 0.
-    #[must_use]
-    pub(crate) fn window(&self) -> Range<usize> {
-        self.seat.axes_from(self.axis_offset)
-    }
-}
-
 /// A controller, and the places of what is judged with its neighbours.
 pub(super) struct Placed {
-    pub(super) controller: DriveController,
+    pub(super) controller: Controller,
+    /// False if it is out for good.
+    pub(super) enabled: bool,
+    link: String,
+    motors: Motors,
     /// Of each of its motors, else of `units` as a whole.
     motors_at: Vec<usize>,
     unit_at: usize,
@@ -129,20 +108,22 @@ pub(super) fn drive_controller<'t>(
     }
     let (motors, motors_at) = motors?;
     let name = name?;
-    let controller = DriveController {
+    let link = link?;
+    let drives = Drives { drive: Arc::new(drive?), link: link.clone(), motors: motors.clone() };
+    let controller = Controller {
         group: group.unwrap_or_else(|| name.clone()),
         name,
         row,
         seat,
-        drive: Arc::new(drive?),
-        link: link?,
-        motors,
+        connection: Connection::Link(drives),
         axis_offset,
+        effects: Some(Vec::new()),
+        at_most: [0.0; SWITCHES],
         estop_inputs,
+        belt_inputs: 0,
         accept_findings,
-        enabled,
     };
-    Some(Placed { controller, motors_at, unit_at, group_at })
+    Some(Placed { controller, enabled, link, motors, motors_at, unit_at, group_at })
 }
 
 fn link_of(section: &mut Section<'_, '_, '_>, links: &[LinkEntry<'_>]) -> Option<String> {
@@ -307,8 +288,8 @@ fn refuse_switch(entry: Entry<'_>, drive: &SeatDrive, estop_inputs: u16, faults:
 pub(super) fn settle(links: Vec<LinkEntry<'_>>, placed: &[Placed], faults: &mut Faults<'_>) -> Vec<Link> {
     let mut settled = Vec::new();
     for entry in links {
-        let on_it: Vec<_> = placed.iter().filter(|one| one.controller.link == entry.name).collect();
-        let family = on_it.first().map(|one| one.controller.motors.family());
+        let on_it: Vec<_> = placed.iter().filter(|one| one.link == entry.name).collect();
+        let family = on_it.first().map(|one| one.motors.family());
         refuse_two_families(&on_it, family, faults);
         refuse_twins(&on_it, faults);
         let link = entry.settle(family, faults);
@@ -321,9 +302,9 @@ pub(super) fn settle(links: Vec<LinkEntry<'_>>, placed: &[Placed], faults: &mut 
 }
 
 fn refuse_two_families(on_it: &[&Placed], family: Option<DriveFamily>, faults: &mut Faults<'_>) {
-    let is_other = |one: &&&Placed| Some(one.controller.motors.family()) != family;
+    let is_other = |one: &&&Placed| Some(one.motors.family()) != family;
     for other in on_it.iter().filter(is_other) {
-        let DriveController { link, motors, .. } = &other.controller;
+        let Placed { link, motors, .. } = other;
         let (word, first) = (motors.family().word(), &on_it[0].controller.name);
         let message = format!(
             "dialect: link {link} has {} already, by {first}, and one line carries one dialect; put {word} on a link of its \
@@ -338,7 +319,7 @@ fn refuse_two_families(on_it: &[&Placed], family: Option<DriveFamily>, faults: &
 fn refuse_twins(on_it: &[&Placed], faults: &mut Faults<'_>) {
     let mut taken: Vec<(u8, Option<u8>, usize)> = Vec::new();
     for one in on_it {
-        let named: Vec<(u8, Option<u8>)> = match &one.controller.motors {
+        let named: Vec<(u8, Option<u8>)> = match &one.motors {
             Motors::SilverMax(units) => units.iter().map(|unit| (*unit, None)).collect(),
             Motors::Sixpack2 { unit, motors } => motors.iter().map(|motor| (*unit, Some(*motor))).collect(),
         };
@@ -348,8 +329,7 @@ fn refuse_twins(on_it: &[&Placed], faults: &mut Faults<'_>) {
                 continue;
             };
             let line = faults.line(*first);
-            let (link, what) =
-                (&one.controller.link, motor.map_or(String::new(), |m| format!("motor {m} of ")));
+            let (link, what) = (&one.link, motor.map_or(String::new(), |m| format!("motor {m} of ")));
             let message = format!(
                 "units: {what}unit {unit} of link {link} moves another axis already, on line {line}; one motor moves one axis"
             );
@@ -363,7 +343,7 @@ fn refuse_units_of_rs232(link: &Link, on_it: &[&Placed], faults: &mut Faults<'_>
     if (link.wiring, link.family) != (LinkWiring::Rs232, Some(DriveFamily::Sixpack2)) {
         return;
     }
-    let unit = |one: &Placed| match one.controller.motors {
+    let unit = |one: &Placed| match one.motors {
         Motors::Sixpack2 { unit, .. } => Some(unit),
         Motors::SilverMax(_) => None,
     };
@@ -380,15 +360,13 @@ fn refuse_units_of_rs232(link: &Link, on_it: &[&Placed], faults: &mut Faults<'_>
 /// Notes groups whose controllers cannot keep together: a rigid seat would be bent.
 pub(super) fn refuse_parted_groups(placed: &[Placed], others: &[&Controller], faults: &mut Faults<'_>) {
     for (index, one) in placed.iter().enumerate() {
-        let DriveController { group, link, enabled, .. } = &one.controller;
-        let apart = placed[..index]
-            .iter()
-            .map(|other| &other.controller)
-            .find(|other| other.group == *group && (other.link != *link || other.enabled != *enabled));
+        let group = &one.controller.group;
+        let parts = |other: &&Placed| other.link != one.link || other.enabled != one.enabled;
+        let apart = placed[..index].iter().find(|other| other.controller.group == *group && parts(other));
         let by_udp = others.iter().find(|other| other.group == *group);
         let (name, why) = match (apart, by_udp) {
-            (Some(other), _) if other.link != *link => (&other.name, "is on another link"),
-            (Some(other), _) => (&other.name, "and this are not both enabled"),
+            (Some(other), _) if other.link != one.link => (&other.controller.name, "is on another link"),
+            (Some(other), _) => (&other.controller.name, "and this are not both enabled"),
             (None, Some(other)) => (&other.name, "is on the network"),
             (None, None) => continue,
         };

@@ -245,7 +245,7 @@ impl Config {
     pub(crate) fn fits_stroke(&self, timeline: &Timeline) -> HallStroke {
         let mut proved: Vec<(Range<usize>, &Arc<SeatType>)> = Vec::new();
         let mut result = HallStroke::default();
-        for window in self.windows() {
+        for window in self.controllers.iter().map(|one| (one.window(), &one.seat)) {
             if proved.contains(&window) {
                 continue;
             }
@@ -267,7 +267,7 @@ fn unshakeable(controller: &Controller, timeline: &Timeline) -> Option<Misfit> {
     let (_, axes) = motion_channel_and_slots(controller.frame_axes(timeline.axes()));
     let axis = 1 + controller.sees(timeline.axes()).find(|&axis| timeline.vibrates(axis))?;
     let controller_name = controller.name.clone();
-    match controller.dialect {
+    match controller.station()?.dialect {
         Dialect::Mbox => Some(Misfit::NoVibration { axis, controller: controller_name }),
         Dialect::Smc if axes > MAX_VIBRATING_AXES => {
             Some(Misfit::WideVibration { axis, controller: controller_name, axes })

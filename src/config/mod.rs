@@ -38,7 +38,7 @@ mod text;
 
 pub(crate) use crate::wire::{Dialect, Timing, VibrationPort};
 pub use api::{Api, ApiToken, Role};
-pub(crate) use drive_controller::DriveController;
+pub(crate) use drive_controller::Drives;
 pub(crate) use effect_limits::EffectLimit;
 pub(crate) use fault::{ConfigFault, ConfigFaults, Faults};
 pub(crate) use film::{FilmPlayer, OnStop, stays_below};
@@ -78,14 +78,13 @@ pub struct Config {
     pub(crate) store: Store,
     /// Where the journal is kept, and how much of it.
     pub(crate) log: Log,
-    /// The controllers that take part, in the order of the file: at least one, unless there are `drives`.
+    /// The controllers that take part, at least one: those on the network in the order of the file, then those on links likewise. A
+    /// lane has the place of its controller.
     pub controllers: Vec<Controller>,
     /// Those that are out for good, in the order of the file.
     pub(crate) absent: Vec<Absent>,
     /// The serial lines and buses that drives share, in the order of their names.
     pub(crate) links: Vec<Link>,
-    /// The seats that drives on links move, in the order of the file. Nothing plays them yet ([`Config::playable`]).
-    pub(crate) drives: Vec<DriveController>,
     /// The port that takes OSC, where there is one.
     pub(crate) osc: Option<OscPort>,
     /// The port that takes lines of text, where there is one.
@@ -179,29 +178,22 @@ impl Effect {
     }
 }
 
-/// A network peer that moves one seat.
+/// What moves one seat: a controller on the network, or the drives of its axes on a serial link. Whoever knows only controllers on the
+/// network takes `Controller<Station>`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Controller {
+pub struct Controller<C = Connection> {
     /// Its name in reports, unlike any other's.
     pub(crate) name: String,
     /// The row its seat stands in.
     pub(crate) row: Option<String>,
     /// What it moves.
     pub seat: Arc<SeatType>,
-    /// Where it listens (PA10 to PA14), unlike any other's.
-    pub(crate) address: SocketAddrV4,
+    /// How it is reached.
+    pub(crate) connection: C,
     /// PA95: its first axis is axis `axis_offset + 1` of the cue; 0 to 11.
     pub(crate) axis_offset: usize,
-    /// Who applies the axis offset.
-    pub(crate) fan_out: FanOut,
-    /// The message set it speaks; an IMAX speaks that of MBOX.
-    pub(crate) dialect: Dialect,
-    /// How it has Port Out in vibration frames.
-    pub(crate) vibration_port: VibrationPort,
     /// Controllers under one rigid seat share a group; its own name by default.
     pub(crate) group: String,
-    /// The accept and reply code of its frames.
-    pub(crate) accept: Accept,
     /// The effects it switches; `None` for all of them and every bit of a raw output word.
     pub(crate) effects: Option<Vec<String>>,
     /// The highest level of each output of the table that cues set ([`crate::channel::switches`]), 0 to 1; 0 where it has none.
@@ -212,6 +204,38 @@ pub struct Controller {
     pub(crate) belt_inputs: u16,
     /// Findings of preflight that are accepted for good of this controller.
     pub(crate) accept_findings: Vec<Acceptance>,
+}
+
+/// How a controller is reached, and what only one has that is reached so.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Connection {
+    /// By datagrams.
+    Udp(Station),
+    /// By a serial link that it shares with others.
+    Link(Drives),
+}
+
+/// A controller on the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Station {
+    /// Where it listens (PA10 to PA14), unlike any other's.
+    pub(crate) address: SocketAddrV4,
+    /// Who applies the axis offset.
+    pub(crate) fan_out: FanOut,
+    /// The message set it speaks; an IMAX speaks that of MBOX.
+    pub(crate) dialect: Dialect,
+    /// How it has Port Out in vibration frames.
+    pub(crate) vibration_port: VibrationPort,
+    /// The accept and reply code of its frames.
+    pub(crate) accept: Accept,
+}
+
+impl Station {
+    /// The accept and reply code in a frame to it.
+    #[must_use]
+    pub(crate) fn code(&self) -> u16 {
+        self.accept.code(self.address)
+    }
 }
 
 /// A controller that is out for good (`enabled = false`): no frame goes to it, nobody waits for it, and nothing is asked of it.
@@ -234,7 +258,7 @@ pub(crate) struct Acceptance {
 
 /// Who applies the axis offset (PA95).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum FanOut {
+pub enum FanOut {
     /// The host: a frame carries just the controller's own axes; PA95 is 0.
     Slice,
     /// The device: a frame carries all axes of the cue; PA95 is the axis offset.
@@ -269,14 +293,14 @@ impl Config {
     /// What the effect called `name` adds to the output word of `controller`: 0 where that controller does not
     /// switch it, `None` where no output has that name.
     #[must_use]
-    pub(crate) fn effect_outputs(&self, controller: &Controller, name: &str) -> Option<u16> {
+    pub(crate) fn effect_outputs<C>(&self, controller: &Controller<C>, name: &str) -> Option<u16> {
         let effect = self.effects.iter().find(|effect| effect.name == name)?;
         Some(if controller.switches(name) { effect.word() } else { 0 })
     }
 
     /// The bits of a raw output word that reach `controller`.
     #[must_use]
-    pub(crate) fn allowed_outputs(&self, controller: &Controller) -> u16 {
+    pub(crate) fn allowed_outputs<C>(&self, controller: &Controller<C>) -> u16 {
         match &controller.effects {
             None => ALL_OUTPUTS,
             Some(_) => {
@@ -301,16 +325,17 @@ impl Config {
     /// The axes of a cue of `cue_axes` axes that are no controller's, also of none that is out for good, counted from 1.
     #[must_use]
     pub(crate) fn untaken_axes(&self, cue_axes: usize) -> Vec<usize> {
-        let of_drive = |axis: usize| self.drives.iter().any(|drive| drive.window().contains(&axis));
-        let is_taken = |axis: usize| self.named().any(|c| c.takes(axis)) || of_drive(axis);
-        (1..=cue_axes).filter(|&axis| !is_taken(axis - 1)).collect()
+        (1..=cue_axes).filter(|&axis| !self.named().any(|one| one.takes(axis - 1))).collect()
     }
 
-    /// The axes of a cue, from 0, that each controller takes which takes part, and on what seat.
-    pub(crate) fn windows(&self) -> impl Iterator<Item = (Range<usize>, &Arc<SeatType>)> {
-        let drives = self.drives.iter().filter(|drive| drive.enabled);
-        let of_drives = drives.map(|drive| (drive.window(), &drive.seat));
-        self.controllers.iter().map(|one| (one.window(), &one.seat)).chain(of_drives)
+    /// The controllers on the network, which come first: each has its own place among all.
+    pub fn stations(&self) -> Vec<Controller<Station>> {
+        self.controllers.iter().filter_map(Controller::on_network).collect()
+    }
+
+    /// The controllers on links.
+    pub(crate) fn on_links(&self) -> impl Iterator<Item = &Controller> {
+        self.controllers.iter().filter(|one| one.drives().is_some())
     }
 
     /// Checks that all of the hall can be played.
@@ -318,7 +343,7 @@ impl Config {
     /// # Errors
     /// [`DrivesUnplayed`] where some of its seats have drives: no room plays these yet, and a part of a hall is not it.
     pub(crate) fn playable(&self) -> Result<(), DrivesUnplayed> {
-        let names: Vec<_> = self.drives.iter().map(|drive| drive.name.as_str()).collect();
+        let names: Vec<_> = self.on_links().map(|one| one.name.as_str()).collect();
         if names.is_empty() { Ok(()) } else { Err(DrivesUnplayed(names.join(", "))) }
     }
 
@@ -352,17 +377,92 @@ pub(crate) struct DrivesUnplayed(String);
 
 /// Axes of a cue that has every axis of these controllers.
 #[must_use]
-pub(crate) fn cue_axes(controllers: &[Controller]) -> usize {
+pub(crate) fn cue_axes<C>(controllers: &[Controller<C>]) -> usize {
     controllers.iter().map(|one| one.window().end).max().unwrap_or(1).min(MAX_AXES)
 }
 
+/// Who applies the axis offset of a controller.
+pub trait FansOut {
+    /// That.
+    fn fan_out(&self) -> FanOut;
+}
+
+impl FansOut for Station {
+    fn fan_out(&self) -> FanOut {
+        self.fan_out
+    }
+}
+
+impl FansOut for Connection {
+    /// The host, for those on links.
+    fn fan_out(&self) -> FanOut {
+        match self {
+            Self::Udp(station) => station.fan_out,
+            Self::Link(_) => FanOut::Slice,
+        }
+    }
+}
+
 impl Controller {
-    /// Axes that its frames have to carry of a cue of `cue_axes` axes: just its own, or all up to its last.
+    /// What it is on the network, where it is there.
     #[must_use]
-    pub(crate) fn frame_axes(&self, cue_axes: usize) -> usize {
-        match self.fan_out {
-            FanOut::Slice => self.seat.axes,
-            FanOut::Shared => cue_axes.max(self.window().end).min(MAX_AXES),
+    pub(crate) const fn station(&self) -> Option<&Station> {
+        match &self.connection {
+            Connection::Udp(station) => Some(station),
+            Connection::Link(_) => None,
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn station_mut(&mut self) -> &mut Station {
+        match &mut self.connection {
+            Connection::Udp(station) => station,
+            Connection::Link(_) => panic!("{} is on a link", self.name),
+        }
+    }
+
+    /// The same controller as one of the network, where it is one.
+    #[must_use]
+    pub(crate) fn on_network(&self) -> Option<Controller<Station>> {
+        self.station().map(|station| self.clone().connected(*station))
+    }
+
+    /// Its drives, where it has a link.
+    #[must_use]
+    pub(crate) const fn drives(&self) -> Option<&Drives> {
+        match &self.connection {
+            Connection::Udp(_) => None,
+            Connection::Link(drives) => Some(drives),
+        }
+    }
+
+    /// Where it is, in the words of the configuration: `IP:PORT` or `link:NAME`.
+    #[must_use]
+    pub(crate) fn address(&self) -> String {
+        match &self.connection {
+            Connection::Udp(station) => station.address.to_string(),
+            Connection::Link(drives) => format!("link:{}", drives.link),
+        }
+    }
+}
+
+impl<C> Controller<C> {
+    /// The same, reached otherwise.
+    fn connected<D>(self, connection: D) -> Controller<D> {
+        let Self { name, row, seat, axis_offset, group, effects, at_most, .. } = self;
+        let Self { estop_inputs, belt_inputs, accept_findings, .. } = self;
+        Controller {
+            name,
+            row,
+            seat,
+            connection,
+            axis_offset,
+            group,
+            effects,
+            at_most,
+            estop_inputs,
+            belt_inputs,
+            accept_findings,
         }
     }
 
@@ -372,31 +472,42 @@ impl Controller {
         self.window().contains(&axis)
     }
 
-    /// The place of its first own axis in its frames.
-    #[must_use]
-    pub(crate) const fn first_slot(&self) -> usize {
-        match self.fan_out {
-            FanOut::Slice => 0,
-            FanOut::Shared => self.axis_offset,
-        }
-    }
-
     /// The axes of the cue that are its own, counted from 0.
     #[must_use]
     pub(crate) fn window(&self) -> Range<usize> {
         self.seat.axes_from(self.axis_offset)
     }
 
-    /// The axes of a cue of `cue_axes` axes that its frames carry, also those of others, from 0.
-    fn sees(&self, cue_axes: usize) -> Range<usize> {
-        match self.fan_out {
-            FanOut::Slice => self.window(),
-            FanOut::Shared => 0..cue_axes,
+    fn switches(&self, effect: &str) -> bool {
+        self.effects.as_ref().is_none_or(|names| names.iter().any(|name| name == effect))
+    }
+}
+
+impl<C: FansOut> Controller<C> {
+    /// Axes that its frames have to carry of a cue of `cue_axes` axes: just its own, or all up to its last.
+    #[must_use]
+    pub(crate) fn frame_axes(&self, cue_axes: usize) -> usize {
+        match self.connection.fan_out() {
+            FanOut::Slice => self.seat.axes,
+            FanOut::Shared => cue_axes.max(self.window().end).min(MAX_AXES),
         }
     }
 
-    fn switches(&self, effect: &str) -> bool {
-        self.effects.as_ref().is_none_or(|names| names.iter().any(|name| name == effect))
+    /// The place of its first own axis in its frames.
+    #[must_use]
+    pub(crate) fn first_slot(&self) -> usize {
+        match self.connection.fan_out() {
+            FanOut::Slice => 0,
+            FanOut::Shared => self.axis_offset,
+        }
+    }
+
+    /// The axes of a cue of `cue_axes` axes that its frames carry, also those of others, from 0.
+    fn sees(&self, cue_axes: usize) -> Range<usize> {
+        match self.connection.fan_out() {
+            FanOut::Slice => self.window(),
+            FanOut::Shared => 0..cue_axes,
+        }
     }
 }
 

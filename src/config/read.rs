@@ -18,7 +18,7 @@ use super::effect_limits::effect_limits;
 use super::fault::{ConfigFault, ConfigFaults, Faults, place};
 use super::film::film;
 use super::library::store;
-use super::link::{Link, LinkEntry, links};
+use super::link::{LinkEntry, links};
 use super::log::log;
 use super::osc::osc;
 use super::preset::presets;
@@ -28,9 +28,8 @@ use super::site::{Site, inputs_up_to, seat_of};
 use super::sync::{FilmSync, sync};
 use super::text::text;
 use super::{
-    Absent, Accept, Api, Belts, Config, Controller, Dialect, DriveController, Effect, FanOut, Log,
-    LossPolicy, MAX_FILE_LEN, Show, Store, Timing, VibrationPort, check_effect_name, check_peer,
-    check_window,
+    Absent, Accept, Api, Belts, Config, Connection, Controller, Dialect, Effect, FanOut, Log, LossPolicy,
+    MAX_FILE_LEN, Show, Station, Store, Timing, VibrationPort, check_effect_name, check_peer, check_window,
 };
 
 /// The text of a file of at most [`MAX_FILE_LEN`] bytes.
@@ -98,8 +97,10 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let peers = controller_at
         .map_or_else(Peers::default, |entry| controllers(entry, &site, (&links, &seat_drives), faults));
     refuse_sparse_acks(show_at, &peers, faults);
-    let (links, drives) = on_links(links, &peers, faults);
-    let Peers { present: controllers, absent, .. } = peers;
+    let by_udp: Vec<_> = peers.present.iter().chain(peers.absent.iter().map(|one| &one.controller)).collect();
+    refuse_parted_groups(&peers.placed, &by_udp, faults);
+    let links = settle(links, &peers.placed, faults);
+    let (controllers, absent) = peers.into_lists();
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
     let osc = osc_at.and_then(|entry| osc(entry, faults));
     let text = text_at.and_then(|entry| text(entry, faults));
@@ -118,7 +119,6 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
         controllers,
         absent,
         links,
-        drives,
         osc,
         text,
         api: api?,
@@ -205,23 +205,26 @@ fn controllers(
         }
     }
     peers.absent.iter().zip(at).for_each(|(one, at)| refuse_parted(one, at, &peers.present, faults));
-    let all_out = peers.placed.iter().all(|one| !one.controller.enabled);
+    let all_out = peers.placed.iter().all(|one| !one.enabled);
     if peers.present.is_empty() && all_out && peers.absent.len() + peers.placed.len() > 0 {
         faults.note_missing(entry.at, "enabled: every [[controller]] is out for good; leave at least one in");
     }
     peers
 }
 
-/// The links and what is on them, after what they cannot be together has been noted.
-fn on_links(
-    links: Vec<LinkEntry<'_>>,
-    peers: &Peers,
-    faults: &mut Faults<'_>,
-) -> (Vec<Link>, Vec<DriveController>) {
-    let by_udp: Vec<_> = peers.present.iter().chain(peers.absent.iter().map(|one| &one.controller)).collect();
-    refuse_parted_groups(&peers.placed, &by_udp, faults);
-    let drives = peers.placed.iter().map(|one| one.controller.clone()).collect();
-    (settle(links, &peers.placed, faults), drives)
+impl Peers {
+    /// The controllers that take part, those on links last, and those that are out for good.
+    fn into_lists(self) -> (Vec<Controller>, Vec<Absent>) {
+        let Self { mut present, mut absent, placed } = self;
+        for Placed { controller, enabled, .. } in placed {
+            if enabled {
+                present.push(controller);
+            } else {
+                absent.push(Absent { controller, after: present.len() });
+            }
+        }
+        (present, absent)
+    }
 }
 
 /// Notes a hall with drives that asks for few acks: what a drive does not answer is in doubt.
@@ -304,12 +307,14 @@ fn controller<'t>(
         name,
         row,
         seat,
-        address: address?,
+        connection: Connection::Udp(Station {
+            address: address?,
+            fan_out,
+            dialect: dialect.unwrap_or(Dialect::Smc),
+            vibration_port: vibration_port.unwrap_or_default(),
+            accept,
+        }),
         axis_offset,
-        fan_out,
-        dialect: dialect.unwrap_or(Dialect::Smc),
-        vibration_port: vibration_port.unwrap_or_default(),
-        accept,
         effects,
         at_most,
         estop_inputs,

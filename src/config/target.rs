@@ -8,8 +8,8 @@ use crate::motion::{MAX_AXES, SeatType};
 
 use super::section::did_you_mean;
 use super::{
-    Accept, Api, Config, Controller, Dialect, Effect, FanOut, Log, Show, Store, VibrationPort,
-    check_effect_name, check_peer, check_window,
+    Accept, Api, Config, Connection, Controller, Dialect, Effect, FanOut, Log, Show, Station, Store,
+    VibrationPort, check_effect_name, check_peer, check_window,
 };
 
 /// What the outputs of a controller on this machine mean unless told otherwise: Y01 to Y06.
@@ -78,7 +78,7 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         let mut controller = parse_target(to, index, cue_axes)?;
         refuse_twin(to, &controller, &controllers)?;
         // Nobody knows the wiring of one that is not of this machine.
-        let bench = controller.address.ip().is_loopback();
+        let bench = controller.station().is_some_and(|station| station.address.ip().is_loopback());
         controller.effects = (!bench).then(|| names.clone());
         controller.at_most = [if bench { 1.0 } else { 0.0 }; SWITCHES];
         controllers.push(controller);
@@ -95,7 +95,6 @@ pub fn from_to_args(tos: &[String], effects: &[String], cue_axes: usize) -> Resu
         controllers,
         absent: Vec::new(),
         links: Vec::new(),
-        drives: Vec::new(),
         osc: None,
         text: None,
         api: Api::default(),
@@ -132,8 +131,8 @@ fn distinct_seats(controllers: &[Controller]) -> Vec<Arc<SeatType>> {
 
 fn refuse_twin(target: &str, controller: &Controller, others: &[Controller]) -> Result<(), TargetError> {
     let twice = |what: String| TargetError::Twice { target: target.to_owned(), what };
-    if others.iter().any(|other| other.address == controller.address) {
-        return Err(twice(format!("the address {}", controller.address)));
+    if others.iter().any(|other| other.address() == controller.address()) {
+        return Err(twice(format!("the address {}", controller.address())));
     }
     if others.iter().any(|other| other.name == controller.name) {
         return Err(twice(format!("the name {}", controller.name)));
@@ -190,12 +189,14 @@ fn parse_target(target: &str, index: usize, cue_axes: usize) -> Result<Controlle
         name: options.name,
         row: None,
         seat: Arc::new(SeatType::bench3(axes)),
-        address,
+        connection: Connection::Udp(Station {
+            address,
+            fan_out: options.fan_out,
+            dialect: options.dialect,
+            vibration_port: options.vibration_port,
+            accept: Accept::All,
+        }),
         axis_offset: options.offset,
-        fan_out: options.fan_out,
-        dialect: options.dialect,
-        vibration_port: options.vibration_port,
-        accept: Accept::All,
         effects: None,
         at_most: [0.0; SWITCHES],
         estop_inputs: 0,

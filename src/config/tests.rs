@@ -42,10 +42,11 @@ fn a_hall_reads_as_it_is_written() {
     assert_eq!((hall.show.ack_every, hall.show.spin_us), (2, 200));
     assert_eq!(hall.show.library, Path::new("/srv/cues"));
     let [a1, a2, b1, b2] = hall.controllers.as_slice() else { panic!("four controllers") };
-    assert_eq!((a1.row.as_deref(), a1.group.as_str(), a1.fan_out), (Some("A"), "A1", FanOut::Slice));
-    assert_eq!((a2.dialect, a2.accept.code(a2.address)), (Dialect::Mbox, 0x0fc9));
-    assert_eq!((b1.group.as_str(), b1.accept.code(b1.address)), ("B", 0x0001));
-    assert_eq!((b2.axis_offset, b2.fan_out), (6, FanOut::Shared));
+    let [of_a1, of_a2, of_b1, of_b2] = [a1, a2, b1, b2].map(|one| one.station().unwrap());
+    assert_eq!((a1.row.as_deref(), a1.group.as_str(), of_a1.fan_out), (Some("A"), "A1", FanOut::Slice));
+    assert_eq!((of_a2.dialect, of_a2.code()), (Dialect::Mbox, 0x0fc9));
+    assert_eq!((b1.group.as_str(), of_b1.code()), ("B", 0x0001));
+    assert_eq!((b2.axis_offset, of_b2.fan_out), (6, FanOut::Shared));
     assert_eq!(b2.seat.each.map(|axis| axis.park)[..7], [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.0]);
     assert_eq!(b2.seat.each[5].neutral, 0.5);
     assert_eq!(a1.seat, Arc::new(SeatType::bench3(3)));
@@ -81,8 +82,8 @@ fn what_is_left_out_has_its_default() {
     assert_eq!(config.show, Show::default());
     let controller = &config.controllers[0];
     assert_eq!((controller.group.as_str(), controller.axis_offset), ("A1", 0));
-    assert_eq!((controller.fan_out, controller.dialect), (FanOut::Slice, Dialect::Smc));
-    assert_eq!(controller.accept.code(controller.address), 0xffff);
+    let station = controller.station().unwrap();
+    assert_eq!((station.fan_out, station.dialect, station.code()), (FanOut::Slice, Dialect::Smc, 0xffff));
     assert!(controller.seat.each.iter().all(|axis| axis.park == 0.0));
     assert_eq!(config.untaken_axes(8), [7, 8]);
 }
@@ -230,7 +231,7 @@ fn a_shared_frame_reaches_no_axis_past_the_twelfth() {
 
 #[test]
 fn port_out_of_vibration_frames_has_two_bytes_or_four_and_mbox_controllers_have_none() {
-    let port = |more: &str| with(more).map(|hall| hall.controllers[0].vibration_port);
+    let port = |more: &str| with(more).map(|hall| hall.controllers[0].station().unwrap().vibration_port);
     assert_eq!(port(""), Ok(VibrationPort::Two));
     assert_eq!(port("vibration_port_octets = 4\n"), Ok(VibrationPort::Four));
     assert_eq!(
@@ -278,7 +279,8 @@ fn a_target_takes_the_axes_of_the_cue_from_its_offset_on() {
     let [c1, b] = config.controllers.as_slice() else { panic!("two controllers") };
     assert_eq!((c1.name.as_str(), c1.seat.axes, c1.axis_offset), ("c1", 12, 0));
     assert_eq!((b.name.as_str(), b.seat.axes, b.axis_offset), ("B", 6, 6));
-    assert_eq!((b.fan_out, b.dialect, b.group.as_str()), (FanOut::Shared, Dialect::Mbox, "B"));
+    let station = b.station().unwrap();
+    assert_eq!((station.fan_out, station.dialect, b.group.as_str()), (FanOut::Shared, Dialect::Mbox, "B"));
     assert_eq!(to(&["localhost:7408,axes=10"], 3, &[]).unwrap().controllers[0].seat.axes, 10);
 }
 

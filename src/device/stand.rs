@@ -7,7 +7,7 @@ use super::settings::Values;
 use super::survey::told;
 use super::talk::Link;
 use super::{Address, Fault, Outcome, Patience, Request, Talk, reads, refusal};
-use crate::config::{Controller, FanOut};
+use crate::config::{Controller, FanOut, Station};
 use crate::motion::{PulseRange, Pulses};
 use crate::time::Clock;
 use crate::wire::{DP_POSITIONS, DeviceError, Dialect, ReplyCode, position};
@@ -121,7 +121,7 @@ impl StandError {
 /// If `controllers` are fewer than the conversation was opened with.
 pub(crate) fn stand<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
-    controllers: &[Controller],
+    controllers: &[Controller<Station>],
 ) -> Vec<Result<Vec<Pulses>, StandError>> {
     let mut first = ask(talk, controllers, |one| {
         settings(one).into_iter().chain(places(one.seat.axes)).collect::<Vec<_>>()
@@ -134,8 +134,8 @@ pub(crate) fn stand<L: Link, C: Clock>(
 }
 
 /// The parameters that decide what becomes of a position, as far as the controller's manual has them.
-fn settings(controller: &Controller) -> Vec<Address> {
-    match controller.dialect {
+fn settings(controller: &Controller<Station>) -> Vec<Address> {
+    match controller.connection.dialect {
         Dialect::Smc => vec![AXES, AUTO_RESET, AMPLITUDE, OFFSET],
         Dialect::Mbox => vec![AXES, OFFSET],
     }
@@ -166,8 +166,8 @@ pub(crate) fn position_words_of(values: &Values, axes: usize) -> Option<Vec<[u16
 
 fn ask<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
-    controllers: &[Controller],
-    wanted: impl Fn(&Controller) -> Vec<Address>,
+    controllers: &[Controller<Station>],
+    wanted: impl Fn(&Controller<Station>) -> Vec<Address>,
 ) -> Vec<Result<Values, StandError>> {
     let mut requests: Vec<(usize, Request)> = Vec::new();
     for (lane, controller) in controllers.iter().enumerate() {
@@ -175,7 +175,7 @@ fn ask<L: Link, C: Clock>(
     }
     let mut found: Vec<Result<Values, StandError>> = vec![Ok(Values::new()); controllers.len()];
     for Outcome { lane, request, result } in talk.ask(requests, PATIENCE) {
-        let dialect = controllers[lane].dialect;
+        let dialect = controllers[lane].connection.dialect;
         let Ok(values) = &mut found[lane] else { continue };
         match result {
             Ok(answer) if answer.code != ReplyCode::Running => {
@@ -189,7 +189,11 @@ fn ask<L: Link, C: Clock>(
 }
 
 /// Where the seat stands, of what it told first and then again.
-fn judge(controller: &Controller, first: &Values, again: &Values) -> Result<Vec<Pulses>, StandError> {
+fn judge(
+    controller: &Controller<Station>,
+    first: &Values,
+    again: &Values,
+) -> Result<Vec<Pulses>, StandError> {
     let axes = controller.seat.axes;
     if axes > DP_POSITIONS.len() {
         return Err(StandError::TooManyAxes { axes });
@@ -203,7 +207,7 @@ fn judge(controller: &Controller, first: &Values, again: &Values) -> Result<Vec<
         .map(|axis| {
             let stroke = controller.seat.each[axis].pulse_range();
             let inside = |pulses: Pulses| stroke.contains(pulses);
-            let [was, is] = [first, again].map(|values| place(values, axis, controller.dialect));
+            let [was, is] = [first, again].map(|values| place(values, axis, controller.connection.dialect));
             let [smc, mbox] = [Dialect::Smc, Dialect::Mbox].map(|dialect| place(again, axis, dialect));
             let axis = axis + 1;
             if was.0.abs_diff(is.0) > 1 {
@@ -220,13 +224,13 @@ fn judge(controller: &Controller, first: &Values, again: &Values) -> Result<Vec<
         .collect()
 }
 
-fn judge_settings(controller: &Controller, values: &Values) -> Result<(), StandError> {
+fn judge_settings(controller: &Controller<Station>, values: &Values) -> Result<(), StandError> {
     let of = |address| values.get(&address).copied();
     let axes = controller.seat.axes;
     if let Some(works) = of(AXES).filter(|works| usize::from(*works) != axes) {
         return Err(StandError::Axes { works, axes });
     }
-    let wanted = match controller.fan_out {
+    let wanted = match controller.connection.fan_out {
         FanOut::Slice => 0,
         FanOut::Shared => controller.axis_offset,
     };

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::settings::Values;
 use super::talk::Link;
 use super::{Address, Answer, Fault, Odds, Outcome, Patience, Request, Talk, places, reads, table};
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::net::Origin;
 use crate::observe::{ControllerState, Observer, Watched};
 use crate::time::{Clock, MonoTime};
@@ -75,7 +75,7 @@ impl Survey {
 /// If `controllers` or `wanted` are fewer than the conversation was opened with.
 pub(crate) fn survey<L: Link, C: Clock>(
     talk: &mut Talk<L, C>,
-    controllers: &[Controller],
+    controllers: &[Controller<Station>],
     wanted: &[Vec<Address>],
     on: &mut dyn FnMut(&str),
 ) -> Vec<Survey> {
@@ -96,7 +96,7 @@ pub(crate) fn survey<L: Link, C: Clock>(
 /// A survey under way.
 struct Asking<'t, L, C> {
     talk: &'t mut Talk<L, C>,
-    controllers: &'t [Controller],
+    controllers: &'t [Controller<Station>],
     observer: Observer,
     begun: MonoTime,
     found: Vec<Survey>,
@@ -127,7 +127,7 @@ impl Packets {
 }
 
 impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
-    fn new(talk: &'t mut Talk<L, C>, controllers: &'t [Controller]) -> Self {
+    fn new(talk: &'t mut Talk<L, C>, controllers: &'t [Controller<Station>]) -> Self {
         Self {
             begun: talk.now(),
             talk,
@@ -171,7 +171,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
             if self.talk.now().since(self.begun) >= LAST_ROUND {
                 return;
             }
-            let of = |lane: usize| match self.controllers[lane].dialect {
+            let of = |lane: usize| match self.controllers[lane].connection.dialect {
                 Dialect::Smc => smc,
                 Dialect::Mbox => mbox,
             };
@@ -252,7 +252,7 @@ impl<'t, L: Link, C: Clock> Asking<'t, L, C> {
     }
 
     fn each_smc(&self, request: Request) -> Vec<(usize, Request)> {
-        let smc = |lane: &usize| self.controllers[*lane].dialect == Dialect::Smc;
+        let smc = |lane: &usize| self.controllers[*lane].connection.dialect == Dialect::Smc;
         self.live().into_iter().filter(smc).map(|lane| (lane, request.clone())).collect()
     }
 }

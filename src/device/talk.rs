@@ -5,7 +5,7 @@ use std::net::SocketAddrV4;
 use std::time::Duration;
 
 use super::{Endpoint, Exchange, Odds, Outcome, Patience, Request};
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::net::{Delivery, NetError, Origin, Ports, Receiver, SendFault, Sender};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock, MonoTime};
@@ -63,8 +63,11 @@ pub struct Talk<L = (Sender, Receiver), C = Monotonic> {
 
 /// How the controllers of a configuration are spoken to.
 #[must_use]
-pub(crate) fn peers(controllers: &[Controller]) -> Vec<Endpoint> {
-    let peer = |one: &Controller| Endpoint { dialect: one.dialect, code: Code(one.accept.code(one.address)) };
+pub(crate) fn peers(controllers: &[Controller<Station>]) -> Vec<Endpoint> {
+    let peer = |one: &Controller<Station>| Endpoint {
+        dialect: one.connection.dialect,
+        code: Code(one.connection.accept.code(one.connection.address)),
+    };
     controllers.iter().map(peer).collect()
 }
 
@@ -73,8 +76,8 @@ impl Talk {
     ///
     /// # Errors
     /// [`NetError`] where it cannot be had, even if another kinocue holds it.
-    pub fn open(bind: SocketAddrV4, controllers: &[Controller]) -> Result<Self, NetError> {
-        let addresses: Vec<_> = controllers.iter().map(|one| one.address).collect();
+    pub fn open(bind: SocketAddrV4, controllers: &[Controller<Station>]) -> Result<Self, NetError> {
+        let addresses: Vec<_> = controllers.iter().map(|one| one.connection.address).collect();
         Ok(Self::over(Ports::open(bind, &addresses)?.split(), Monotonic, &peers(controllers)))
     }
 }

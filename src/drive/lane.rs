@@ -1,6 +1,7 @@
 //! From a pose to the datagram of one controller: the frame number, whether a reply is asked for, and the bytes as its family has
 //! them. Tick thread; allocates nothing.
 
+use super::link::LinkPose;
 use super::mbox::MotionCodec;
 use crate::engine::{Beat, Mix};
 use crate::motion::{Pose, Window};
@@ -24,6 +25,8 @@ pub struct Lane {
 pub(super) enum Codec {
     /// SMC, IMAX and MBOX controllers.
     Mbox(MotionCodec),
+    /// The thread of a serial link, which makes its own of poses.
+    Link,
 }
 
 /// A frame that was written: its number, and whether it asks for a reply.
@@ -47,9 +50,11 @@ impl Lane {
         buf: &'b mut [u8; MAX_LEN],
     ) -> (Stamped, &'b [u8]) {
         let mut stamped = self.stamp();
-        let Codec::Mbox(codec) = &self.codec;
-        let datagram = codec.write(&self.window, beat, pose, mix, &mut stamped, buf);
-        (stamped, datagram)
+        let octets = match &self.codec {
+            Codec::Mbox(codec) => codec.write(&self.window, beat, pose, mix, &mut stamped, buf),
+            Codec::Link => LinkPose::of(&self.window, beat, pose, mix, &mut stamped).emit(buf),
+        };
+        (stamped, octets)
     }
 
     /// Writes the one slow frame that brings the lane to its park pose in `time_ms`, plain, effects and outputs off.
@@ -58,9 +63,9 @@ impl Lane {
         time_ms: u32,
         buf: &'b mut [u8; MAX_LEN],
     ) -> (Stamped, &'b [u8]) {
-        let set_vibrates = |lane: &mut Self, vibrates| {
-            let Codec::Mbox(codec) = &mut lane.codec;
-            std::mem::replace(&mut codec.vibrates, vibrates)
+        let set_vibrates = |lane: &mut Self, vibrates| match &mut lane.codec {
+            Codec::Mbox(codec) => std::mem::replace(&mut codec.vibrates, vibrates),
+            Codec::Link => vibrates,
         };
         let vibrates = set_vibrates(self, false);
         let park = self.window.park();
@@ -72,8 +77,10 @@ impl Lane {
     /// Makes every frame from now on hold the lane at its park pose, whatever it is asked for, vibration, effects and outputs off.
     pub(crate) fn hold(&mut self) {
         self.window.hold();
-        let Codec::Mbox(codec) = &mut self.codec;
-        codec.hold();
+        match &mut self.codec {
+            Codec::Mbox(codec) => codec.hold(),
+            Codec::Link => {}
+        }
     }
 
     /// The lane with the number of its next frame.

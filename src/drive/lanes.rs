@@ -3,7 +3,7 @@
 use super::Lane;
 use super::lane::Codec;
 use super::mbox::{MotionCodec, Wiring};
-use crate::config::{Config, Controller, FanOut};
+use crate::config::{Config, Connection, Controller, FanOut, FansOut as _};
 use crate::motion::{SeatType, Slot, Window};
 use crate::timeline::Timeline;
 use crate::wire::{Code, FrameNo, motion_channel_and_slots};
@@ -33,20 +33,24 @@ pub(crate) fn lanes(config: &Config, timeline: &Timeline, manner: Manner) -> Vec
 
 fn lane(config: &Config, controller: &Controller, timeline: &Timeline, manner: Manner) -> Lane {
     let (channel, slots) = motion_channel_and_slots(controller.frame_axes(timeline.axes()));
-    let window = match controller.fan_out {
+    let window = match controller.connection.fan_out() {
         FanOut::Slice => slice(controller, slots, timeline, manner.level),
         FanOut::Shared => shared(config, controller, slots, timeline, manner.level),
     };
     let vibrates = window.moving().filter_map(|(_, slot)| slot.axis).any(|axis| timeline.vibrates(axis));
-    Lane {
-        window,
-        codec: Codec::Mbox(MotionCodec {
+    let codec = match &controller.connection {
+        Connection::Udp(station) => Codec::Mbox(MotionCodec {
             channel,
-            code: Code(controller.accept.code(controller.address)),
+            code: Code(station.code()),
             vibrates,
-            vibration_port: controller.vibration_port,
+            vibration_port: station.vibration_port,
             wiring: wiring(config, controller, timeline),
         }),
+        Connection::Link(_) => Codec::Link,
+    };
+    Lane {
+        window,
+        codec,
         ack_every: manner.ack_every(config),
         longest_ms: controller.seat.max_interval_ms,
         next_frame: FrameNo::FIRST,
@@ -67,7 +71,7 @@ fn slice(controller: &Controller, slots: usize, timeline: &Timeline, level: f64)
 /// The whole cue's axes, as every controller that shares the frame sees them; each takes its own window by PA95.
 fn shared(config: &Config, controller: &Controller, slots: usize, timeline: &Timeline, level: f64) -> Window {
     let any_slot = |axis: usize| {
-        let takes = |other: &&Controller| other.fan_out == FanOut::Shared && other.takes(axis);
+        let takes = |other: &&Controller| other.connection.fan_out() == FanOut::Shared && other.takes(axis);
         let taker = if controller.takes(axis) { Some(controller) } else { config.named().find(takes) };
         let taker = taker.unwrap_or(controller);
         let own = (axis < timeline.axes()).then_some(axis);

@@ -6,6 +6,7 @@
 
 mod lane;
 mod lanes;
+mod link;
 mod mbox;
 pub(crate) mod rates;
 mod rounds;
@@ -35,9 +36,12 @@ use crate::wire::{FromController, PerAxis, ReplyCode};
 
 /// The other end of a lane: one controller. A variant for each family, matched and never boxed.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "one for each controller, made once")]
 pub(crate) enum Peer {
     /// SMC, IMAX and MBOX controllers.
     Mbox(mbox::MboxPeer),
+    /// Drives on a serial link, whose thread asks them by itself.
+    Link,
 }
 
 /// What is wanted of a controller.
@@ -134,58 +138,81 @@ pub(crate) struct Seen {
 impl Peer {
     /// The controller to which a lane sends.
     pub(crate) fn new(controller: &Controller, lane: &Lane) -> Self {
-        match &lane.codec {
-            lane::Codec::Mbox(codec) => Self::Mbox(mbox::MboxPeer::new(controller, lane, codec.code)),
+        match controller.on_network() {
+            Some(station) => Self::Mbox(mbox::MboxPeer::new(&station, lane)),
+            None => Self::Link,
         }
-    }
-
-    fn mbox(&mut self) -> &mut mbox::MboxPeer {
-        let Self::Mbox(peer) = self;
-        peer
     }
 
     /// Asks for what is needed by `send`, which says whether the kernel took a datagram; gives how many it took.
     pub(crate) fn poll(&mut self, need: Need, now: MonoTime, send: &mut dyn FnMut(&[u8]) -> bool) -> u32 {
-        self.mbox().poll(need, now, send)
+        match self {
+            Self::Mbox(peer) => peer.poll(need, now, send),
+            Self::Link => 0,
+        }
     }
 
     /// Takes a message: puts into `out` of what it is evidence, which is nothing where it answers nothing.
     pub(crate) fn receive(&mut self, arrival: Incoming<'_>, out: &mut EvidenceList) {
-        self.mbox().receive(arrival, out);
+        match self {
+            Self::Mbox(peer) => peer.receive(arrival, out),
+            Self::Link => {}
+        }
     }
 
     /// Takes the reply code of a frame; says whether it is a refusal of that frame, and not how the controller is.
     pub(crate) fn on_reply_code(&mut self, code: ReplyCode) -> bool {
-        self.mbox().on_reply_code(code)
+        match self {
+            Self::Mbox(peer) => peer.on_reply_code(code),
+            Self::Link => false,
+        }
     }
 
-    /// Takes what a controller reported unasked of where its axes are.
-    pub(crate) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Whereabouts {
-        self.mbox().on_report(positions, at)
+    /// Takes what a controller reported unasked of where its axes are; none where its family has no such reports.
+    pub(crate) fn on_report(&mut self, positions: &[Pulses], at: MonoTime) -> Option<Whereabouts> {
+        match self {
+            Self::Mbox(peer) => Some(peer.on_report(positions, at)),
+            Self::Link => None,
+        }
     }
 
     /// A frame went to it.
     pub(crate) fn on_sent(&mut self, at: MonoTime) {
-        self.mbox().position.on_sent(at);
+        match self {
+            Self::Mbox(peer) => peer.position.on_sent(at),
+            Self::Link => {}
+        }
     }
 
     /// No frame goes to it any more, and its seat may vibrate on by so much, strokes.
     pub(crate) fn on_cut_off(&mut self, shakes: f64) {
-        self.mbox().position.on_cut_off(shakes);
+        match self {
+            Self::Mbox(peer) => peer.position.on_cut_off(shakes),
+            Self::Link => {}
+        }
     }
 
     /// It is home, as it was asked to be.
     pub(crate) fn on_homed(&mut self) {
-        self.mbox().position.on_homed();
+        match self {
+            Self::Mbox(peer) => peer.position.on_homed(),
+            Self::Link => {}
+        }
     }
 
     /// True if it leaves so much unanswered that it is not to be asked again yet while frames flow.
     pub(crate) fn is_behind(&mut self, now: MonoTime) -> bool {
-        self.mbox().pending.is_full(now)
+        match self {
+            Self::Mbox(peer) => peer.pending.is_full(now),
+            Self::Link => false,
+        }
     }
 
     /// True if it has answered something of what it was when last asked for its identity.
     pub(crate) fn has_answered(&mut self) -> bool {
-        self.mbox().probe.has_answered()
+        match self {
+            Self::Mbox(peer) => peer.probe.has_answered(),
+            Self::Link => false,
+        }
     }
 }

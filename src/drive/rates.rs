@@ -5,9 +5,9 @@ use std::fmt;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::config::Config;
 use crate::config::drive::DriveFamily;
 use crate::config::link::{Link, LinkWiring};
+use crate::config::{Config, Controller};
 use crate::drive::LOOP;
 use crate::time::nanos;
 
@@ -62,8 +62,9 @@ impl LinkLoad {
     /// they may be put in again.
     #[must_use]
     pub(crate) fn of(link: &Link, config: &Config) -> Option<Self> {
-        let on_it = config.drives.iter().filter(|drive| drive.link == link.name);
-        let axes = on_it.map(|drive| u32::try_from(drive.seat.axes).unwrap_or(u32::MAX)).sum();
+        let is_on_it = |one: &&Controller| one.drives().is_some_and(|drives| drives.link == link.name);
+        let on_it = config.named().filter(is_on_it);
+        let axes = on_it.map(|one| u32::try_from(one.seat.axes).unwrap_or(u32::MAX)).sum();
         let family = link.family.filter(|_| axes > 0)?;
         let is_usb = is_usb(&link.port);
         let delay = match (family, link.wiring) {

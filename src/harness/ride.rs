@@ -30,7 +30,7 @@ pub fn stage(
     let show =
         Show { rate: Rate::from_hz(rate_hz), timing: Timing::Relative, start: ShowTime::ZERO, plays: 1 };
     let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent });
-    let watched = config.controllers.iter().map(Watched::of).collect();
+    let watched = config.stations().iter().map(Watched::of).collect();
     (staged.expect("the ride is gentle"), watched)
 }
 

@@ -19,7 +19,7 @@ pub mod channel {
     pub use crate::channel::Sample;
 }
 pub mod config {
-    pub use crate::config::{Api, ApiToken, Config, Controller, LossPolicy, from_to_args, load};
+    pub use crate::config::{Api, ApiToken, Config, Controller, LossPolicy, Station, from_to_args, load};
 }
 pub mod control {
     pub use crate::control::{

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::config::{Config, Controller, FanOut, cue_axes};
+use crate::config::{Config, Controller, FanOut, FansOut as _, cue_axes};
 use crate::cue::CueBuilder;
 use crate::motion::{Pulses, SeatType};
 use crate::time::ShowTime;
@@ -18,7 +18,7 @@ pub(crate) fn held(config: &Config, places: &[Vec<Pulses>]) -> Config {
     let hold = |(controller, places): (&Controller, &Vec<Pulses>)| {
         let seat = standing(&controller.seat, places);
         // A slice is cut on this side of the wire; here all its axes rest.
-        let axis_offset = match controller.fan_out {
+        let axis_offset = match controller.connection.fan_out() {
             FanOut::Slice => 0,
             FanOut::Shared => controller.axis_offset,
         };

@@ -198,6 +198,16 @@ impl Window {
         self.slots.iter().enumerate().filter(|(_, slot)| slot.axis.is_some() || slot.is_own)
     }
 
+    /// A pose as it leaves: each slot inside its stroke, or where it is held.
+    #[must_use]
+    pub(crate) fn reached(&self, pose: &Pose) -> Pose {
+        let mut reached = *pose;
+        for (place, slot) in reached.iter_mut().zip(&self.slots) {
+            *place = place.clamp(slot.reach.0, slot.reach.1);
+        }
+        reached
+    }
+
     /// Holds every slot at its park pose: whatever it is asked for from now on, it is sent there and nowhere else.
     pub(crate) fn hold(&mut self) {
         for slot in &mut self.slots {

@@ -13,7 +13,7 @@ pub(crate) use state::{ControllerState, Heard};
 use std::collections::VecDeque;
 use std::net::{Ipv4Addr, SocketAddrV4};
 
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::motion::Pulses;
 use crate::time::MonoTime;
 use crate::wire::{
@@ -40,13 +40,9 @@ pub struct Watched {
 impl Watched {
     /// What the configuration says of a controller.
     #[must_use]
-    pub fn of(controller: &Controller) -> Self {
-        Self {
-            address: controller.address,
-            dialect: controller.dialect,
-            vibration_port: controller.vibration_port,
-            estop_inputs: controller.estop_inputs,
-        }
+    pub fn of(controller: &Controller<Station>) -> Self {
+        let Station { address, dialect, vibration_port, .. } = controller.connection;
+        Self { address, dialect, vibration_port, estop_inputs: controller.estop_inputs }
     }
 
     fn station(&self) -> Code {

@@ -81,7 +81,7 @@ fn judge_inputs(subject: &Subject<'_>, notes: &mut Notes) {
         }
     }
     let watched = subject.controller.estop_inputs;
-    let mbox = subject.controller.dialect == Dialect::Mbox;
+    let mbox = subject.controller.connection.dialect == Dialect::Mbox;
     let remedy = format!("write estop_inputs = [{}] for this controller", numbers(mask));
     if watched != 0 && watched != mask {
         let found =

@@ -67,7 +67,7 @@ fn judge_lead(subject: &Subject<'_>, notes: &mut Notes) {
 /// 0 says nothing. In the SMC manual's table it is the rise of axis 1 where PA40 = 0, in its section 5.7 the stroke, as with
 /// IMAX.
 fn judge_stroke(subject: &Subject<'_>, notes: &mut Notes) {
-    let is_rise = subject.controller.dialect == Dialect::Smc && subject.pa(0x40) == Some(0);
+    let is_rise = subject.controller.connection.dialect == Dialect::Smc && subject.pa(0x40) == Some(0);
     let Some(tenths) = subject.pa(0x42).filter(|tenths| *tenths > 0 && !is_rise) else { return };
     let seat = &subject.controller.seat;
     let stroke = f64::from(tenths) / 10.0;

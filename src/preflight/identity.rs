@@ -17,7 +17,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     if let Some(version) = version(subject) {
         notes.add(Check::Version, format!("software {version}"), "");
     }
-    if subject.controller.dialect == Dialect::Mbox {
+    if subject.controller.connection.dialect == Dialect::Mbox {
         let found = "not in the IMAX manual, so not asked: auto reset (PA0d), status reports (PA1e, PA1f), amplitude \
                      (PA55), encoder (PA54), bus period (PA59), analogue positions (PA60), speed of single axes (PA80 to PA85), \
                      emergency reset (PA98), outputs (PA9d), packets (DP34)";
@@ -26,7 +26,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
 }
 
 fn judge_address(subject: &Subject<'_>, notes: &mut Notes) {
-    let address = subject.controller.address;
+    let address = subject.controller.connection.address;
     let (Some(ip), Some(port)) = (subject.ip(0x10), subject.pa(0x14)) else { return };
     if (ip, port) != (*address.ip(), address.port()) {
         let found = format!("takes itself for {ip}:{port} (PA10 to PA14), but was reached at {address}");
@@ -112,7 +112,7 @@ fn judge_rotary(subject: &Subject<'_>, notes: &mut Notes) {
 /// 10 is the work mode (SMC manual 2.3.1); 0 that of RS-485 controllers (IMAX manual 5.2).
 fn judge_mode(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(mode) = subject.pa(0x00) else { return };
-    let dialect = subject.controller.dialect;
+    let dialect = subject.controller.connection.dialect;
     let what = match (mode, dialect) {
         (10, _) | (0, Dialect::Mbox) => return,
         (0, Dialect::Smc) => {
@@ -135,7 +135,7 @@ fn judge_mode(subject: &Subject<'_>, notes: &mut Notes) {
 
 fn judge_offset(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(offset) = subject.pa(0x95) else { return };
-    let (word, wanted) = match subject.controller.fan_out {
+    let (word, wanted) = match subject.controller.connection.fan_out {
         FanOut::Slice => ("slice", 0),
         FanOut::Shared => ("shared", subject.controller.axis_offset),
     };
@@ -151,7 +151,7 @@ fn judge_offset(subject: &Subject<'_>, notes: &mut Notes) {
 /// Version and minor version. The IMAX manual has something else where SMC controllers have the minor one.
 fn version(subject: &Subject<'_>) -> Option<String> {
     let (major, minor) = (subject.register(Address::Dp(0xff))?, subject.register(Address::Dp(0xfe)));
-    Some(match (subject.controller.dialect, minor) {
+    Some(match (subject.controller.connection.dialect, minor) {
         (Dialect::Smc, Some(minor)) => format!("{major}.{minor}"),
         _ => major.to_string(),
     })
@@ -161,7 +161,7 @@ fn version(subject: &Subject<'_>) -> Option<String> {
 pub(super) fn judge_together(subjects: &[Subject<'_>], all: &mut [Notes]) {
     for (index, subject) in subjects.iter().enumerate() {
         let twin = |other: &&Subject<'_>| {
-            other.controller.address == subject.controller.address
+            other.controller.connection.address == subject.controller.connection.address
                 || mac(subject).is_some_and(|own| mac(other) == Some(own))
         };
         let others = subjects[..index].iter().chain(&subjects[index + 1..]);
@@ -177,7 +177,7 @@ pub(super) fn judge_together(subjects: &[Subject<'_>], all: &mut [Notes]) {
 /// Those that differ from what most of their dialect have.
 fn judge_versions(subjects: &[Subject<'_>], all: &mut [Notes]) {
     let of = |subject: &Subject<'_>| {
-        version(subject).map(|version| (subject.controller.dialect == Dialect::Smc, version))
+        version(subject).map(|version| (subject.controller.connection.dialect == Dialect::Smc, version))
     };
     let mut counts: BTreeMap<(bool, String), usize> = BTreeMap::new();
     for key in subjects.iter().filter_map(of) {

@@ -41,7 +41,7 @@ pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
 /// Whatever else than the Time and the positions of frames it goes by.
 fn judge_source(subject: &Subject<'_>, notes: &mut Notes) {
     // SMC has another meaning for it: a time for commands that have none. Ours always have one.
-    let imax = subject.controller.dialect == Dialect::Mbox;
+    let imax = subject.controller.connection.dialect == Dialect::Mbox;
     if let Some(value) = subject.pa(0x0a).filter(|value| imax && *value != 0) {
         let found = format!("PA0a = {value}: ignores the Time of frames and goes by when they come");
         notes.add(Check::TimeIgnored, found, "set PA0a = 0");
@@ -72,7 +72,7 @@ fn judge_bus(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
 fn judge_signed(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(depth) = subject.pa(0x51).filter(|depth| *depth != 0) else { return };
     let below = subject.controller.seat.own().iter().position(|axis| axis.low < 0.0);
-    if let Some(axis) = below.filter(|_| subject.controller.dialect == Dialect::Mbox) {
+    if let Some(axis) = below.filter(|_| subject.controller.connection.dialect == Dialect::Mbox) {
         let found = format!("PA51 = {depth}: filters positions, and those of axis {} go below 0", axis + 1);
         notes.add(Check::SignedFilter, found, "set PA51 = 0");
     }
@@ -82,7 +82,7 @@ fn judge_signed(subject: &Subject<'_>, notes: &mut Notes) {
 /// least and the most that they may mean.
 fn judge_delay(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     let value = |number| subject.pa(number).unwrap_or(0);
-    let (what, least, most) = match subject.controller.dialect {
+    let (what, least, most) = match subject.controller.connection.dialect {
         Dialect::Mbox => {
             // 0 is no filter and 1 smooths nothing (IMAX manual 5.8).
             let depth = value(0x51).min(16);
@@ -100,7 +100,7 @@ fn judge_delay(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
         return;
     }
     let span = if least < most { format!("{least:.0} to {most:.0} ms") } else { format!("{most:.0} ms") };
-    let remedy = match subject.controller.dialect {
+    let remedy = match subject.controller.connection.dialect {
         Dialect::Mbox => "set PA51 = 0",
         Dialect::Smc => "set PA4c = 0 and PA4d = 0",
     };
@@ -112,7 +112,7 @@ fn judge_delay(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
 fn judge_interval(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     let Some(most) = subject.pa(0x0b) else { return };
     if most == 0 {
-        if subject.controller.dialect == Dialect::Mbox {
+        if subject.controller.connection.dialect == Dialect::Mbox {
             let found = "PA0b = 0: no limit by the SMC manual, unexplained by this controller's own";
             notes.add(Check::IntervalUnlimited, found, "set PA0b = 3000");
         }

@@ -4,7 +4,7 @@ use super::{Check, Notes, Subject, Terms};
 
 /// True if datagrams get there, whole.
 pub(super) fn judge_way(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
-    let address = subject.controller.address;
+    let address = subject.controller.connection.address;
     match &subject.route {
         Err(why) => {
             let found = format!("no way to {address}: {why}");

@@ -19,7 +19,7 @@ pub(super) fn judge(subject: &Subject<'_>, notes: &mut Notes) {
     let Some(words) = position_words_of(&survey.values, axes) else { return };
     let again = position_words_of(&survey.again, axes);
     let reported = survey.reported.measured.map(|heard| heard.value);
-    let dialect = subject.controller.dialect;
+    let dialect = subject.controller.connection.dialect;
     let stand = Stand { words: &words, dialect, strokes: &strokes, reported: reported.as_deref() };
     let stand = if again.is_some_and(|again| stand.rests(&again)) {
         stand

@@ -15,7 +15,7 @@ const SECOND_HOST: u8 = 0x25;
 
 pub(super) fn judge(subject: &Subject<'_>, terms: &Terms, notes: &mut Notes) {
     judge_state(subject, notes);
-    if subject.controller.dialect == Dialect::Smc {
+    if subject.controller.connection.dialect == Dialect::Smc {
         judge_reports(subject, terms, notes);
     }
 }

@@ -3,7 +3,7 @@
 use std::net::Ipv4Addr;
 use std::ops::RangeInclusive;
 
-use crate::config::{Controller, FanOut};
+use crate::config::{Controller, FanOut, Station};
 use crate::device::survey::Survey;
 use crate::device::{Address, home, places, table};
 use crate::motion::MAX_AXES;
@@ -22,7 +22,7 @@ const HEADERS_LEN: usize = 28;
 #[derive(Debug)]
 pub(crate) struct Subject<'a> {
     /// What it should be.
-    pub(crate) controller: &'a Controller,
+    pub(crate) controller: &'a Controller<Station>,
     /// How many axes its seat has; `None` if nobody says.
     pub(crate) axes: Option<usize>,
     /// The way to it, or why there is none.
@@ -63,11 +63,12 @@ const PARAMETERS: [RangeInclusive<u8>; 15] = [
 
 /// The registers that are judged of a controller, as far as its manual has them.
 #[must_use]
-pub(crate) fn wanted(controller: &Controller) -> Vec<Address> {
+pub(crate) fn wanted(controller: &Controller<Station>) -> Vec<Address> {
     let parameters = PARAMETERS.into_iter().flatten().map(Address::Pa);
     let monitors = [home::DPF0, Address::Dp(0xfe), Address::Dp(0xff)];
-    let known =
-        |it: &Address| table().get(*it).is_some_and(|register| register.dialect.has(controller.dialect));
+    let known = |it: &Address| {
+        table().get(*it).is_some_and(|register| register.dialect.has(controller.connection.dialect))
+    };
     parameters.chain(places(controller.seat.axes)).chain(monitors).filter(known).collect()
 }
 
@@ -115,20 +116,20 @@ impl Terms {
 
     /// The largest IP packet that goes to a controller or comes from it, bytes.
     #[must_use]
-    pub(crate) fn packet_len(&self, controller: &Controller) -> usize {
+    pub(crate) fn packet_len(&self, controller: &Controller<Station>) -> usize {
         let cue_axes = self.cue.map_or_else(|| most_axes(controller), |(axes, _)| axes);
         let (_, slots) = motion_channel_and_slots(controller.frame_axes(cue_axes));
         let vibrates = self.cue.is_none_or(|(_, vibrates)| vibrates)
-            && controller.dialect == Dialect::Smc
+            && controller.connection.dialect == Dialect::Smc
             && slots <= MAX_VIBRATING_AXES;
-        let frame = motion_len(slots, vibrates.then_some(controller.vibration_port));
+        let frame = motion_len(slots, vibrates.then_some(controller.connection.vibration_port));
         frame.max(REGISTER_LEN) + HEADERS_LEN
     }
 }
 
 /// The most axes a frame to it may ever carry.
-fn most_axes(controller: &Controller) -> usize {
-    match controller.fan_out {
+fn most_axes(controller: &Controller<Station>) -> usize {
+    match controller.connection.fan_out {
         FanOut::Slice => controller.seat.axes,
         FanOut::Shared => MAX_AXES,
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Finding, Subject, Terms, judge, wanted};
-use crate::config::{Controller, from_to_args};
+use crate::config::{Controller, Station, from_to_args};
 use crate::device::home::DPF0;
 use crate::device::survey::{ROUNDS, Survey};
 use crate::device::{Address, table};
@@ -28,7 +28,7 @@ const SAFE_MBOX: [(u8, u16); 1] = [(0x51, 0)];
 
 /// One controller with all that preflight knows of it.
 pub(super) struct Case {
-    pub(super) controller: Controller,
+    pub(super) controller: Controller<Station>,
     pub(super) axes: Option<usize>,
     pub(super) survey: Survey,
     pub(super) route: Result<Route, String>,
@@ -38,8 +38,8 @@ pub(super) struct Case {
 impl Case {
     pub(super) fn new(dialect: Dialect) -> Self {
         let to = ["192.168.15.201:7408,name=A1".to_owned()];
-        let mut controller = from_to_args(&to, &[], 3).unwrap().controllers.remove(0);
-        controller.dialect = dialect;
+        let mut controller = from_to_args(&to, &[], 3).unwrap().stations().remove(0);
+        controller.connection.dialect = dialect;
         controller.estop_inputs = u16::from(dialect == Dialect::Mbox);
         controller.seat = Arc::new(SeatType::bench3(3));
         let factory = |address: Address| {

@@ -167,7 +167,7 @@ fn settings_of_the_factory_are_refused() {
 #[test]
 fn a_shared_frame_needs_its_offset_in_the_device() {
     let mut case = Case::smc();
-    (case.controller.fan_out, case.controller.axis_offset) = (FanOut::Shared, 6);
+    (case.controller.connection.fan_out, case.controller.axis_offset) = (FanOut::Shared, 6);
     assert_eq!(check(&case), Some(Check::AxisOffset));
     assert_eq!(check(&case.with(&[(0x95, 6)])), None);
 }
@@ -340,7 +340,7 @@ fn controllers_with_one_address_or_hardware_address_are_told_both() {
 fn the_one_with_other_software_is_told() {
     let mut cases = [Case::smc(), Case::smc(), Case::smc()];
     for (case, host) in cases.iter_mut().zip(201..) {
-        case.controller.address.set_ip(std::net::Ipv4Addr::new(192, 168, 15, host));
+        case.controller.connection.address.set_ip(std::net::Ipv4Addr::new(192, 168, 15, host));
         case.survey.values.insert(Address::Pa(0x13), u16::from(host));
         case.survey.values.insert(Address::Dp(0xff), 4);
     }

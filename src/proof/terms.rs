@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Digest;
-use crate::config::{Config, EffectLimit};
+use crate::config::{Config, Controller, EffectLimit};
 use crate::motion::SeatType;
 use crate::time::Rate;
 
@@ -46,7 +46,8 @@ impl Terms {
     #[must_use]
     pub(crate) fn of_hall(config: &Config, cue: Digest, rate: Rate, level: f64) -> Self {
         let mut parts: Vec<Part> = Vec::new();
-        for part in config.windows().map(|(axes, seat)| Part { seat: Arc::clone(seat), axes }) {
+        let part = |one: &Controller| Part { seat: Arc::clone(&one.seat), axes: one.window() };
+        for part in config.controllers.iter().map(part) {
             if !parts.contains(&part) {
                 parts.push(part);
             }

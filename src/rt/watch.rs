@@ -250,8 +250,9 @@ impl Watch {
             if let Some(told) = state.measured.filter(|told| told.at == at && at > self.reported[controller])
             {
                 self.reported[controller] = at;
-                let place = self.peers[controller].on_report(&told.value, at);
-                self.publish(controller, &place);
+                if let Some(place) = self.peers[controller].on_report(&told.value, at) {
+                    self.publish(controller, &place);
+                }
             }
         }
         self.look_anew(now);

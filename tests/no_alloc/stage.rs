@@ -249,7 +249,7 @@ fn staged(addresses: &[SocketAddrV4; CONTROLLERS]) -> (StagedShow, Vec<Watched>)
         Show { rate: Rate::from_hz(1000.0), timing: Timing::Absolute, start: ShowTime::ZERO, plays: 0 };
     let staged = StagedShow::new(&config, timeline, show, Manner { level: 1.0, silent: false })
         .expect("the ride is gentle");
-    (staged, config.controllers.iter().map(Watched::of).collect())
+    (staged, config.stations().iter().map(Watched::of).collect())
 }
 
 /// What came of a play.

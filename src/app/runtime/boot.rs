@@ -13,7 +13,7 @@ use crate::timeline::Timeline;
 
 /// Binds the frame port.
 pub(super) fn bind(config: &Config) -> Result<(Sender, Receiver), RuntimeError> {
-    let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
+    let peers: Vec<_> = config.stations().iter().map(|one| one.connection.address).collect();
     Ok(Ports::open(config.show.bind, &peers).map_err(RuntimeError::Net)?.split())
 }
 
@@ -29,7 +29,7 @@ pub(super) fn open(config: &Config, numbers: &Numbers, manner: Manner) -> Result
     let mut staged =
         StagedShow::new(config, Timeline::new(rest), show, manner).map_err(RuntimeError::Plan)?;
     for (lane, controller) in staged.lanes.iter_mut().zip(&config.controllers) {
-        if let Some(next) = numbers.get(&controller.address) {
+        if let Some(next) = numbers.get(&controller.address()) {
             *lane = lane.clone().starting_at(*next);
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::device::home::{HomeError, Progress, TIMEOUT, home, unsearched};
 use crate::device::survey::{Survey, survey};
 use crate::device::{Link, Talk, Watch, peers};
@@ -70,7 +70,7 @@ impl Link for OverLine<'_> {
 /// Asks, and waits for what comes; `tell` hears in words how far it is.
 pub(crate) fn run_on_devices(
     line: &mut Line,
-    controllers: &[Controller],
+    controllers: &[Controller<Station>],
     job: DeviceJob,
     tell: &mut dyn FnMut(&str),
 ) -> Finding {
@@ -101,11 +101,12 @@ pub(crate) fn run_on_devices(
 /// Homes these, unless one of them would go to zero without a search: a seat may have several controllers.
 fn home_all(
     talk: &mut Talk<OverLine<'_>>,
-    controllers: &[Controller],
+    controllers: &[Controller<Station>],
     lanes: &[usize],
     tell: &mut dyn FnMut(&str),
 ) -> Vec<(usize, Result<(), HomeError>)> {
-    let seats: Vec<(usize, Dialect)> = lanes.iter().map(|lane| (*lane, controllers[*lane].dialect)).collect();
+    let seats: Vec<(usize, Dialect)> =
+        lanes.iter().map(|lane| (*lane, controllers[*lane].connection.dialect)).collect();
     let would_not_search = unsearched(talk, &seats);
     if !would_not_search.is_empty() {
         return would_not_search.into_iter().map(|(lane, error)| (lane, Err(error))).collect();

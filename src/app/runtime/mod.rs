@@ -8,7 +8,6 @@ pub(crate) use device_job::{DeviceJob, Finding, run_on_devices};
 
 use std::collections::BTreeMap;
 use std::io;
-use std::net::SocketAddrV4;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::thread::{self, Thread};
@@ -19,7 +18,7 @@ use rtrb::{Producer, RingBuffer};
 use super::company::Company;
 use super::helpers::Helpers;
 use super::run::Run;
-use crate::config::Config;
+use crate::config::{Config, Controller};
 use crate::drive::{Lane, Manner};
 use crate::engine::{Engine, Mix};
 use crate::film::chase::ChaseRules;
@@ -58,7 +57,7 @@ pub enum RuntimeError {
 }
 
 /// The number of each controller's next frame, by its address: a number never comes twice within one process.
-pub type Numbers = BTreeMap<SocketAddrV4, FrameNo>;
+pub type Numbers = BTreeMap<String, FrameNo>;
 
 /// What a runtime is for.
 #[derive(Debug)]
@@ -198,7 +197,7 @@ impl Runtime {
             }
             Purpose::Play { film, .. } => (engine.waiting(), watch(health), film),
         };
-        let watched = config.controllers.iter().map(Watched::of).collect();
+        let watched = config.stations().iter().map(Watched::of).collect();
         let firsts: Vec<FrameNo> = lanes.iter().map(|lane| lane.last_frame().next()).collect();
         let acks = AckLoop::new(receiver, watched, ack_every, sent, ticks).going_on(&firsts, ack_every);
         let plans = PlanLoop { planning: Box::new(Planning { planner, timeline }), tasks, answers };
@@ -347,5 +346,5 @@ impl Ticks {
 /// From where the frame numbers of each controller go on.
 fn next_numbers(config: &Config, lanes: &[Lane]) -> Numbers {
     let next = lanes.iter().map(|lane| lane.last_frame().next());
-    config.controllers.iter().map(|one| one.address).zip(next).collect()
+    config.controllers.iter().map(Controller::address).zip(next).collect()
 }

@@ -90,7 +90,7 @@ impl Job {
     /// Does it.
     pub(super) fn run(self, tools: &Tools) -> JobResult {
         let Tools { config, library, line, settings } = tools;
-        let on_devices = |job| run_on_devices(&mut line.hold(), &config.controllers, job, &mut |_| {});
+        let on_devices = |job| run_on_devices(&mut line.hold(), &config.stations(), job, &mut |_| {});
         match self {
             Self::Load(id) => JobResult::Loaded(read(library, config, &id, &EntryFilm::default())),
             Self::List(id) => {

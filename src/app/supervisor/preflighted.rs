@@ -24,14 +24,14 @@ impl Preflighted {
         let bind = *config.show.bind.ip();
         let way =
             |address| -> Result<Route, String> { route(bind, address).map_err(|error| error.to_string()) };
-        let subjects: Vec<Subject<'_>> = config
-            .controllers
+        let stations = config.stations();
+        let subjects: Vec<Subject<'_>> = stations
             .iter()
             .zip(surveys)
             .map(|(controller, survey)| Subject {
                 controller,
                 axes: Some(controller.seat.axes),
-                route: way(controller.address),
+                route: way(controller.connection.address),
                 survey: Some(survey),
             })
             .collect();

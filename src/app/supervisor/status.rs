@@ -157,7 +157,7 @@ fn nameplate(controller: &Controller) -> ControllerStatus {
         name: controller.name.clone(),
         row: controller.row.clone(),
         seat: controller.seat.name.clone(),
-        address: controller.address.to_string(),
+        address: controller.address(),
         group: controller.group.clone(),
         rotary_axis: controller.seat.rotary_axis().map(|axis| axis + 1),
         ..ControllerStatus::default()

@@ -250,7 +250,7 @@ impl Rig {
         let config = Arc::new(config(folder.path()));
         let (runtime, commands_end, news) = runtime(&config);
         let desk = Arc::clone(&runtime.desk);
-        let peers: Vec<_> = config.controllers.iter().map(|one| one.address).collect();
+        let peers: Vec<_> = config.stations().iter().map(|one| one.connection.address).collect();
         let (sender, _) = Ports::open(config.show.bind, &peers).unwrap().split();
         let (line, _) = line(sender, 2);
         let library = library::Hall::new(&folder.path().join("hall.toml"), &config.store);

@@ -153,7 +153,7 @@ impl ControllerReport {
         Self {
             name: controller.name.clone(),
             row: controller.row.clone(),
-            address: controller.address,
+            address: controller.connection.address,
             answered: subject.answered(),
             round_trip_us: subject.survey.and_then(|survey| {
                 let (p50, max) = round_trip(&survey.round_trips)?;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::read_values;
 use crate::cli::targets::{TargetArgs, Targets, Troubles, read_file};
 use crate::cli::{Exit, Failure, OrExit as _, print};
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::device::settings::{self, Difference, Saved, differences};
 use crate::device::{Address, table};
 
@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let reports = targets.controllers.iter().zip(&saved).zip(found).map(|((controller, saved), found)| {
         ControllerReport {
             name: &controller.name,
-            address: controller.address.to_string(),
+            address: controller.connection.address.to_string(),
             saved_as: &saved.name,
             differences: differences(&saved.values, &found.values, args.all),
             faults: found.faults,
@@ -108,8 +108,8 @@ pub(super) fn matched<'f>(
         return Ok(vec![one; targets.controllers.len()]);
     }
     let only = || if let ([one], [_]) = (file, &targets.controllers[..]) { Some(one) } else { None };
-    let of = |controller: &Controller| {
-        let by_address = || file.iter().find(|one| one.address == controller.address);
+    let of = |controller: &Controller<Station>| {
+        let by_address = || file.iter().find(|one| one.address == controller.connection.address);
         by_name(&controller.name).or_else(by_address).or_else(only).ok_or_else(|| {
             anyhow!("has no settings of {}; it has {}; --as NAME chooses", controller.name, known())
         })

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Found, read_values};
 use crate::cli::targets::{TargetArgs, Targets, Troubles};
 use crate::cli::{Exit, Failure, OrExit as _, print};
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::device::change::dialect_name;
 use crate::device::{Address, Selection, selections, settings::Values, table};
 use crate::wire::{DP_POSITIONS, position};
@@ -53,8 +53,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// The registers that a controller is asked for: of ranges, those that its dialect has.
-fn wanted(selections: &[Selection], controller: &Controller) -> anyhow::Result<Vec<Address>> {
-    let dialect = controller.dialect;
+fn wanted(selections: &[Selection], controller: &Controller<Station>) -> anyhow::Result<Vec<Address>> {
+    let dialect = controller.connection.dialect;
     let has = |address: &Address| table().has(*address, dialect);
     let mut wanted = Vec::new();
     for selection in selections {
@@ -95,10 +95,10 @@ struct RegisterReport {
 
 impl<'a> Report<'a> {
     fn new(targets: &'a Targets, found: &'a [Found]) -> Self {
-        let one = |(controller, found): (&'a Controller, &'a Found)| ControllerReport {
+        let one = |(controller, found): (&'a Controller<Station>, &'a Found)| ControllerReport {
             name: &controller.name,
-            address: controller.address.to_string(),
-            dialect: dialect_name(controller.dialect),
+            address: controller.connection.address.to_string(),
+            dialect: dialect_name(controller.connection.dialect),
             state: found.state.as_deref(),
             registers: registers(controller, &found.values),
             faults: &found.faults,
@@ -107,7 +107,7 @@ impl<'a> Report<'a> {
     }
 }
 
-fn registers(controller: &Controller, values: &Values) -> Vec<RegisterReport> {
+fn registers(controller: &Controller<Station>, values: &Values) -> Vec<RegisterReport> {
     let one = |(&address, &value)| {
         let register = table().get(address);
         RegisterReport {
@@ -122,12 +122,12 @@ fn registers(controller: &Controller, values: &Values) -> Vec<RegisterReport> {
 }
 
 /// What a value means in words; for the first word of a position, the position.
-fn says(controller: &Controller, values: &Values, address: Address, value: u16) -> Option<String> {
+fn says(controller: &Controller<Station>, values: &Values, address: Address, value: u16) -> Option<String> {
     if let Address::Dp(number) = address
         && DP_POSITIONS.contains(&u16::from(number))
     {
         let second = values.get(&address.after(1)?)?;
-        return Some(format!("position {}", position([value, *second], controller.dialect).0));
+        return Some(format!("position {}", position([value, *second], controller.connection.dialect).0));
     }
     table().get(address)?.says(value).map(str::to_owned)
 }

@@ -30,7 +30,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let targets = args.targets.resolve(&args.name)?;
     let wanted: Vec<Vec<Address>> = (targets.controllers.iter())
-        .map(|one| parameters(one.dialect).map(|register| register.address).collect())
+        .map(|one| parameters(one.connection.dialect).map(|register| register.address).collect())
         .collect();
     let mut talk = targets.open()?;
     let mut troubles = Troubles::default();
@@ -42,8 +42,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, Failure> {
     let saved: Vec<Saved> = (targets.controllers.iter().zip(found))
         .map(|(controller, found)| Saved {
             name: controller.name.clone(),
-            address: controller.address,
-            dialect: controller.dialect,
+            address: controller.connection.address,
+            dialect: controller.connection.dialect,
             values: found.values,
         })
         .collect();

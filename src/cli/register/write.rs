@@ -11,6 +11,7 @@ use super::{diff, read_values};
 use crate::cli::ask::agreed;
 use crate::cli::targets::{TargetArgs, Targets, Troubles};
 use crate::cli::{Exit, Failure, OrExit as _, print};
+use crate::config::{Controller, Station};
 use crate::device::change::{check, keeps, moves};
 use crate::device::settings::is_own;
 use crate::device::{Address, Assignment, Patience, Request, Talk, assignments, table};
@@ -132,7 +133,7 @@ fn wanted(args: &Args, targets: &Targets) -> Result<Vec<Vec<Assignment>>, Failur
     }
     for (controller, assignments) in targets.controllers.iter().zip(&wanted) {
         for assignment in assignments {
-            if let Err(objection) = check(*assignment, controller.dialect, args.force) {
+            if let Err(objection) = check(*assignment, controller.connection.dialect, args.force) {
                 objections.push(objection.to_string());
             }
         }
@@ -166,7 +167,7 @@ fn from_file(
         let values = saved.values.iter().map(|(&address, &value)| Assignment { address, value });
         values.filter(|one| writable(one.address, dialect)).collect()
     };
-    let dialects = targets.controllers.iter().map(|one| one.dialect);
+    let dialects = targets.controllers.iter().map(|one| one.connection.dialect);
     Ok(saved.into_iter().zip(dialects).map(of).collect())
 }
 
@@ -252,7 +253,8 @@ fn read_back(talk: &mut Talk, targets: &Targets, changes: &mut [Change], trouble
 
 /// Has the SMC controllers keep their settings; MBOX ones have done so with the write.
 fn keep(talk: &mut Talk, targets: &Targets, troubles: &mut Troubles) {
-    let smc = targets.controllers.iter().enumerate().filter(|(_, one)| one.dialect == Dialect::Smc);
+    let smc =
+        targets.controllers.iter().enumerate().filter(|(_, one)| one.connection.dialect == Dialect::Smc);
     let requests = smc.map(|(lane, _)| (lane, Request::write(KEEP.0, KEEP.1))).collect();
     for outcome in talk.ask(requests, Patience::default()) {
         let _ = troubles.sort(targets, outcome); // it has told of it
@@ -273,9 +275,9 @@ fn finish(args: &Args, targets: &Targets, changes: &[Change], kept: bool) -> Res
     if !args.json {
         return Ok(());
     }
-    let one = |(lane, controller): (usize, &crate::config::Controller)| ControllerReport {
+    let one = |(lane, controller): (usize, &Controller<Station>)| ControllerReport {
         name: targets.name(lane),
-        address: controller.address.to_string(),
+        address: controller.connection.address.to_string(),
         changes: changes.iter().filter(|change| change.lane == lane).collect(),
     };
     let controllers = targets.controllers.iter().enumerate().map(one).collect();

@@ -3,10 +3,10 @@
 use super::homing::{HomeWay, Side};
 use super::sixpack2::{MotorCurrent, PropDiv};
 use super::*;
-use crate::config::Config;
 use crate::config::drive_controller::Motors;
 use crate::config::link::LinkWiring;
 use crate::config::tests::parse;
+use crate::config::{Config, Controller, Drives};
 
 const LINK: &str = "[link.stalls]\nport = \"/dev/ttyUSB0\"\n";
 const SEAT: &str = "[seat.s]\naxes = 3\nstroke_mm = 150\nlead_mm = 5\npulses_per_rev = 4000\n\
@@ -56,28 +56,30 @@ fn a_seat_of_silvermax_units_reads_as_it_is_written_with_defaults_for_the_rest()
     let [link] = &hall.links[..] else { panic!("one link") };
     assert_eq!((link.wiring, link.baud, link.stop_bits), (LinkWiring::Rs232, 57_600, 2));
     assert_eq!((link.has_echo, link.rate_hz, link.family), (false, None, Some(DriveFamily::SilverMax)));
-    let [one] = &hall.drives[..] else { panic!("one seat") };
-    assert_eq!((one.name.as_str(), one.link.as_str(), one.group.as_str()), ("A1", "stalls", "A1"));
-    assert_eq!((one.window(), one.estop_inputs, one.enabled), (3..6, 0b10, true));
-    assert_eq!(one.motors, Motors::SilverMax(vec![16, 17, 18]));
-    let homing = one.drive.homing;
+    let [one] = &hall.controllers[..] else { panic!("one seat") };
+    let Drives { drive, link, motors } = one.drives().unwrap();
+    assert_eq!((one.name.as_str(), link.as_str(), one.group.as_str()), ("A1", "stalls", "A1"));
+    assert_eq!((one.window(), one.estop_inputs, one.address().as_str()), (3..6, 0b10, "link:stalls"));
+    assert_eq!(*motors, Motors::SilverMax(vec![16, 17, 18]));
+    let homing = drive.homing;
     assert_eq!(homing.way, HomeWay::Switch { input: Some(1), active_high: true });
     assert_eq!((homing.toward, homing.speed_mm_s, homing.zero_mm), (Side::Down, 10.0, -2.0));
-    let silver = one.drive.silvermax.as_ref().unwrap();
+    let silver = drive.silvermax.as_ref().unwrap();
     assert_eq!(silver.torque, Torque { hold: 0.6, moving: 1.0, full: 20_000 });
     assert_eq!((silver.max_error_mm, silver.hold_error_mm, silver.settle_ms), (3.0, 1.0, 120));
-    assert_eq!((one.drive.margin_mm, one.drive.sixpack2.as_ref()), (1.0, None));
+    assert_eq!((drive.margin_mm, drive.sixpack2.as_ref()), (1.0, None));
     assert_eq!(hall.untaken_axes(6), [1, 2, 3]);
 }
 
 #[test]
 fn a_seat_on_a_sixpack_reads_as_it_is_written_and_its_link_has_the_rate_that_is_made_of_57600() {
     let hall = six(SIX, "").unwrap();
-    assert_eq!(hall.drives[0].motors, Motors::Sixpack2 { unit: 1, motors: vec![0, 1, 2] });
+    let drives = hall.controllers[0].drives().unwrap();
+    assert_eq!(drives.motors, Motors::Sixpack2 { unit: 1, motors: vec![0, 1, 2] });
     let link = &hall.links[0];
     assert_eq!((link.baud, link.stop_bits), (56_818, 1));
     assert_eq!(link.asked_baud, 57_600);
-    let drive = hall.drives[0].drive.sixpack2.clone().unwrap();
+    let drive = drives.drive.sixpack2.clone().unwrap();
     assert_eq!(drive.current, MotorCurrent { peak: 238, stand: 50, run: 75, ramp: 100 });
     assert_eq!((drive.clock_divider, drive.propdiv, drive.jump_mm_s), (3, PropDiv::Auto, None));
     let bus = LINK.replace("/dev/ttyUSB0", "can0") + "wiring = \"can\"\n";
@@ -89,11 +91,14 @@ fn a_seat_on_a_sixpack_reads_as_it_is_written_and_its_link_has_the_rate_that_is_
 fn a_hall_mixes_families_and_only_the_reading_of_it_takes_drives_so_far() {
     let udp = "[[controller]]\nname = \"A2\"\nseat = \"s\"\naddress = \"10.0.0.1:7408\"\naxis_offset = 3\n";
     let hall = silver(udp).unwrap();
-    assert_eq!((hall.controllers.len(), hall.drives.len()), (1, 1));
+    let names = |all: Vec<&Controller>| all.iter().map(|one| one.name.clone()).collect::<Vec<_>>().join(" ");
+    assert_eq!(names(hall.controllers.iter().collect()), "A2 A1", "those on links come last");
+    assert_eq!(names(hall.on_links().collect()), "A1");
     assert_eq!(hall.untaken_axes(6), [0; 0]);
     let refused = hall.playable().unwrap_err().to_string();
     assert!(refused.starts_with("drives are not played yet: A1 on serial links"), "{refused}");
-    assert_eq!(Config { drives: Vec::new(), ..hall }.playable(), Ok(()));
+    let by_udp = hall.controllers[..1].to_vec();
+    assert_eq!(Config { controllers: by_udp, ..hall }.playable(), Ok(()));
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn stood(setup: Setup, to: &str) -> Stood {
 
 fn stood_on(rig: &Rig, to: &str) -> Stood {
     let to: Vec<_> = (0..rig.lanes()).map(|n| format!("127.0.0.1:{}{to}", 7_408 + n)).collect();
-    let controllers = from_to_args(&to, &[], 3).unwrap().controllers;
+    let controllers = from_to_args(&to, &[], 3).unwrap().stations();
     stand(&mut rig.talk(), &controllers).remove(0)
 }
 
@@ -52,7 +52,7 @@ fn a_seat_that_stands_tells_where_and_nothing_moves() {
 fn each_of_many_is_judged_by_itself() {
     let rig = Rig::of(vec![setup(&[]), Setup { mute: true, ..setup(&[]) }, setup(&[(pa::AXES, 6)])]);
     let to: Vec<_> = (0..3).map(|n| format!("127.0.0.1:{}", 7_408 + n)).collect();
-    let controllers = from_to_args(&to, &[], 3).unwrap().controllers;
+    let controllers = from_to_args(&to, &[], 3).unwrap().stations();
     let stood = stand(&mut rig.talk(), &controllers);
     assert_eq!(stood[0], Ok(vec![Pulses(0); 3]));
     assert!(matches!(&stood[1], Err(error @ StandError::Unread(_)) if !error.answered()), "{stood:?}");

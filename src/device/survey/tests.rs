@@ -16,9 +16,9 @@ fn wanted() -> Vec<Address> {
     parameters.filter(|it| table().get(*it).is_some()).chain([Address::Dp(0xfe), Address::Dp(0xff)]).collect()
 }
 
-fn controllers(count: usize) -> Vec<Controller> {
+fn controllers(count: usize) -> Vec<Controller<Station>> {
     let to: Vec<_> = (0..count).map(|n| format!("127.0.0.1:{}", 7_408 + n)).collect();
-    from_to_args(&to, &[], 3).unwrap().controllers
+    from_to_args(&to, &[], 3).unwrap().stations()
 }
 
 fn run(rig: &Rig) -> Vec<Survey> {
@@ -167,7 +167,7 @@ fn a_state_that_is_not_normal_is_kept() {
 fn mbox_controllers_are_not_asked_what_they_lack() {
     let rig = Rig::of(vec![Setup { dialect: Dialect::Mbox, ..Setup::default() }]);
     let mut controllers = controllers(1);
-    controllers[0].dialect = Dialect::Mbox;
+    controllers[0].connection.dialect = Dialect::Mbox;
     let found = survey(&mut rig.talk(), &controllers, &[vec![Address::Pa(0x90)]], &mut |_| {}).remove(0);
     assert_eq!(found.foreign_packets, None);
     assert!(!found.values.contains_key(&PACKETS));

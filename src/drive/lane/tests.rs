@@ -115,7 +115,7 @@ fn analogue_outputs_go_as_far_as_the_controller_says_and_are_off_on_the_way_to_p
 fn vibration_stands_two_bytes_further_back_where_port_out_takes_four() {
     let cue = cue("time_ms,a1,v1_hz,v1_amp\n0,0,20,0.01\n1000,0,20,0.01\n");
     let mut config = hall(&["127.0.0.1:1"], 1);
-    config.controllers[0].vibration_port = VibrationPort::Four;
+    config.controllers[0].station_mut().vibration_port = VibrationPort::Four;
     let mut lane = lanes(&config, &cue, FULL).remove(0);
     let mut beat = Beat::still(Timing::Relative, 10);
     beat.effects = EffectSet::Word(0x0003);

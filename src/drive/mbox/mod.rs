@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use super::{Evidence, EvidenceList, Incoming, Lane, Need, Seen, Whereabouts};
 use crate::belief::Reading;
-use crate::config::Controller;
+use crate::config::{Controller, Station};
 use crate::motion::{AxisGeometry, MAX_AXES, Pose, Pulses, SeatType};
 use crate::time::MonoTime;
 use crate::wire::{
@@ -59,8 +59,10 @@ pub(crate) struct MboxPeer {
 }
 
 impl MboxPeer {
-    pub(super) fn new(controller: &Controller, lane: &Lane, code: Code) -> Self {
-        let (dialect, seat, first_slot) = (controller.dialect, &controller.seat, controller.first_slot());
+    pub(super) fn new(controller: &Controller<Station>, lane: &Lane) -> Self {
+        let Station { dialect, .. } = controller.connection;
+        let (code, seat) = (Code(controller.connection.code()), &controller.seat);
+        let first_slot = controller.first_slot();
         let slots = lane.window.slots();
         let places = slots.len() - first_slot;
         // Axes beyond those of the seat type are read where frames have no more than places that are always 0: whoever stands there

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::*;
-use crate::config::from_to_args;
+use crate::config::{Accept, from_to_args};
 use crate::cue::{Source, read};
 use crate::drive::{Manner, lanes};
 use crate::timeline::Timeline;
@@ -18,9 +18,11 @@ fn peer(dialect: Dialect, axes: usize) -> MboxPeer {
     let text = &b"time_ms,a1\n0,0\n1000,0.1\n"[..];
     let cue = Timeline::new(read(Path::new("a.csv"), text, &Source::Native).unwrap());
     let mut config = from_to_args(&[format!("127.0.0.1:1,axes={axes}")], &[], 1).unwrap();
-    (config.controllers[0].dialect, config.controllers[0].belt_inputs) = (dialect, 1);
+    config.controllers[0].station_mut().dialect = dialect;
+    config.controllers[0].station_mut().accept = Accept::Code(CODE.0);
+    config.controllers[0].belt_inputs = 1;
     let lane = lanes(&config, &cue, Manner { level: 1.0, silent: false }).remove(0);
-    MboxPeer::new(&config.controllers[0], &lane, CODE)
+    MboxPeer::new(&config.stations()[0], &lane)
 }
 
 /// What it is asked for, by channel, first register and count.

@@ -48,7 +48,7 @@ fn pulses_that_no_count_of_the_encoder_makes_are_refused() {
 fn seats_of_one_type_with_different_encoders_are_told() {
     let mut cases = [Case::smc(), Case::smc(), Case::smc().with(&[(0x54, 1)])];
     for (case, host) in cases.iter_mut().zip(201..) {
-        case.controller.address.set_ip(std::net::Ipv4Addr::new(192, 168, 15, host));
+        case.controller.connection.address.set_ip(std::net::Ipv4Addr::new(192, 168, 15, host));
         case.survey.values.insert(Address::Pa(0x13), u16::from(host));
     }
     let subjects: Vec<_> = cases.iter().map(Case::subject).collect();

@@ -16,15 +16,17 @@ use crate::wire::{Access, Dialect, FromController, RegisterReply, Words};
 fn watch(dialect: Dialect) -> (Watch, rtrb::Consumer<Alarm>, Observer) {
     let cue = read(Path::new("a.csv"), &b"time_ms,a1\n0,0\n1000,0.1\n"[..], &Source::Native).unwrap();
     let mut config = from_to_args(&["127.0.0.1:9".to_owned()], &[], 1).unwrap();
-    (config.controllers[0].dialect, config.controllers[0].belt_inputs) = (dialect, 1);
+    config.controllers[0].station_mut().dialect = dialect;
+    config.controllers[0].belt_inputs = 1;
+    let stations = config.stations();
     let lanes = lanes(&config, &Timeline::new(cue), Manner { level: 1.0, silent: false });
     let (sender, _) =
-        Ports::open("127.0.0.1:0".parse().unwrap(), &[config.controllers[0].address]).unwrap().split();
+        Ports::open("127.0.0.1:0".parse().unwrap(), &[stations[0].connection.address]).unwrap().split();
     let (producer, alarms) = RingBuffer::new(2);
     let health =
         HealthTable::new(Groups::of(&config.controllers), LossPolicy::Continue, 1, Duration::from_millis(10));
     let watch = Watch::new(health, &config.controllers, &lanes, sender, producer, Arc::default());
-    (watch, alarms, Observer::new(config.controllers.iter().map(Watched::of).collect()))
+    (watch, alarms, Observer::new(stations.iter().map(Watched::of).collect()))
 }
 
 #[test]
