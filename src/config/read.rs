@@ -97,8 +97,7 @@ fn root<'t>(table: &'t DeTable<'t>, faults: &mut Faults<'_>) -> Option<Config> {
     let peers = controller_at
         .map_or_else(Peers::default, |entry| controllers(entry, &site, (&links, &seat_drives), faults));
     refuse_sparse_acks(show_at, &peers, faults);
-    let by_udp: Vec<_> = peers.present.iter().chain(peers.absent.iter().map(|one| &one.controller)).collect();
-    refuse_parted_groups(&peers.placed, &by_udp, faults);
+    refuse_parted_groups(&peers.placed, &peers.by_udp(), faults);
     let links = settle(links, &peers.placed, faults);
     let (controllers, absent) = peers.into_lists();
     let api = api_at.map_or_else(|| Some(Api::default()), |entry| api(entry, faults));
@@ -213,6 +212,10 @@ fn controllers(
 }
 
 impl Peers {
+    fn by_udp(&self) -> Vec<&Controller> {
+        self.present.iter().chain(self.absent.iter().map(|one| &one.controller)).collect()
+    }
+
     /// The controllers that take part, those on links last, and those that are out for good.
     fn into_lists(self) -> (Vec<Controller>, Vec<Absent>) {
         let Self { mut present, mut absent, placed } = self;
@@ -281,24 +284,17 @@ fn controller<'t>(
     let row = section.text("row");
     let group = section.text("group");
     let seat = seat_of(&mut section, site);
-    let address = section.address("address");
-    if let (Some(address), Some(entry)) = (address, section.get("address"))
-        && let Err(reason) = check_peer(address)
-    {
-        entry.fault(section.faults, &format!("{address}: {reason}"));
-    }
     let axis_offset = section.whole_in("axis_offset", 0..=MAX_AXES - 1).unwrap_or(0);
     let fan_out = section.choice("fan_out", &[("slice", FanOut::Slice), ("shared", FanOut::Shared)]);
-    let dialect = dialect(&mut section);
-    let vibration_port = vibration_port(&mut section, dialect);
-    let accept = accept(&mut section).unwrap_or(Accept::All);
+    let fan_out = fan_out.unwrap_or(FanOut::Slice);
+    let station = station(&mut section, fan_out);
     let effects = effects_of(&mut section, site);
     let at_most = levels_of(&mut section);
     let (estop_inputs, belt_inputs) = named_inputs(&mut section);
     let accept_findings = acceptances(&mut section);
     let enabled = section.get("enabled").and_then(|entry| entry.switch(section.faults)).unwrap_or(true);
     section.finish();
-    let (name, seat, fan_out) = (name?, seat?, fan_out.unwrap_or(FanOut::Slice));
+    let (name, seat) = (name?, seat?);
     if let Err(reason) = check_window(axis_offset, seat.axes, fan_out) {
         faults.note(table.get("axis_offset").map_or(at, |value| value.span().start), reason);
     }
@@ -307,13 +303,7 @@ fn controller<'t>(
         name,
         row,
         seat,
-        connection: Connection::Udp(Station {
-            address: address?,
-            fan_out,
-            dialect: dialect.unwrap_or(Dialect::Smc),
-            vibration_port: vibration_port.unwrap_or_default(),
-            accept,
-        }),
+        connection: Connection::Udp(station?),
         axis_offset,
         effects,
         at_most,
@@ -322,6 +312,26 @@ fn controller<'t>(
         accept_findings,
     };
     Some((controller, enabled))
+}
+
+/// What only a controller on the network has.
+fn station(section: &mut Section<'_, '_, '_>, fan_out: FanOut) -> Option<Station> {
+    let address = section.address("address");
+    if let (Some(address), Some(entry)) = (address, section.get("address"))
+        && let Err(reason) = check_peer(address)
+    {
+        entry.fault(section.faults, &format!("{address}: {reason}"));
+    }
+    let dialect = dialect(section);
+    let vibration_port = vibration_port(section, dialect).unwrap_or_default();
+    let accept = accept(section).unwrap_or(Accept::All);
+    Some(Station {
+        address: address?,
+        fan_out,
+        dialect: dialect.unwrap_or(Dialect::Smc),
+        vibration_port,
+        accept,
+    })
 }
 
 /// The highest level of each output, as its name says it.

@@ -12,7 +12,7 @@ use rustix::event::{EventfdFlags, Timespec, epoll, eventfd};
 
 use super::log::Logs;
 use super::outcome::Outcome;
-use super::station::Station;
+use super::station::VirtualStation;
 use super::{Command, CommandError};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -39,7 +39,7 @@ pub(super) enum Order {
 /// All that the thread owns.
 #[derive(Debug)]
 pub(super) struct EventLoop {
-    pub(super) stations: Vec<Station>,
+    pub(super) stations: Vec<VirtualStation>,
     pub(super) epoll: OwnedFd,
     /// Rings when there are orders.
     pub(super) bell: Arc<OwnedFd>,
@@ -146,7 +146,7 @@ impl EventLoop {
 }
 
 /// An epoll over all sockets and the bell.
-pub(super) fn wait_for(stations: &[Station]) -> rustix::io::Result<(OwnedFd, OwnedFd)> {
+pub(super) fn wait_for(stations: &[VirtualStation]) -> rustix::io::Result<(OwnedFd, OwnedFd)> {
     let epoll = epoll::create(epoll::CreateFlags::CLOEXEC)?;
     for (index, station) in (0..).zip(stations) {
         epoll::add(&epoll, &station.socket, epoll::EventData::new_u64(index), epoll::EventFlags::IN)?;

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use super::event_loop::{DELAYED, EventLoop, Order, wait_for};
 use super::log::Logs;
 use super::outcome::Outcome;
-use super::station::{Station, listen};
+use super::station::{VirtualStation, listen};
 use super::{Command, CommandError, Options, Setup};
 use crate::sys::clock::Monotonic;
 use crate::time::{Clock as _, MonoTime};
@@ -165,7 +165,7 @@ fn script(options: &Options, start: MonoTime) -> Result<VecDeque<(MonoTime, Comm
     Ok(script.into())
 }
 
-fn stations(options: &Options, start: MonoTime) -> Result<Vec<Station>, FarmError> {
+fn stations(options: &Options, start: MonoTime) -> Result<Vec<VirtualStation>, FarmError> {
     let first = options.listen;
     let station = |(index, setup): (usize, &Setup)| {
         let outside = FarmError::Ports { first: first.port(), count: options.controllers.len() };
@@ -175,7 +175,7 @@ fn stations(options: &Options, start: MonoTime) -> Result<Vec<Station>, FarmErro
         };
         let wanted = SocketAddrV4::new(*first.ip(), port);
         let socket = listen(wanted).map_err(|source| FarmError::Listen { address: wanted, source })?;
-        Ok(Station::new(options, index, setup, socket, start))
+        Ok(VirtualStation::new(options, index, setup, socket, start))
     };
     options.controllers.iter().enumerate().map(station).collect()
 }

@@ -19,7 +19,7 @@ const REPORTS: usize = 1 << 20;
 
 /// A controller at its address.
 #[derive(Debug)]
-pub(super) struct Station {
+pub(super) struct VirtualStation {
     pub(super) address: SocketAddrV4,
     pub(super) socket: UdpSocket,
     controller: Controller,
@@ -42,7 +42,7 @@ struct Parcel {
     bytes: [u8; MAX_LEN],
 }
 
-impl Station {
+impl VirtualStation {
     /// A controller that listens on `socket`, the `index`th of its farm.
     pub(super) fn new(
         options: &Options,
