@@ -19,7 +19,6 @@ mod register;
 mod reply;
 mod report;
 mod servo;
-#[expect(dead_code, unused_imports, reason = "the simulator and decode come next")]
 pub(crate) mod silvermax;
 pub(crate) mod sixpack2;
 mod status;

@@ -1,6 +1,7 @@
 //! What happens to a unit on purpose.
 
 use super::unit::Unit;
+use crate::time::MonoTime;
 
 /// What can happen to a virtual unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,11 +23,13 @@ pub(crate) enum Action {
     Dead(bool),
     /// It answers as another unit; as itself where there is none.
     AnswersAs(Option<u8>),
+    /// From now on its crystal runs so much faster than ours, millionths.
+    Crystal(i32),
 }
 
 impl Unit {
-    /// It happens now.
-    pub(crate) fn act(&mut self, action: Action) {
+    /// It happens now, to which the unit has been advanced.
+    pub(crate) fn act(&mut self, action: Action, now: MonoTime) {
         match action {
             Action::Reset => self.reset(),
             Action::Hot(is_hot) => self.world.is_hot = is_hot,
@@ -34,6 +37,7 @@ impl Unit {
             Action::Input { input, is_high } => self.axis.set_input(input, is_high),
             Action::Dead(is_dead) => self.world.is_dead = is_dead,
             Action::AnswersAs(other) => self.world.answers_as = other,
+            Action::Crystal(ppm) => self.run_at(ppm, now),
         }
     }
 }

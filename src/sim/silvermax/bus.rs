@@ -46,7 +46,7 @@ impl SilverBus {
     pub(crate) fn act(&mut self, unit: Option<u8>, action: Action, now: MonoTime) {
         self.advance(now);
         let named = self.units.iter_mut().filter(|one| unit.is_none_or(|unit| one.number() == unit));
-        named.for_each(|one| one.act(action));
+        named.for_each(|one| one.act(action, now));
     }
 
     /// All units hear a line.

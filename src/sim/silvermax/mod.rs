@@ -25,9 +25,9 @@ mod unit_setup;
 
 pub(crate) use action::Action;
 pub(crate) use bus::SilverBus;
-pub(crate) use executed::Executed;
-pub(crate) use unit::{Tally, Unit};
-pub(crate) use unit_setup::{Switch, UnitSetup};
+use executed::Executed;
+pub(crate) use unit::Unit;
+pub(crate) use unit_setup::UnitSetup;
 
 /// Nanoseconds of a tick by a crystal that is right.
 const TICK_NS: u32 = 120_000;

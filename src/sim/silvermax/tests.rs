@@ -7,9 +7,7 @@ use std::time::Duration;
 use super::*;
 use crate::sim::serial::{Bus as _, LineFaults, SerialLine};
 use crate::time::MonoTime;
-use crate::wire::silvermax::{
-    Internal, Io, LineCollector, MAX_LINE, NakReason, Poll, Reply, Request, StopOn, register,
-};
+use crate::wire::silvermax::{Internal, Io, MAX_LINE, NakReason, Poll, Reply, Request, StopOn, register};
 
 mod queue;
 mod safety;
@@ -192,7 +190,8 @@ fn units_of_any_number_answer_in_hexadecimal_and_only_themselves() {
 #[test]
 fn two_units_of_one_number_garble_each_other() {
     let mut host = Host::with(&[UnitSetup::new(16), UnitSetup { adl: 4, place: 0, ..UnitSetup::new(16) }]);
-    host.line.bus_mut().units_mut()[1].act(Action::Input { input: 7, is_high: false });
+    let now = host.now;
+    host.line.bus_mut().units_mut()[1].act(Action::Input { input: 7, is_high: false }, now);
     let answer = host.send(b"@16 21\r");
     assert!(Reply::parse(answer.strip_suffix(b"\r").unwrap()).is_err(), "{answer:?}");
 }

@@ -32,8 +32,8 @@ pub(crate) struct Tally {
 #[derive(Debug, Clone)]
 pub(crate) struct Unit {
     pub(super) setup: UnitSetup,
-    /// Where its ticks are counted from.
-    start: MonoTime,
+    /// From where on its crystal runs as it does, and how many ticks were before.
+    since: (MonoTime, u64),
     pub(super) tick: u64,
     /// The tick at which it listens.
     listens: u64,
@@ -116,7 +116,7 @@ impl Unit {
         let status = Status { news: Poll::DONE, ..Status::default() };
         Self {
             setup,
-            start,
+            since: (start, 0),
             tick: 0,
             listens: 0,
             axis,
@@ -205,10 +205,11 @@ impl Unit {
 
     /// All ticks up to now.
     pub(crate) fn advance(&mut self, now: MonoTime) {
-        let gone = u128::from(now.as_nanos().saturating_sub(self.start.as_nanos()));
+        let (since, before) = self.since;
+        let gone = u128::from(now.as_nanos().saturating_sub(since.as_nanos()));
         let speed = u128::from(1_000_000_u32.saturating_add_signed(self.setup.ppm));
         let ticks = gone * speed / (u128::from(TICK_NS) * 1_000_000);
-        let ticks = u64::try_from(ticks).unwrap_or(u64::MAX);
+        let ticks = u64::try_from(ticks).unwrap_or(u64::MAX).saturating_add(before);
         while self.tick < ticks {
             self.tick += 1;
             self.run_tick();
@@ -216,6 +217,12 @@ impl Unit {
                 self.tick = ticks;
             }
         }
+    }
+
+    /// From now on, to which it has been advanced, its crystal is off by so many millionths.
+    pub(super) fn run_at(&mut self, ppm: i32, now: MonoTime) {
+        self.since = (now, self.tick);
+        self.setup.ppm = ppm;
     }
 
     /// True if the next tick is like this one until somebody does something.

@@ -1,7 +1,7 @@
 //! The timed queue: what it executes, and what it does when it runs dry.
 
 use super::*;
-use crate::drive::segments::{DriveCourse, DriveUnits, Segment};
+use crate::drive::{DriveCourse, DriveUnits, Segment};
 
 impl Host {
     /// Ready for segments, as a play has it.
