@@ -12,6 +12,7 @@
 //! thread of normal priority; once it runs, a motion frame costs it no allocation. What the manuals leave open is
 //! [`Invented`], and can be played the other way.
 
+mod chance;
 mod command;
 mod controller;
 mod counts;
@@ -26,15 +27,16 @@ mod outcome;
 pub mod pa;
 mod player;
 mod registers;
+pub(crate) mod serial;
 mod setup;
 mod sheet;
+pub(crate) mod silvermax;
 mod station;
 
 pub use command::{Action, Command, CommandError};
 pub use controller::Controller;
 pub(crate) use controller::MotionSeen;
 pub(crate) use counts::Counts;
-pub(crate) use farm::Remote;
 pub use farm::{Farm, FarmError};
 pub(crate) use invented::{Commands, Invented};
 pub(crate) use outcome::Outcome;
