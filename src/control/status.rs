@@ -175,6 +175,8 @@ pub struct FilmStatus {
     pub(crate) chosen: Option<String>,
     /// How often another source took over.
     pub(crate) switches: u64,
+    /// How often seats have joined it since the hall was opened.
+    pub(crate) joins: u64,
     /// All sources, in their ranking.
     pub(crate) sources: Vec<FilmSourceStatus>,
 }
@@ -211,6 +213,8 @@ pub(crate) struct FilmSourceStatus {
     pub(crate) may_lead: bool,
     /// How often nothing was heard of it.
     pub(crate) dropouts: u64,
+    /// For how long the film was taken to run on meanwhile, s.
+    pub(crate) freewheel_s: f64,
     /// Samples that were too far off to be used.
     pub(crate) rejected: u64,
     /// How often the film jumped by it.

@@ -55,6 +55,7 @@ fn film() -> FilmStatus {
         source: "ltc:alsa:hw:2,0".to_owned(),
         state: "lost".to_owned(),
         dropouts: 3,
+        freewheel_s: 4.5,
         level_dbfs: Some(-60.0),
         ..FilmSourceStatus::default()
     };
@@ -73,6 +74,7 @@ fn film() -> FilmStatus {
         error_ms: Some(-0.5),
         disagrees: Some(FilmDisagreement { source: silent.source.clone(), ahead_s: 3.25 }),
         switches: 2,
+        joins: 4,
         sources: vec![silent, leading],
         ..FilmStatus::default()
     }
@@ -231,6 +233,8 @@ fn a_film_is_told_by_each_of_its_sources_and_not_at_all_where_none_is_followed()
         ("kinocue_sync_error_seconds", -0.000_5),
         ("kinocue_sync_disagreement_seconds", 3.25),
         ("kinocue_sync_switches_total", 2.0),
+        ("kinocue_sync_joins_total", 4.0),
+        ("kinocue_sync_freewheel_seconds_total{source=\"ltc:alsa:hw:2,0\"}", 4.5),
         ("kinocue_sync_leads{source=\"ltc:alsa:hw:2,0\"}", 0.0),
         ("kinocue_sync_leads{source=\"artnet:10.0.0.20\"}", 1.0),
         ("kinocue_sync_chosen{source=\"artnet:10.0.0.20\"}", 0.0),

@@ -173,6 +173,11 @@ impl Conductor {
         self.film_error_ns
     }
 
+    /// How often seats have joined the film.
+    pub(super) fn film_joins(&self) -> u64 {
+        self.film.as_ref().map_or(0, FilmLead::joins)
+    }
+
     /// Where the hall stands, and why.
     #[must_use]
     pub const fn machine(&self) -> &Machine {

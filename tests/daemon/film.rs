@@ -59,10 +59,14 @@ fn a_show_follows_the_film_of_its_hall_once_a_person_has_let_it_go_and_moves_nob
     drop(reel);
     let waits = hall.wait(|status| status["state"] == "waiting" && status["film"]["state"] == "lost");
     assert_eq!(waits["film"]["error_ms"], serde_json::Value::Null, "seats that wait follow nothing");
+    assert_eq!(waits["film"]["joins"], 1, "{}", waits["film"]);
     assert_eq!(waits["cause"], "nothing is heard of the film any more");
     assert!(waits["next"].as_str().is_some_and(|next| next.contains("see to the film")), "{}", waits["next"]);
     let reel = film(0, "01:00:30:00");
-    hall.wait(|status| status["state"] == "playing" && status["show"]["position_s"].as_f64() > Some(29.0));
+    let again = hall
+        .wait(|status| status["state"] == "playing" && status["show"]["position_s"].as_f64() > Some(29.0));
+    assert_eq!(again["film"]["joins"], 2, "{}", again["film"]);
+    assert!(again["film"]["sources"][0]["freewheel_s"].as_f64() > Some(1.0), "{}", again["film"]);
     drop(reel);
     let _trailer = film(0, "02:00:00:00");
     let parked = hall.wait(|status| status["state"] == "parked");

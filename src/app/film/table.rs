@@ -67,6 +67,8 @@ pub(crate) struct SourceRow {
     pub(crate) rejected: u64,
     pub(crate) jumps: u64,
     pub(crate) dropouts: u64,
+    /// For how long the estimate has run on while nothing was heard, in all, seconds.
+    pub(crate) freewheel_s: f64,
     #[serde(flatten)]
     pub(crate) notes: SourceNotes,
 }
@@ -143,6 +145,7 @@ impl TrackedSource {
             rejected: counts.rejected,
             jumps: counts.jumps,
             dropouts: counts.dropouts,
+            freewheel_s: counts.freewheel.as_secs_f64(),
             notes,
         }
     }

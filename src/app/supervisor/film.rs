@@ -29,6 +29,7 @@ pub(super) fn status(table: &FilmTable, hall: &HallContext) -> FilmStatus {
         }),
         chosen: table.chosen.and_then(|place| Some(table.sources.get(place)?.source.clone())),
         switches: table.switches,
+        joins: hall.live.film_joins(),
         sources: table.sources.iter().map(|row| source(row, begin_s)).collect(),
     }
 }
@@ -55,6 +56,7 @@ fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
         sigma_ms: row.sigma_ms,
         may_lead: row.may_lead,
         dropouts: row.dropouts,
+        freewheel_s: row.freewheel_s,
         rejected: row.rejected,
         jumps: row.jumps,
         level_dbfs: row.notes.level_db,

@@ -339,6 +339,7 @@ mod tests {
             rejected: 0,
             jumps: 0,
             dropouts: 0,
+            freewheel_s: 0.0,
             notes: Default::default(),
         }
     }

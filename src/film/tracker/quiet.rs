@@ -6,11 +6,15 @@ use super::states::SourceSign;
 use super::{
     ACQUIRE_FOR, DOUBT, MISSING, MISSING_PERIODS, SURE_COARSE_S, SURE_S, SourceTracker, WINDOW_PERIODS,
 };
+use crate::film::point::FilmState;
 use crate::time::MonoTime;
 
 impl SourceTracker {
     /// Notes that time has passed. To be told some times a second, whatever is heard.
     pub(crate) fn poll(&mut self, now: MonoTime) {
+        // From poll to poll, so that it never goes back: a sample that ends the gap is older than the poll before it.
+        let passed = now.since(std::mem::replace(&mut self.polled, now));
+        self.counts.freewheel += if self.state == FilmState::Freewheeling { passed } else { Duration::ZERO };
         let quiet = self.newest.map_or_else(|| now.since(self.since), |newest| now.since(newest.at));
         let period = self.newest.map_or(Duration::ZERO, |newest| newest.period);
         if quiet > MISSING.max(MISSING_PERIODS * period) {

@@ -125,6 +125,8 @@ fn an_outage_is_run_through_by_estimate_and_is_no_jump() {
             let run = Run::of(told.kind, &film, &all, 50.0);
             assert_eq!(run.tracker.epoch, 0, "{name}: {:?}", run.states);
             assert!(run.has_been(FilmState::Freewheeling), "{name}: {:?}", run.states);
+            let alone_s = run.tracker.counts().freewheel.as_secs_f64();
+            assert!((alone_s - lasts).abs() < 0.2, "{name}: {alone_s} s of {lasts} s were run through");
             let around = run.errors.iter().filter(|error| (gap.0..gap.1 + 1.0).contains(&error.0));
             let worst = around.map(|error| error.1.abs() * 1e3).fold(0.0, f64::max);
             println!("{name:<12} {lasts} s from {from} s on: {worst:.3} ms");
