@@ -84,6 +84,9 @@ impl ParkCause {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::FilmEnded => "the film is over",
+            Self::FilmCutShort => {
+                "the film is over, and the seats have followed it through a part of the cue alone"
+            }
             Self::CueLeft => "the film has left the cue",
             Self::HeldTooLong => "the film could not be followed for five minutes",
         }

@@ -196,7 +196,7 @@ fn a_player_leads_the_seat_which_rests_while_it_is_paused_and_parks_when_its_fil
     player.tell(json!({ "event": "end-file", "reason": "eof" }));
     playing.wait_for("parked");
     let run = playing.finish();
-    assert_eq!(run.report_of(0)["result"], "completed");
+    assert_eq!((&run.report_of(0)["result"], run.code), (&"stopped".into(), Some(0)), "part of the cue");
     let seen = sim.end();
     assert!(seen.rest_in_park() && seen.rows.iter().any(|row| row.commanded[0] > pulses(0.001)));
 }

@@ -14,7 +14,6 @@ use super::readiness::ReadinessCheck;
 use super::record::ShowRecords;
 use super::seat_testing::SeatTesting;
 use crate::control::Problem;
-use crate::state::Cause;
 use crate::time::ShowTime;
 
 /// All of them.
@@ -114,7 +113,7 @@ impl Features {
             return vec![Act::Stage(ShowChange::Again)];
         }
         if hall.aside.is_some() {
-            let how = if hall.ended == Cause::CueEnded { "completed" } else { "stopped" };
+            let how = if hall.ended.completes() { "completed" } else { "stopped" };
             return vec![Act::EndTest(how), Act::Stage(ShowChange::Rewind)];
         }
         hall.keep_place();

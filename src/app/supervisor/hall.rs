@@ -260,7 +260,7 @@ impl HallContext {
     pub(super) fn note_place(&mut self, from: State, to: State) {
         // A film that others show says by itself where a show goes on.
         let is_led = self.cued.as_ref().is_some_and(|cued| cued.film.is_some() && cued.movie.is_none());
-        if rides(from) && !rides(to) && !is_led && self.mirror.cause != Cause::CueEnded {
+        if rides(from) && !rides(to) && !is_led && !self.mirror.cause.completes() {
             self.left_at = Some(self.live.show());
         }
     }

@@ -14,7 +14,7 @@ use crate::control::{Code, Command, Problem, Surface};
 use crate::journal::PlaylistPlace;
 use crate::playlist::{PlaylistId, Then};
 use crate::rt::Command as TickCommand;
-use crate::state::{Cause, State, Transition};
+use crate::state::{State, Transition};
 
 /// What lets an entry start by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -147,9 +147,8 @@ impl Onward {
         let mut acts = vec![Act::Stage(ShowChange::Rewind)];
         let Some(list) = &self.list else { return acts };
         let (played, next) = (list.current, list.current + 1);
-        let completed = hall.ended == Cause::CueEnded;
         // A cue that a person loaded beside the playlist leads nowhere.
-        if !completed || !self.is_entry(played, hall) || next >= list.playlist.entries.len() {
+        if !hall.ended.completes() || !self.is_entry(played, hall) || next >= list.playlist.entries.len() {
             return acts;
         }
         let goes = list.entry().then == Then::Go && hall.mirror.state == State::Parked && !self.held;
