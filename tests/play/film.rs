@@ -213,6 +213,30 @@ fn a_reel_that_ends_before_it_has_reached_the_cue_ends_the_play_and_moves_nobody
 }
 
 #[test]
+fn a_relay_ends_with_its_lines() {
+    let folder = Folder::new();
+    let at = folder.write("none", String::new()).parent().expect("it lies in the folder").to_owned();
+    let run = kinocue(&["sync", "relay", "ltc:-", "--folder", at.to_str().expect("text")]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert!(run.stderr.contains("each line has ended"), "{run:?}");
+}
+
+#[test]
+fn a_recording_that_is_none_of_16_bits_is_refused_with_what_it_is_and_what_to_do() {
+    let (folder, sim) = (Folder::new(), Sim::one(&[]));
+    let reel = reel(&folder, "01:00:00:00", "2");
+    let mut wav = std::fs::read(&reel).expect("it was made");
+    wav[34] = 24;
+    std::fs::write(&reel, wav).expect("it can be written");
+    let run = Playing::start(&rise(&folder, 4), &sim.to(), &["--chase", &format!("ltc:{reel}")]).finish();
+    assert_eq!(run.code, Some(71), "{run:?}");
+    for said in ["reel.wav cannot be read", "uncompressed sound of 24 bits", "-c:a pcm_s16le"] {
+        assert!(run.stderr.contains(said), "{said}: {run:?}");
+    }
+    assert_eq!(sim.end().rows.len(), 0, "nobody was moved");
+}
+
+#[test]
 fn a_source_that_is_none_is_refused_and_so_is_what_a_film_cannot_be_led_with() {
     let (folder, to) = (Folder::new(), ["127.0.0.1:9".to_owned()]);
     let cue = rise(&folder, 2);

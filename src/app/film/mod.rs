@@ -45,6 +45,7 @@ use crate::film::source::{FilmArgs, FilmSource};
 use heard::Listening;
 use left::LeftRead;
 use relay::Listeners;
+use riff::RiffFault;
 use table::Ranking;
 use told::{Notes, WordSink};
 
@@ -62,6 +63,14 @@ pub(crate) enum FilmError {
         what: String,
         /// Why.
         source: io::Error,
+    },
+    /// A file is none that can be read as sound.
+    #[error("{what} cannot be read")]
+    Sound {
+        /// Which, as it was named.
+        what: String,
+        /// Why.
+        source: RiffFault,
     },
     /// A file is no index of a film's sound.
     #[error("{} cannot be used", path.display())]

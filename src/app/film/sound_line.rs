@@ -2,7 +2,7 @@
 //! the film.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read as _, Seek as _};
 use std::os::fd::AsFd as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
@@ -14,8 +14,8 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::heard::{Listener, Listening};
 use super::line::{ByteLine, LineTaker};
-use super::riff::{Channels, SampleStream};
-use super::{ChildSlot, FilmError, WordSink, start};
+use super::riff::{Channels, HEADER, SampleStream};
+use super::{ChildSlot, FilmError, WordSink, riff, start};
 use crate::film::observation::{FilmWord, Observation};
 use crate::film::source::{FilmArgs, LineKind, SoundLine};
 use crate::sys::clock::Monotonic;
@@ -54,7 +54,12 @@ pub(super) fn start_line(input: &SoundLine, line: ByteLine, child: &ChildSlot) -
     };
     match input {
         SoundLine::File(path) => {
-            let file = File::open(path).map_err(failed(path))?;
+            let mut file = File::open(path).map_err(failed(path))?;
+            let mut begin = Vec::new();
+            let read = (&file).take(HEADER as u64).read_to_end(&mut begin).and_then(|_| file.rewind());
+            read.map_err(failed(path))?;
+            let wrong = |source| FilmError::Sound { what: path.display().to_string(), source };
+            riff::check(&begin).map_err(wrong)?;
             start("line", move || end(&line, line.read(file)))?;
         }
         SoundLine::Stdin => {
@@ -134,7 +139,8 @@ fn lock(child: &Mutex<Option<Child>>) -> MutexGuard<'_, Option<Child>> {
 }
 
 /// Nothing more can come, whatever ended it: whoever wrote is gone for good, and the film over.
-fn end(line: &ByteLine, _read: io::Result<()>) {
+fn end(line: &ByteLine, read: io::Result<()>) {
+    line.told.note(|notes| notes.trouble = read.err().map(|error| error.to_string()));
     line.told.tell(Observation::new(Monotonic.now(), FilmWord::End));
 }
 
