@@ -104,6 +104,7 @@ fn playing() -> Status {
         lapses_s: None,
         moving: true,
         film: Some(film()),
+        osc: Some([("received".to_owned(), 12), ("refused".to_owned(), 3)].into()),
         show: Some(ShowStatus {
             cue: "storm".to_owned(),
             title: None,
@@ -148,6 +149,7 @@ fn booting() -> Status {
         state: State::Boot.into(),
         moving: false,
         film: None,
+        osc: None,
         show: None,
         lateness: Times::default(),
         ack_latency: Times::default(),
@@ -219,6 +221,7 @@ fn figures_are_in_base_units() {
         ("kinocue_acks_total{controller=\"B1\",result=\"lost\"}", 8.0),
         ("kinocue_limit_interventions_total{controller=\"B1\"}", 3.0),
         ("kinocue_controller_ack_latency_seconds{controller=\"B1\",quantile=\"0.5\"}", 40e-6),
+        ("kinocue_osc_messages_total{result=\"refused\"}", 3.0),
     ] {
         assert_eq!(page.samples.get(series), Some(&value), "{series}");
     }

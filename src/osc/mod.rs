@@ -75,7 +75,6 @@ impl Osc {
 
     /// What has come so far, for whoever counts.
     #[must_use]
-    #[cfg(test)]
     pub(crate) fn counts(&self) -> Arc<Counts> {
         Arc::clone(&self.counts)
     }

@@ -61,6 +61,7 @@ fn source(row: &SourceRow, begin_s: f64) -> FilmSourceStatus {
         jumps: row.jumps,
         level_dbfs: row.notes.level_db,
         foreign: row.notes.foreign,
+        garbage: row.notes.garbage,
     }
 }
 

@@ -15,6 +15,7 @@ use crate::config::Config;
 use crate::control::{Code, Problem};
 use crate::engine::Unplanned;
 use crate::health::Groups;
+use crate::osc::Counts;
 use crate::rt::{Desk, Live, Loaded, Row, Times};
 use crate::state::{Cause, State, Whose};
 use crate::sys::realtime::RealTime;
@@ -47,6 +48,8 @@ pub(super) struct HallContext {
     pub(super) film: Option<SharedTable>,
     /// The way to the player, if the hall has one.
     pub(super) player: Option<PlayerLink>,
+    /// What has come to the port for OSC, if there is one.
+    pub(super) osc: Option<Arc<Counts>>,
     /// The slow work that is under way.
     pub(super) job: Option<&'static str>,
     pub(super) now: MonoTime,
@@ -114,6 +117,7 @@ impl HallContext {
             ended: Cause::Started,
             film: None,
             player: None,
+            osc: None,
             job: None,
             now,
         }
