@@ -15,7 +15,7 @@ pub(crate) const JOIN_ABOVE: Duration = FILM_FRAME;
 /// Seats that are parked join once the film has been followable for so long: a reader that flickers must not begin a show.
 const READY_FOR: Duration = Duration::from_millis(500);
 /// So long before the first sample of the cue seats join its first pose.
-const PRE_ROLL: ShowTime = ShowTime::from_millis(-10_000);
+pub(crate) const PRE_ROLL: ShowTime = ShowTime::from_millis(-10_000);
 /// A film that is outside the cue for longer has left it.
 const LEFT_AFTER: Duration = Duration::from_secs(2);
 /// Seats that have held for longer are parked, as in a pause.

@@ -136,6 +136,29 @@ fn each_entry_of_a_playlist_waits_for_its_own_place_in_one_reel() {
 }
 
 #[test]
+fn a_film_that_comes_to_the_place_of_another_entry_has_that_loaded_and_nobody_armed() {
+    let mut hall = hall(3);
+    let entry = |start: &str| format!("[[entry]]\ncue = \"night\"\nfilm = \"{start}\"\n");
+    let entries = ["01:10:00:00", "01:20:00:00"].map(entry).concat();
+    hall.write("playlists/reel.toml", &format!("title = \"Reel\"\n{entries}"));
+    hall.done(&["playlist", "reel"]);
+    let _reel = film(3, "01:20:00:00");
+    let loaded = hall.wait(|status| status["playlist"]["current"] == 1);
+    assert_eq!(loaded["state"], "parked");
+    hall.lives_on(100);
+    assert_eq!((hall.relay(0).count(), hall.relay(1).count()), (0, 0), "the film moves nobody");
+    hall.done(&["preflight"]);
+    hall.done(&["arm"]);
+    hall.done(&["go"]);
+    let led = hall.comes_to("playing");
+    assert_eq!(led["playlist"]["current"], 1);
+    hall.done(&["park"]);
+    hall.comes_to("parked");
+    hall.close();
+    assert!(hall.end().rest_in_park());
+}
+
+#[test]
 fn a_hall_opens_without_the_source_of_its_film_and_says_what_is_wrong_with_it() {
     let hall = Hall::open_with(|config| {
         format!("{config}[sync]\nsources = [\"mtc\"]\n[sync.mtc]\ndevice = \"/nowhere/midi\"\n")

@@ -67,6 +67,7 @@ impl Features {
             }
             JobResult::Listed(listed) => self.onward.take_list(listed?, hall),
             JobResult::Entry(entry, cued) => self.onward.take_entry(entry, cued, hall),
+            JobResult::Reached(entry) => Ok(self.onward.enter(entry, hall)),
             JobResult::Again(again) => Ok(self.take_again(again, hall)),
             JobResult::Tested(made, only) => self.seats.take(made?, only, hall),
             JobResult::Preflighted(preflighted) => {

@@ -314,26 +314,6 @@ mod tests {
         }
     }
 
-    /// A source of which nothing is known but its name and state.
-    fn named((source, state): (&str, FilmState)) -> SourceRow {
-        SourceRow {
-            source: source.to_owned(),
-            state,
-            words: "",
-            media_s: None,
-            timecode: None,
-            rate_ppm: None,
-            sigma_ms: None,
-            may_lead: false,
-            used: 0,
-            rejected: 0,
-            jumps: 0,
-            dropouts: 0,
-            freewheel_s: 0.0,
-            notes: Default::default(),
-        }
-    }
-
     #[test]
     fn proof_of_play_has_the_sources_that_were_followed_and_the_farthest_from_the_film() {
         let table = |leads, switches| FilmTable {
@@ -342,7 +322,7 @@ mod tests {
                 ("artnet", FilmState::Freewheeling),
                 ("mtc", FilmState::Absent),
             ]
-            .map(named)
+            .map(|(source, state)| SourceRow::named(source, state))
             .into(),
             leads,
             switches,
