@@ -105,6 +105,8 @@ pub(crate) struct SourceTracker {
     held: HeldSince,
     /// For how long after the newest position the estimate may run on.
     patience: Duration,
+    /// And that as a multiple of it.
+    freewheel: f64,
     polled: MonoTime,
     counts: TrackerCounts,
 }
@@ -155,6 +157,7 @@ impl SourceTracker {
             needed: traits.samples(),
             held: HeldSince::default(),
             patience: traits.silent_for,
+            freewheel: 1.0,
             polled: now,
             counts: TrackerCounts::default(),
         }

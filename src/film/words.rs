@@ -71,7 +71,7 @@ impl HoldCause {
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::Film(state) => state.words(),
-            Self::Apart => "the film was more than 40 ms away from the seats",
+            Self::Apart => "the film was further away from the seats than they slew to it",
             Self::Unstable => "the seats had to join five times in a minute: see to its source, and resume",
             Self::Asks => "each join waits for a person: resume",
         }

@@ -23,6 +23,10 @@ pub(crate) enum RiffFault {
     Format(WavFormat),
     #[error("it begins like a WAV file and does not say of what kind its samples are; make it anew")]
     NoFormat,
+    #[error(
+        "it has {has} channels, and timecode is to be read from channel {wanted}; see channel in [sync.ltc]"
+    )]
+    Channel { has: usize, wanted: u8 },
     #[error("it begins like a WAV file and has no samples")]
     NoData,
 }
@@ -48,14 +52,6 @@ impl fmt::Display for WavFormat {
     }
 }
 
-/// Whether a file that begins so can be read as sound; `begin` is all of it, or [`HEADER`] octets.
-///
-/// # Errors
-/// [`RiffFault`].
-pub(super) fn check(begin: &[u8]) -> Result<(), RiffFault> {
-    header(begin)?.map(drop).ok_or(RiffFault::NoData)
-}
-
 /// Makes samples of octets, whichever way they come in pieces.
 #[derive(Debug, Default)]
 pub(super) struct SampleStream {
@@ -66,12 +62,18 @@ pub(super) struct SampleStream {
 }
 
 /// Which of the channels is read.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Channels {
-    #[default]
-    First,
+    /// That one, counted from 1.
+    One(u8),
     /// The mean of all.
     Mixed,
+}
+
+impl Default for Channels {
+    fn default() -> Self {
+        Self::One(1)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,6 +85,12 @@ struct SoundFormat {
 impl SampleStream {
     pub(super) fn of(channels: Channels) -> Self {
         Self { channels, ..Self::default() }
+    }
+
+    /// Whether a file that begins so can be read; `begin` is all of it, or [`HEADER`] octets.
+    pub(super) fn check(mut self, begin: &[u8]) -> Result<(), RiffFault> {
+        self.push(begin, &mut Vec::new())?;
+        self.format.map(drop).ok_or(RiffFault::NoData)
     }
 
     /// SampleStream a second; none before that is known.
@@ -108,7 +116,13 @@ impl SampleStream {
         let sample = |octets: &[u8]| i16::from_le_bytes([octets[0], octets[1]]);
         let frames = self.kept[..whole].chunks_exact(frame);
         match self.channels {
-            Channels::First => out.extend(frames.map(sample)),
+            Channels::One(wanted) if usize::from(wanted) > format.channels => {
+                return Err(RiffFault::Channel { has: format.channels, wanted });
+            }
+            Channels::One(wanted) => {
+                let at = 2 * (usize::from(wanted).max(1) - 1);
+                out.extend(frames.map(|one| sample(&one[at..])));
+            }
             Channels::Mixed => out.extend(frames.map(|one| mean(one.chunks_exact(2).map(sample)))),
         }
         self.kept.drain(..whole);
@@ -194,6 +208,11 @@ mod tests {
                 assert_eq!(read(&octets, piece), (vec![1, 2, 3], Some(48_000)), "pieces of {piece}");
             }
         }
+        let mut second = (SampleStream::of(Channels::One(2)), Vec::new());
+        second.0.push(&wav(1, 2, 16, 8, &[1, -1, 2, -2]), &mut second.1).expect("it has two");
+        assert_eq!(second.1, [-1, -2]);
+        let missing = SampleStream::of(Channels::One(2)).check(&wav(1, 1, 16, 4, &[1]));
+        assert_eq!(missing, Err(RiffFault::Channel { has: 1, wanted: 2 }));
         let mut mixed = (SampleStream::of(Channels::Mixed), Vec::new());
         mixed.0.push(&wav(1, 2, 16, 8, &[4, 2, i16::MIN, i16::MIN]), &mut mixed.1).expect("it is sound");
         assert_eq!(mixed.1, [3, i16::MIN], "of both channels");
@@ -213,8 +232,9 @@ mod tests {
         );
         for wrong in [wav(3, 1, 32, 4, &[]), wav(1, 0, 16, 4, &[]), wav(2, 1, 16, 4, &[])] {
             assert!(matches!(push(&wrong), Err(RiffFault::Format(_))));
-            assert_eq!(check(&wrong), push(&wrong));
+            assert_eq!(SampleStream::default().check(&wrong), push(&wrong));
         }
+        let check = |octets: &[u8]| SampleStream::default().check(octets);
         assert_eq!((check(&wav(1, 1, 16, 4, &[])), check(b"RIFF")), (Ok(()), Err(RiffFault::NoData)));
         let mut endless = b"RIFF\0\0\0\0WAVE".to_vec();
         endless.extend(b"junk\xff\xff\xff\xff");

@@ -174,10 +174,10 @@ pub(super) struct Ranking {
 impl Ranking {
     /// Those sources, of which nothing was heard yet, with the notes of each.
     pub(super) fn new(args: &[FilmArgs], notes: &[Notes], rules: SourceRules) -> Self {
-        let (now, SourceRules { allows_coarse, band }) = (Monotonic.now(), rules);
+        let (now, SourceRules { allows_coarse, band, freewheel }) = (Monotonic.now(), rules);
         let of = |(args, notes): (&FilmArgs, &Notes)| TrackedSource {
             name: args.source.to_string(),
-            tracker: SourceTracker::new(args.source.kind(), band, now),
+            tracker: SourceTracker::new(args.source.kind(), band, now).freewheeling(freewheel),
             grade: SourceGrade::default(),
             notes: Arc::clone(notes),
         };

@@ -280,6 +280,23 @@ fn how_long_the_estimate_runs_on_hangs_on_the_cause() {
 }
 
 #[test]
+fn an_estimate_runs_on_for_as_long_as_is_configured_and_a_told_stop_is_obeyed_at_once_all_the_same() {
+    for (freewheel, lasts_s) in [(0.25, 0.5), (1.0, 2.0), (2.0, 4.0)] {
+        let mut tracker = SourceTracker::new(SourceKind::Mpv, BAND, mono(0.0)).freewheeling(freewheel);
+        for told in player(&TrueFilm::new(0.0, 1.0), 5.0, &[]) {
+            tracker.hear(&told);
+        }
+        let mut stopped = tracker.clone();
+        stopped.hear(&Observation::new(mono(5.01), FilmWord::Stop));
+        assert_eq!(stopped.state(), FilmState::Stopped);
+        tracker.poll(mono(5.0 + lasts_s - 0.1));
+        assert_eq!(tracker.state(), FilmState::Freewheeling, "{freewheel}");
+        tracker.poll(mono(5.0 + lasts_s + 0.1));
+        assert_eq!(tracker.state(), FilmState::Lost, "{freewheel}");
+    }
+}
+
+#[test]
 fn a_told_speed_is_believed_at_once() {
     // The player's clock is 300 ppm fast all the while.
     let film = TrueFilm::new(10.0, 1.0003)
