@@ -152,6 +152,9 @@ fn a_film_that_comes_to_the_place_of_another_entry_has_that_loaded_and_nobody_ar
     hall.done(&["go"]);
     let led = hall.comes_to("playing");
     assert_eq!(led["playlist"]["current"], 1);
+    hall.done(&["trim", "+2f"]);
+    assert_eq!(hall.done(&["trim", "-1f"]).code, Some(0));
+    assert_eq!(hall.status()["trim_ms"], 40, "a frame of 25 a second is left");
     hall.done(&["park"]);
     hall.comes_to("parked");
     hall.close();

@@ -321,6 +321,20 @@ fn a_film_that_comes_to_the_part_of_another_entry_has_it_loaded_once_while_all_i
 }
 
 #[test]
+fn frames_last_as_long_as_those_of_the_film_that_is_configured_or_heard() {
+    let mut hall = hall(State::Armed, "one");
+    let ms =
+        |hall: &HallContext| [-1, 1, 2].map(|frames| crate::app::supervisor::film::frames_ms(frames, hall));
+    assert_eq!(ms(&hall), [-42, 42, 83], "24 a second, where nobody knows");
+    let mut row = SourceRow { may_lead: true, ..SourceRow::named("ltc", FilmState::Locked) };
+    row.notes.fps = Some("30".to_owned());
+    hall.film =
+        Some(SharedTable::of(FilmTable { sources: vec![row], leads: Some(0), ..FilmTable::default() }));
+    assert_eq!(ms(&hall), [-33, 33, 67]);
+    assert_eq!(ms(&Reel::new(State::Armed, "one").hall), [-40, 40, 80], "25 are configured");
+}
+
+#[test]
 fn no_film_has_a_cue_loaded_that_is_armed_or_moves_or_where_a_person_has_loaded_another() {
     let states = State::ALL.into_iter().filter(|state| *state != State::Parked);
     for state in states {
